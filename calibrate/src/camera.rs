@@ -1,0 +1,175 @@
+use crate::{Distortion, Lens};
+use glam::DVec2;
+
+/// The id of a camera in a reconstruction: sparse, chosen by whoever made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CameraId(pub u32);
+
+/// A camera as calibration files store it: a named model and its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Which formula.
+    pub model: ModelKind,
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+    /// In the order of [`ModelKind::parameter_names`].
+    pub params: Vec<f64>,
+}
+
+/// What makes a camera unusable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// The number of parameters does not fit the model.
+    #[error("{} has {} parameters ({}), found {found}",
+        model.name(), model.parameter_names().len(), model.parameter_names().join(", "))]
+    ParameterCount {
+        /// The model.
+        model: ModelKind,
+        /// How many were given.
+        found: usize,
+    },
+    /// A parameter is NaN or infinite.
+    #[error("parameter {name} of {} is {value}, not a finite number", model.name())]
+    NotFinite {
+        /// The model.
+        model: ModelKind,
+        /// Which parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A focal length is zero or negative.
+    #[error("focal length {name} of {} is {value}; it must be positive", model.name())]
+    Focal {
+        /// The model.
+        model: ModelKind,
+        /// Which parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The image has no pixels.
+    #[error("the image size is {width} × {height}")]
+    Size {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+    },
+}
+
+macro_rules! models {
+    ($($variant:ident $id:literal $name:literal [$($param:literal),*] $doc:literal;)*) => {
+        /// COLMAP's camera models, by COLMAP's own names, ids and parameter orders.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum ModelKind { $(#[doc = $doc] $variant,)* }
+
+        impl ModelKind {
+            /// Every model this version reads.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+
+            /// COLMAP's numeric id.
+            pub fn colmap_id(self) -> i32 {
+                match self { $(Self::$variant => $id,)* }
+            }
+
+            /// COLMAP's name.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            /// The parameters' names, in COLMAP's order.
+            pub fn parameter_names(self) -> &'static [&'static str] {
+                match self { $(Self::$variant => &[$($param),*],)* }
+            }
+        }
+    };
+}
+
+models! {
+    SimplePinhole 0 "SIMPLE_PINHOLE" ["f", "cx", "cy"] "One focal length, no distortion.";
+    Pinhole 1 "PINHOLE" ["fx", "fy", "cx", "cy"] "Two focal lengths, no distortion.";
+    SimpleRadial 2 "SIMPLE_RADIAL" ["f", "cx", "cy", "k"] "One radial term.";
+    Radial 3 "RADIAL" ["f", "cx", "cy", "k1", "k2"] "Two radial terms.";
+    OpenCv 4 "OPENCV" ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"]
+        "Two radial and two tangential terms.";
+    OpenCvFisheye 5 "OPENCV_FISHEYE" ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"]
+        "Equidistant with a polynomial in the angle.";
+    FullOpenCv 6 "FULL_OPENCV"
+        ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
+        "A rational radial term and two tangential ones.";
+}
+
+impl ModelKind {
+    /// The model with COLMAP's numeric id, if this version reads it.
+    pub fn from_colmap_id(id: i32) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|model| model.colmap_id() == id)
+    }
+
+    /// The model with COLMAP's name, if this version reads it.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|model| model.name() == name)
+    }
+}
+
+impl Camera {
+    /// Checks the parameters and returns the lens they describe.
+    ///
+    /// # Errors
+    /// A wrong number of parameters, one that is not finite, a focal length that is not
+    /// positive, or an empty image.
+    pub fn lens(&self) -> Result<Lens, CameraError> {
+        let (model, p) = (self.model, &self.params);
+        let names = model.parameter_names();
+        if p.len() != names.len() {
+            return Err(CameraError::ParameterCount {
+                model,
+                found: p.len(),
+            });
+        }
+        for (&value, &name) in p.iter().zip(names) {
+            if !value.is_finite() {
+                return Err(CameraError::NotFinite { model, name, value });
+            }
+            if name.starts_with('f') && value <= 0.0 {
+                return Err(CameraError::Focal { model, name, value });
+            }
+        }
+        if self.width == 0 || self.height == 0 {
+            return Err(CameraError::Size {
+                width: self.width,
+                height: self.height,
+            });
+        }
+        let one_focal =
+            |distortion| Lens::new(DVec2::splat(p[0]), DVec2::new(p[1], p[2]), distortion);
+        let two_focals =
+            |distortion| Lens::new(DVec2::new(p[0], p[1]), DVec2::new(p[2], p[3]), distortion);
+        let radial = |k1, k2| Distortion::Rational {
+            k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
+            p: [0.0; 2],
+        };
+        Ok(match model {
+            ModelKind::SimplePinhole => one_focal(Distortion::None),
+            ModelKind::Pinhole => two_focals(Distortion::None),
+            ModelKind::SimpleRadial => one_focal(radial(p[3], 0.0)),
+            ModelKind::Radial => one_focal(radial(p[3], p[4])),
+            ModelKind::OpenCv => two_focals(Distortion::Rational {
+                k: [p[4], p[5], 0.0, 0.0, 0.0, 0.0],
+                p: [p[6], p[7]],
+            }),
+            ModelKind::OpenCvFisheye => two_focals(Distortion::Fisheye {
+                k: [p[4], p[5], p[6], p[7]],
+            }),
+            ModelKind::FullOpenCv => two_focals(Distortion::Rational {
+                k: [p[4], p[5], p[8], p[9], p[10], p[11]],
+                p: [p[6], p[7]],
+            }),
+        })
+    }
+}

@@ -1,0 +1,1 @@
+//! COLMAP models: `cameras`, `images` and `points3D`, binary or text.

@@ -1,0 +1,22 @@
+//! Camera models and poses; reading and writing calibrations.
+//!
+//! Conventions, decided once for the whole project:
+//!
+//! - The **camera frame** has x right, y down and z forward, as in COLMAP and OpenCV.
+//! - Poses are named by their frames: `camera_from_world` maps a point in the world to
+//!   the same point in the camera's frame.
+//! - **Pixels**: the image's top-left corner is (0, 0) and the first pixel's centre is
+//!   (0.5, 0.5), as in COLMAP. OpenCV puts that centre at (0, 0).
+
+mod camera;
+pub mod colmap;
+mod lens;
+mod reconstruction;
+mod rigid;
+mod view;
+
+pub use camera::{Camera, CameraError, CameraId, ModelKind};
+pub use lens::{Distortion, Lens, Pixel};
+pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};
+pub use rigid::Rigid3;
+pub use view::View;

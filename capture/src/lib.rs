@@ -1,0 +1,1 @@
+//! Photo sets: finding, ordering and decoding photos.

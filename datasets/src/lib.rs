@@ -1,0 +1,1 @@
+//! Procedural scenes ray-traced with exact colour, depth and pose.

@@ -1,0 +1,1 @@
+//! The approximate surface that carries rays to the photos.

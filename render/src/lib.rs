@@ -1,0 +1,1 @@
+//! The blending field, its triangulation, and the engine that draws it.
