@@ -1,0 +1,129 @@
+//! What the sparse points say about themselves through their neighbours.
+
+use glam::DVec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::num::NonZero;
+
+/// How many neighbours decide whether a point stands alone.
+const NEIGHBOURS: usize = 8;
+/// A point is isolated when its neighbours are this many times farther away than they
+/// are for the typical point. Sparse points thin out smoothly by factors of ten between
+/// near and far; mismatches lie hundreds of spacings from anything.
+const ISOLATION: f64 = 30.0;
+
+/// Spacing and isolation of a point cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudStatistics {
+    /// The median distance from a point to its nearest neighbour, in world units.
+    pub spacing: f64,
+    /// How many points stand alone.
+    pub isolated: usize,
+}
+
+/// Measures a cloud; `None` with fewer than two finite points.
+pub fn statistics(points_in_world: &[DVec3]) -> Option<CloudStatistics> {
+    let nearest = neighbour_distances(points_in_world, 1)?;
+    let isolated = isolated_points(points_in_world)
+        .iter()
+        .filter(|&&b| b)
+        .count();
+    Some(CloudStatistics {
+        spacing: median(nearest),
+        isolated,
+    })
+}
+
+/// Which points stand alone: far from their neighbours by the cloud's own measure.
+/// Points that are not finite always do. With fewer than three points none does.
+pub fn isolated_points(points_in_world: &[DVec3]) -> Vec<bool> {
+    let mut isolated: Vec<bool> = points_in_world.iter().map(|p| !p.is_finite()).collect();
+    let Some(distances) = neighbour_distances(points_in_world, NEIGHBOURS) else {
+        return isolated;
+    };
+    if distances.len() < 3 {
+        return isolated;
+    }
+    let limit = ISOLATION * median(distances.clone());
+    let finite = (0..points_in_world.len()).filter(|&i| points_in_world[i].is_finite());
+    for (point_idx, distance) in finite.collect::<Vec<_>>().into_iter().zip(distances) {
+        isolated[point_idx] = distance > limit;
+    }
+    isolated
+}
+
+/// For each finite point, the mean distance to its `count` nearest others.
+fn neighbour_distances(points_in_world: &[DVec3], count: usize) -> Option<Vec<f64>> {
+    let finite: Vec<[f64; 3]> = points_in_world
+        .iter()
+        .filter(|p| p.is_finite())
+        .map(DVec3::to_array)
+        .collect();
+    if finite.len() < 2 {
+        return None;
+    }
+    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&finite).ok()?;
+    // One more than asked for: the nearest is the point itself.
+    let wanted = NonZero::new(count.min(finite.len() - 1) + 1)?;
+    let mean_distance = |point: &[f64; 3]| {
+        let found = tree
+            .query(point)
+            .nearest_n::<SquaredEuclidean<f64>>(wanted)
+            .execute();
+        let sum: f64 = found.iter().map(|item| item.distance.sqrt()).sum();
+        sum / (found.len().max(2) - 1) as f64
+    };
+    Some(finite.iter().map(mean_distance).collect())
+}
+
+/// The middle value (the upper of two). The slice must not be empty.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lattice() -> Vec<DVec3> {
+        let along = |n: usize| (0..n).map(|i| i as f64 * 0.5).collect::<Vec<_>>();
+        let mut points = Vec::new();
+        for x in along(6) {
+            for y in along(6) {
+                for z in along(6) {
+                    points.push(DVec3::new(x, y, z));
+                }
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn a_lattice_has_its_spacing_and_no_outliers() {
+        let statistics = statistics(&lattice()).unwrap();
+        assert_eq!(
+            statistics,
+            CloudStatistics {
+                spacing: 0.5,
+                isolated: 0
+            }
+        );
+    }
+
+    #[test]
+    fn a_far_point_and_a_nan_stand_alone() {
+        let mut points = lattice();
+        points.insert(7, DVec3::splat(1e9));
+        points.push(DVec3::new(f64::NAN, 0.0, 0.0));
+        let isolated = isolated_points(&points);
+        let found: Vec<usize> = (0..points.len()).filter(|&i| isolated[i]).collect();
+        assert_eq!(found, [7, points.len() - 1]);
+    }
+
+    #[test]
+    fn many_points_in_one_place_are_no_trouble() {
+        let points = vec![DVec3::ONE; 500];
+        assert_eq!(statistics(&points).unwrap().spacing, 0.0);
+        assert_eq!(isolated_points(&points), vec![false; 500]);
+    }
+}

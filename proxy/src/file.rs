@@ -1,0 +1,190 @@
+//! Proxy files: JSON holds the surface exactly; GLB is for looking at it elsewhere, and
+//! carries the same JSON in its `extras`.
+
+use crate::{Plane, PlaneError, Proxy, glb};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a proxy file.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It cannot be read or written.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Io(PathBuf, std::io::Error),
+    /// It is not the JSON that was expected.
+    #[error("{path}: not a proxy file: {error}", path = .0.display(), error = .1)]
+    Json(PathBuf, serde_json::Error),
+    /// It is from a later version.
+    #[error("{path}: proxy file version {found}; this program reads version 1", path = .0.display(), found = .1)]
+    Version(PathBuf, u32),
+    /// Its plane is not one.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Plane(PathBuf, PlaneError),
+    /// A GLB that this program did not write, or no GLB at all.
+    #[error("{path}: {reason}", path = .0.display(), reason = .1)]
+    Glb(PathBuf, String),
+    /// Neither .json nor .glb.
+    #[error("{path}: proxies are read and written as .json (exact) or .glb", path = .0.display())]
+    Extension(PathBuf),
+}
+
+/// What the files say. Unknown keys are kept out of the way, not refused.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Stored {
+    version: u32,
+    #[serde(flatten)]
+    surface: StoredSurface,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum StoredSurface {
+    Plane { point: [f64; 3], normal: [f64; 3] },
+}
+
+impl Stored {
+    fn of(proxy: &Proxy) -> Self {
+        let surface = match proxy {
+            Proxy::Plane(plane) => StoredSurface::Plane {
+                point: plane.point().to_array(),
+                normal: plane.normal().to_array(),
+            },
+        };
+        Self {
+            version: 1,
+            surface,
+        }
+    }
+
+    fn proxy(&self, path: &Path) -> Result<Proxy, FileError> {
+        if self.version != 1 {
+            return Err(FileError::Version(path.to_owned(), self.version));
+        }
+        match self.surface {
+            StoredSurface::Plane { point, normal } => {
+                Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
+                    .map(Proxy::Plane)
+                    .map_err(|e| FileError::Plane(path.to_owned(), e))
+            }
+        }
+    }
+}
+
+/// Reads a proxy that [`write`] wrote.
+///
+/// # Errors
+/// The file, and what is wrong with it.
+pub fn read(path: &Path) -> Result<Proxy, FileError> {
+    let stored: Stored = match extension(path).as_str() {
+        "json" => {
+            let text = std::fs::read(path).map_err(|e| FileError::Io(path.to_owned(), e))?;
+            serde_json::from_slice(&text).map_err(|e| FileError::Json(path.to_owned(), e))?
+        }
+        "glb" => {
+            let bytes = std::fs::read(path).map_err(|e| FileError::Io(path.to_owned(), e))?;
+            let extras = glb::extras(&bytes).map_err(|e| FileError::Glb(path.to_owned(), e))?;
+            serde_json::from_str(&extras).map_err(|e| FileError::Json(path.to_owned(), e))?
+        }
+        _ => return Err(FileError::Extension(path.to_owned())),
+    };
+    stored.proxy(path)
+}
+
+/// Writes a proxy as `.json` or `.glb`. A GLB shows an infinite surface only around
+/// `shown_points_in_world` (the sparse points, say).
+///
+/// The file appears complete or not at all.
+///
+/// # Errors
+/// The file, and what is wrong with it.
+pub fn write(path: &Path, proxy: &Proxy, shown_points_in_world: &[DVec3]) -> Result<(), FileError> {
+    let json = |pretty: bool| {
+        let stored = Stored::of(proxy);
+        let text = if pretty {
+            serde_json::to_string_pretty(&stored)
+        } else {
+            serde_json::to_string(&stored)
+        };
+        text.map_err(|e| FileError::Json(path.to_owned(), e))
+    };
+    let bytes = match extension(path).as_str() {
+        "json" => (json(true)? + "\n").into_bytes(),
+        "glb" => {
+            let Proxy::Plane(plane) = proxy;
+            glb::quad(plane, shown_points_in_world, json(false)?)
+                .map_err(|e| FileError::Glb(path.to_owned(), e))?
+        }
+        _ => return Err(FileError::Extension(path.to_owned())),
+    };
+    let io = |e| FileError::Io(path.to_owned(), e);
+    let temporary = path.with_extension("tmp");
+    std::fs::write(&temporary, bytes).map_err(io)?;
+    std::fs::rename(&temporary, path).map_err(io)
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_formats_give_back_every_digit() {
+        let folder = tempfile::tempdir().unwrap();
+        let point = DVec3::new(500_000.123_456_789_1, 5.4e6 + 0.1, 1.0 / 3.0);
+        let plane = Plane::new(point, DVec3::new(0.1, -0.7, 0.3)).unwrap();
+        let shown = [
+            point + DVec3::new(2.0, 1.0, 0.0),
+            point - DVec3::new(1.0, 0.0, 3.0),
+        ];
+        for name in ["p.json", "p.glb"] {
+            let path = folder.path().join(name);
+            write(&path, &Proxy::Plane(plane), &shown).unwrap();
+            let Proxy::Plane(back) = read(&path).unwrap();
+            assert_eq!(back.point(), plane.point());
+            assert!((back.normal() - plane.normal()).length() < 1e-15);
+        }
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            2,
+            "nothing left behind"
+        );
+    }
+
+    #[test]
+    fn bad_files_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let error = read(&path).unwrap_err().to_string();
+            error.replace(&folder.path().display().to_string(), "DIR")
+        };
+        assert_eq!(
+            message(
+                "a.json",
+                r#"{"version": 2, "kind": "plane", "point": [0,0,0], "normal": [0,0,1]}"#
+            ),
+            "DIR/a.json: proxy file version 2; this program reads version 1"
+        );
+        assert_eq!(
+            message(
+                "a.json",
+                r#"{"version": 1, "kind": "plane", "point": [0,0,0], "normal": [0,0,0]}"#
+            ),
+            "DIR/a.json: the plane's normal is zero; give a direction such as 0,0,1"
+        );
+        assert!(message("a.json", "{").starts_with("DIR/a.json: not a proxy file: "));
+        assert!(message("a.glb", "x").starts_with("DIR/a.glb: "));
+        assert_eq!(
+            message("a.stl", ""),
+            "DIR/a.stl: proxies are read and written as .json (exact) or .glb"
+        );
+    }
+}

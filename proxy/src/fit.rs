@@ -1,0 +1,227 @@
+//! The plane proxy of Buehler et al. 2001, §5 (Pond): "oriented (roughly) parallel to the
+//! camera image planes and placed at the average 1/z distance from the cameras".
+
+use crate::cloud::{isolated_points, median};
+use crate::{Plane, PlaneError};
+use calibrate::Reconstruction;
+use glam::DVec3;
+use nalgebra::{Matrix3, SymmetricEigen};
+
+/// A fitted plane and what it rests on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneFit {
+    /// The plane. Its normal points away from the cameras.
+    pub plane: Plane,
+    /// The harmonic mean distance from the cameras to it, in world units.
+    pub distance: f64,
+    /// Observations of sparse points that decided the distance.
+    pub observations: usize,
+    /// Observations left out: of isolated points, behind their camera, or far from the
+    /// typical inverse depth.
+    pub outliers: usize,
+}
+
+/// Why no plane could be fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// There is nothing to fit to.
+    #[error(
+        "the reconstruction has no sparse points in front of its cameras to fit a plane to; \
+         give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
+    )]
+    NoPoints,
+    /// The points make no plane.
+    #[error(transparent)]
+    Plane(#[from] PlaneError),
+}
+
+/// Below this length of the mean forward axis the cameras look every way (an orbit), and
+/// their mean says nothing.
+const COMMON_DIRECTION: f64 = 0.2;
+/// Inverse depths farther from their median than this many standard deviations (by the
+/// median absolute deviation) do not count.
+const OUTLIER_SIGMAS: f64 = 3.0;
+
+/// Fits the plane: parallel to the mean image plane, at the mean inverse depth.
+///
+/// Each observation of a point by an image counts once, so that what many photos see
+/// weighs more. Robust: isolated points go first, then inverse depths beyond three
+/// deviations of the median. Where the cameras look every way the orientation is that of
+/// least spread among the points.
+///
+/// # Errors
+/// No observation of a point in front of its camera.
+pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> {
+    // 1. Orientation: the mean of the forward axes.
+    let forward_sum: DVec3 = reconstruction
+        .images
+        .values()
+        .map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z)
+        .sum();
+    let mean_forward = forward_sum / reconstruction.images.len().max(1) as f64;
+    let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
+    let isolated = isolated_points(&positions);
+    let normal = if mean_forward.length() >= COMMON_DIRECTION {
+        mean_forward.normalize()
+    } else {
+        let kept = positions
+            .iter()
+            .zip(&isolated)
+            .filter(|(_, alone)| !**alone);
+        direction_of_least_spread(kept.map(|(p, _)| *p)).unwrap_or(DVec3::Z)
+    };
+
+    // 2. Inverse depths along it, one an observation; and the observing cameras' mean.
+    let mut observed: Vec<(f64, DVec3)> = Vec::new();
+    let mut total = 0;
+    for (point, alone) in reconstruction.points.values().zip(&isolated) {
+        for (image_id, _) in &point.track {
+            let Some(image) = reconstruction.images.get(image_id) else {
+                continue;
+            };
+            total += 1;
+            let in_front = (image.camera_from_world * point.position).z > 0.0;
+            let center = image.camera_from_world.center();
+            let depth = normal.dot(point.position - center).abs();
+            if in_front && !alone && depth > 0.0 {
+                observed.push((1.0 / depth, center));
+            }
+        }
+    }
+    if observed.is_empty() {
+        return Err(FitError::NoPoints);
+    }
+
+    // 3. Drop what is far from the middle, and average the rest.
+    let middle = median(observed.iter().map(|o| o.0).collect());
+    let deviation = 1.4826 * median(observed.iter().map(|o| (o.0 - middle).abs()).collect());
+    observed.retain(|o| (o.0 - middle).abs() <= OUTLIER_SIGMAS * deviation);
+    let count = observed.len() as f64;
+    let distance = count / observed.iter().map(|o| o.0).sum::<f64>();
+    let origin = observed[0].1;
+    let mean_center = origin + observed.iter().map(|o| o.1 - origin).sum::<DVec3>() / count;
+
+    let plane = Plane::new(mean_center + normal * distance, normal)?;
+    Ok(PlaneFit {
+        plane,
+        distance,
+        observations: observed.len(),
+        outliers: total - observed.len(),
+    })
+}
+
+/// The direction in which a cloud is thinnest; `None` without a point.
+fn direction_of_least_spread(points: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
+    let first = points.clone().next()?;
+    let count = points.clone().count() as f64;
+    let mean = first + points.clone().map(|p| p - first).sum::<DVec3>() / count;
+    let mut covariance = Matrix3::<f64>::zeros();
+    for point in points {
+        let d = nalgebra::Vector3::from((point - mean).to_array());
+        covariance += d * d.transpose();
+    }
+    let eigen = SymmetricEigen::new(covariance);
+    let thinnest = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    Some(DVec3::new(thinnest[0], thinnest[1], thinnest[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Point3D, Point3DId, Rigid3};
+    use glam::DQuat;
+
+    /// Four cameras at z = 0 looking along +z at points on z = `depth`.
+    fn capture(depth: f64, world_from_scene: Rigid3) -> Reconstruction {
+        let mut r = Reconstruction::default();
+        let params = vec![100.0, 50.0, 50.0];
+        let camera = Camera {
+            model: ModelKind::SimplePinhole,
+            width: 100,
+            height: 100,
+            params,
+        };
+        r.cameras.insert(CameraId(1), camera);
+        for i in 0..4 {
+            let center = DVec3::new(f64::from(i % 2), f64::from(i / 2), 0.0);
+            let camera_from_scene = Rigid3::new(DQuat::IDENTITY, -center);
+            r.images.insert(
+                ImageId(i),
+                Image {
+                    name: format!("{i}.png"),
+                    camera_id: CameraId(1),
+                    camera_from_world: camera_from_scene * world_from_scene.inverse(),
+                    keypoints: Vec::new(),
+                },
+            );
+        }
+        for i in 0..100 {
+            let scene = DVec3::new(f64::from(i % 10) * 0.1, f64::from(i / 10) * 0.1, depth);
+            add_point(&mut r, i, world_from_scene * scene);
+        }
+        r
+    }
+
+    fn add_point(r: &mut Reconstruction, id: u32, position: DVec3) {
+        let track = r.images.keys().map(|id| (*id, 0)).collect();
+        let point = Point3D {
+            position,
+            color: [0; 3],
+            error_px: 0.0,
+            track,
+        };
+        r.points.insert(Point3DId(u64::from(id)), point);
+    }
+
+    #[test]
+    fn the_plane_of_the_points_is_found_wherever_the_world_lies() {
+        let far = Rigid3::new(DQuat::from_rotation_x(1.1), DVec3::new(3e5, -5e6, 200.0));
+        for world_from_scene in [Rigid3::IDENTITY, far] {
+            let fit = fit_plane(&capture(5.0, world_from_scene)).unwrap();
+            for scene in [DVec3::new(0.0, 0.0, 5.0), DVec3::new(9.0, -7.0, 5.0)] {
+                let distance = fit.plane.signed_distance(world_from_scene * scene);
+                assert!(distance.abs() < 1e-7, "{distance}");
+            }
+            assert!((fit.distance - 5.0).abs() < 1e-7);
+            assert_eq!((fit.observations, fit.outliers), (400, 0));
+        }
+    }
+
+    #[test]
+    fn outliers_do_not_move_it() {
+        let mut r = capture(5.0, Rigid3::IDENTITY);
+        for (i, far) in [1e9, 1e4, 4e3].into_iter().enumerate() {
+            add_point(&mut r, 1000 + i as u32, DVec3::new(0.0, far, far));
+        }
+        add_point(&mut r, 2000, DVec3::new(0.3, 0.3, -2.0));
+        add_point(&mut r, 2001, DVec3::new(0.3, 0.3, 0.01));
+        let fit = fit_plane(&r).unwrap();
+        assert!((fit.distance - 5.0).abs() < 1e-9, "{fit:?}");
+        assert_eq!(fit.outliers, 20);
+    }
+
+    #[test]
+    fn the_distance_is_the_harmonic_mean() {
+        let mut r = capture(2.0, Rigid3::IDENTITY);
+        for i in 0..100 {
+            let x = f64::from(i % 10) * 0.1;
+            add_point(&mut r, 500 + i, DVec3::new(x, f64::from(i / 10) * 0.1, 4.0));
+        }
+        let fit = fit_plane(&r).unwrap();
+        assert!(
+            (1.0 / fit.distance - (0.5 + 0.25) / 2.0).abs() < 1e-12,
+            "{fit:?}"
+        );
+    }
+
+    #[test]
+    fn without_points_the_remedy_is_named() {
+        let mut r = capture(5.0, Rigid3::IDENTITY);
+        r.points.clear();
+        assert_eq!(
+            fit_plane(&r).unwrap_err().to_string(),
+            "the reconstruction has no sparse points in front of its cameras to fit a plane to; \
+             give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
+        );
+    }
+}
