@@ -1,1 +1,35 @@
 //! The blending field, its triangulation, and the engine that draws it.
+//!
+//! Unstructured lumigraph rendering after Buehler et al. 2001. A [`Frame`] is one desired
+//! view of a [`Lumigraph`]; three engines draw it: [`reference`](mod@reference), plain
+//! f64, is the specification; [`cpu`] and [`gpu`] are fast and compared with it.
+
+pub mod blend;
+pub mod cpu;
+pub mod field;
+mod frame;
+mod image_out;
+mod lumigraph;
+mod options;
+mod photos;
+mod raster;
+mod rays;
+pub mod reference;
+pub mod triangulation;
+
+pub use field::TriangulatedField;
+pub use frame::{Frame, FrameSource, ProxyPoint};
+pub use lumigraph::{Lumigraph, SourceView};
+pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
+pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
+
+/// Why a frame could not be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// A photo that is needed cannot be decoded.
+    #[error(transparent)]
+    Photo(#[from] PhotoError),
+    /// The image plane could not be triangulated.
+    #[error(transparent)]
+    Triangulation(#[from] triangulation::TriangulationError),
+}

@@ -1,0 +1,135 @@
+//! From the candidates for one ray to their weights: Buehler et al. 2001, §4.1, and what
+//! measurement taught.
+
+use crate::options::{Blend, FieldOptions, MAX_CONTRIBUTORS};
+
+/// A source view that sees the proxy point inside its image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Which source view.
+    pub source_idx: usize,
+    /// angDiff + β·resDiff.
+    pub diff: f64,
+    /// fovBlend, 0…1.
+    pub fov: f64,
+}
+
+/// A source view and its share of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contributor {
+    /// Which source view.
+    pub source_idx: usize,
+    /// Positive; the shares of one ray sum to one.
+    pub weight: f64,
+}
+
+/// A difference this small is none: such views share all the weight.
+pub const SAME_RAY: f64 = 1e-12;
+
+/// The weights of the candidates for one ray, in the order of their indices.
+///
+/// Consistent form: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t)/diffᵢ, with aᵢ = fovBlendᵢ and t from
+/// [`threshold`]. Paper: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t) with t the k-th smallest diff ("k-th
+/// largest" is a misprint). Where that is undefined:
+///
+/// - all candidates on the very edge of their images (every fovBlend zero): as if each
+///   were one;
+/// - candidates with diff ≤ [`SAME_RAY`] (consistent form): they share all weight in
+///   proportion to aᵢ;
+/// - all weights zero because the candidates are tied: those with the smallest diff share
+///   in proportion to aᵢ, the [`MAX_CONTRIBUTORS`] of lowest index;
+/// - no candidate: no contributor.
+///
+/// Every weight is finite and positive, and they sum to one unless there are none.
+pub fn blend(candidates: &[Candidate], options: &FieldOptions) -> Vec<Contributor> {
+    // 1. Relevance: the feather, unless there is nothing but feather.
+    let feathered_out = candidates.iter().all(|c| c.fov <= 0.0);
+    let mut relevant: Vec<(usize, f64, f64)> = candidates
+        .iter()
+        .map(|c| {
+            (
+                c.source_idx,
+                c.diff,
+                if feathered_out { 1.0 } else { c.fov },
+            )
+        })
+        .filter(|(_, _, a)| *a > 0.0)
+        .collect();
+    relevant.sort_by(|x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
+    let Some(&(_, smallest, _)) = relevant.first() else {
+        return Vec::new();
+    };
+
+    // 2. The weights by the formula.
+    let sorted: Vec<(f64, f64)> = relevant.iter().map(|&(_, diff, a)| (diff, a)).collect();
+    let mut weighted: Vec<Contributor> = match options.blend {
+        Blend::Consistent if smallest <= SAME_RAY => Vec::new(),
+        Blend::Consistent => {
+            let t = threshold(&sorted, options.full_weight());
+            let weight = |diff: f64, a: f64| a * (1.0 - diff / t).max(0.0) / diff;
+            contributors(&relevant, weight)
+        }
+        Blend::Paper => {
+            let t = sorted[options.k.min(sorted.len()) - 1].0;
+            let weight = |diff: f64, a: f64| {
+                if t > 0.0 {
+                    a * (1.0 - diff / t).max(0.0)
+                } else {
+                    0.0
+                }
+            };
+            contributors(&relevant, weight)
+        }
+    };
+
+    // 3. Where it gives nothing, the tied candidates share.
+    if weighted.is_empty() {
+        let limit = match options.blend {
+            Blend::Consistent => smallest.max(SAME_RAY),
+            Blend::Paper => smallest,
+        };
+        relevant.retain(|&(_, diff, _)| diff <= limit);
+        relevant.sort_by_key(|&(source_idx, _, _)| source_idx);
+        relevant.truncate(MAX_CONTRIBUTORS);
+        weighted = contributors(&relevant, |_, a| a);
+    }
+
+    // 4. Shares, in the order of the views.
+    let sum: f64 = weighted.iter().map(|c| c.weight).sum();
+    weighted.iter_mut().for_each(|c| c.weight /= sum);
+    weighted.sort_by_key(|c| c.source_idx);
+    weighted
+}
+
+fn contributors(
+    relevant: &[(usize, f64, f64)],
+    weight: impl Fn(f64, f64) -> f64,
+) -> Vec<Contributor> {
+    let weighted = relevant.iter().map(|&(source_idx, diff, a)| Contributor {
+        source_idx,
+        weight: weight(diff, a),
+    });
+    weighted.filter(|c| c.weight > 0.0).collect()
+}
+
+/// t of the consistent blend, from (diff, a) sorted by diff.
+///
+/// It solves Σ aᵢ·max(0, 1 − diffᵢ/t) = m, which grows with t. With the first n terms in
+/// play it reads A − B/t = m, A = Σ aᵢ and B = Σ aᵢ·diffᵢ, so t = B/(A − m); the right n
+/// is the first whose t does not reach the next diff. Infinite where Σ aᵢ ≤ m. At most
+/// [`MAX_CONTRIBUTORS`] stay below it.
+pub fn threshold(sorted: &[(f64, f64)], m: f64) -> f64 {
+    let limit = sorted.get(MAX_CONTRIBUTORS).map_or(f64::INFINITY, |s| s.0);
+    let (mut sum_a, mut sum_a_diff) = (0.0, 0.0);
+    for (n, &(diff, a)) in sorted.iter().enumerate() {
+        sum_a += a;
+        sum_a_diff += a * diff;
+        if sum_a > m {
+            let t = sum_a_diff / (sum_a - m);
+            if sorted.get(n + 1).is_none_or(|next| t <= next.0) {
+                return t.min(limit);
+            }
+        }
+    }
+    limit
+}

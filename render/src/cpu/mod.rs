@@ -1,0 +1,222 @@
+//! The shipped CPU engine: f32, a row of pixels at a time, all threads.
+//!
+//! Every pixel is computed from its own inputs alone, so any number of threads gives the
+//! same bytes.
+
+mod lanes;
+mod shade;
+mod source;
+mod weights;
+
+use crate::field::TriangulatedField;
+use crate::frame::Frame;
+use crate::image_out::straight_rgba8;
+use crate::options::Method;
+use crate::photos::PhotoError;
+use crate::raster::Raster;
+use crate::rays::RayMap;
+use crate::RenderError;
+use glam::DVec3;
+use image::RgbaImage;
+use lanes::{LANES, Lane, each};
+use rayon::prelude::*;
+use source::{Sight, Source, Tile};
+use weights::{Term, weigh};
+
+/// Rows that one thread does in one go.
+const BAND: usize = 8;
+
+/// Draws a frame.
+///
+/// # Errors
+/// A photo that is needed cannot be decoded; the triangulation refuses the view.
+pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+    match method {
+        Method::Exact => Ok(render_exact(frame)?),
+        Method::Triangulated { cells_across } => {
+            let field = TriangulatedField::new(frame, cells_across)?;
+            Ok(render_field(frame, &field)?)
+        }
+    }
+}
+
+/// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
+///
+/// # Errors
+/// A photo that is needed cannot be decoded.
+pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
+    let engine = Engine::new(frame);
+    let sources: Vec<usize> = (0..engine.sources.len()).collect();
+    draw(frame, |row, _, pixels| {
+        for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
+            let tile = engine.tile(tile_idx * LANES, row, |_| true);
+            // 1. Who sees the tile, how well each ray fits, and what that weighs.
+            let (seeing, mut terms): (Vec<_>, Vec<_>) = sources
+                .iter()
+                .filter_map(|&i| {
+                    let sight = engine.sources[i].see(&tile)?;
+                    let diff = engine.sources[i].difference(&tile);
+                    let term = Term { diff, a: sight.a, weight: [0.0; LANES] };
+                    Some(((i, sight), term))
+                })
+                .unzip();
+            weigh(&mut terms, &frame.options);
+            // 2. The photos' colours.
+            let seen = seeing.iter().zip(&terms).map(|((i, sight), term)| (*i, sight, &term.weight));
+            engine.shade(seen, out)?;
+        }
+        Ok(())
+    })
+}
+
+/// The field interpolated over triangles. What changes faster than that (fovBlend, the
+/// proxy point, the photos) is evaluated at every pixel.
+///
+/// # Errors
+/// A photo that is needed cannot be decoded.
+pub fn render_field(frame: &Frame<'_>, field: &TriangulatedField) -> Result<RgbaImage, PhotoError> {
+    let engine = Engine::new(frame);
+    let raster = Raster::new(field);
+    draw(frame, |row, spans, pixels| {
+        raster.spans(row, spans);
+        let mut triangle_of = [None; LANES];
+        for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
+            let x0 = tile_idx * LANES;
+            // 1. The interpolated weights of the triangles that cross the tile.
+            triangle_of.fill(None);
+            let mut active: Vec<(usize, Lane)> = Vec::with_capacity(16);
+            for span in spans.iter().filter(|s| s.start < x0 + LANES && s.end > x0) {
+                let (start, end) = (span.start.max(x0), span.end.min(x0 + LANES));
+                let mut shares = [[0.0; LANES]; 3];
+                for x in start..end {
+                    triangle_of[x - x0] = Some(span.triangle_idx);
+                    let share = raster.barycentric(span.triangle_idx, x, row);
+                    (0..3).for_each(|corner| shares[corner][x - x0] = share[corner]);
+                }
+                for entry in field.entries_of(span.triangle_idx) {
+                    let i = entry.source_idx as usize;
+                    let at = active.iter().position(|(j, _)| *j == i).unwrap_or_else(|| {
+                        active.push((i, [0.0; LANES]));
+                        active.len() - 1
+                    });
+                    let weight = &mut active[at].1;
+                    for k in 0..LANES {
+                        weight[k] += shares[0][k] * entry.weights[0]
+                            + shares[1][k] * entry.weights[1]
+                            + shares[2][k] * entry.weights[2];
+                    }
+                }
+            }
+            // 2. The pixel's own share of them: fovBlend where the photo sees the point.
+            let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
+            active.sort_by_key(|(i, _)| *i);
+            let mut seen: Vec<(usize, Sight)> = Vec::with_capacity(active.len());
+            for (i, weight) in active {
+                if let Some(mut sight) = engine.sources[i].see(&tile) {
+                    sight.a = each(|k| sight.a[k] * weight[k]);
+                    seen.push((i, sight));
+                }
+            }
+            engine.shade(seen.iter().map(|(i, sight)| (*i, sight, &sight.a)), out)?;
+        }
+        Ok(())
+    })
+}
+
+/// What all pixels of a frame share.
+struct Engine<'a> {
+    frame: &'a Frame<'a>,
+    sources: Vec<Source>,
+    rays: RayMap,
+    plane: [f32; 3],
+    no_plane: bool,
+    gains: bool,
+}
+
+impl<'a> Engine<'a> {
+    fn new(frame: &'a Frame<'a>) -> Self {
+        let sources = &frame.lumigraph.sources;
+        Self {
+            frame,
+            sources: (0..sources.len()).map(|i| Source::new(frame, i)).collect(),
+            rays: RayMap::of(&frame.desired),
+            plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
+            no_plane: frame.plane.is_none(),
+            gains: sources.iter().any(|s| s.gain != [1.0; 3]),
+        }
+    }
+
+    /// The rays of a tile and where they meet the proxy.
+    fn tile(&self, x0: usize, row: usize, wanted: impl Fn(usize) -> bool) -> Tile {
+        let mut tile = Tile { x: [0.0; LANES], y: [0.0; LANES], z: [1.0; LANES], s: [-1.0; LANES] };
+        let width = self.frame.desired.width as usize;
+        for k in 0..LANES.min(width - x0) {
+            let Some([x, y, z]) = self.rays.ray(x0 + k, row) else { continue };
+            (tile.x[k], tile.y[k], tile.z[k]) = (x, y, z);
+            if wanted(k) && !self.no_plane {
+                tile.s[k] = self.plane[0] * x + self.plane[1] * y + self.plane[2] * z;
+            }
+        }
+        tile
+    }
+
+    /// Blends the photos of a tile and writes its pixels.
+    fn shade<'s>(
+        &self,
+        seen: impl Iterator<Item = (usize, &'s Sight, &'s Lane)>,
+        out: &mut [u8],
+    ) -> Result<(), PhotoError> {
+        let count = out.len() / 4;
+        let mut color = [glam::Vec4::ZERO; LANES];
+        let mut gain = [glam::Vec4::ZERO; LANES];
+        let mut sum = [0.0_f32; LANES];
+        for (i, sight, weight) in seen {
+            if weight[..count].iter().all(|w| *w == 0.0) {
+                continue;
+            }
+            let photo = self.frame.lumigraph.photos.get(i)?;
+            let [r, g, b] = self.sources[i].gain;
+            let source_gain = glam::Vec4::new(r, g, b, 1.0);
+            for k in 0..count {
+                let w = weight[k];
+                if w > 0.0 {
+                    let mut sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
+                    if self.gains {
+                        sample /= source_gain;
+                        gain[k] += source_gain * w;
+                    }
+                    color[k] += sample * w;
+                    sum[k] += w;
+                }
+            }
+        }
+        for (k, out) in out.chunks_exact_mut(4).enumerate() {
+            if sum[k] > 0.0 {
+                let mut rgba = color[k] / (sum[k] * 255.0);
+                if self.gains {
+                    rgba *= gain[k] / sum[k];
+                }
+                out.copy_from_slice(&straight_rgba8(rgba.to_array().map(f64::from)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Runs `row(row, scratch, pixels)` for every row of the picture, in parallel.
+fn draw<S: Default + Send>(
+    frame: &Frame<'_>,
+    row: impl Fn(usize, &mut S, &mut [u8]) -> Result<(), PhotoError> + Sync,
+) -> Result<RgbaImage, PhotoError> {
+    let (width, height) = (frame.desired.width, frame.desired.height);
+    let pitch = width as usize * 4;
+    let mut pixels = vec![0; pitch * height as usize];
+    pixels.par_chunks_mut(pitch * BAND).enumerate().try_for_each_init(
+        S::default,
+        |scratch, (band, rows)| {
+            let rows = rows.chunks_mut(pitch).enumerate();
+            rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels)).collect()
+        },
+    )?;
+    Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
+}

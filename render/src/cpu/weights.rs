@@ -1,0 +1,95 @@
+//! The weights of [`crate::blend::blend`], for a tile of pixels at once.
+
+use super::lanes::{LANES, Lane, each};
+use crate::blend::SAME_RAY;
+use crate::options::{Blend, FieldOptions, MAX_CONTRIBUTORS};
+
+/// One source view's terms over a tile.
+pub(crate) struct Term {
+    pub diff: Lane,
+    pub a: Lane,
+    /// The weight, not yet normalised; what this module computes.
+    pub weight: Lane,
+}
+
+/// Below this, f32 differences are noise: they count as equal to it, and share.
+const SMALLEST: f32 = SAME_RAY as f32;
+/// Keeps diff/t defined where every diff is zero.
+const SMALLEST_THRESHOLD: f32 = 1e-30;
+
+/// Fills in the weights.
+pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) {
+    let t = match options.blend {
+        Blend::Consistent => consistent_threshold(terms, options.full_weight() as f32),
+        Blend::Paper => each(|k| nth_smallest(terms, k, options.k)),
+    };
+    let mut sum = [0.0; LANES];
+    for term in terms.iter_mut() {
+        for k in 0..LANES {
+            let near = (1.0 - term.diff[k] / t[k]).max(0.0);
+            let weight = match options.blend {
+                Blend::Consistent => term.a[k] * near / term.diff[k].max(SMALLEST),
+                Blend::Paper => term.a[k] * near,
+            };
+            term.weight[k] = weight;
+            sum[k] += weight;
+        }
+    }
+    // All candidates tied: the nearest share, lowest indices first.
+    for k in 0..LANES {
+        if sum[k] == 0.0 && terms.iter().any(|term| term.a[k] > 0.0) {
+            let nearest = nth_smallest(terms, k, 1);
+            let tied = terms.iter_mut().filter(|t| t.a[k] > 0.0 && t.diff[k] <= nearest);
+            tied.take(MAX_CONTRIBUTORS).for_each(|term| term.weight[k] = term.a[k]);
+        }
+    }
+}
+
+/// Solves Σ a·max(0, 1 − diff/t) = m for t in each pixel by Newton's method in 1/t.
+///
+/// The sum is convex and piecewise linear in 1/t, so from t = ∞ the steps come down on
+/// the root from above and land on it exactly: no sorting.
+fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
+    let mut t = [f32::INFINITY; LANES];
+    let mut contributors = [0.0_f32; LANES];
+    for _ in 0..=terms.len() {
+        let mut sum_a = [0.0_f32; LANES];
+        let mut sum_a_diff = [0.0_f32; LANES];
+        contributors = [0.0; LANES];
+        for term in terms {
+            for k in 0..LANES {
+                let a = if term.diff[k] < t[k] { term.a[k] } else { 0.0 };
+                sum_a[k] += a;
+                sum_a_diff[k] += a * term.diff[k];
+                contributors[k] += if a > 0.0 { 1.0 } else { 0.0 };
+            }
+        }
+        let mut moved = false;
+        for k in 0..LANES {
+            let next = sum_a_diff[k] / (sum_a[k] - m);
+            let next = if sum_a[k] > m { next.max(SMALLEST_THRESHOLD) } else { f32::INFINITY };
+            moved |= next < t[k];
+            t[k] = t[k].min(next);
+        }
+        if !moved {
+            break;
+        }
+    }
+    for k in 0..LANES {
+        if contributors[k] > MAX_CONTRIBUTORS as f32 {
+            t[k] = t[k].min(nth_smallest(terms, k, MAX_CONTRIBUTORS + 1));
+        }
+    }
+    t
+}
+
+/// The n-th smallest diff among the candidates of one pixel, or the largest if there are
+/// fewer; at least [`SMALLEST_THRESHOLD`].
+fn nth_smallest(terms: &[Term], k: usize, n: usize) -> f32 {
+    let mut diffs: Vec<f32> = terms.iter().filter(|t| t.a[k] > 0.0).map(|t| t.diff[k]).collect();
+    if diffs.is_empty() {
+        return SMALLEST_THRESHOLD;
+    }
+    let nth = n.min(diffs.len()) - 1;
+    diffs.select_nth_unstable_by(nth, f32::total_cmp).1.max(SMALLEST_THRESHOLD)
+}

@@ -1,0 +1,233 @@
+//! One desired view, made ready: everything about the source views as seen from it.
+
+use crate::lumigraph::Lumigraph;
+use crate::options::{FieldOptions, Resolution};
+use calibrate::{Distortion, Lens, Pixel, View};
+use glam::{DMat3, DVec3};
+use proxy::Proxy;
+
+/// A point of the proxy as the desired view sees it: along `ray` from its centre, at
+/// p = ray / `inverse_distance` in the desired camera's frame.
+///
+/// Kept as a fraction, so that a point on the plane's horizon is finite too. Every formula
+/// below is the usual one multiplied through by `inverse_distance`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProxyPoint {
+    /// Any length but zero; in the desired camera's frame.
+    pub ray: DVec3,
+    /// Zero at infinity, else positive; in units of the ray's length.
+    pub inverse_distance: f64,
+}
+
+/// A source view, relative to the desired one.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameSource {
+    /// Turns the desired camera's frame into the source camera's.
+    pub rotation: DMat3,
+    /// The desired centre in the source camera's frame.
+    pub translation: DVec3,
+    /// The source centre in the desired camera's frame.
+    pub center: DVec3,
+    /// Its lens.
+    pub lens: Lens,
+    /// Image size in pixels.
+    pub size: [f64; 2],
+    /// What the ratio of distances is multiplied by to compare pixel footprints.
+    pub footprint_ratio: f64,
+    /// Pixels from the border over which it fades in.
+    pub feather_px: f64,
+}
+
+/// One desired view of a lumigraph, with all that does not depend on the pixel.
+#[derive(Debug)]
+pub struct Frame<'a> {
+    /// What is rendered.
+    pub lumigraph: &'a Lumigraph,
+    /// From where.
+    pub desired: View,
+    /// How views are weighted.
+    pub options: FieldOptions,
+    /// The source views, by the lumigraph's index.
+    pub sources: Vec<FrameSource>,
+    /// q with inverse_distance = q · ray, in the desired camera's frame; `None` where the
+    /// plane is seen edge on.
+    pub plane: Option<DVec3>,
+}
+
+impl<'a> Frame<'a> {
+    /// Prepares a desired view.
+    ///
+    /// # Panics
+    /// If the options fail [`FieldOptions::check`]: check them where they come in.
+    pub fn new(lumigraph: &'a Lumigraph, desired: View, options: FieldOptions) -> Self {
+        assert_eq!(options.check(), Ok(()));
+        let desired_center = desired.center();
+        let desired_from_world = desired.camera_from_world.rotation;
+        let desired_rotation = desired.camera_from_world.matrix();
+
+        // A desired view finer than every photo undersamples all of them alike; that is no
+        // reason to prefer any. So its focal length counts only up to the longest there is.
+        let longest = lumigraph
+            .sources
+            .iter()
+            .map(|s| s.view.lens.mean_focal())
+            .fold(0.0, f64::max);
+        let desired_focal = desired.lens.mean_focal().min(longest);
+
+        let sources = lumigraph
+            .sources
+            .iter()
+            .map(|source| {
+                let View {
+                    lens,
+                    width,
+                    height,
+                    camera_from_world,
+                } = source.view;
+                // Centres are subtracted in the world before anything else: there the
+                // digits are, however far away the origin is.
+                let offset_in_world = camera_from_world.center() - desired_center;
+                FrameSource {
+                    rotation: camera_from_world.matrix() * desired_rotation.transpose(),
+                    translation: camera_from_world.rotation * -offset_in_world,
+                    center: desired_from_world * offset_in_world,
+                    lens,
+                    size: [f64::from(width), f64::from(height)],
+                    footprint_ratio: match options.resolution {
+                        Resolution::Footprint => desired_focal / lens.mean_focal(),
+                        Resolution::Distance | Resolution::Length => 1.0,
+                    },
+                    feather_px: options.feather * f64::from(width.min(height)),
+                }
+            })
+            .collect();
+        let Proxy::Plane(plane) = lumigraph.proxy;
+        let plane = plane
+            .inverse_distance_from(desired_center)
+            .map(|q| desired_from_world * q);
+        Self {
+            lumigraph,
+            desired,
+            options,
+            sources,
+            plane,
+        }
+    }
+
+    /// The proxy point seen at a pixel of the desired image, if there is one.
+    pub fn proxy_point(&self, pixel: Pixel) -> Option<ProxyPoint> {
+        let ray = self.desired.lens.unproject(pixel)?;
+        let inverse_distance = self.plane?.dot(ray);
+        (inverse_distance >= 0.0).then_some(ProxyPoint {
+            ray,
+            inverse_distance,
+        })
+    }
+
+    /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1).
+    pub fn difference(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
+        let source = &self.sources[source_idx];
+        let angle = angle_difference(source.center, point);
+        if self.options.beta == 0.0 {
+            return angle;
+        }
+        let resolution = match self.options.resolution {
+            Resolution::Length => length_difference(source.center, point),
+            Resolution::Footprint | Resolution::Distance => {
+                footprint_difference(source.center, point, source.footprint_ratio)
+            }
+        };
+        angle + self.options.beta * resolution
+    }
+
+    /// Where a proxy point falls in a source image, or outside it; `None` where the source
+    /// camera cannot see in that direction.
+    pub fn project(&self, source_idx: usize, point: &ProxyPoint) -> Option<Pixel> {
+        let source = &self.sources[source_idx];
+        source
+            .lens
+            .project(source.rotation * point.ray + source.translation * point.inverse_distance)
+    }
+
+    /// fovBlend: rises smoothly from 0 at the image's border to 1 at the feather's width;
+    /// negative outside the image.
+    pub fn fov_blend(&self, source_idx: usize, pixel: Pixel) -> f64 {
+        let source = &self.sources[source_idx];
+        let [width, height] = source.size;
+        let border = pixel
+            .x
+            .min(width - pixel.x)
+            .min(pixel.y)
+            .min(height - pixel.y);
+        if border < 0.0 {
+            return -1.0;
+        }
+        if border >= source.feather_px {
+            return 1.0;
+        }
+        let s = border / source.feather_px;
+        s * s * (3.0 - 2.0 * s)
+    }
+
+    /// The mip level at which a source photo is sampled: half the binary logarithm of how
+    /// many source pixels one desired pixel covers.
+    ///
+    /// A patch of the proxy covers, in an image of focal length f whose centre lies at
+    /// distance h from the patch's plane and which sees it at depth z, f²·h/z³ times its
+    /// area; the ratio of two such terms is exact for pinholes and planes. A fisheye has
+    /// the distance in the depth's place.
+    pub fn level_of_detail(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
+        let source = &self.sources[source_idx];
+        let scale = self.area_scale(source_idx, self.plane.unwrap_or(DVec3::ZERO));
+        let in_source = source.rotation * point.ray + source.translation * point.inverse_distance;
+        let ratio =
+            depth_for_area(&self.desired.lens, point.ray) / depth_for_area(&source.lens, in_source);
+        let area = scale * ratio * ratio * ratio;
+        (0.5 * area.log2()).max(0.0)
+    }
+
+    /// What the cube of the ratio of depths is multiplied by to give the ratio of areas,
+    /// for a facet in the plane with vector `q`.
+    pub fn area_scale(&self, source_idx: usize, q: DVec3) -> f64 {
+        let source = &self.sources[source_idx];
+        let focal = source.lens.mean_focal() / self.desired.lens.mean_focal();
+        // q · x = 1 on the plane, so 1 − q · c is c's distance from it over the viewer's.
+        focal * focal * (1.0 - q.dot(source.center)).abs()
+    }
+}
+
+/// The depth, or for a fisheye the distance, that decides a patch's area in the image.
+pub(crate) fn depth_for_area(lens: &Lens, point_in_camera: DVec3) -> f64 {
+    match lens.distortion() {
+        Distortion::Fisheye { .. } => point_in_camera.length(),
+        Distortion::None | Distortion::Rational { .. } => point_in_camera.z,
+    }
+}
+
+/// The angle at p between the directions to the desired centre and to c.
+///
+/// p and c are relative to the desired centre, so it is the angle between p and p − c:
+/// |c × p| over p·(p − c), which loses nothing however close c is to the line of sight.
+fn angle_difference(center: DVec3, point: &ProxyPoint) -> f64 {
+    let (ray, s) = (point.ray, point.inverse_distance);
+    let across = s * center.cross(ray).length();
+    let along = ray.length_squared() - s * ray.dot(center);
+    across.atan2(along)
+}
+
+/// max(0, g·|p − c|/|p − d| − 1), computed as (g²|p − c|²/|p − d|² − 1) over (… + 1) so
+/// that a ratio near one keeps its digits.
+fn footprint_difference(center: DVec3, point: &ProxyPoint, g: f64) -> f64 {
+    let (ray, s) = (point.ray, point.inverse_distance);
+    let excess =
+        (s * s * center.length_squared() - 2.0 * s * ray.dot(center)) / ray.length_squared();
+    let squares = (g * g - 1.0) + g * g * excess;
+    (squares / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)).max(0.0)
+}
+
+/// max(0, |p − c| − |p − d|), by the same trick; finite at infinity too.
+fn length_difference(center: DVec3, point: &ProxyPoint) -> f64 {
+    let (ray, s) = (point.ray, point.inverse_distance);
+    let squares = s * center.length_squared() - 2.0 * ray.dot(center);
+    (squares / ((ray - s * center).length() + ray.length())).max(0.0)
+}

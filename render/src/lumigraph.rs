@@ -1,0 +1,25 @@
+use crate::photos::PhotoStore;
+use calibrate::View;
+use proxy::Proxy;
+
+/// One photo with its camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceView {
+    /// The photo's name.
+    pub name: String,
+    /// Where it was taken from, and with which lens.
+    pub view: View,
+    /// Exposure per colour channel, relative to the other photos; 1 where unknown.
+    pub gain: [f64; 3],
+}
+
+/// An unstructured lumigraph: everything a view is rendered from.
+#[derive(Debug)]
+pub struct Lumigraph {
+    /// The source views. Ties between them go to the lower index.
+    pub sources: Vec<SourceView>,
+    /// Their photos, by the same index, decoded when first needed.
+    pub photos: PhotoStore,
+    /// The surface that carries rays to them.
+    pub proxy: Proxy,
+}

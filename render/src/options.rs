@@ -1,0 +1,100 @@
+/// How source views are weighted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOptions {
+    /// How many source views share a ray, roughly: Buehler's k. At least 1.
+    pub k: usize,
+    /// β/α: radians of angular difference that a doubling of the pixel footprint is worth.
+    pub beta: f64,
+    /// The formula for the weights.
+    pub blend: Blend,
+    /// What a source view's lack of resolution is measured by.
+    pub resolution: Resolution,
+    /// The width over which a source view fades towards its border, as a fraction of the
+    /// shorter side of its image.
+    pub feather: f64,
+}
+
+/// At most this many source views contribute to a ray.
+pub const MAX_CONTRIBUTORS: usize = 16;
+
+impl Default for FieldOptions {
+    fn default() -> Self {
+        Self {
+            k: 5,
+            beta: 0.1,
+            blend: Blend::Consistent,
+            resolution: Resolution::Footprint,
+            feather: 0.02,
+        }
+    }
+}
+
+impl FieldOptions {
+    /// m of the consistent blend: the sum of relevance that fixes the threshold.
+    pub fn full_weight(&self) -> f64 {
+        self.k as f64 / 3.0
+    }
+
+    /// Whether every number makes sense.
+    ///
+    /// # Errors
+    /// A sentence that names the option, its value and its range.
+    pub fn check(&self) -> Result<(), String> {
+        if !(1..=MAX_CONTRIBUTORS).contains(&self.k) {
+            return Err(format!(
+                "k is {}; it must lie in 1..={MAX_CONTRIBUTORS}",
+                self.k
+            ));
+        }
+        if !(self.beta >= 0.0 && self.beta.is_finite()) {
+            return Err(format!("beta is {}; it must be zero or more", self.beta));
+        }
+        if !(self.feather >= 0.0 && self.feather <= 0.5) {
+            return Err(format!(
+                "feather is {}; it must lie in 0..=0.5",
+                self.feather
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The formula for the weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blend {
+    /// aᵢ · max(0, 1 − diffᵢ/t) / diffᵢ with t such that Σ aᵢ · max(0, 1 − diffᵢ/t) = k/3:
+    /// exact at a source view's own centre, and continuous where views come and go.
+    Consistent,
+    /// Buehler 2001, §4.1, literally: aᵢ · max(0, 1 − diffᵢ/t), t the k-th smallest diff.
+    Paper,
+}
+
+/// What a source view's lack of resolution is measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolution {
+    /// The ratio of pixel footprints on the proxy, less one. With equal focal lengths it
+    /// is [`Self::Distance`].
+    Footprint,
+    /// |p − c|/|p − d| − 1.
+    Distance,
+    /// |p − c| − |p − d| in world units: Buehler 2001, §4.1, literally.
+    Length,
+}
+
+/// How the blending field is evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// At every pixel.
+    Exact,
+    /// At the vertices of a triangulation of the image plane, and interpolated
+    /// (Buehler 2001, §4.2).
+    Triangulated {
+        /// Cells of the regular grid across the image's longer side.
+        cells_across: u32,
+    },
+}
+
+impl Method {
+    /// The triangulated field at the default grid.
+    pub const TRIANGULATED: Self = Self::Triangulated { cells_across: 32 };
+}

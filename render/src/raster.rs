@@ -1,0 +1,116 @@
+//! Which triangle of the image plane covers which pixel, in exact integers.
+
+use crate::field::TriangulatedField;
+
+/// Lattice steps a pixel; triangulations have their vertices on this lattice.
+const STEPS: i64 = 64;
+
+/// A run of pixels of one row, `start..end`, covered by one triangle.
+pub(crate) struct Span {
+    pub triangle_idx: usize,
+    pub start: usize,
+    pub end: usize,
+}
+
+/// An edge function: a·x + b·y + c in pixel indices, at pixel centres; ≥ 0 inside. On a
+/// shared edge exactly one of the two triangles owns the zero; the other's c is less by 1.
+#[derive(Clone, Copy)]
+struct Edge {
+    a: i64,
+    b: i64,
+    c: i64,
+}
+
+struct Prepared {
+    /// Opposite corner 0, 1, 2.
+    edges: [Edge; 3],
+    inverse_area: f32,
+    rows: (usize, usize),
+}
+
+/// The triangles of a field, ready to be scanned row by row.
+pub(crate) struct Raster {
+    triangles: Vec<Prepared>,
+}
+
+impl Raster {
+    pub(crate) fn new(field: &TriangulatedField) -> Self {
+        let corner = |i: u32| {
+            let on_lattice = field.vertices[i as usize] * STEPS as f64;
+            debug_assert_eq!(on_lattice, on_lattice.round(), "vertices lie on the lattice");
+            [on_lattice.x as i64, on_lattice.y as i64]
+        };
+        let prepare = |corners: [u32; 3]| {
+            let [a, b, c] = corners.map(corner);
+            let top = a[1].min(b[1]).min(c[1]).div_euclid(STEPS).max(0);
+            let bottom = a[1].max(b[1]).max(c[1]).div_euclid(STEPS) + 1;
+            let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            Prepared {
+                edges: [edge(b, c), edge(c, a), edge(a, b)],
+                inverse_area: 1.0 / area as f32,
+                rows: (top as usize, bottom.max(0) as usize),
+            }
+        };
+        Self { triangles: field.triangles.iter().map(|t| prepare(t.corners)).collect() }
+    }
+
+    /// The spans of a row, in the triangles' order; replaces what `spans` held.
+    pub(crate) fn spans(&self, row: usize, spans: &mut Vec<Span>) {
+        spans.clear();
+        for (triangle_idx, triangle) in self.triangles.iter().enumerate() {
+            if !(triangle.rows.0..triangle.rows.1).contains(&row) {
+                continue;
+            }
+            let (mut start, mut end) = (0, i64::MAX);
+            for edge in triangle.edges {
+                let constant = edge.b * row as i64 + edge.c;
+                // a·x + constant ≥ 0
+                match edge.a {
+                    0 if constant < 0 => end = 0,
+                    0 => {}
+                    a if a > 0 => start = start.max((-constant).div_euclid(a) + i64::from((-constant).rem_euclid(a) != 0)),
+                    a => end = end.min(constant.div_euclid(-a) + 1),
+                }
+            }
+            if start < end {
+                spans.push(Span { triangle_idx, start: start as usize, end: end as usize });
+            }
+        }
+    }
+
+    /// The shares of a triangle's corners in a pixel that it covers.
+    #[inline]
+    pub(crate) fn barycentric(&self, triangle_idx: usize, column: usize, row: usize) -> [f32; 3] {
+        let triangle = &self.triangles[triangle_idx];
+        triangle.edges.map(|edge| {
+            let value = edge.a * column as i64 + edge.b * row as i64 + edge.c;
+            value as f32 * triangle.inverse_area
+        })
+    }
+}
+
+/// The edge function of p ↦ (b − a) × (p − a), p the centre of pixel (x, y).
+fn edge(a: [i64; 2], b: [i64; 2]) -> Edge {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    let owns_zero = dy > 0 || (dy == 0 && dx > 0);
+    let half = STEPS / 2;
+    Edge {
+        a: -dy * STEPS,
+        b: dx * STEPS,
+        c: dx * (half - a[1]) - dy * (half - a[0]) - i64::from(!owns_zero),
+    }
+}
+
+/// The triangle under each pixel of an image, row by row; `u32::MAX` where there is none.
+pub(crate) fn triangle_map(raster: &Raster, width: usize, height: usize) -> Vec<u32> {
+    let mut map = vec![u32::MAX; width * height];
+    let mut spans = Vec::new();
+    for (row, pixels) in map.chunks_exact_mut(width).enumerate() {
+        raster.spans(row, &mut spans);
+        for span in &spans {
+            pixels[span.start..span.end.min(width)].fill(span.triangle_idx as u32);
+        }
+    }
+    map
+}
+

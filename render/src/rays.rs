@@ -1,0 +1,51 @@
+//! The ray through each pixel of the desired image.
+
+use calibrate::{Distortion, Pixel, View};
+use rayon::prelude::*;
+
+/// Rays through pixel centres, in the desired camera's frame. A pinhole's are computed as
+/// they are needed; any other lens has them in a table, inverted in f64.
+pub(crate) enum RayMap {
+    Pinhole { scale: [f64; 2], offset: [f64; 2] },
+    /// Row by row; NaN where the lens has no ray.
+    Table { width: usize, rays: Vec<[f32; 4]> },
+}
+
+impl RayMap {
+    pub(crate) fn of(view: &View) -> Self {
+        let lens = view.lens;
+        if lens.distortion() == Distortion::None {
+            let scale = [1.0 / lens.focal.x, 1.0 / lens.focal.y];
+            let offset = [0.5 - lens.principal.x, 0.5 - lens.principal.y];
+            return Self::Pinhole { scale, offset };
+        }
+        let width = view.width as usize;
+        let count = width * view.height as usize;
+        let ray = |i: usize| {
+            let pixel = Pixel::center_of((i % width) as u32, (i / width) as u32);
+            match lens.unproject(pixel) {
+                // At z = 1 where there is a z, as a pinhole's.
+                Some(ray) if ray.z > 0.1 => (ray / ray.z).as_vec3().extend(0.0).to_array(),
+                Some(ray) => ray.as_vec3().extend(0.0).to_array(),
+                None => [f32::NAN; 4],
+            }
+        };
+        Self::Table { width, rays: (0..count).into_par_iter().map(ray).collect() }
+    }
+
+    /// The ray through a pixel's centre; any length.
+    #[inline]
+    pub(crate) fn ray(&self, column: usize, row: usize) -> Option<[f32; 3]> {
+        match self {
+            Self::Pinhole { scale, offset } => {
+                let x = (column as f64 + offset[0]) * scale[0];
+                let y = (row as f64 + offset[1]) * scale[1];
+                Some([x as f32, y as f32, 1.0])
+            }
+            Self::Table { width, rays } => {
+                let [x, y, z, _] = rays[row * width + column];
+                (!x.is_nan()).then_some([x, y, z])
+            }
+        }
+    }
+}
