@@ -33,3 +33,4 @@ pub enum RenderError {
     #[error(transparent)]
     Triangulation(#[from] triangulation::TriangulationError),
 }
+
