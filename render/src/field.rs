@@ -8,6 +8,7 @@
 //! renormalises. The feather is narrower than a grid cell, and interpolating it cost 15 to
 //! 20 dB.
 
+use crate::blend::Contributor;
 use crate::blend::{SAME_RAY, threshold};
 use crate::frame::{Frame, ProxyPoint};
 use crate::options::Blend;
@@ -15,7 +16,6 @@ use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
 use crate::reference;
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
-use crate::blend::Contributor;
 use calibrate::{Lens, Pixel};
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
@@ -73,7 +73,10 @@ impl TriangulatedField {
         let epipoles = epipole_vertices(frame, grid);
         let points: Vec<DVec2> = epipoles.iter().map(|(_, at)| *at).collect();
         let edges = horizon(frame);
-        let constraints = Constraints { points: &points, edges: &edges };
+        let constraints = Constraints {
+            points: &points,
+            edges: &edges,
+        };
         let plane = triangulation::triangulate(width, height, grid, &constraints)?;
 
         // 2. The field at every vertex. A plane looks the same from both sides of an edge,
@@ -83,19 +86,40 @@ impl TriangulatedField {
                 return Vec::new();
             };
             let inverse_distance = frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0);
-            vertex_weights(frame, &ProxyPoint { ray, inverse_distance })
+            vertex_weights(
+                frame,
+                &ProxyPoint {
+                    ray,
+                    inverse_distance,
+                },
+            )
         };
         let weights: Vec<Vec<(u32, f32)>> = plane.vertices.par_iter().map(at_vertex).collect();
 
         // 3. Each triangle carries the union of its corners' views.
-        let mut field = Self { vertices: plane.vertices, triangles: Vec::new(), entries: Vec::new(), epipoles };
+        let mut field = Self {
+            vertices: plane.vertices,
+            triangles: Vec::new(),
+            entries: Vec::new(),
+            epipoles,
+        };
         for corners in plane.triangles {
-            let centroid = corners.iter().map(|&i| field.vertices[i as usize]).sum::<DVec2>() / 3.0;
-            if frame.proxy_point(Pixel::new(centroid.x, centroid.y)).is_none() {
+            let centroid = corners
+                .iter()
+                .map(|&i| field.vertices[i as usize])
+                .sum::<DVec2>()
+                / 3.0;
+            if frame
+                .proxy_point(Pixel::new(centroid.x, centroid.y))
+                .is_none()
+            {
                 continue;
             }
             let first = field.entries.len();
-            merge(corners.map(|i| weights[i as usize].as_slice()), &mut field.entries);
+            merge(
+                corners.map(|i| weights[i as usize].as_slice()),
+                &mut field.entries,
+            );
             field.triangles.push(FieldTriangle {
                 corners,
                 first_entry: first as u32,
@@ -128,14 +152,18 @@ impl TriangulatedField {
             let weight = |entry: &FieldEntry| {
                 let source_idx = entry.source_idx as usize;
                 let fov = frame.fov_blend(source_idx, frame.project(source_idx, &point)?);
-                let interpolated: f64 =
-                    (0..3).map(|c| shares[c] * f64::from(entry.weights[c])).sum();
+                let interpolated: f64 = (0..3)
+                    .map(|c| shares[c] * f64::from(entry.weights[c]))
+                    .sum();
                 // On the very edge of its image a view counts where there is no other.
                 let weight = interpolated * fov.max(1e-12);
                 (fov >= 0.0 && weight > 0.0).then_some(Contributor { source_idx, weight })
             };
-            let mut contributors: Vec<Contributor> =
-                self.entries_of(triangle_idx).iter().filter_map(weight).collect();
+            let mut contributors: Vec<Contributor> = self
+                .entries_of(triangle_idx)
+                .iter()
+                .filter_map(weight)
+                .collect();
             let sum: f64 = contributors.iter().map(|c| c.weight).sum();
             contributors.iter_mut().for_each(|c| c.weight /= sum);
             contributors
@@ -149,10 +177,15 @@ impl TriangulatedField {
 ///
 /// # Errors
 /// A photo that is needed cannot be decoded.
-pub fn render_reference(frame: &Frame<'_>, field: &TriangulatedField) -> Result<RgbaImage, PhotoError> {
+pub fn render_reference(
+    frame: &Frame<'_>,
+    field: &TriangulatedField,
+) -> Result<RgbaImage, PhotoError> {
     let width = frame.desired.width as usize;
     let contributors = field.contributors(frame);
-    reference::render(frame, |(x, y), _| contributors[y as usize * width + x as usize].clone())
+    reference::render(frame, |(x, y), _| {
+        contributors[y as usize * width + x as usize].clone()
+    })
 }
 
 /// The blend at a vertex, without fovBlend, by source view.
@@ -169,7 +202,10 @@ fn vertex_weights(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<(u32, f32)> {
     let near = |source_idx: usize| {
         let [width, height] = frame.sources[source_idx].size;
         let pixel = frame.project(source_idx, point)?;
-        let beyond = (-pixel.x).max(pixel.x - width).max(-pixel.y).max(pixel.y - height);
+        let beyond = (-pixel.x)
+            .max(pixel.x - width)
+            .max(-pixel.y)
+            .max(pixel.y - height);
         (beyond <= BEYOND_BORDER * width.max(height)).then(|| Near {
             source_idx,
             diff: frame.difference(source_idx, point),
@@ -185,7 +221,9 @@ fn vertex_weights(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<(u32, f32)> {
         sorted = near.iter().map(|n| (n.diff, 1.0)).collect();
     }
     sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
-    let Some(&(smallest, _)) = sorted.first() else { return Vec::new() };
+    let Some(&(smallest, _)) = sorted.first() else {
+        return Vec::new();
+    };
     let t = match frame.options.blend {
         Blend::Consistent => threshold(&sorted, frame.options.full_weight()),
         Blend::Paper => sorted[frame.options.k.min(sorted.len()) - 1].0,
@@ -193,20 +231,30 @@ fn vertex_weights(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<(u32, f32)> {
 
     // The weights, and where they all vanish (ties) equal ones for the nearest.
     let weight = |n: &Near| {
-        let relevance = if t > 0.0 { (1.0 - n.diff / t).max(0.0) } else { 0.0 };
+        let relevance = if t > 0.0 {
+            (1.0 - n.diff / t).max(0.0)
+        } else {
+            0.0
+        };
         match frame.options.blend {
             Blend::Consistent => relevance / n.diff.max(SAME_RAY),
             Blend::Paper => relevance,
         }
     };
-    let mut weights: Vec<(u32, f64)> =
-        near.iter().map(|n| (n.source_idx as u32, weight(n))).filter(|w| w.1 > 0.0).collect();
+    let mut weights: Vec<(u32, f64)> = near
+        .iter()
+        .map(|n| (n.source_idx as u32, weight(n)))
+        .filter(|w| w.1 > 0.0)
+        .collect();
     if weights.is_empty() {
         let tied = near.iter().filter(|n| n.diff <= smallest.max(SAME_RAY));
         weights = tied.map(|n| (n.source_idx as u32, 1.0)).collect();
     }
     let sum: f64 = weights.iter().map(|w| w.1).sum();
-    weights.into_iter().map(|(i, w)| (i, (w / sum) as f32)).collect()
+    weights
+        .into_iter()
+        .map(|(i, w)| (i, (w / sum) as f32))
+        .collect()
 }
 
 /// Merges three lists sorted by source view into entries.
@@ -229,7 +277,10 @@ fn merge(corners: [&[(u32, f32)]; 3], entries: &mut Vec<FieldEntry>) {
                 next[c] += 1;
             }
         }
-        entries.push(FieldEntry { source_idx, weights });
+        entries.push(FieldEntry {
+            source_idx,
+            weights,
+        });
     }
 }
 
@@ -239,7 +290,10 @@ fn merge(corners: [&[(u32, f32)]; 3], entries: &mut Vec<FieldEntry>) {
 /// A view behind the desired one has its epipole where the line through both centres
 /// meets the image: the difference of angles vanishes there as well.
 fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVec2)> {
-    let (width, height) = (f64::from(frame.desired.width), f64::from(frame.desired.height));
+    let (width, height) = (
+        f64::from(frame.desired.width),
+        f64::from(frame.desired.height),
+    );
     let candidate = |source_idx: usize| {
         let center = frame.sources[source_idx].center;
         let lens = &frame.desired.lens;
@@ -251,10 +305,15 @@ fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVec2)> {
         let stronger = field.iter().filter(|c| c.weight > own).count();
         (stronger < 2).then_some((source_idx, own, DVec2::new(ahead.x, ahead.y)))
     };
-    let mut candidates: Vec<(usize, f64, DVec2)> =
-        (0..frame.sources.len()).into_par_iter().filter_map(candidate).collect();
+    let mut candidates: Vec<(usize, f64, DVec2)> = (0..frame.sources.len())
+        .into_par_iter()
+        .filter_map(candidate)
+        .collect();
     candidates.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
-    let cells = DVec2::new(f64::from(grid.columns) / width, f64::from(grid.rows) / height);
+    let cells = DVec2::new(
+        f64::from(grid.columns) / width,
+        f64::from(grid.rows) / height,
+    );
     let mut taken = std::collections::BTreeMap::new();
     candidates.retain(|(_, _, at)| {
         let cell = (*at * cells).floor();
@@ -262,23 +321,33 @@ fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVec2)> {
         *count += 1;
         *count <= EPIPOLES_PER_CELL
     });
-    candidates.into_iter().map(|(source_idx, _, at)| (source_idx, at)).collect()
+    candidates
+        .into_iter()
+        .map(|(source_idx, _, at)| (source_idx, at))
+        .collect()
 }
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.
 fn horizon(frame: &Frame<'_>) -> Vec<[DVec2; 2]> {
-    let Some(q) = frame.plane else { return Vec::new() };
+    let Some(q) = frame.plane else {
+        return Vec::new();
+    };
     // The directions along the plane, by angle from the one that looks most forward.
     let normal = q.normalize();
     let forward = DVec3::Z - normal * normal.z;
-    let Some(u) = forward.try_normalize() else { return Vec::new() };
+    let Some(u) = forward.try_normalize() else {
+        return Vec::new();
+    };
     let v = normal.cross(u);
     let direction = |angle: f64| u * angle.cos() + v * angle.sin();
     let lens: &Lens = &frame.desired.lens;
     let project = |angle: f64| lens.project(direction(angle)).map(|p| DVec2::new(p.x, p.y));
 
     let near_image = |p: DVec2| {
-        let size = DVec2::new(f64::from(frame.desired.width), f64::from(frame.desired.height));
+        let size = DVec2::new(
+            f64::from(frame.desired.width),
+            f64::from(frame.desired.height),
+        );
         p.cmpge(-size).all() && p.cmple(2.0 * size).all()
     };
     let mut edges = Vec::new();

@@ -6,8 +6,10 @@
 
 pub mod blend;
 pub mod cpu;
+mod engine;
 pub mod field;
 mod frame;
+pub mod gpu;
 mod image_out;
 mod lumigraph;
 mod options;
@@ -17,6 +19,7 @@ mod rays;
 pub mod reference;
 pub mod triangulation;
 
+pub use engine::{DeviceChoice, Engine};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, ProxyPoint};
 pub use lumigraph::{Lumigraph, SourceView};
@@ -32,5 +35,7 @@ pub enum RenderError {
     /// The image plane could not be triangulated.
     #[error(transparent)]
     Triangulation(#[from] triangulation::TriangulationError),
+    /// The graphics device is missing or failed.
+    #[error("graphics device: {0}")]
+    Gpu(String),
 }
-

@@ -37,7 +37,11 @@ impl Raster {
     pub(crate) fn new(field: &TriangulatedField) -> Self {
         let corner = |i: u32| {
             let on_lattice = field.vertices[i as usize] * STEPS as f64;
-            debug_assert_eq!(on_lattice, on_lattice.round(), "vertices lie on the lattice");
+            debug_assert_eq!(
+                on_lattice,
+                on_lattice.round(),
+                "vertices lie on the lattice"
+            );
             [on_lattice.x as i64, on_lattice.y as i64]
         };
         let prepare = |corners: [u32; 3]| {
@@ -51,7 +55,9 @@ impl Raster {
                 rows: (top as usize, bottom.max(0) as usize),
             }
         };
-        Self { triangles: field.triangles.iter().map(|t| prepare(t.corners)).collect() }
+        Self {
+            triangles: field.triangles.iter().map(|t| prepare(t.corners)).collect(),
+        }
     }
 
     /// The spans of a row, in the triangles' order; replaces what `spans` held.
@@ -68,12 +74,20 @@ impl Raster {
                 match edge.a {
                     0 if constant < 0 => end = 0,
                     0 => {}
-                    a if a > 0 => start = start.max((-constant).div_euclid(a) + i64::from((-constant).rem_euclid(a) != 0)),
+                    a if a > 0 => {
+                        start = start.max(
+                            (-constant).div_euclid(a) + i64::from((-constant).rem_euclid(a) != 0),
+                        )
+                    }
                     a => end = end.min(constant.div_euclid(-a) + 1),
                 }
             }
             if start < end {
-                spans.push(Span { triangle_idx, start: start as usize, end: end as usize });
+                spans.push(Span {
+                    triangle_idx,
+                    start: start as usize,
+                    end: end as usize,
+                });
             }
         }
     }
@@ -113,4 +127,3 @@ pub(crate) fn triangle_map(raster: &Raster, width: usize, height: usize) -> Vec<
     }
     map
 }
-

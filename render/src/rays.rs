@@ -6,9 +6,15 @@ use rayon::prelude::*;
 /// Rays through pixel centres, in the desired camera's frame. A pinhole's are computed as
 /// they are needed; any other lens has them in a table, inverted in f64.
 pub(crate) enum RayMap {
-    Pinhole { scale: [f64; 2], offset: [f64; 2] },
+    Pinhole {
+        scale: [f64; 2],
+        offset: [f64; 2],
+    },
     /// Row by row; NaN where the lens has no ray.
-    Table { width: usize, rays: Vec<[f32; 4]> },
+    Table {
+        width: usize,
+        rays: Vec<[f32; 4]>,
+    },
 }
 
 impl RayMap {
@@ -30,7 +36,10 @@ impl RayMap {
                 None => [f32::NAN; 4],
             }
         };
-        Self::Table { width, rays: (0..count).into_par_iter().map(ray).collect() }
+        Self::Table {
+            width,
+            rays: (0..count).into_par_iter().map(ray).collect(),
+        }
     }
 
     /// The ray through a pixel's centre; any length.

@@ -31,11 +31,9 @@ pub(crate) fn angle(y: f32, x: f32) -> f32 {
     let far = q > TAN_PI_8;
     let r = if far { (q - 1.0) / (q + 1.0) } else { q };
     let z = r * r;
-    let polynomial = (((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z
-        - 3.333_295e-1)
-        * z
-        * r
-        + r;
+    let polynomial =
+        (((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1) * z * r
+            + r;
     let first = polynomial + if far { FRAC_PI_4 } else { 0.0 };
     let steep = if y > ax { FRAC_PI_2 - first } else { first };
     if x < 0.0 { PI - steep } else { steep }

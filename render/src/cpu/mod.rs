@@ -8,14 +8,14 @@ mod shade;
 mod source;
 mod weights;
 
+use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::image_out::straight_rgba8;
 use crate::options::Method;
 use crate::photos::PhotoError;
-use crate::raster::Raster;
+use crate::raster::{Raster, Span};
 use crate::rays::RayMap;
-use crate::RenderError;
 use glam::DVec3;
 use image::RgbaImage;
 use lanes::{LANES, Lane, each};
@@ -47,7 +47,7 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
 pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame);
     let sources: Vec<usize> = (0..engine.sources.len()).collect();
-    draw(frame, |row, _, pixels| {
+    draw(frame, |row, _: &mut (), pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let tile = engine.tile(tile_idx * LANES, row, |_| true);
             // 1. Who sees the tile, how well each ray fits, and what that weighs.
@@ -56,13 +56,20 @@ pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
                 .filter_map(|&i| {
                     let sight = engine.sources[i].see(&tile)?;
                     let diff = engine.sources[i].difference(&tile);
-                    let term = Term { diff, a: sight.a, weight: [0.0; LANES] };
+                    let term = Term {
+                        diff,
+                        a: sight.a,
+                        weight: [0.0; LANES],
+                    };
                     Some(((i, sight), term))
                 })
                 .unzip();
             weigh(&mut terms, &frame.options);
             // 2. The photos' colours.
-            let seen = seeing.iter().zip(&terms).map(|((i, sight), term)| (*i, sight, &term.weight));
+            let seen = seeing
+                .iter()
+                .zip(&terms)
+                .map(|((i, sight), term)| (*i, sight, &term.weight));
             engine.shade(seen, out)?;
         }
         Ok(())
@@ -77,7 +84,7 @@ pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
 pub fn render_field(frame: &Frame<'_>, field: &TriangulatedField) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame);
     let raster = Raster::new(field);
-    draw(frame, |row, spans, pixels| {
+    draw(frame, |row, spans: &mut Vec<Span>, pixels| {
         raster.spans(row, spans);
         let mut triangle_of = [None; LANES];
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
@@ -148,10 +155,17 @@ impl<'a> Engine<'a> {
 
     /// The rays of a tile and where they meet the proxy.
     fn tile(&self, x0: usize, row: usize, wanted: impl Fn(usize) -> bool) -> Tile {
-        let mut tile = Tile { x: [0.0; LANES], y: [0.0; LANES], z: [1.0; LANES], s: [-1.0; LANES] };
+        let mut tile = Tile {
+            x: [0.0; LANES],
+            y: [0.0; LANES],
+            z: [1.0; LANES],
+            s: [-1.0; LANES],
+        };
         let width = self.frame.desired.width as usize;
         for k in 0..LANES.min(width - x0) {
-            let Some([x, y, z]) = self.rays.ray(x0 + k, row) else { continue };
+            let Some([x, y, z]) = self.rays.ray(x0 + k, row) else {
+                continue;
+            };
             (tile.x[k], tile.y[k], tile.z[k]) = (x, y, z);
             if wanted(k) && !self.no_plane {
                 tile.s[k] = self.plane[0] * x + self.plane[1] * y + self.plane[2] * z;
@@ -211,12 +225,13 @@ fn draw<S: Default + Send>(
     let (width, height) = (frame.desired.width, frame.desired.height);
     let pitch = width as usize * 4;
     let mut pixels = vec![0; pitch * height as usize];
-    pixels.par_chunks_mut(pitch * BAND).enumerate().try_for_each_init(
-        S::default,
-        |scratch, (band, rows)| {
+    pixels
+        .par_chunks_mut(pitch * BAND)
+        .enumerate()
+        .try_for_each_init(S::default, |scratch, (band, rows)| {
             let rows = rows.chunks_mut(pitch).enumerate();
-            rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels)).collect()
-        },
-    )?;
+            rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels))
+                .try_for_each(|done| done)
+        })?;
     Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
 }

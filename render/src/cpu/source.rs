@@ -39,9 +39,19 @@ pub(crate) struct Source {
 /// The lens formulas, the cheapest that is exact.
 enum Distortion32 {
     None,
-    Polynomial { k: [f32; 3], limit_squared: f32 },
-    Rational { k: [f32; 6], p: [f32; 2], limit_squared: f32 },
-    Fisheye { k: [f32; 4], limit: f32 },
+    Polynomial {
+        k: [f32; 3],
+        limit_squared: f32,
+    },
+    Rational {
+        k: [f32; 6],
+        p: [f32; 2],
+        limit_squared: f32,
+    },
+    Fisheye {
+        k: [f32; 4],
+        limit: f32,
+    },
 }
 
 /// Where a tile's proxy points fall in one photo, and what they are worth there.
@@ -68,16 +78,20 @@ impl Source {
             Distortion::None => Distortion32::None,
             Distortion::Rational { k, p } if k[3..] == [0.0; 3] && p == [0.0; 2] => {
                 let k = [k[0] as f32, k[1] as f32, k[2] as f32];
-                Distortion32::Polynomial { k, limit_squared: (limit * limit) as f32 }
+                Distortion32::Polynomial {
+                    k,
+                    limit_squared: (limit * limit) as f32,
+                }
             }
             Distortion::Rational { k, p } => Distortion32::Rational {
                 k: k.map(|v| v as f32),
                 p: p.map(|v| v as f32),
                 limit_squared: (limit * limit) as f32,
             },
-            Distortion::Fisheye { k } => {
-                Distortion32::Fisheye { k: k.map(|v| v as f32), limit: limit as f32 }
-            }
+            Distortion::Fisheye { k } => Distortion32::Fisheye {
+                k: k.map(|v| v as f32),
+                limit: limit as f32,
+            },
         };
         let is_fisheye = |d| matches!(d, Distortion::Fisheye { .. });
         let g = source.footprint_ratio;
@@ -118,11 +132,22 @@ impl Source {
             Distortion32::None => {
                 for k in 0..LANES {
                     let inverse_z = 1.0 / z[k];
-                    u[k] = if z[k] > 0.0 { x[k] * inverse_z } else { OUTSIDE };
-                    v[k] = if z[k] > 0.0 { y[k] * inverse_z } else { OUTSIDE };
+                    u[k] = if z[k] > 0.0 {
+                        x[k] * inverse_z
+                    } else {
+                        OUTSIDE
+                    };
+                    v[k] = if z[k] > 0.0 {
+                        y[k] * inverse_z
+                    } else {
+                        OUTSIDE
+                    };
                 }
             }
-            Distortion32::Polynomial { k: [k1, k2, k3], limit_squared } => {
+            Distortion32::Polynomial {
+                k: [k1, k2, k3],
+                limit_squared,
+            } => {
                 for k in 0..LANES {
                     let inverse_z = 1.0 / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
@@ -133,7 +158,11 @@ impl Source {
                     v[k] = if seen { b * radial } else { OUTSIDE };
                 }
             }
-            Distortion32::Rational { k: c, p, limit_squared } => {
+            Distortion32::Rational {
+                k: c,
+                p,
+                limit_squared,
+            } => {
                 for k in 0..LANES {
                     let inverse_z = 1.0 / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
@@ -152,9 +181,12 @@ impl Source {
                     let radius = (x[k] * x[k] + y[k] * y[k]).sqrt();
                     let theta = angle(radius, z[k]);
                     let t2 = theta * theta;
-                    let bent =
-                        theta * (1.0 + t2 * (c[0] + t2 * (c[1] + t2 * (c[2] + t2 * c[3]))));
-                    let scale = if radius > 0.0 { bent / radius } else { 1.0 / z[k] };
+                    let bent = theta * (1.0 + t2 * (c[0] + t2 * (c[1] + t2 * (c[2] + t2 * c[3]))));
+                    let scale = if radius > 0.0 {
+                        bent / radius
+                    } else {
+                        1.0 / z[k]
+                    };
                     let seen = (theta <= *limit) & ((radius > 0.0) | (z[k] > 0.0));
                     u[k] = if seen { x[k] * scale } else { OUTSIDE };
                     v[k] = if seen { y[k] * scale } else { OUTSIDE };

@@ -39,8 +39,11 @@ pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) {
     for k in 0..LANES {
         if sum[k] == 0.0 && terms.iter().any(|term| term.a[k] > 0.0) {
             let nearest = nth_smallest(terms, k, 1);
-            let tied = terms.iter_mut().filter(|t| t.a[k] > 0.0 && t.diff[k] <= nearest);
-            tied.take(MAX_CONTRIBUTORS).for_each(|term| term.weight[k] = term.a[k]);
+            let tied = terms
+                .iter_mut()
+                .filter(|t| t.a[k] > 0.0 && t.diff[k] <= nearest);
+            tied.take(MAX_CONTRIBUTORS)
+                .for_each(|term| term.weight[k] = term.a[k]);
         }
     }
 }
@@ -67,7 +70,11 @@ fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
         let mut moved = false;
         for k in 0..LANES {
             let next = sum_a_diff[k] / (sum_a[k] - m);
-            let next = if sum_a[k] > m { next.max(SMALLEST_THRESHOLD) } else { f32::INFINITY };
+            let next = if sum_a[k] > m {
+                next.max(SMALLEST_THRESHOLD)
+            } else {
+                f32::INFINITY
+            };
             moved |= next < t[k];
             t[k] = t[k].min(next);
         }
@@ -86,10 +93,17 @@ fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
 /// The n-th smallest diff among the candidates of one pixel, or the largest if there are
 /// fewer; at least [`SMALLEST_THRESHOLD`].
 fn nth_smallest(terms: &[Term], k: usize, n: usize) -> f32 {
-    let mut diffs: Vec<f32> = terms.iter().filter(|t| t.a[k] > 0.0).map(|t| t.diff[k]).collect();
+    let mut diffs: Vec<f32> = terms
+        .iter()
+        .filter(|t| t.a[k] > 0.0)
+        .map(|t| t.diff[k])
+        .collect();
     if diffs.is_empty() {
         return SMALLEST_THRESHOLD;
     }
     let nth = n.min(diffs.len()) - 1;
-    diffs.select_nth_unstable_by(nth, f32::total_cmp).1.max(SMALLEST_THRESHOLD)
+    diffs
+        .select_nth_unstable_by(nth, f32::total_cmp)
+        .1
+        .max(SMALLEST_THRESHOLD)
 }
