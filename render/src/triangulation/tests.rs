@@ -358,6 +358,20 @@ fn the_smallest_image_works() {
 }
 
 #[test]
+fn the_largest_image_overflows_nothing() {
+    let side = lattice::MAX_SIDE;
+    let mut scene = Scene::new(side, side, 2, 3);
+    let far = f64::from(side);
+    scene.points = vec![p(far, far), p(far - 1.0 / 64.0, 0.3), p(0.0, far / 2.0)];
+    for i in 0..12 {
+        let start = f64::from(i) * far / 11.0;
+        scene.edges.push([p(start, -1e15), p(far - start, 1e15)]);
+        scene.edges.push([p(0.0, start), p(far, far - start + 0.7)]);
+    }
+    check(&scene);
+}
+
+#[test]
 fn grids_have_square_cells() {
     assert_eq!(
         Grid::for_image(1000, 1000, 10),
