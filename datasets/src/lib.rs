@@ -25,6 +25,7 @@ mod picture;
 mod points;
 mod print;
 mod scene;
+mod shading;
 mod shape;
 mod shelf;
 mod texture;

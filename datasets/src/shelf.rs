@@ -82,7 +82,7 @@ fn scene(finest: f64) -> Scene {
         sky: 0.52 * DVec3::new(0.92, 0.97, 1.0),
         ground: 0.34 * DVec3::new(1.0, 0.90, 0.78),
         up: DVec3::Y,
-        corner_reach: 0.16,
+        corner_reach: 0.13,
     };
     Scene::new(objects, lighting, finest)
 }
@@ -101,6 +101,8 @@ const GLAZED: Finish = Finish::Glossy {
 
 fn object(shape: Shape, at: DVec3, rotation: DQuat, texture: Texture, finish: Finish) -> Object {
     Object {
+        // The wall, the sideboard and the room shade nothing else.
+        casts_shadow: shape.ball().1 < 1.0,
         shape,
         world_from_shape: Rigid3::new(rotation, at),
         material: Material { texture, finish },
@@ -299,7 +301,7 @@ fn vase(objects: &mut Vec<Object>) {
     let foot = DVec3::new(-0.10, 0.004, -0.10);
     objects.push(object(
         Shape::Lathe {
-            profile: smooth_profile(&through, 4),
+            profile: smooth_profile(&through, 3),
         },
         foot,
         DQuat::from_rotation_y(0.3),

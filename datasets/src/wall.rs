@@ -40,6 +40,7 @@ pub fn wall(options: &Options) -> Result<Dataset, DatasetError> {
             },
             finish: Finish::Flat,
         },
+        casts_shadow: false,
     };
     let lighting = Lighting {
         lamp: world_from_wall * DVec3::new(-1.0, 2.0, 4.0),
