@@ -88,6 +88,9 @@ pub enum DatasetError {
         /// What went wrong.
         source: image::ImageError,
     },
+    /// The COLMAP model could not be written.
+    #[error(transparent)]
+    Colmap(#[from] calibrate::colmap::ColmapError),
 }
 
 type Build = fn(&Options) -> Result<Dataset, DatasetError>;

@@ -1,7 +1,7 @@
 //! Procedural scenes ray-traced with exact colour, depth and pose.
 //!
 //! A dataset is a scene, the posed cameras that photograph it and what structure from
-//! motion would have left: a COLMAP model, here without error. [`write`] puts it on disk
+//! motion would have left: a COLMAP model, here without error. [`write()`] puts it on disk
 //! as the folder a user would have, with the truth beside it.
 //!
 //! | name | scene | cameras | good for |
@@ -30,6 +30,7 @@ mod shape;
 mod shelf;
 mod texture;
 mod wall;
+mod write;
 
 pub use dataset::{Dataset, DatasetError, Options, Photo, by_name, names};
 pub use picture::{render_depth, render_view, srgb_from_linear};
@@ -38,3 +39,4 @@ pub use shape::{Shape, Surface};
 pub use shelf::shelf;
 pub use texture::{Motif, Texture};
 pub use wall::wall;
+pub use write::{DEPTH_STEPS_PER_UNIT, Written, write};
