@@ -96,7 +96,7 @@ const SATIN: Finish = Finish::Glossy {
 const GLAZED: Finish = Finish::Glossy {
     highlight: 0.9,
     exponent: 350.0,
-    mirror: 0.05,
+    mirror: 0.09,
 };
 
 fn object(shape: Shape, at: DVec3, rotation: DQuat, texture: Texture, finish: Finish) -> Object {
@@ -142,7 +142,7 @@ fn room(lamp: DVec3, objects: &mut Vec<Object>) {
         still,
         Texture::Wallpaper {
             ground: rgb(0x6f9a92),
-            figure: rgb(0xd9d3b0),
+            figure: rgb(0xc9caa9),
             period: 0.15,
             seed: 11,
         },

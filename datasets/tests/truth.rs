@@ -262,7 +262,7 @@ fn depth_stays_within_its_promised_range() {
         let mean = depth.iter().sum::<f64>() / depth.len() as f64;
         for depth in depth {
             assert!(
-                (depth / mean - 1.0).abs() < 0.2,
+                (depth / mean - 1.0).abs() < 0.16,
                 "{}: {depth} of {mean}",
                 photo.name
             );
