@@ -44,12 +44,12 @@ fn triangle(in: Corner) -> @location(0) vec4f {
         if weight <= 0.0 {
             continue;
         }
-        let source = &sources[entries[i].source_idx];
-        let sight = see(source, ray, s);
+        let source_idx = entries[i].source_idx;
+        let sight = see(source_idx, ray, s);
         let a = weight * sight.a;
         if a > 0.0 {
-            let color = sample_photo(photos, photo_sampler, source, sight, ray);
-            add(&mix, a, color, (*source).gain.rgb);
+            let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
+            add(&mix, a, color, sources[source_idx].gain.rgb);
         }
     }
     return resolve(mix);
