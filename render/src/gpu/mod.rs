@@ -141,7 +141,8 @@ impl Gpu {
             .triangles
             .iter()
             .flat_map(|triangle| {
-                let list = [triangle.first_entry, triangle.entry_count];
+                let bordered = u32::from(triangle.bordered) << 31;
+                let list = [triangle.first_entry, triangle.entry_count | bordered];
                 let pixel = |i: u32| field.vertices[i as usize].as_vec2().to_array();
                 triangle.corners.map(|i| Corner {
                     pixel: pixel(i),
@@ -154,7 +155,7 @@ impl Gpu {
             .iter()
             .map(|e| Entry {
                 source_idx: e.source_idx,
-                weights: e.weights,
+                values: e.values,
             })
             .collect();
         let corners_buffer = self.buffer("corners", &corners, wgpu::BufferUsages::VERTEX);
