@@ -328,10 +328,14 @@ fn invert_monotone(value: f64, limit: f64, f: impl Fn(f64) -> (f64, f64)) -> Opt
         }
         let newton = x - (fx - value) / slope;
         // Close to a pole Newton's steps are tiny though the root is far: a step that
-        // changes nothing gives way to bisection, which ends with the bracket.
-        let moves = (newton - x).abs() > f64::EPSILON * x;
+        // changes nothing ends the search only where the value is met, and gives way to
+        // bisection, which ends with the bracket, elsewhere.
+        let moves = (newton - x).abs() > 4.0 * f64::EPSILON * x;
         let near = (fx - value).abs() <= RESIDUAL_TOLERANCE * (1.0 + value);
-        let next = if newton > low && newton < high && (moves || near) {
+        if near && !moves {
+            return Some(newton.clamp(0.0, limit));
+        }
+        let next = if newton > low && newton < high && moves {
             newton
         } else {
             0.5 * (low + high)

@@ -7,8 +7,6 @@ struct Entry {
     values: array<f32, 3>,
 }
 
-// Set in a list's length where the border of a photo crosses the triangle.
-const BORDERED = 0x80000000u;
 // MAX_LISTED of field.rs.
 const LISTED = 32u;
 const CONTRIBUTORS = 16u;
@@ -52,13 +50,8 @@ fn triangle(in: Corner) -> @location(0) vec4f {
     if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
-    let first = in.list.x;
-    let count = in.list.y & ~BORDERED;
-    if (in.list.y & BORDERED) != 0u {
-        return blend_at_border(ray, s, first, count, in.shares);
-    }
     var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
-    for (var i = first; i < first + count; i++) {
+    for (var i = in.list.x; i < in.list.x + in.list.y; i++) {
         let weight = interpolate(i, in.shares);
         if weight <= 0.0 {
             continue;
@@ -80,12 +73,22 @@ struct Terms {
     a: array<f32, LISTED>,
 }
 
-// Interpolated differences, the pixel's own fovBlend, and the blend of the exact field.
-fn blend_at_border(ray: vec3f, s: f32, first: u32, count: u32, shares: vec3f) -> vec4f {
+// Where the border of a photo crosses the triangle: interpolated differences, the pixel's
+// own fovBlend, and the blend of the exact field. A pipeline of its own, because software
+// drivers pay for its arrays in every pixel.
+@fragment
+fn bordered_triangle(in: Corner) -> @location(0) vec4f {
+    let ray = ray_through(vec2u(in.position.xy));
+    let s = dot(params.plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
+        return vec4f(0.0);
+    }
+    let first = in.list.x;
+    let count = in.list.y;
     var terms: Terms;
     var nearest = INFINITY;
     for (var n = 0u; n < count; n++) {
-        terms.diff[n] = max(interpolate(first + n, shares), 0.0);
+        terms.diff[n] = max(interpolate(first + n, in.shares), 0.0);
         terms.a[n] = see(entries[first + n].source_idx, ray, s).a;
         if terms.a[n] > 0.0 {
             nearest = min(nearest, terms.diff[n]);
