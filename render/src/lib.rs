@@ -14,9 +14,11 @@ mod image_out;
 mod lumigraph;
 mod options;
 mod photos;
+pub mod picture;
 mod raster;
 mod rays;
 pub mod reference;
+pub mod score;
 pub mod triangulation;
 
 pub use engine::{DeviceChoice, Engine};
@@ -25,6 +27,7 @@ pub use frame::{Frame, FrameSource, ProxyPoint};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
+pub use score::Score;
 
 /// Why a frame could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
