@@ -13,6 +13,7 @@ pub mod gpu;
 mod image_out;
 mod lumigraph;
 mod options;
+pub mod path;
 mod photos;
 pub mod picture;
 mod raster;
@@ -26,6 +27,7 @@ pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, ProxyPoint};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
+pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
 
