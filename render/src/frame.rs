@@ -114,6 +114,11 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// Whether any source view's exposure differs from one.
+    pub fn gains_differ(&self) -> bool {
+        self.lumigraph.sources.iter().any(|s| s.gain != [1.0; 3])
+    }
+
     /// The proxy point seen at a pixel of the desired image, if there is one.
     pub fn proxy_point(&self, pixel: Pixel) -> Option<ProxyPoint> {
         let ray = self.desired.lens.unproject(pixel)?;

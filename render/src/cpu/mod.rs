@@ -202,7 +202,7 @@ impl<'a> Engine<'a> {
             rays: RayMap::of(&frame.desired),
             plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
             no_plane: frame.plane.is_none(),
-            gains: sources.iter().any(|s| s.gain != [1.0; 3]),
+            gains: frame.gains_differ(),
         }
     }
 

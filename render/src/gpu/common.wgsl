@@ -21,6 +21,7 @@ struct Params {
     blend: u32,
     resolution: u32,
     plane_seen: u32,
+    gains_differ: u32,
 }
 
 const BLEND_CONSISTENT = 0u;
@@ -28,48 +29,57 @@ const BLEND_PAPER = 1u;
 const RESOLUTION_RATIO = 0u;
 const RESOLUTION_LENGTH = 1u;
 
-struct Source {
-    // Rows of the rotation from the desired camera's frame; w: the translation.
-    x_axis: vec4f,
-    y_axis: vec4f,
-    z_axis: vec4f,
-    // The source's centre in the desired camera's frame; w: footprint ratio g.
-    center: vec4f,
-    focal: vec2f,
-    principal: vec2f,
-    size: vec2f,
-    inverse_feather: f32,
-    area_scale: f32,
-    // k1..k4, then k5, k6, p1, p2.
-    k1234: vec4f,
-    k56p12: vec4f,
-    // Limit of the squared radius, or of theta for a fisheye.
-    limit: f32,
-    // g squared less one.
-    footprint_excess: f32,
-    // See LENS_*.
-    lens: u32,
-    // Layer of the photos' array.
-    layer: u32,
-    // rgb; w: the last mip level.
-    gain: vec4f,
-}
+// A source view is SOURCE_TEXELS texels of a texture (`Source` of layout.rs): software
+// drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
+const SOURCE_TEXELS = 10u;
+const SOURCES_PER_ROW = 128u;
+// Rows of the rotation from the desired camera's frame; w: the translation.
+const X_AXIS = 0u;
+const Y_AXIS = 1u;
+const Z_AXIS = 2u;
+// The source's centre in the desired camera's frame; w: footprint ratio g.
+const CENTER = 3u;
+// Focal lengths, principal point.
+const PINHOLE = 4u;
+// Image size; inverse feather; area scale.
+const IMAGE = 5u;
+// k1..k4.
+const K1234 = 6u;
+// k5, k6, p1, p2.
+const K56P12 = 7u;
+// Limit of the squared radius, or of theta for a fisheye; g squared less one; LENS_*;
+// layer of the photos' array.
+const KIND = 8u;
+// rgb.
+const GAIN = 9u;
 
-const LENS_PINHOLE = 0u;
-const LENS_RATIONAL = 1u;
-const LENS_FISHEYE = 2u;
-const LENS_POLYNOMIAL = 3u;
+// The one kind of lens that all source views have; negative where they differ. Set when a
+// pipeline is made, so that no pixel pays for lenses that are not there.
+override COMMON_LENS: f32 = -1.0;
+
+const LENS_PINHOLE = 0.0;
+const LENS_RATIONAL = 1.0;
+const LENS_FISHEYE = 2.0;
+const LENS_POLYNOMIAL = 3.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> sources: array<Source>;
+@group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
+
+fn source_data(source_idx: u32, texel: u32) -> vec4f {
+    let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
+    return textureLoad(sources, vec2u(x, source_idx / SOURCES_PER_ROW), 0);
+}
 
 // Where a proxy point falls in a photo.
 struct Sight {
     pixel: vec2f,
-    // fovBlend; 0 where the photo does not see the point.
-    a: f32,
-    in_camera: vec3f,
+    // Depth, or distance for a fisheye.
+    depth: f32,
+    // Whether the lens sees that way at all; the pixel may still lie outside the photo.
+    seen: bool,
+    // Of the photos' array.
+    layer: u32,
 }
 
 // atan2 for y >= 0; the polynomial is Cephes' atanf.
@@ -96,26 +106,32 @@ fn ray_through(pixel: vec2u) -> vec3f {
 }
 
 fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
+    let x_axis = source_data(source_idx, X_AXIS);
+    let y_axis = source_data(source_idx, Y_AXIS);
+    let z_axis = source_data(source_idx, Z_AXIS);
     let p = vec3f(
-        dot(sources[source_idx].x_axis.xyz, ray) + sources[source_idx].x_axis.w * s,
-        dot(sources[source_idx].y_axis.xyz, ray) + sources[source_idx].y_axis.w * s,
-        dot(sources[source_idx].z_axis.xyz, ray) + sources[source_idx].z_axis.w * s,
+        dot(x_axis.xyz, ray) + x_axis.w * s,
+        dot(y_axis.xyz, ray) + y_axis.w * s,
+        dot(z_axis.xyz, ray) + z_axis.w * s,
     );
-    var sight = Sight(vec2f(0.0), 0.0, p);
+    let kind = source_data(source_idx, KIND);
+    let limit = kind.x;
+    let lens = select(kind.z, COMMON_LENS, COMMON_LENS >= 0.0);
+    var sight = Sight(vec2f(0.0), p.z, false, u32(kind.w));
 
     // 1. Through the lens.
     var bent: vec2f;
-    let lens = sources[source_idx].lens;
     if lens == LENS_FISHEYE {
         let radius = length(p.xy);
         let theta = angle(radius, p.z);
-        if theta > sources[source_idx].limit || (radius == 0.0 && p.z <= 0.0) {
+        if theta > limit || (radius == 0.0 && p.z <= 0.0) {
             return sight;
         }
-        let k = sources[source_idx].k1234;
+        let k = source_data(source_idx, K1234);
         let t2 = theta * theta;
         let r = theta * (1.0 + t2 * (k.x + t2 * (k.y + t2 * (k.z + t2 * k.w))));
         bent = p.xy * select(1.0 / p.z, r / radius, radius > 0.0);
+        sight.depth = length(p);
     } else {
         if p.z <= 0.0 {
             return sight;
@@ -123,56 +139,52 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
         let n = p.xy / p.z;
         bent = n;
         if lens != LENS_PINHOLE {
-            let k = sources[source_idx].k1234;
+            let k = source_data(source_idx, K1234);
             let r2 = dot(n, n);
-            if r2 > sources[source_idx].limit {
+            if r2 > limit {
                 return sight;
             }
             let above = 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
             bent = n * above;
             if lens == LENS_RATIONAL {
-                let h = sources[source_idx].k56p12;
+                let h = source_data(source_idx, K56P12);
                 let below = 1.0 + r2 * (k.w + r2 * (h.x + r2 * h.y));
                 bent = n * (above / below)
                     + 2.0 * h.zw * n.x * n.y + h.wz * (r2 + 2.0 * n * n);
             }
         }
     }
-    sight.pixel = bent * sources[source_idx].focal + sources[source_idx].principal;
-
-    // 2. fovBlend. On the very edge a view counts where there is no other.
-    let to_border = min(sight.pixel, sources[source_idx].size - sight.pixel);
-    let border = min(to_border.x, to_border.y);
-    if border >= 0.0 {
-        let f = clamp(border * sources[source_idx].inverse_feather, 0.0, 1.0);
-        sight.a = max(f * f * (3.0 - 2.0 * f), 1e-12);
-    }
+    let pinhole = source_data(source_idx, PINHOLE);
+    sight.pixel = bent * pinhole.xy + pinhole.zw;
+    sight.seen = true;
     return sight;
 }
 
-// The photo's colour there: premultiplied, at the mip level of the projected footprint.
-fn sample_photo(
-    photos: texture_2d_array<f32>,
-    photo_sampler: sampler,
-    source_idx: u32,
-    sight: Sight,
-    ray: vec3f,
-) -> vec4f {
-    let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
-    let there = select(sight.in_camera.z, length(sight.in_camera), sources[source_idx].lens == LENS_FISHEYE);
-    let ratio = here / there;
-    let area = sources[source_idx].area_scale * ratio * ratio * ratio;
-    var level = 0.0;
-    if area > 1.0 {
-        level = min(0.5 * log2(area), sources[source_idx].gain.w);
+// fovBlend: 0 where the photo does not see the point. On the photo's very edge a view
+// counts where there is no other.
+fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
+    let image = source_data(source_idx, IMAGE);
+    let to_border = min(sight.pixel, image.xy - sight.pixel);
+    let border = min(to_border.x, to_border.y);
+    if !sight.seen || border < 0.0 {
+        return 0.0;
     }
-    let uv = sight.pixel / params.array_size;
-    return textureSampleLevel(photos, photo_sampler, uv, sources[source_idx].layer, level);
+    let f = clamp(border * image.z, 0.0, 1.0);
+    return max(f * f * (3.0 - 2.0 * f), 1e-12);
+}
+
+// The mip level of the projected footprint.
+fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
+    let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
+    let ratio = here / sight.depth;
+    let area = source_data(source_idx, IMAGE).w * ratio * ratio * ratio;
+    return 0.5 * log2(max(area, 1.0));
 }
 
 // angDiff + beta * resDiff.
 fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
-    let c = sources[source_idx].center.xyz;
+    let center = source_data(source_idx, CENTER);
+    let c = center.xyz;
     let across = s * length(cross(c, ray));
     let towards = dot(ray, c);
     let ray_squared = dot(ray, ray);
@@ -181,9 +193,9 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
         let squares = s * dot(c, c) - 2.0 * towards;
         resolution = squares / (length(ray - s * c) + sqrt(ray_squared));
     } else {
-        let g = sources[source_idx].center.w;
+        let g = center.w;
         let excess = (s * s * dot(c, c) - 2.0 * s * towards) / ray_squared;
-        resolution = (sources[source_idx].footprint_excess + g * g * excess)
+        resolution = (source_data(source_idx, KIND).y + g * g * excess)
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
     return angle(across, ray_squared - s * towards) + params.beta * max(resolution, 0.0);
@@ -196,9 +208,14 @@ struct Mix {
     sum: f32,
 }
 
-fn add(mix: ptr<function, Mix>, weight: f32, color: vec4f, gain: vec3f) {
-    (*mix).color += weight * vec4f(color.rgb / gain, color.a);
-    (*mix).gain += weight * gain;
+fn add(mix: ptr<function, Mix>, weight: f32, color: vec4f, source_idx: u32) {
+    if params.gains_differ == 1u {
+        let gain = source_data(source_idx, GAIN).rgb;
+        (*mix).color += weight * vec4f(color.rgb / gain, color.a);
+        (*mix).gain += weight * gain;
+    } else {
+        (*mix).color += weight * color;
+    }
     (*mix).sum += weight;
 }
 
@@ -207,7 +224,8 @@ fn resolve(mix: Mix) -> vec4f {
     if mix.sum <= 0.0 || mix.color.a <= 0.0 {
         return vec4f(0.0);
     }
-    let rgb = mix.color.rgb * (mix.gain / mix.sum) / mix.color.a;
+    let gain = select(vec3f(1.0), mix.gain / mix.sum, params.gains_differ == 1u);
+    let rgb = mix.color.rgb * gain / mix.color.a;
     let alpha = mix.color.a / mix.sum;
     // What rounds to no coverage has no colour.
     return select(vec4f(rgb, alpha), vec4f(0.0), alpha * 255.0 < 0.5);

@@ -19,8 +19,8 @@ struct Nearest {
 fn nearest_sources(ray: vec3f, s: f32) -> Nearest {
     var nearest: Nearest;
     for (var i = 0u; i < params.source_count; i++) {
-        let sight = see(i, ray, s);
-        if sight.a <= 0.0 {
+        let a = fov_blend(i, see(i, ray, s));
+        if a <= 0.0 {
             continue;
         }
         let diff = difference(i, ray, s);
@@ -41,7 +41,7 @@ fn nearest_sources(ray: vec3f, s: f32) -> Nearest {
         }
         nearest.source_idx[at] = i;
         nearest.diff[at] = diff;
-        nearest.a[at] = sight.a;
+        nearest.a[at] = a;
     }
     return nearest;
 }

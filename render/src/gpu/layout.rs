@@ -25,9 +25,11 @@ pub(crate) struct Params {
     pub blend: u32,
     pub resolution: u32,
     pub plane_seen: u32,
+    pub gains_differ: u32,
+    pub padding: [u32; 3],
 }
 
-/// `Source` of common.wgsl.
+/// A source view: the texels that common.wgsl names, in order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Source {
@@ -42,8 +44,8 @@ pub(crate) struct Source {
     pub k56p12: [f32; 4],
     pub limit: f32,
     pub footprint_excess: f32,
-    pub lens: u32,
-    pub layer: u32,
+    pub lens: f32,
+    pub layer: f32,
     pub gain: [f32; 4],
 }
 
@@ -55,18 +57,23 @@ pub(crate) struct Corner {
     pub list: [u32; 2],
 }
 
-/// `Entry` of triangulated.wgsl.
+/// A texel of triangulated.wgsl's entries.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Entry {
-    pub source_idx: u32,
+    pub source_idx: f32,
     pub values: [f32; 3],
 }
 
-const LENS_PINHOLE: u32 = 0;
-const LENS_RATIONAL: u32 = 1;
-const LENS_FISHEYE: u32 = 2;
-const LENS_POLYNOMIAL: u32 = 3;
+/// Texels of a row of the sources' texture, and of the entries'.
+pub(crate) const SOURCE_ROW: u32 = 128 * (size_of::<Source>() / 16) as u32;
+/// See [`SOURCE_ROW`].
+pub(crate) const ENTRY_ROW: u32 = 1024;
+
+const LENS_PINHOLE: f32 = 0.0;
+const LENS_RATIONAL: f32 = 1.0;
+const LENS_FISHEYE: f32 = 2.0;
+const LENS_POLYNOMIAL: f32 = 3.0;
 
 impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
@@ -92,12 +99,14 @@ impl Params {
                 Resolution::Length => 1,
             },
             plane_seen: u32::from(frame.plane.is_some()),
+            gains_differ: u32::from(frame.gains_differ()),
+            padding: [0; 3],
         }
     }
 }
 
 impl Source {
-    pub(crate) fn of(frame: &Frame<'_>, source_idx: usize, layer: u32, last_level: usize) -> Self {
+    pub(crate) fn of(frame: &Frame<'_>, source_idx: usize, layer: u32) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
         let axis = |r: usize| {
             let w = source.translation[r] as f32;
@@ -106,23 +115,15 @@ impl Source {
         let g = source.footprint_ratio;
         let limit = source.lens.limit();
         let f = |v: f64| v as f32;
-        let (lens, k1234, k56p12, limit) = match source.lens.distortion() {
-            Distortion::None => (LENS_PINHOLE, [0.0; 4], [0.0; 4], f64::INFINITY),
-            Distortion::Rational { k, p } => {
-                let simple = k[3..] == [0.0; 3] && p == [0.0; 2];
-                let lens = if simple {
-                    LENS_POLYNOMIAL
-                } else {
-                    LENS_RATIONAL
-                };
-                (
-                    lens,
-                    [k[0], k[1], k[2], k[3]],
-                    [k[4], k[5], p[0], p[1]],
-                    limit * limit,
-                )
-            }
-            Distortion::Fisheye { k } => (LENS_FISHEYE, k, [0.0; 4], limit),
+        let lens = lens_kind(source.lens.distortion());
+        let (k1234, k56p12, limit) = match source.lens.distortion() {
+            Distortion::None => ([0.0; 4], [0.0; 4], f64::INFINITY),
+            Distortion::Rational { k, p } => (
+                [k[0], k[1], k[2], k[3]],
+                [k[4], k[5], p[0], p[1]],
+                limit * limit,
+            ),
+            Distortion::Fisheye { k } => (k, [0.0; 4], limit),
         };
         let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
         Self {
@@ -138,9 +139,25 @@ impl Source {
             limit: f(limit.min(1e30)),
             footprint_excess: f(g * g - 1.0),
             lens,
-            layer,
-            gain: gain.extend(last_level as f32).to_array(),
+            layer: layer as f32,
+            gain: gain.extend(0.0).to_array(),
         }
+    }
+}
+
+/// The kind of lens that all source views have, if it is one; as the shaders number them.
+pub(crate) fn common_lens(frame: &Frame<'_>) -> Option<f32> {
+    let mut kinds = frame.sources.iter().map(|s| lens_kind(s.lens.distortion()));
+    let first = kinds.next()?;
+    kinds.all(|kind| kind == first).then_some(first)
+}
+
+fn lens_kind(distortion: Distortion) -> f32 {
+    match distortion {
+        Distortion::None => LENS_PINHOLE,
+        Distortion::Rational { k, p } if k[3..] == [0.0; 3] && p == [0.0; 2] => LENS_POLYNOMIAL,
+        Distortion::Rational { .. } => LENS_RATIONAL,
+        Distortion::Fisheye { .. } => LENS_FISHEYE,
     }
 }
 

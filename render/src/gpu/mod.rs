@@ -14,7 +14,7 @@ use calibrate::Lens;
 use image::RgbaImage;
 use layout::{Corner, Entry, Params, Source};
 use photos::Photos;
-use pipelines::Pipelines;
+use pipelines::{Pass, Pipelines};
 use std::fmt;
 use std::sync::{Arc, Mutex};
 use target::Target;
@@ -156,27 +156,28 @@ impl Gpu {
             .entries
             .iter()
             .map(|e| Entry {
-                source_idx: e.source_idx,
+                source_idx: e.source_idx as f32,
                 values: e.values,
             })
             .collect();
         let plain_buffer = self.buffer("corners", &plain, wgpu::BufferUsages::VERTEX);
         let bordered_buffer = self.buffer("corners", &bordered, wgpu::BufferUsages::VERTEX);
-        let entries_buffer = self.buffer("entries", &entries, wgpu::BufferUsages::STORAGE);
+        let entries = self.table("entries", bytemuck::cast_slice(&entries), layout::ENTRY_ROW);
         let photos = self.photos.as_ref().expect("prepared above");
-        let own = self.pipelines.triangulated_group(
-            &self.device,
-            &photos.view,
-            &self.sampler,
-            &entries_buffer,
-        );
+        let own =
+            self.pipelines
+                .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
+        let lens = layout::common_lens(frame);
+        self.pipelines.ensure(&self.device, Pass::Triangles, lens);
+        self.pipelines
+            .ensure(&self.device, Pass::BorderedTriangles, lens);
         self.draw(frame, |pass, pipelines| {
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
-            pass.set_pipeline(&pipelines.triangles);
+            pass.set_pipeline(pipelines.get(Pass::Triangles, lens));
             pass.set_vertex_buffer(0, plain_buffer.slice(..));
             pass.draw(0..plain.len() as u32, 0..1);
-            pass.set_pipeline(&pipelines.bordered_triangles);
+            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, lens));
             pass.set_vertex_buffer(0, bordered_buffer.slice(..));
             pass.draw(0..bordered.len() as u32, 0..1);
         })
@@ -195,8 +196,10 @@ impl Gpu {
         let own = self
             .pipelines
             .exact_group(&self.device, &photos.view, &self.sampler);
+        let lens = layout::common_lens(frame);
+        self.pipelines.ensure(&self.device, Pass::Exact, lens);
         self.draw(frame, |pass, pipelines| {
-            pass.set_pipeline(&pipelines.exact);
+            pass.set_pipeline(pipelines.get(Pass::Exact, lens));
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
             pass.draw(0..3, 0..1);
@@ -214,7 +217,10 @@ impl Gpu {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipelines.mark);
+            pass.set_pipeline(
+                self.pipelines
+                    .mark(&self.device, layout::common_lens(frame)),
+            );
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
             let (width, height) = (frame.desired.width, frame.desired.height);
@@ -241,13 +247,14 @@ impl Gpu {
         let rays = self.rays(frame)?;
         let photos = self.photos.as_ref().expect("ensured above");
         let params = Params::of(frame, photos.size);
-        let source = |i| Source::of(frame, i, photos.layer(i), photos.last_level(frame, i));
-        let mut sources: Vec<Source> = (0..frame.sources.len()).map(source).collect();
-        if sources.is_empty() {
-            sources.push(bytemuck::Zeroable::zeroed());
-        }
+        let source = |i| Source::of(frame, i, photos.layer(i));
+        let sources: Vec<Source> = (0..frame.sources.len()).map(source).collect();
         let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
-        let sources = self.buffer("sources", &sources, wgpu::BufferUsages::STORAGE);
+        let sources = self.table(
+            "sources",
+            bytemuck::cast_slice(&sources),
+            layout::SOURCE_ROW,
+        );
         Ok(self
             .pipelines
             .shared_group(&self.device, &params, &sources, &rays))
@@ -280,28 +287,46 @@ impl Gpu {
                 size[0], size[1]
             )));
         }
-        let texture = self.device.create_texture_with_data(
-            &self.queue,
-            &wgpu::TextureDescriptor {
-                label: Some("rays"),
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba32Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::LayerMajor,
-            bytemuck::cast_slice(&texels),
-        );
-        let view = texture.create_view(&Default::default());
+        let view = self.texels("rays", width, height, &texels);
         self.rays = Some((desired.lens, size, view.clone()));
         Ok(view)
+    }
+
+    /// A list of texels as a texture of rows of `row` texels; never empty.
+    fn table(&self, label: &str, texels: &[[f32; 4]], row: u32) -> wgpu::TextureView {
+        let height = (texels.len() as u32).div_ceil(row).max(1);
+        let mut texels = texels.to_vec();
+        texels.resize((row * height) as usize, [0.0; 4]);
+        self.texels(label, row, height, &texels)
+    }
+
+    fn texels(
+        &self,
+        label: &str,
+        width: u32,
+        height: u32,
+        texels: &[[f32; 4]],
+    ) -> wgpu::TextureView {
+        let descriptor = wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let order = wgpu::util::TextureDataOrder::LayerMajor;
+        let bytes = bytemuck::cast_slice(texels);
+        let texture = self
+            .device
+            .create_texture_with_data(&self.queue, &descriptor, order, bytes);
+        texture.create_view(&Default::default())
     }
 
     fn buffer<T: bytemuck::Pod>(

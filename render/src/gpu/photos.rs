@@ -21,7 +21,6 @@ pub(crate) struct Photos {
     layers: Vec<Option<u32>>,
     used_layers: u32,
     capacity: u32,
-    levels: usize,
 }
 
 /// Both sides of the array are multiples of this, the texel of the coarsest level.
@@ -105,7 +104,6 @@ impl Photos {
             ..Default::default()
         });
         let layers = vec![None; sources.len()];
-        let levels = MAX_LEVELS;
         Ok(Self {
             texture,
             view,
@@ -114,7 +112,6 @@ impl Photos {
             layers,
             used_layers: 0,
             capacity,
-            levels,
         })
     }
 
@@ -136,7 +133,9 @@ impl Photos {
     }
 
     fn upload(&self, queue: &wgpu::Queue, photo: &Pyramid, layer: u32) {
-        for (level, image) in photo.levels.iter().enumerate() {
+        for level in 0..MAX_LEVELS {
+            // A photo that is one texel sooner stays one.
+            let image = &photo.levels[level.min(photo.levels.len() - 1)];
             let padded = pad(image, self.size[0] >> level, self.size[1] >> level);
             let (width, height) = padded.dimensions();
             queue.write_texture(
@@ -173,17 +172,6 @@ impl Photos {
     /// Whether every photo is on the device.
     pub(crate) fn complete(&self, store_id: u64) -> bool {
         self.store_id == store_id && self.layers.iter().all(Option::is_some)
-    }
-
-    /// The coarsest mip level that a photo of this size has.
-    pub(crate) fn last_level(&self, frame: &Frame<'_>, source_idx: usize) -> usize {
-        let view = &frame.lumigraph.sources[source_idx].view;
-        let halvings = view
-            .width
-            .max(view.height)
-            .next_power_of_two()
-            .trailing_zeros() as usize;
-        halvings.min(self.levels - 1)
     }
 }
 

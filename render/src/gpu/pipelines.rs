@@ -1,6 +1,7 @@
 //! Shaders, pipelines and bind groups: what exists once per device.
 
 use super::layout::Corner;
+use std::collections::BTreeMap;
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, Device, ShaderStages};
 
 /// What pictures are drawn in: stored sRGB values, blended as they are.
@@ -19,12 +20,23 @@ pub(crate) const SHADERS: [(&str, &[&str]); 3] = [
     ("exact_mark", &[COMMON, EXACT, EXACT_MARK]),
 ];
 
-/// Pipelines and the layouts of what they read.
+/// What a pipeline draws or computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Pass {
+    /// The triangulated field where no photo's border is.
+    Triangles,
+    /// The triangulated field where a photo's border crosses.
+    BorderedTriangles,
+    /// The exact field.
+    Exact,
+}
+
+/// The pipelines made so far, and all that it takes to make more. Each exists once for
+/// every kind of lens that is met.
 pub(crate) struct Pipelines {
-    pub triangles: wgpu::RenderPipeline,
-    pub bordered_triangles: wgpu::RenderPipeline,
-    pub exact: wgpu::RenderPipeline,
-    pub mark: wgpu::ComputePipeline,
+    made: BTreeMap<(Pass, u32), wgpu::RenderPipeline>,
+    mark: BTreeMap<u32, wgpu::ComputePipeline>,
+    shaders: [wgpu::ShaderModule; 3],
     shared_layout: BindGroupLayout,
     triangulated_layout: BindGroupLayout,
     exact_layout: BindGroupLayout,
@@ -57,102 +69,139 @@ impl Pipelines {
                 entries: &entries,
             })
         };
-        let read_only = buffer(Storage { read_only: true });
         let photos = texture(wgpu::TextureViewDimension::D2Array, true);
         let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-        let fragment = ShaderStages::FRAGMENT;
-        let rays = texture(wgpu::TextureViewDimension::D2, false);
-        let shared_layout = layout(
-            "shared",
-            ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE,
-            &[buffer(Uniform), read_only, rays],
-        );
-        let triangulated_layout = layout("triangulated", fragment, &[photos, sampler, read_only]);
-        let exact_layout = layout("exact", fragment, &[photos, sampler]);
+        let table = texture(wgpu::TextureViewDimension::D2, false);
         let writable = buffer(Storage { read_only: false });
-        let mark_layout = layout("mark", ShaderStages::COMPUTE, &[writable]);
-
+        let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
+        let fragment = ShaderStages::FRAGMENT;
         let shader = |(name, parts): (&str, &[&str])| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
             })
         };
-        let [triangulated, exact_draw, exact_mark] = SHADERS.map(shader);
-        let pipeline_layout = |own: &BindGroupLayout| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: None,
-                bind_group_layouts: &[Some(&shared_layout), Some(own)],
-                immediate_size: 0,
-            })
-        };
-        let render = |own, module, vertex, fragment, buffers: &[_]| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(fragment),
-                layout: Some(&pipeline_layout(own)),
-                vertex: wgpu::VertexState {
-                    module,
-                    entry_point: Some(vertex),
-                    compilation_options: Default::default(),
-                    buffers,
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module,
-                    entry_point: Some(fragment),
-                    compilation_options: Default::default(),
-                    targets: &[Some(PICTURE_FORMAT.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        let corner_layout = wgpu::VertexBufferLayout {
+        Self {
+            made: BTreeMap::new(),
+            mark: BTreeMap::new(),
+            shaders: SHADERS.map(shader),
+            shared_layout: layout("shared", all, &[buffer(Uniform), table, table]),
+            triangulated_layout: layout("triangulated", fragment, &[photos, sampler, table]),
+            exact_layout: layout("exact", fragment, &[photos, sampler]),
+            mark_layout: layout("mark", ShaderStages::COMPUTE, &[writable]),
+        }
+    }
+
+    /// Makes sure that [`Self::get`] has a pipeline for the frame's lenses. `common_lens`
+    /// is what all source views have, if they have one kind.
+    pub(crate) fn ensure(&mut self, device: &Device, pass: Pass, common_lens: Option<f32>) {
+        let key = (pass, lens_key(common_lens));
+        if self.made.contains_key(&key) {
+            return;
+        }
+        let corners = [Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Corner>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Uint32x2],
-        };
-        let field_pipeline = |fragment| {
-            let corners = [Some(corner_layout.clone())];
-            render(
-                &triangulated_layout,
-                &triangulated,
+        })];
+        let (own, module, vertex, fragment, buffers): (_, _, _, _, &[_]) = match pass {
+            Pass::Triangles => (
+                &self.triangulated_layout,
+                &self.shaders[0],
                 "corner",
-                fragment,
+                "triangle",
                 &corners,
-            )
+            ),
+            Pass::BorderedTriangles => (
+                &self.triangulated_layout,
+                &self.shaders[0],
+                "corner",
+                "bordered_triangle",
+                &corners,
+            ),
+            Pass::Exact => (
+                &self.exact_layout,
+                &self.shaders[1],
+                "whole_image",
+                "draw",
+                &[],
+            ),
         };
-        Self {
-            triangles: field_pipeline("triangle"),
-            bordered_triangles: field_pipeline("bordered_triangle"),
-            exact: render(&exact_layout, &exact_draw, "whole_image", "draw", &[]),
-            mark: device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("mark"),
-                layout: Some(&pipeline_layout(&mark_layout)),
-                module: &exact_mark,
-                entry_point: Some("mark"),
-                compilation_options: Default::default(),
-                cache: None,
+        let constants = [("COMMON_LENS", f64::from(common_lens.unwrap_or(-1.0)))];
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            constants: &constants,
+            ..Default::default()
+        };
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(fragment),
+            layout: Some(&self.layout(device, own)),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some(vertex),
+                compilation_options: compilation_options.clone(),
+                buffers,
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some(fragment),
+                compilation_options,
+                targets: &[Some(PICTURE_FORMAT.into())],
             }),
-            shared_layout,
-            triangulated_layout,
-            exact_layout,
-            mark_layout,
-        }
+            multiview_mask: None,
+            cache: None,
+        });
+        self.made.insert(key, pipeline);
+    }
+
+    /// A pipeline that [`Self::ensure`] made.
+    pub(crate) fn get(&self, pass: Pass, common_lens: Option<f32>) -> &wgpu::RenderPipeline {
+        &self.made[&(pass, lens_key(common_lens))]
+    }
+
+    /// The pass that marks the photos which the exact field samples.
+    pub(crate) fn mark(
+        &mut self,
+        device: &Device,
+        common_lens: Option<f32>,
+    ) -> &wgpu::ComputePipeline {
+        let layout = self.layout(device, &self.mark_layout);
+        let module = &self.shaders[2];
+        self.mark.entry(lens_key(common_lens)).or_insert_with(|| {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("mark"),
+                layout: Some(&layout),
+                module,
+                entry_point: Some("mark"),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("COMMON_LENS", f64::from(common_lens.unwrap_or(-1.0)))],
+                    ..Default::default()
+                },
+                cache: None,
+            })
+        })
+    }
+
+    fn layout(&self, device: &Device, own: &BindGroupLayout) -> wgpu::PipelineLayout {
+        device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(&self.shared_layout), Some(own)],
+            immediate_size: 0,
+        })
     }
 
     pub(crate) fn shared_group(
         &self,
         device: &Device,
         params: &wgpu::Buffer,
-        sources: &wgpu::Buffer,
+        sources: &wgpu::TextureView,
         rays: &wgpu::TextureView,
     ) -> BindGroup {
         let resources = [
             params.as_entire_binding(),
-            sources.as_entire_binding(),
+            BindingResource::TextureView(sources),
             BindingResource::TextureView(rays),
         ];
         group(device, &self.shared_layout, resources)
@@ -163,12 +212,12 @@ impl Pipelines {
         device: &Device,
         photos: &wgpu::TextureView,
         sampler: &wgpu::Sampler,
-        entries: &wgpu::Buffer,
+        entries: &wgpu::TextureView,
     ) -> BindGroup {
         let resources = [
             BindingResource::TextureView(photos),
             BindingResource::Sampler(sampler),
-            entries.as_entire_binding(),
+            BindingResource::TextureView(entries),
         ];
         group(device, &self.triangulated_layout, resources)
     }
@@ -189,6 +238,11 @@ impl Pipelines {
     pub(crate) fn mark_group(&self, device: &Device, used: &wgpu::Buffer) -> BindGroup {
         group(device, &self.mark_layout, [used.as_entire_binding()])
     }
+}
+
+/// Lenses' numbers are small and whole; those of views that differ share one more.
+fn lens_key(common_lens: Option<f32>) -> u32 {
+    common_lens.map_or(u32::MAX, |lens| lens as u32)
 }
 
 fn group<const N: usize>(

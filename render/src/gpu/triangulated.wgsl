@@ -1,12 +1,6 @@
 // The triangulated field: each triangle carries a list of source views with their weights
 // at its corners (Buehler et al. 2001, section 4.2), drawn once for the whole list.
 
-struct Entry {
-    source_idx: u32,
-    // At the corners: weights, or in a bordered triangle differences.
-    values: array<f32, 3>,
-}
-
 // MAX_LISTED of field.rs.
 const LISTED = 32u;
 const CONTRIBUTORS = 16u;
@@ -16,7 +10,10 @@ const INFINITY = 3e38;
 
 @group(1) @binding(0) var photos: texture_2d_array<f32>;
 @group(1) @binding(1) var photo_sampler: sampler;
-@group(1) @binding(2) var<storage, read> entries: array<Entry>;
+// A texel an entry: the source view, then its values at the corners: weights, or in a
+// bordered triangle differences.
+@group(1) @binding(2) var entries: texture_2d<f32>;
+const ENTRIES_PER_ROW = 1024u;
 
 struct Corner {
     @builtin(position) position: vec4f,
@@ -38,9 +35,14 @@ fn corner(
     return Corner(vec4f(ndc, 0.0, 1.0), shares, list);
 }
 
-fn interpolate(entry_idx: u32, shares: vec3f) -> f32 {
-    let v = entries[entry_idx].values;
-    return shares.x * v[0] + shares.y * v[1] + shares.z * v[2];
+fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, layer: u32, texel: vec3f) {
+    let uv = texel.xy / params.array_size;
+    let color = textureSampleLevel(photos, photo_sampler, uv, layer, texel.z);
+    add(mix, weight, color, source_idx);
+}
+
+fn entry(entry_idx: u32) -> vec4f {
+    return textureLoad(entries, vec2u(entry_idx % ENTRIES_PER_ROW, entry_idx / ENTRIES_PER_ROW), 0);
 }
 
 @fragment
@@ -52,25 +54,29 @@ fn triangle(in: Corner) -> @location(0) vec4f {
     }
     var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
     for (var i = in.list.x; i < in.list.x + in.list.y; i++) {
-        let weight = interpolate(i, in.shares);
+        let listed = entry(i);
+        let weight = dot(in.shares, listed.yzw);
         if weight <= 0.0 {
             continue;
         }
-        let source_idx = entries[i].source_idx;
+        let source_idx = u32(listed.x);
+        // Every listed view sees all of the triangle: fovBlend is one.
         let sight = see(source_idx, ray, s);
-        let a = weight * sight.a;
-        if a > 0.0 {
-            let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
-            add(&mix, a, color, sources[source_idx].gain.rgb);
+        if sight.seen {
+            let level = level_of_detail(source_idx, sight, ray);
+            add_photo(&mix, weight, source_idx, sight.layer, vec3f(sight.pixel, level));
         }
     }
     return resolve(mix);
 }
 
-// One view's terms of the blend at a pixel.
+// The views' terms of the blend at a pixel.
 struct Terms {
     diff: array<f32, LISTED>,
     a: array<f32, LISTED>,
+    // Where to sample, and the mip level.
+    texel: array<vec3f, LISTED>,
+    source_idx: array<u32, LISTED>,
 }
 
 // Where the border of a photo crosses the triangle: interpolated differences, the pixel's
@@ -84,32 +90,44 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let first = in.list.x;
-    let count = in.list.y;
+    // 1. Who sees the point.
     var terms: Terms;
+    var count = 0u;
     var nearest = INFINITY;
-    for (var n = 0u; n < count; n++) {
-        terms.diff[n] = max(interpolate(first + n, in.shares), 0.0);
-        terms.a[n] = see(entries[first + n].source_idx, ray, s).a;
-        if terms.a[n] > 0.0 {
-            nearest = min(nearest, terms.diff[n]);
+    for (var i = first; i < first + in.list.y; i++) {
+        let listed = entry(i);
+        let source_idx = u32(listed.x);
+        let sight = see(source_idx, ray, s);
+        let a = fov_blend(source_idx, sight);
+        if a > 0.0 {
+            let diff = max(dot(in.shares, listed.yzw), 0.0);
+            nearest = min(nearest, diff);
+            terms.diff[count] = diff;
+            terms.a[count] = a;
+            terms.texel[count] = vec3f(sight.pixel, level_of_detail(source_idx, sight, ray));
+            terms.source_idx[count] = source_idx;
+            count++;
         }
     }
+    if count == 0u {
+        return vec4f(0.0);
+    }
+    // 2. Their weights and colours.
     let t = max(threshold(&terms, count), SMALLEST_THRESHOLD);
     var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
-        var weight = terms.a[n] * max(1.0 - terms.diff[n] / t, 0.0);
+        let diff = terms.diff[n];
+        var weight = terms.a[n] * max(1.0 - diff / t, 0.0);
         if params.blend == BLEND_CONSISTENT {
-            weight /= max(terms.diff[n], SAME_RAY);
+            weight /= max(diff, SAME_RAY);
         }
         // Where the nearest is as far as the threshold, all are tied.
-        if nearest >= t && terms.diff[n] <= nearest {
+        if nearest >= t && diff <= nearest {
             weight = terms.a[n];
         }
         if weight > 0.0 {
-            let source_idx = entries[first + n].source_idx;
-            let sight = see(source_idx, ray, s);
-            let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
-            add(&mix, weight, color, sources[source_idx].gain.rgb);
+            let layer = u32(source_data(terms.source_idx[n], KIND).w);
+            add_photo(&mix, weight, terms.source_idx[n], layer, terms.texel[n]);
         }
     }
     return resolve(mix);
@@ -128,7 +146,7 @@ fn threshold(terms: ptr<function, Terms>, count: u32) -> f32 {
         contributors = 0u;
         for (var n = 0u; n < count; n++) {
             let a = (*terms).a[n];
-            if (*terms).diff[n] < t && a > 0.0 {
+            if (*terms).diff[n] < t {
                 sum_a += a;
                 sum_a_diff += a * (*terms).diff[n];
                 contributors++;
@@ -158,7 +176,7 @@ fn nth_smallest(terms: ptr<function, Terms>, count: u32, nth: u32) -> f32 {
         var ties = 0u;
         for (var n = 0u; n < count; n++) {
             let diff = (*terms).diff[n];
-            if (*terms).a[n] <= 0.0 || diff <= value {
+            if diff <= value {
                 continue;
             }
             ties = select(ties, 0u, diff < next);
