@@ -1,0 +1,7 @@
+//! COLMAP models: read, written, and refused.
+
+mod captures;
+mod errors;
+mod find;
+mod round_trip;
+mod synthetic;

@@ -1,0 +1,191 @@
+//! A dataset on disk: the folder a user would have, with the truth beside it.
+
+use crate::picture::{Corners, render_through};
+use crate::{Dataset, DatasetError, Photo, render_depth};
+use calibrate::colmap;
+use image::{DynamicImage, ImageBuffer, Luma};
+use std::path::{Path, PathBuf};
+
+/// Depth maps hold this many steps to a world unit: millimetres where units are metres.
+pub const DEPTH_STEPS_PER_UNIT: f64 = 1000.0;
+
+/// What [`write()`] has written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Where.
+    pub folder: PathBuf,
+    /// How many photos, each with a depth map.
+    pub photos: usize,
+    /// How many of them are kept aside for scoring.
+    pub held_out: usize,
+    /// How many sparse points.
+    pub points: usize,
+    /// How often these are seen, all photos together.
+    pub observations: usize,
+}
+
+/// Renders and writes a dataset: `images/`, `depth/`, `sparse/0/` (COLMAP, binary),
+/// `split.json` and `README.md`.
+///
+/// Everything is written into a folder beside `folder` that takes its name only when it
+/// is complete.
+///
+/// # Errors
+/// `folder` exists and is not empty, or something cannot be written; then nothing stays
+/// behind.
+pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> {
+    // 1. A place to work, next to the destination: renaming must not cross disks.
+    if folder.exists() && !is_empty(folder)? {
+        return Err(DatasetError::NotEmpty {
+            folder: folder.to_owned(),
+        });
+    }
+    let partial = partial_name(folder);
+    make_folder(&partial)?;
+    // 2. Fill it, and let it take the destination's place.
+    let done = fill(dataset, &partial).and_then(|()| {
+        if folder.exists() {
+            std::fs::remove_dir(folder).map_err(|source| io(folder, source))?;
+        }
+        std::fs::rename(&partial, folder).map_err(|source| io(folder, source))
+    });
+    if let Err(error) = done {
+        // The first error is the one to tell.
+        let _ = std::fs::remove_dir_all(&partial);
+        return Err(error);
+    }
+    let points = &dataset.reconstruction.points;
+    Ok(Written {
+        folder: folder.to_owned(),
+        photos: dataset.photos.len(),
+        held_out: dataset.held_out.len(),
+        points: points.len(),
+        observations: points.values().map(|point| point.track.len()).sum(),
+    })
+}
+
+fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
+    let [images, depths, sparse] = ["images", "depth", "sparse/0"].map(|name| folder.join(name));
+    for folder in [&images, &depths, &sparse] {
+        make_folder(folder)?;
+    }
+    colmap::write_binary(&dataset.reconstruction, &sparse)?;
+    let mut last: Option<(&Photo, Corners)> = None;
+    for photo in &dataset.photos {
+        // Photos through one lens share its rays.
+        let corners = match last {
+            Some((before, corners)) if before.camera == photo.camera => corners,
+            _ => Corners::of(&photo.view),
+        };
+        let picture = render_through(
+            &dataset.scene,
+            &photo.view,
+            dataset.samples_per_side,
+            &corners,
+        );
+        save(
+            DynamicImage::from(DynamicImage::from(picture).into_rgb8()),
+            &images.join(&photo.name),
+        )?;
+        let depth = DynamicImage::from(depth_steps(dataset, photo));
+        let name = Path::new(&photo.name).with_extension("png");
+        save(depth, &depths.join(name))?;
+        last = Some((photo, corners));
+    }
+    write_text(&folder.join("split.json"), &split(dataset))?;
+    write_text(&folder.join("README.md"), &readme(dataset))
+}
+
+/// Depth along z in steps; 0 where there is no surface or it is too far to say.
+fn depth_steps(dataset: &Dataset, photo: &Photo) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let steps = render_depth(&dataset.scene, &photo.view)
+        .into_iter()
+        .map(|depth| {
+            let steps = (depth * DEPTH_STEPS_PER_UNIT).round();
+            if (0.0..=f64::from(u16::MAX)).contains(&steps) {
+                steps as u16
+            } else {
+                0
+            }
+        })
+        .collect();
+    ImageBuffer::from_raw(photo.view.width, photo.view.height, steps).expect("a step a pixel")
+}
+
+fn split(dataset: &Dataset) -> String {
+    // Names are ours: nothing in them needs escaping.
+    let names: Vec<String> = dataset
+        .held_out
+        .iter()
+        .map(|name| format!("  \"{name}\""))
+        .collect();
+    format!("{{\n \"test\": [\n{}\n ]\n}}\n", names.join(",\n"))
+}
+
+fn readme(dataset: &Dataset) -> String {
+    let camera = &dataset.photos[0].camera;
+    let params: Vec<String> = camera.params.iter().map(f64::to_string).collect();
+    let points = &dataset.reconstruction.points;
+    let observations: usize = points.values().map(|point| point.track.len()).sum();
+    format!(
+        "# {name}\n\
+         \n\
+         - Source: `lumigraph generate {name}`, a procedural scene. Licence: as the program's.\n\
+         - Kind: {kind}\n\
+         - {photos} images of {width} x {height} (images/), depth/; {held_out} held out in \
+         split.json (every 8th by name).\n\
+         - Camera: {model} (shared), params {params}.\n\
+         - {points} points, mean track length {track:.1}, reprojection error 0: points and \
+         keypoints are exact.\n\
+         - Calibration: poses, points and depth are exact by construction. depth/NAME.png is \
+         16-bit along z at pixel centres, 1/{steps} of a world unit a step, 0 = no surface.\n\
+         - Photos: {samples}x{samples} rays a pixel, averaged in linear light, stored as sRGB.\n\
+         - Stresses: {stresses}\n",
+        name = dataset.name,
+        kind = dataset.kind,
+        photos = dataset.photos.len(),
+        width = camera.width,
+        height = camera.height,
+        held_out = dataset.held_out.len(),
+        model = camera.model.name(),
+        params = params.join(", "),
+        points = points.len(),
+        track = observations as f64 / points.len().max(1) as f64,
+        steps = DEPTH_STEPS_PER_UNIT,
+        samples = dataset.samples_per_side,
+        stresses = dataset.stresses,
+    )
+}
+
+fn is_empty(folder: &Path) -> Result<bool, DatasetError> {
+    let mut entries = std::fs::read_dir(folder).map_err(|source| io(folder, source))?;
+    Ok(entries.next().is_none())
+}
+
+/// A hidden sibling named after this process.
+fn partial_name(folder: &Path) -> PathBuf {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    folder.with_file_name(format!(".{name}.partial-{}", std::process::id()))
+}
+
+fn make_folder(folder: &Path) -> Result<(), DatasetError> {
+    std::fs::create_dir_all(folder).map_err(|source| io(folder, source))
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), DatasetError> {
+    std::fs::write(path, text).map_err(|source| io(path, source))
+}
+
+fn save(picture: DynamicImage, path: &Path) -> Result<(), DatasetError> {
+    picture.save(path).map_err(|source| DatasetError::Picture {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn io(path: &Path, source: std::io::Error) -> DatasetError {
+    DatasetError::Io {
+        path: path.to_owned(),
+        source,
+    }
+}

@@ -1,0 +1,271 @@
+//! What the datasets promise: everything about them is exact, on disk as in memory.
+
+use calibrate::Pixel;
+use datasets::{
+    DEPTH_STEPS_PER_UNIT, Dataset, DatasetError, Finish, Options, by_name, names, render_depth,
+    render_view, srgb_from_linear, write,
+};
+use glam::DVec3;
+
+fn small(name: &str, views: usize) -> Dataset {
+    let options = Options {
+        size: Some((160, 120)),
+        views: Some(views),
+        samples_per_side: Some(2),
+    };
+    by_name(name, &options).unwrap()
+}
+
+#[test]
+fn keypoints_are_the_projections_of_their_points() {
+    for name in names() {
+        let dataset = small(name, 9);
+        let reconstruction = &dataset.reconstruction;
+        assert!(reconstruction.points.len() > 500, "{name}");
+        let mut observations = 0;
+        for (id, point) in &reconstruction.points {
+            assert!(point.track.len() >= 2);
+            assert_eq!(point.error_px, 0.0);
+            for (image_id, keypoint_idx) in &point.track {
+                let image = &reconstruction.images[image_id];
+                let keypoint = image.keypoints[*keypoint_idx as usize];
+                assert_eq!(keypoint.point, Some(*id));
+                let photo = dataset
+                    .photos
+                    .iter()
+                    .find(|p| p.name == image.name)
+                    .unwrap();
+                let pixel = photo.view.project(point.position).unwrap();
+                assert!(photo.view.contains(pixel));
+                assert!(pixel.distance(Pixel::new(keypoint.x, keypoint.y)) < 1e-9);
+                observations += 1;
+            }
+        }
+        let keypoints: usize = reconstruction
+            .images
+            .values()
+            .map(|i| i.keypoints.len())
+            .sum();
+        assert_eq!(observations, keypoints, "every keypoint belongs to a point");
+    }
+}
+
+#[test]
+fn depth_maps_agree_with_rays_and_with_points() {
+    for name in names() {
+        let dataset = small(name, 2);
+        let photo = &dataset.photos[1];
+        let view = &photo.view;
+        let depth = render_depth(&dataset.scene, view);
+        for row in (0..view.height).step_by(7) {
+            for column in (0..view.width).step_by(7) {
+                let found = depth[(row * view.width + column) as usize];
+                let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
+                let direction = view.camera_from_world.rotation.conjugate() * ray;
+                let hit = dataset.scene.trace(view.center(), direction).unwrap();
+                let expected = (view.camera_from_world * hit.point).z;
+                assert!(
+                    (found - expected).abs() < 1e-12,
+                    "{name} at {column}, {row}"
+                );
+                let back = view.project(hit.point).unwrap();
+                assert!(back.distance(Pixel::center_of(column, row)) < 1e-9);
+            }
+        }
+        // A sparse point lies on the surface that the map has around its keypoint.
+        let image = reconstruction_image(&dataset, &photo.name);
+        let mut near = 0;
+        for keypoint in &image.keypoints {
+            let point = &dataset.reconstruction.points[&keypoint.point.unwrap()];
+            let z = (view.camera_from_world * point.position).z;
+            let (column, row) = (
+                (keypoint.x as u32).min(view.width - 1),
+                (keypoint.y as u32).min(view.height - 1),
+            );
+            let found = depth[(row * view.width + column) as usize];
+            near += usize::from((found / z - 1.0).abs() < 0.01);
+        }
+        // All but those within half a pixel of a silhouette.
+        assert!(near * 100 > image.keypoints.len() * 93, "{name}: {near}");
+    }
+}
+
+fn reconstruction_image<'a>(dataset: &'a Dataset, name: &str) -> &'a calibrate::Image {
+    let mut images = dataset.reconstruction.images.values();
+    images.find(|image| image.name == name).unwrap()
+}
+
+#[test]
+fn every_photo_is_full_and_shows_what_rays_find() {
+    for name in names() {
+        let dataset = small(name, 3);
+        let view = &dataset.photos[2].view;
+        let picture = render_view(&dataset.scene, view, 1);
+        for (column, row, rgba) in picture.enumerate_pixels() {
+            assert_eq!(rgba.0[3], 255, "{name} at {column}, {row}");
+            if (column + row) % 5 != 0 {
+                continue;
+            }
+            let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
+            let direction = view.camera_from_world.rotation.conjugate() * ray;
+            let hit = dataset.scene.trace(view.center(), direction).unwrap();
+            let expected = srgb_from_linear(hit.color);
+            for (found, expected) in rgba.0.iter().zip(expected) {
+                assert!(found.abs_diff(expected) <= 1, "{name} at {column}, {row}");
+            }
+        }
+    }
+}
+
+/// The light at a place is the same from everywhere on what is matte, and is not on what
+/// is glossy.
+#[test]
+fn highlights_move_with_the_viewer_and_nothing_else_does() {
+    let dataset = small("shelf", 20);
+    let views: Vec<_> = dataset.photos.iter().map(|photo| &photo.view).collect();
+    let (mut matte, mut most) = (0, 0.0_f64);
+    for point in dataset.reconstruction.points.values() {
+        let colors: Vec<(DVec3, usize)> = point
+            .track
+            .iter()
+            .map(|(image_id, _)| {
+                let center = views[image_id.0 as usize - 1].center();
+                let hit = dataset.scene.trace(center, point.position - center);
+                let hit = hit.unwrap();
+                (DVec3::from_array(hit.color), hit.object_idx)
+            })
+            .collect();
+        let change = colors
+            .iter()
+            .map(|(color, _)| (*color - colors[0].0).abs().max_element())
+            .fold(0.0, f64::max);
+        match dataset.scene.objects()[colors[0].1].material.finish {
+            // Shadows are counted at points: rounding may hide one more or less.
+            Finish::Flat | Finish::Matte => {
+                assert!(change < 0.07, "{change} at {}", point.position);
+                matte += usize::from(change < 1e-6);
+            }
+            Finish::Glossy { .. } => most = most.max(change),
+        }
+    }
+    assert!(matte > 1000, "{matte} points look the same from everywhere");
+    assert!(most > 0.2, "the brightest change is {most}");
+}
+
+#[test]
+fn the_same_bytes_come_from_any_number_of_threads() {
+    let dataset = small("shelf", 2);
+    let view = &dataset.photos[0].view;
+    let with_threads = |count| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(count)
+            .build()
+            .unwrap();
+        pool.install(|| render_view(&dataset.scene, view, 2).into_raw())
+    };
+    let one = with_threads(1);
+    assert_eq!(one, with_threads(2));
+    assert_eq!(one, with_threads(3));
+    let again = small("shelf", 2);
+    assert_eq!(again.reconstruction, dataset.reconstruction);
+    assert_eq!(one, render_view(&again.scene, view, 2).into_raw());
+}
+
+#[test]
+fn what_is_written_reads_back_equal() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in names() {
+        let dataset = small(name, 9);
+        let destination = folder.path().join(name);
+        let written = write(&dataset, &destination).unwrap();
+        assert_eq!((written.photos, written.held_out), (9, 2));
+        let model = calibrate::colmap::read_model(&destination.join("sparse/0")).unwrap();
+        assert_eq!(model, dataset.reconstruction);
+
+        let photo = &dataset.photos[8];
+        let picture = image::open(destination.join("images/0008.png")).unwrap();
+        let rendered = render_view(&dataset.scene, &photo.view, 2);
+        assert!(matches!(picture, image::DynamicImage::ImageRgb8(_)));
+        assert_eq!(picture.to_rgba8(), rendered);
+
+        let steps = image::open(destination.join("depth/0008.png")).unwrap();
+        let steps = steps.as_luma16().expect("16 bits").as_raw();
+        let depth = render_depth(&dataset.scene, &photo.view);
+        for (&steps, depth) in steps.iter().zip(depth) {
+            let error = f64::from(steps) / DEPTH_STEPS_PER_UNIT - depth;
+            assert!(error.abs() <= 0.5001 / DEPTH_STEPS_PER_UNIT);
+        }
+        let split = std::fs::read_to_string(destination.join("split.json")).unwrap();
+        assert_eq!(
+            split,
+            "{\n \"test\": [\n  \"0000.png\",\n  \"0008.png\"\n ]\n}\n"
+        );
+        let readme = std::fs::read_to_string(destination.join("README.md")).unwrap();
+        assert!(readme.contains("9 images of 160 x 120"), "{readme}");
+    }
+    // Nothing else was left.
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        names().len()
+    );
+}
+
+#[test]
+fn a_folder_that_holds_something_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = small("wall", 2);
+    std::fs::write(folder.path().join("precious.txt"), "mine").unwrap();
+    let error = write(&dataset, folder.path()).unwrap_err();
+    assert!(matches!(error, DatasetError::NotEmpty { .. }));
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "{}: the folder is not empty; choose another or remove it first",
+            folder.path().display()
+        )
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    // An empty one will do.
+    let empty = tempfile::tempdir().unwrap();
+    write(&dataset, empty.path()).unwrap();
+    assert!(empty.path().join("sparse/0/cameras.bin").exists());
+}
+
+#[test]
+fn mistakes_are_told() {
+    let error = by_name("shelv", &Options::default()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "no dataset is called \"shelv\"; there are: shelf, wall"
+    );
+    let one_view = Options {
+        views: Some(1),
+        ..Options::default()
+    };
+    assert_eq!(
+        by_name("wall", &one_view).unwrap_err().to_string(),
+        "the number of photos is 1; expected 2 to 9999"
+    );
+}
+
+/// A plane proxy is exact on the wall, and fair on the shelf.
+#[test]
+fn depth_stays_within_its_promised_range() {
+    let wall = small("wall", 9);
+    let frame = wall.scene.objects()[0].world_from_shape.inverse();
+    for point in wall.reconstruction.points.values() {
+        assert!((frame * point.position).z.abs() < 1e-12);
+    }
+    let shelf = small("shelf", 20);
+    for photo in &shelf.photos {
+        let depth = render_depth(&shelf.scene, &photo.view);
+        let mean = depth.iter().sum::<f64>() / depth.len() as f64;
+        for depth in depth {
+            assert!(
+                (depth / mean - 1.0).abs() < 0.2,
+                "{}: {depth} of {mean}",
+                photo.name
+            );
+        }
+    }
+}
