@@ -1,0 +1,149 @@
+use crate::{CaptureError, jpeg, reduced_size, resize};
+use image::{ImageError, ImageFormat, ImageReader, RgbaImage};
+use std::fs::{self, File};
+use std::io::{BufReader, Cursor, Read};
+use std::path::Path;
+
+/// Size of the first part of a JPEG in which its size is looked for; more only where
+/// that does not hold it.
+const HEAD_BYTES: u64 = 1 << 16;
+
+/// Width and height of a photo as stored, from the start of the file alone.
+///
+/// # Errors
+/// A file that cannot be read, or is no JPEG or PNG picture.
+pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
+    let failed = read_failed(path);
+    let mut file = File::open(path).map_err(&failed)?;
+    let mut head = Vec::new();
+    let mut wanted = HEAD_BYTES;
+    loop {
+        let missing = wanted - head.len() as u64;
+        let got = Read::by_ref(&mut file)
+            .take(missing)
+            .read_to_end(&mut head)
+            .map_err(&failed)?;
+        match format_of(path, &head)? {
+            ImageFormat::Jpeg => {
+                if let Some(size) = jpeg::size(&head) {
+                    return Ok(size);
+                }
+            }
+            format => {
+                drop(head);
+                let file = BufReader::new(File::open(path).map_err(&failed)?);
+                return ImageReader::with_format(file, format)
+                    .into_dimensions()
+                    .map_err(|error| decode_failed(path, &error, None));
+            }
+        }
+        if (got as u64) < missing {
+            // That was the whole file.
+            return Err(decode_error(path, "the JPEG data do not state a size"));
+        }
+        wanted *= 4;
+    }
+}
+
+/// Decodes a photo as 8-bit RGBA, alpha not premultiplied: the stored pixel grid, EXIF
+/// orientation not applied. Grey, palette and 16-bit pictures are converted; a picture
+/// without alpha is opaque.
+///
+/// # Errors
+/// A file that cannot be read, is no JPEG or PNG picture, is damaged or cut short, needs
+/// more than 512 MiB, or has another size than `expected_size`.
+pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImage, CaptureError> {
+    let bytes = fs::read(path).map_err(read_failed(path))?;
+    let format = format_of(path, &bytes)?;
+
+    // 1. The size first: a picture of the wrong one is not worth decoding.
+    let size = match format {
+        ImageFormat::Jpeg => jpeg::size(&bytes),
+        _ => None,
+    };
+    let size = match size {
+        Some(size) => size,
+        None => ImageReader::with_format(Cursor::new(&bytes), format)
+            .into_dimensions()
+            .map_err(|error| decode_failed(path, &error, None))?,
+    };
+    if let Some(expected) = expected_size
+        && size != expected
+    {
+        return Err(CaptureError::Size {
+            path: path.to_owned(),
+            found: size,
+            expected,
+        });
+    }
+
+    // 2. The JPEG decoder would paint what is missing grey.
+    if format == ImageFormat::Jpeg && !jpeg::is_complete(&bytes) {
+        return Err(decode_error(path, "the JPEG data have no end"));
+    }
+
+    // 3. The pixels.
+    let picture = ImageReader::with_format(Cursor::new(&bytes), format)
+        .decode()
+        .map_err(|error| decode_failed(path, &error, Some(size)))?;
+    Ok(picture.into_rgba8())
+}
+
+/// Decodes a photo and reduces it so that its longer side is at most `max_side` pixels;
+/// a smaller one comes as it is. See [`decode`] and [`reduced_size`].
+///
+/// # Errors
+/// As [`decode`]; `expected_size` is the size before the reduction.
+pub fn decode_reduced(
+    path: &Path,
+    expected_size: Option<(u32, u32)>,
+    max_side: u32,
+) -> Result<RgbaImage, CaptureError> {
+    let picture = decode(path, expected_size)?;
+    let (width, height) = reduced_size(picture.dimensions(), max_side);
+    if (width, height) == picture.dimensions() {
+        return Ok(picture);
+    }
+    Ok(resize(&picture, width, height))
+}
+
+/// JPEG or PNG, by a file's first bytes: its extension may be wrong.
+fn format_of(path: &Path, bytes: &[u8]) -> Result<ImageFormat, CaptureError> {
+    if bytes.is_empty() {
+        return Err(decode_error(path, "the file is empty (0 bytes)"));
+    }
+    let found = match image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png)) => return Ok(format),
+        Ok(other) => format!("a file that seems to be {other:?}"),
+        Err(_) => "no picture format known here".to_owned(),
+    };
+    Err(CaptureError::Format {
+        path: path.to_owned(),
+        found,
+    })
+}
+
+fn read_failed(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
+    move |source| CaptureError::Read {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+fn decode_error(path: &Path, problem: impl Into<String>) -> CaptureError {
+    CaptureError::Decode {
+        path: path.to_owned(),
+        problem: problem.into(),
+    }
+}
+
+fn decode_failed(path: &Path, error: &ImageError, size: Option<(u32, u32)>) -> CaptureError {
+    match (error, size) {
+        (ImageError::Limits(_), Some((width, height))) => CaptureError::TooLarge {
+            path: path.to_owned(),
+            width,
+            height,
+        },
+        _ => decode_error(path, error.to_string()),
+    }
+}

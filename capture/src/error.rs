@@ -1,0 +1,109 @@
+use std::io;
+use std::path::PathBuf;
+
+/// Why a photo or a set of them could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// A folder cannot be listed.
+    #[error("{}: cannot list the folder: {source}; check the path", folder.display())]
+    List {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A folder without photos.
+    #[error(
+        "{}: no photos here or in the folders within; files ending in .jpg, .jpeg or .png are \
+         read: give another folder, or convert the photos",
+        folder.display()
+    )]
+    NoPhotos {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A file's name cannot be the name of a photo.
+    #[error("{}: the name is not UTF-8 text; rename the file", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error(
+        "{}: cannot read the photo: {source}; check that it is there and may be read",
+        path.display()
+    )]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file is something other than a JPEG or PNG picture.
+    #[error(
+        "{}: found {found}, expected a JPEG or PNG picture; convert it, or leave it out",
+        path.display()
+    )]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What it seems to be.
+        found: String,
+    },
+    /// A picture that is damaged or cut short.
+    #[error(
+        "cannot decode {}: {problem}; the file may be truncated: copy it again or leave it out",
+        path.display()
+    )]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder says.
+        problem: String,
+    },
+    /// A picture that would fill the memory.
+    #[error(
+        "{}: decoding {width} × {height} pixels takes more memory than the 512 MiB allowed for \
+         one photo; reduce it, or leave it out",
+        path.display()
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+    },
+    /// A picture of another size than its calibration speaks about.
+    #[error(
+        "{}: the photo has {} × {} pixels, expected {} × {} as calibrated; {}",
+        path.display(), found.0, found.1, expected.0, expected.1, size_remedy(*found, *expected)
+    )]
+    Size {
+        /// The file.
+        path: PathBuf,
+        /// Width and height in pixels.
+        found: (u32, u32),
+        /// Width and height in pixels.
+        expected: (u32, u32),
+    },
+    /// A picture cannot be written.
+    #[error("{}: cannot write the picture: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+fn size_remedy(found: (u32, u32), expected: (u32, u32)) -> &'static str {
+    if found.0 != found.1 && found == (expected.1, expected.0) {
+        "width and height are exchanged: EXIF orientation is not applied here, but a program may \
+         have turned the photos by it before or after they were calibrated; use the photos that \
+         were calibrated"
+    } else {
+        "use the photos that were calibrated, or calibrate these"
+    }
+}

@@ -1,0 +1,126 @@
+use crate::CaptureError;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What a photo's name may end in.
+const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
+
+/// The photos in a folder and the folders within.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PhotoSet {
+    /// The folder that the names are relative to.
+    pub root: PathBuf,
+    /// Sorted by name, byte by byte.
+    pub photos: Vec<PhotoFile>,
+}
+
+/// A photo that has not been opened yet.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PhotoFile {
+    /// Its path relative to the set's root, `/` between the parts: what calibrations
+    /// call it.
+    pub name: String,
+    /// Where it lies.
+    pub path: PathBuf,
+}
+
+impl PhotoSet {
+    /// Lists the JPEG and PNG files of a folder and the folders within, by their
+    /// extensions in any case. Names that begin with a dot are left out.
+    ///
+    /// # Errors
+    /// A folder that cannot be listed or holds no photo; a photo whose name is not UTF-8.
+    pub fn open(folder: &Path) -> Result<PhotoSet, CaptureError> {
+        let mut photos = Vec::new();
+        collect(folder, "", &mut Vec::new(), &mut photos)?;
+        if photos.is_empty() {
+            return Err(CaptureError::NoPhotos {
+                folder: folder.to_owned(),
+            });
+        }
+        photos.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(PhotoSet {
+            root: folder.to_owned(),
+            photos,
+        })
+    }
+
+    /// The photo of a name.
+    pub fn find(&self, name: &str) -> Option<&PhotoFile> {
+        let index = self
+            .photos
+            .binary_search_by(|photo| photo.name.as_str().cmp(name))
+            .ok()?;
+        Some(&self.photos[index])
+    }
+}
+
+/// Where a capture's photos are: in its folder `images`, or else in the capture itself if
+/// it directly holds some.
+pub fn find_photos_folder(capture: &Path) -> Option<PathBuf> {
+    let images = capture.join("images");
+    if images.is_dir() {
+        return Some(images);
+    }
+    let holds_photo = fs::read_dir(capture).ok()?.flatten().any(|entry| {
+        let path = entry.path();
+        is_photo(&path) && path.is_file()
+    });
+    holds_photo.then(|| capture.to_owned())
+}
+
+/// Appends the photos in `folder`, whose own name within the set is `prefix`.
+fn collect(
+    folder: &Path,
+    prefix: &str,
+    around: &mut Vec<PathBuf>,
+    photos: &mut Vec<PhotoFile>,
+) -> Result<(), CaptureError> {
+    let failed = |source: io::Error| CaptureError::List {
+        folder: folder.to_owned(),
+        source,
+    };
+    // A link to a folder around this one would lead in a circle.
+    let real = fs::canonicalize(folder).map_err(failed)?;
+    if around.contains(&real) {
+        return Ok(());
+    }
+    around.push(real);
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let Some(file_name) = path.file_name() else {
+            continue;
+        };
+        if is_hidden(&path) || !(is_photo(&path) || path.is_dir()) {
+            continue;
+        }
+        let Some(file_name) = file_name.to_str() else {
+            return Err(CaptureError::Name { path });
+        };
+        let name = format!("{prefix}{file_name}");
+        if path.is_dir() {
+            collect(&path, &format!("{name}/"), around, photos)?;
+        } else {
+            photos.push(PhotoFile { name, path });
+        }
+    }
+    around.pop();
+    Ok(())
+}
+
+fn is_hidden(path: &Path) -> bool {
+    path.file_name()
+        .is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
+}
+
+/// Whether a name is a photo's: visible, with one of the extensions.
+fn is_photo(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    let known = |extension: &str| {
+        EXTENSIONS
+            .iter()
+            .any(|known| extension.eq_ignore_ascii_case(known))
+    };
+    !is_hidden(path) && extension.is_some_and(known)
+}
