@@ -6,7 +6,7 @@
 //!
 //! | name | scene | cameras | good for |
 //! |---|---|---|---|
-//! | `shelf` | a still life on a sideboard: glazed vase, globe, books, toys, pictures on the wall; soft shadows, highlights and mirror images that move with the viewer | 20 hand-held views in a 5 × 4 grid, neighbours 5 % of the distance apart, 480 × 360, SIMPLE_RADIAL with k = −0.05 | demonstrations: depth within ±15 % of its mean, so a plane is a fair proxy |
+//! | `shelf` | a still life on a sideboard: glazed vase, globe, books, toys, pictures on the wall; soft shadows, highlights and mirror images that move with the viewer | 20 hand-held views in a 5 × 4 grid, neighbours 5 % of the distance apart, 480 × 360, SIMPLE_RADIAL with k = −0.05 | demonstrations: depth within 15 % of its mean, so a plane is a fair proxy |
 //! | `wall` | one brick plane in a general position, no highlights | 9 views from general positions, the last one much closer, 480 × 360, PINHOLE | tests: a plane proxy is the exact truth, every difference is the renderer's |
 //!
 //! ```

@@ -12,15 +12,15 @@ use rayon::prelude::*;
 /// evenly over it, stored as sRGB. Alpha is the part of them that met something. The
 /// same bytes come out whatever the number of threads.
 pub fn render_view(scene: &Scene, view: &View, samples_per_side: u32) -> RgbaImage {
-    render_through(scene, view, samples_per_side, &Corners::of(view))
+    render_through(scene, view, samples_per_side, &LensRays::of(view))
 }
 
-/// [`render_view`] with the corners' rays at hand: photos through one lens share them.
+/// [`render_view`] with the lens' rays at hand: photos through one lens share them.
 pub(crate) fn render_through(
     scene: &Scene,
     view: &View,
     samples_per_side: u32,
-    corners: &Corners,
+    lens_rays: &LensRays,
 ) -> RgbaImage {
     let (width, height) = (view.width, view.height);
     let side = samples_per_side.max(1);
@@ -32,7 +32,7 @@ pub(crate) fn render_through(
         .for_each(|(row, out)| {
             let mut rays = Vec::new();
             for (column, rgba) in out.chunks_exact_mut(4).enumerate() {
-                corners.rays_within(view, column, row, side, &mut rays);
+                lens_rays.rays_within(view, column, row, side, &mut rays);
                 let (mean, hits) = mean_color(scene, view, &order, &mut rays);
                 if hits > 0 {
                     rgba[..3].copy_from_slice(&srgb_from_linear(mean.to_array()));
@@ -98,27 +98,36 @@ fn mean_color(
     (sum / seen.len().max(1) as f64, seen.len() as u32)
 }
 
-/// The rays through the corners of all pixels of a view, in its camera's frame.
+/// The rays through the centres and the corners of all pixels of a view, in its camera's
+/// frame.
 ///
-/// Inverting a distortion costs more than tracing a ray. Within one pixel the lens is so
+/// Inverting a distortion costs as much as tracing a ray. Within one pixel the lens is so
 /// nearly linear that rays interpolated between its corners lie within 1e-6 px of the
 /// true ones, which moves where a pixel is sampled, not what is found there.
-pub(crate) struct Corners {
-    columns: usize,
-    rays: Vec<Option<DVec3>>,
+pub(crate) struct LensRays {
+    width: usize,
+    centers: Vec<Option<DVec3>>,
+    corners: Vec<Option<DVec3>>,
 }
 
-impl Corners {
+impl LensRays {
     pub(crate) fn of(view: &View) -> Self {
-        let columns = view.width as usize + 1;
-        let rays = (0..columns * (view.height as usize + 1))
-            .into_par_iter()
-            .map(|i| {
-                let pixel = Pixel::new((i % columns) as f64, (i / columns) as f64);
-                view.lens.unproject(pixel)
-            })
-            .collect();
-        Self { columns, rays }
+        let (width, height) = (view.width as usize, view.height as usize);
+        let rays = |columns: usize, rows: usize, at: f64| {
+            (0..columns * rows)
+                .into_par_iter()
+                .map(|i| {
+                    let (column, row) = (i % columns, i / columns);
+                    let pixel = Pixel::new(column as f64 + at, row as f64 + at);
+                    view.lens.unproject(pixel)
+                })
+                .collect()
+        };
+        Self {
+            width,
+            centers: rays(width, height, 0.5),
+            corners: rays(width + 1, height + 1, 0.0),
+        }
     }
 
     /// `side`² rays spread evenly over a pixel; one alone is exact, and so are all where
@@ -134,9 +143,9 @@ impl Corners {
         rays.clear();
         let within = |k: u32| (f64::from(k) + 0.5) / f64::from(side);
         let places = (0..side * side).map(|i| (within(i % side), within(i / side)));
-        let top = row * self.columns + column;
-        let bottom = top + self.columns;
-        let corners = [top, top + 1, bottom, bottom + 1].map(|i| self.rays[i]);
+        let top = row * (self.width + 1) + column;
+        let bottom = top + self.width + 1;
+        let corners = [top, top + 1, bottom, bottom + 1].map(|i| self.corners[i]);
         if let [Some(a), Some(b), Some(c), Some(d)] = corners
             && side > 1
         {
@@ -153,23 +162,24 @@ impl Corners {
 /// The depth along the camera's z axis at every pixel's centre, row by row, in world
 /// units; NaN where the pixel's ray meets nothing.
 pub fn render_depth(scene: &Scene, view: &View) -> Vec<f64> {
-    let world_from_camera = view.camera_from_world.matrix().transpose();
+    depth_through(scene, view, &LensRays::of(view))
+}
+
+/// [`render_depth`] with the lens' rays at hand.
+pub(crate) fn depth_through(scene: &Scene, view: &View, lens_rays: &LensRays) -> Vec<f64> {
+    let world_from_camera = view.camera_from_world.rotation.conjugate();
     let center = view.center();
-    let mut depth = vec![f64::NAN; view.width as usize * view.height as usize];
-    depth
-        .par_chunks_mut(view.width.max(1) as usize)
-        .enumerate()
-        .for_each(|(row, out)| {
-            for (column, depth) in out.iter_mut().enumerate() {
-                let pixel = Pixel::center_of(column as u32, row as u32);
-                if let Some(ray) = view.lens.unproject(pixel)
-                    && let Some(distance) = scene.distance(center, world_from_camera * ray)
-                {
-                    *depth = distance * ray.z;
-                }
-            }
-        });
-    depth
+    let order = scene.by_distance(center);
+    lens_rays
+        .centers
+        .par_iter()
+        .map(|ray| {
+            let ray = (*ray)?;
+            let seen = scene.look_in_order(center, world_from_camera * ray, &order)?;
+            Some(seen.distance * ray.z)
+        })
+        .map(|depth| depth.unwrap_or(f64::NAN))
+        .collect()
 }
 
 /// The 8-bit sRGB code of linear light, clipped to what it can hold.

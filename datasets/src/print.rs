@@ -130,22 +130,23 @@ pub(crate) fn label(
     let bands = edge(y.abs(), 0.62, soft) * (1.0 - rim);
     let hairline = band(y.abs(), 0.55, 0.58, soft);
     // The front is repeated on the back.
-    let half_turn = 0.5 * TURN * DVec2::new(at.point.x, at.point.z).length();
+    let radius = DVec2::new(at.point.x, at.point.z).length();
+    let half_turn = 0.5 * TURN * radius;
     let x = p.x - half_turn * (p.x / half_turn).round();
     let title = text(
         "LUMI",
         DVec2::new(x, p.y - 0.27 * half_height),
-        0.36 * half_height,
+        (0.36 * half_height).min(0.5 * radius),
         finest,
     );
     let subtitle = text(
         "GRAPH",
-        DVec2::new(x, p.y + 0.08 * half_height),
-        0.24 * half_height,
+        DVec2::new(x, p.y + 0.06 * half_height),
+        (0.24 * half_height).min(0.38 * radius),
         finest,
     );
-    let aside = band(p.y, -0.5 * half_height, -0.12 * half_height, finest);
-    let print = 0.8 * aside * small_print(p, 0.085 * half_height, seed, finest);
+    let below = band(p.y, -0.53 * half_height, -0.24 * half_height, finest);
+    let print = 0.8 * below * small_print(p, 0.085 * half_height, seed, finest);
     let dots = {
         let step = 0.16 * half_height;
         let q = DVec2::new(

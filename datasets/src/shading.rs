@@ -124,6 +124,9 @@ impl Scene {
             return diffuse;
         };
         // 3. The highlight (Blinn 1977); the root lets it fade towards the shadow line.
+        if light.lamp == 0.0 {
+            return diffuse;
+        }
         let halfway = (towards_lamp - direction).normalize();
         let shine = highlight * seen.normal.dot(halfway).max(0.0).powf(exponent);
         diffuse + from_lamp * (shine * cosine.sqrt())

@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 
 const SEED: u32 = 7;
 /// From the cameras to what they look at, in metres.
-const DISTANCE: f64 = 2.5;
+const DISTANCE: f64 = 3.1;
 /// What they look at: the sideboard's top is y = 0, x points right, z to the viewer.
 const TARGET: DVec3 = DVec3::new(0.0, 0.30, 0.0);
 /// The wall is z = −`BACK`, the sideboard's front z = `FRONT`.
@@ -29,14 +29,14 @@ const FRONT: f64 = 0.30;
 pub fn shelf(options: &Options) -> Result<Dataset, DatasetError> {
     let chosen = options.or_defaults((480, 360), 20)?;
     let (width, height) = (f64::from(chosen.width), f64::from(chosen.height));
-    let focal = 1.5 * width.max(height * 4.0 / 3.0);
+    let focal = 1.86 * width.max(height * 4.0 / 3.0);
     let footprint = DISTANCE / focal;
     let plan = Plan {
         name: "shelf",
         kind: "synthetic: still life on a sideboard, forward-facing 2-D grid of viewpoints.",
         stresses: "Thin twigs before a patterned wall, contact shadows, highlights and \
                    mirror images that move with the viewer (vase, globe, red ball, knobs); \
-                   depth stays within about 15 % of its mean.",
+                   depth stays within 15 % of its mean.",
         scene: scene(2.0 * footprint),
         model: ModelKind::SimpleRadial,
         params: vec![focal, 0.5 * width, 0.5 * height, -0.05],
@@ -96,7 +96,7 @@ const SATIN: Finish = Finish::Glossy {
 const GLAZED: Finish = Finish::Glossy {
     highlight: 0.9,
     exponent: 350.0,
-    mirror: 0.05,
+    mirror: 0.09,
 };
 
 fn object(shape: Shape, at: DVec3, rotation: DQuat, texture: Texture, finish: Finish) -> Object {
@@ -142,7 +142,7 @@ fn room(lamp: DVec3, objects: &mut Vec<Object>) {
         still,
         Texture::Wallpaper {
             ground: rgb(0x6f9a92),
-            figure: rgb(0xd9d3b0),
+            figure: rgb(0xc9caa9),
             period: 0.15,
             seed: 11,
         },

@@ -390,7 +390,7 @@ fn porcelain(point: DVec3, span: DVec2, seed: u32, finest: f64) -> DVec3 {
     let soft = finest / (span.y - span.x);
     let angle = longitude(point);
     let brush = fractal3(seed, point, 0.02, finest) - 0.5;
-    let glaze = rgb(0xf3efe4) * (1.0 + 0.06 * brush);
+    let glaze = rgb(0xe0dccf) * (1.0 + 0.06 * brush);
     let cobalt = rgb(0x1d3f94).lerp(rgb(0x4f7fd0), (0.5 + 1.6 * brush).clamp(0.0, 1.0));
     let petal = (5.0 * angle).cos().abs();
     // Lotus petals at the foot, a scroll around the belly, bands between, leaves above.

@@ -1,7 +1,7 @@
 //! A dataset on disk: the folder a user would have, with the truth beside it.
 
-use crate::picture::{Corners, render_through};
-use crate::{Dataset, DatasetError, Photo, render_depth};
+use crate::picture::{LensRays, depth_through, render_through};
+use crate::{Dataset, DatasetError, Photo};
 use calibrate::colmap;
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::{Path, PathBuf};
@@ -70,35 +70,39 @@ fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
         make_folder(folder)?;
     }
     colmap::write_binary(&dataset.reconstruction, &sparse)?;
-    let mut last: Option<(&Photo, Corners)> = None;
+    let mut last: Option<(&Photo, LensRays)> = None;
     for photo in &dataset.photos {
         // Photos through one lens share its rays.
-        let corners = match last {
-            Some((before, corners)) if before.camera == photo.camera => corners,
-            _ => Corners::of(&photo.view),
+        let lens_rays = match last {
+            Some((before, lens_rays)) if before.camera == photo.camera => lens_rays,
+            _ => LensRays::of(&photo.view),
         };
         let picture = render_through(
             &dataset.scene,
             &photo.view,
             dataset.samples_per_side,
-            &corners,
+            &lens_rays,
         );
         save(
             DynamicImage::from(DynamicImage::from(picture).into_rgb8()),
             &images.join(&photo.name),
         )?;
-        let depth = DynamicImage::from(depth_steps(dataset, photo));
+        let depth = DynamicImage::from(depth_steps(dataset, photo, &lens_rays));
         let name = Path::new(&photo.name).with_extension("png");
         save(depth, &depths.join(name))?;
-        last = Some((photo, corners));
+        last = Some((photo, lens_rays));
     }
     write_text(&folder.join("split.json"), &split(dataset))?;
     write_text(&folder.join("README.md"), &readme(dataset))
 }
 
 /// Depth along z in steps; 0 where there is no surface or it is too far to say.
-fn depth_steps(dataset: &Dataset, photo: &Photo) -> ImageBuffer<Luma<u16>, Vec<u16>> {
-    let steps = render_depth(&dataset.scene, &photo.view)
+fn depth_steps(
+    dataset: &Dataset,
+    photo: &Photo,
+    lens_rays: &LensRays,
+) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let steps = depth_through(&dataset.scene, &photo.view, lens_rays)
         .into_iter()
         .map(|depth| {
             let steps = (depth * DEPTH_STEPS_PER_UNIT).round();

@@ -4,7 +4,7 @@
 use image::RgbaImage;
 use std::fmt;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// A decoded photo and its mip levels.
 ///
@@ -105,6 +105,7 @@ pub struct PhotoStore {
     slots: Vec<OnceLock<Result<Pyramid, PhotoError>>>,
     load: Box<Load>,
     decoded: AtomicUsize,
+    id: u64,
 }
 
 impl PhotoStore {
@@ -115,10 +116,13 @@ impl PhotoStore {
         load: impl Fn(usize) -> Result<RgbaImage, String> + Send + Sync + 'static,
     ) -> Self {
         let slots = (0..count).map(|_| OnceLock::new()).collect();
+        static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+        let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         Self {
             slots,
             load: Box::new(load),
             decoded: AtomicUsize::new(0),
+            id,
         }
     }
 
@@ -136,6 +140,11 @@ impl PhotoStore {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
+    }
+
+    /// Tells this store from every other in the program, for caches.
+    pub fn id(&self) -> u64 {
+        self.id
     }
 
     /// How many have been decoded.

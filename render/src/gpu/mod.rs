@@ -1,28 +1,102 @@
-//! The wgpu engine.
+//! The wgpu engine: the triangulated field in one draw, the exact field in another.
+
+mod layout;
+mod photos;
+mod pipelines;
+mod target;
 
 use crate::RenderError;
+use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::options::Method;
+use crate::rays::RayMap;
+use calibrate::Lens;
 use image::RgbaImage;
+use layout::{Corner, Entry, Params, Source};
+use photos::Photos;
+use pipelines::Pipelines;
+use std::fmt;
+use std::sync::{Arc, Mutex};
+use target::Target;
+use wgpu::util::DeviceExt;
 
-/// A graphics device.
-#[derive(Debug)]
+/// A graphics device with all that it keeps between frames: pipelines, photos, the last
+/// lens' rays and the picture's buffers.
 pub struct Gpu {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
     description: String,
+    pipelines: Pipelines,
+    sampler: wgpu::Sampler,
+    photos: Option<Photos>,
+    rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
+    target: Option<Target>,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Gpu({})", self.description)
+    }
 }
 
 impl Gpu {
-    /// Opens the best device there is.
+    /// Opens the best device there is; a software driver if there is nothing better.
     ///
     /// # Errors
     /// No driver answers.
     pub fn open() -> Result<Self, RenderError> {
-        Err(RenderError::Gpu("no graphics driver answers".to_owned()))
+        let instance =
+            wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        }))
+        .map_err(|e| RenderError::Gpu(format!("no graphics driver answers ({e})")))?;
+        let info = adapter.get_info();
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("lumigraph"),
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|e| RenderError::Gpu(format!("{}: {e}", info.name)))?;
+
+        // Errors that no call returns are kept for the next one that can.
+        let failure = Arc::new(Mutex::new(None));
+        let first_failure = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            if let Ok(mut slot) = first_failure.lock() {
+                slot.get_or_insert(error.to_string());
+            }
+        }));
+
+        let pipelines = Pipelines::new(&device);
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("photos"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            ..Default::default()
+        });
+        let description = format!("{} ({:?})", info.name, info.backend);
+        Ok(Self {
+            device,
+            queue,
+            info,
+            description,
+            pipelines,
+            sampler,
+            photos: None,
+            rays: None,
+            target: None,
+            failure,
+        })
     }
 
     /// Whether the driver imitates a graphics processor in software.
     pub fn is_software(&self) -> bool {
-        true
+        self.info.device_type == wgpu::DeviceType::Cpu
     }
 
     /// The device's name and its driver, for people.
@@ -33,8 +107,259 @@ impl Gpu {
     /// Draws a frame.
     ///
     /// # Errors
-    /// A photo that is needed cannot be decoded; the device fails.
-    pub fn render(&mut self, _: &Frame<'_>, _: Method) -> Result<RgbaImage, RenderError> {
-        Err(RenderError::Gpu("no graphics driver answers".to_owned()))
+    /// A photo that is needed cannot be decoded; the triangulation refuses the view; the
+    /// device fails or its limits do not suffice.
+    pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+        match method {
+            Method::Exact => self.render_exact(frame),
+            Method::Triangulated { cells_across } => {
+                let field = TriangulatedField::new(frame, cells_across)?;
+                self.render_field(frame, &field)
+            }
+        }
+    }
+
+    /// Draws a triangulated field. Only photos in its lists are decoded and uploaded.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn render_field(
+        &mut self,
+        frame: &Frame<'_>,
+        field: &TriangulatedField,
+    ) -> Result<RgbaImage, RenderError> {
+        let mut wanted: Vec<usize> = field
+            .entries
+            .iter()
+            .map(|e| e.source_idx as usize)
+            .collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let shared = self.prepare(frame, &wanted)?;
+
+        let corners: Vec<Corner> = field
+            .triangles
+            .iter()
+            .flat_map(|triangle| {
+                let list = [triangle.first_entry, triangle.entry_count];
+                let pixel = |i: u32| field.vertices[i as usize].as_vec2().to_array();
+                triangle.corners.map(|i| Corner {
+                    pixel: pixel(i),
+                    list,
+                })
+            })
+            .collect();
+        let entries: Vec<Entry> = field
+            .entries
+            .iter()
+            .map(|e| Entry {
+                source_idx: e.source_idx,
+                weights: e.weights,
+            })
+            .collect();
+        let corners_buffer = self.buffer("corners", &corners, wgpu::BufferUsages::VERTEX);
+        let entries_buffer = self.buffer("entries", &entries, wgpu::BufferUsages::STORAGE);
+        let photos = self.photos.as_ref().expect("prepared above");
+        let own = self.pipelines.triangulated_group(
+            &self.device,
+            &photos.view,
+            &self.sampler,
+            &entries_buffer,
+        );
+        self.draw(frame, |pass, pipelines| {
+            pass.set_pipeline(&pipelines.triangulated);
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &own, &[]);
+            pass.set_vertex_buffer(0, corners_buffer.slice(..));
+            pass.draw(0..corners.len() as u32, 0..1);
+        })
+    }
+
+    /// Draws the exact field. A first pass finds the photos that it samples, unless all
+    /// are on the device already.
+    fn render_exact(&mut self, frame: &Frame<'_>) -> Result<RgbaImage, RenderError> {
+        let store_id = frame.lumigraph.photos.id();
+        if !self.photos.as_ref().is_some_and(|p| p.complete(store_id)) {
+            let used = self.mark(frame)?;
+            self.prepare(frame, &used)?;
+        }
+        let shared = self.prepare(frame, &[])?;
+        let photos = self.photos.as_ref().expect("prepared above");
+        let own = self
+            .pipelines
+            .exact_group(&self.device, &photos.view, &self.sampler);
+        self.draw(frame, |pass, pipelines| {
+            pass.set_pipeline(&pipelines.exact);
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &own, &[]);
+            pass.draw(0..3, 0..1);
+        })
+    }
+
+    /// The source views that the exact field samples anywhere in the picture.
+    fn mark(&mut self, frame: &Frame<'_>) -> Result<Vec<usize>, RenderError> {
+        let shared = self.prepare(frame, &[])?;
+        let zeros = vec![0_u32; frame.sources.len().max(1)];
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let used = self.buffer("used photos", &zeros, usage);
+        let own = self.pipelines.mark_group(&self.device, &used);
+        let readback = target::readback_buffer(&self.device, used.size());
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipelines.mark);
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &own, &[]);
+            let (width, height) = (frame.desired.width, frame.desired.height);
+            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+        }
+        encoder.copy_buffer_to_buffer(&used, 0, &readback, 0, used.size());
+        self.queue.submit([encoder.finish()]);
+        let bytes = target::read(&self.device, &readback);
+        self.check()?;
+        let flags: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes?);
+        Ok((0..frame.sources.len())
+            .filter(|&i| flags[i] != 0)
+            .collect())
+    }
+
+    /// Brings photos, source views and parameters to the device; returns the bind group
+    /// that all shaders share.
+    fn prepare(
+        &mut self,
+        frame: &Frame<'_>,
+        wanted: &[usize],
+    ) -> Result<wgpu::BindGroup, RenderError> {
+        Photos::ensure(&mut self.photos, &self.device, &self.queue, frame, wanted)?;
+        let rays = self.rays(frame)?;
+        let photos = self.photos.as_ref().expect("ensured above");
+        let params = Params::of(frame, photos.size);
+        let source = |i| Source::of(frame, i, photos.layer(i), photos.last_level(frame, i));
+        let mut sources: Vec<Source> = (0..frame.sources.len()).map(source).collect();
+        if sources.is_empty() {
+            sources.push(bytemuck::Zeroable::zeroed());
+        }
+        let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
+        let sources = self.buffer("sources", &sources, wgpu::BufferUsages::STORAGE);
+        Ok(self
+            .pipelines
+            .shared_group(&self.device, &params, &sources, &rays))
+    }
+
+    /// The table of rays of a lens that is not a pinhole; a single texel otherwise.
+    fn rays(&mut self, frame: &Frame<'_>) -> Result<wgpu::TextureView, RenderError> {
+        let desired = &frame.desired;
+        let size = [desired.width, desired.height];
+        if let Some((lens, of_size, view)) = &self.rays
+            && (*lens, *of_size) == (desired.lens, size)
+        {
+            return Ok(view.clone());
+        }
+        let (width, height, texels) = match RayMap::of(desired) {
+            RayMap::Pinhole { .. } => (1, 1, vec![[0.0; 4]]),
+            RayMap::Table { mut rays, .. } => {
+                // Shaders may assume there are no NaNs: no ray is the zero vector there.
+                rays.iter_mut()
+                    .filter(|r| r[0].is_nan())
+                    .for_each(|r| *r = [0.0; 4]);
+                (size[0], size[1], rays)
+            }
+        };
+        let side = self.device.limits().max_texture_dimension_2d;
+        if size[0] > side || size[1] > side {
+            return Err(RenderError::Gpu(format!(
+                "a picture of {} × {} is more than this device draws ({side} × {side}); \
+                 use --device cpu or a smaller --size",
+                size[0], size[1]
+            )));
+        }
+        let texture = self.device.create_texture_with_data(
+            &self.queue,
+            &wgpu::TextureDescriptor {
+                label: Some("rays"),
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            bytemuck::cast_slice(&texels),
+        );
+        let view = texture.create_view(&Default::default());
+        self.rays = Some((desired.lens, size, view.clone()));
+        Ok(view)
+    }
+
+    fn buffer<T: bytemuck::Pod>(
+        &self,
+        label: &str,
+        contents: &[T],
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
+        // Bindings may not be empty.
+        let empty = [0_u8; 16];
+        let contents: &[u8] = if contents.is_empty() {
+            &empty
+        } else {
+            bytemuck::cast_slice(contents)
+        };
+        let descriptor = wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        };
+        self.device.create_buffer_init(&descriptor)
+    }
+
+    /// One render pass over a cleared picture, and the picture.
+    fn draw(
+        &mut self,
+        frame: &Frame<'_>,
+        record: impl FnOnce(&mut wgpu::RenderPass<'_>, &Pipelines),
+    ) -> Result<RgbaImage, RenderError> {
+        let (width, height) = (frame.desired.width, frame.desired.height);
+        if self
+            .target
+            .as_ref()
+            .is_none_or(|t| t.size != [width, height])
+        {
+            self.target = Some(Target::new(&self.device, width, height));
+        }
+        let target = self.target.as_ref().expect("made above");
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("frame"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target.view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            record(&mut pass, &self.pipelines);
+        }
+        target.copy_to_readback(&mut encoder);
+        self.queue.submit([encoder.finish()]);
+        let picture = target.read(&self.device);
+        self.check()?;
+        picture
+    }
+
+    /// The first failure that the device has reported, once.
+    fn check(&self) -> Result<(), RenderError> {
+        let failure = self.failure.lock().ok().and_then(|mut slot| slot.take());
+        failure.map_or(Ok(()), |message| Err(RenderError::Gpu(message)))
     }
 }

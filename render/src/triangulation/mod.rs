@@ -74,8 +74,8 @@ pub struct Triangulation {
     /// Indices of vertices, clockwise on the screen (y down): (b − a) × (c − a) > 0, never
     /// zero. Ordered by cell, row by row.
     pub triangles: Vec<[u32; 3]>,
-    /// Pieces of edges that could not be kept because snapping never came to rest, or spade
-    /// would not take them. Normally 0.
+    /// Pieces of edges that the triangulation would not take. Pieces cross nothing by
+    /// then, so 0 unless there is a bug.
     pub constraints_declined: usize,
     /// Cells that are two triangles, as nothing lies in them.
     pub cells_plain: usize,
@@ -171,7 +171,6 @@ struct Arrangement {
     /// The pieces of each cell that has some: they cross nothing and end at vertices.
     /// Sorted by cell.
     pieces: Vec<(u32, Vec<Piece>)>,
-    declined: usize,
 }
 
 /// Cuts the constraints at the grid and splits them within each cell.
@@ -206,11 +205,9 @@ fn arrange(lines: Lines, constraints: &Constraints) -> Result<Arrangement, Trian
         })
         .collect();
 
-    let mut declined = 0;
     let mut pieces = Vec::with_capacity(splits.len());
     for (cell, split) in splits {
-        declined += split.declined;
-        vertices.extend_from_slice(&split.new_vertices);
+        vertices.extend_from_slice(&split.crossings);
         if !split.pieces.is_empty() {
             pieces.push((cell, split.pieces));
         }
@@ -221,7 +218,6 @@ fn arrange(lines: Lines, constraints: &Constraints) -> Result<Arrangement, Trian
         lines,
         vertices,
         pieces,
-        declined,
     })
 }
 
@@ -231,7 +227,6 @@ fn fill(arrangement: &Arrangement) -> Triangulation {
         lines,
         vertices,
         pieces,
-        declined,
     } = arrangement;
     let cells = (lines.columns() * lines.rows()) as u32;
     let corners = lines.xs.len() * lines.ys.len();
@@ -286,7 +281,7 @@ fn fill(arrangement: &Arrangement) -> Triangulation {
             .map(Point::to_pixel)
             .collect(),
         triangles,
-        constraints_declined: declined + filled.iter().map(|f| f.1).sum::<usize>(),
+        constraints_declined: filled.iter().map(|f| f.1).sum::<usize>(),
         cells_plain: cells as usize - busy.len(),
         cells_triangulated: busy.len(),
     }

@@ -33,7 +33,7 @@ pub fn to_svg(
     }
     // Lines and dots keep their looks whatever the size the picture is shown at.
     let side = f64::from(width.max(height));
-    let (line, dot) = (side / 2000.0, side / 250.0);
+    let (line, dot) = (side / 1000.0, side / 200.0);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
          width=\"{width}\" height=\"{height}\">\n\

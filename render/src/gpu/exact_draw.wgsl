@@ -1,0 +1,33 @@
+// Draws the exact field.
+
+@group(1) @binding(0) var photos: texture_2d_array<f32>;
+@group(1) @binding(1) var photo_sampler: sampler;
+
+// One triangle that covers the image.
+@vertex
+fn whole_image(@builtin(vertex_index) vertex_idx: u32) -> @builtin(position) vec4f {
+    let corner = vec2f(vec2u(vertex_idx & 1u, vertex_idx >> 1u));
+    return vec4f(corner * 4.0 - 1.0, 0.0, 1.0);
+}
+
+@fragment
+fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    let ray = ray_through(vec2u(position.xy));
+    let s = dot(params.plane, ray);
+    if s < 0.0 || params.plane_seen == 0u || all(ray == vec3f(0.0)) {
+        return vec4f(0.0);
+    }
+    var nearest = nearest_sources(ray, s);
+    let count = weigh(&nearest);
+    var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
+    for (var n = 0u; n < count; n++) {
+        if nearest.a[n] <= 0.0 {
+            continue;
+        }
+        let source = &sources[nearest.source_idx[n]];
+        let sight = see(source, ray, s);
+        let color = sample_photo(photos, photo_sampler, source, sight, ray);
+        add(&mix, nearest.a[n], color, (*source).gain.rgb);
+    }
+    return resolve(mix);
+}

@@ -1,0 +1,22 @@
+// Marks the photos that the exact field will sample, so that no other is decoded.
+
+@group(1) @binding(0) var<storage, read_write> used: array<atomic<u32>>;
+
+@compute @workgroup_size(8, 8)
+fn mark(@builtin(global_invocation_id) pixel: vec3u) {
+    if any(pixel.xy >= params.size) || params.plane_seen == 0u {
+        return;
+    }
+    let ray = ray_through(pixel.xy);
+    let s = dot(params.plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
+        return;
+    }
+    var nearest = nearest_sources(ray, s);
+    let count = weigh(&nearest);
+    for (var n = 0u; n < count; n++) {
+        if nearest.a[n] > 0.0 {
+            atomicOr(&used[nearest.source_idx[n]], 1u);
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! The photos on the device: one texture array, filled as frames ask for photos.
+
+use crate::RenderError;
+use crate::frame::Frame;
+use crate::photos::{MAX_LEVELS, Pyramid};
+use image::RgbaImage;
+
+/// A texture array with one photo a layer.
+///
+/// Layers are as large as the largest photo, rounded up so that every mip level halves
+/// exactly; smaller photos repeat their border once, so that filtering never mixes in
+/// anything else.
+#[derive(Debug)]
+pub(crate) struct Photos {
+    texture: wgpu::Texture,
+    pub view: wgpu::TextureView,
+    pub size: [u32; 2],
+    /// The photo store that the layers came from.
+    store_id: u64,
+    /// By source view.
+    layers: Vec<Option<u32>>,
+    used_layers: u32,
+    capacity: u32,
+    levels: usize,
+}
+
+/// Both sides of the array are multiples of this, the texel of the coarsest level.
+const ALIGNMENT: u32 = 1 << (MAX_LEVELS - 1);
+
+impl Photos {
+    /// Makes sure that the photos of the given source views are on the device. Those that
+    /// are there already stay.
+    pub(crate) fn ensure(
+        current: &mut Option<Self>,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        frame: &Frame<'_>,
+        wanted: &[usize],
+    ) -> Result<(), RenderError> {
+        let store_id = frame.lumigraph.photos.id();
+        let of_this_store = current.as_ref().filter(|p| p.store_id == store_id);
+        let missing = |p: &Self| wanted.iter().filter(|&&i| p.layers[i].is_none()).count() as u32;
+        if of_this_store.is_none_or(|p| p.used_layers + missing(p) > p.capacity) {
+            // A new array, with room for what is there and what is wanted, and some more.
+            let mut keep: Vec<usize> = of_this_store.map_or_else(Vec::new, |p| {
+                (0..p.layers.len())
+                    .filter(|&i| p.layers[i].is_some())
+                    .collect()
+            });
+            keep.extend(wanted);
+            keep.sort_unstable();
+            keep.dedup();
+            let total = frame.lumigraph.sources.len() as u32;
+            let needed = (keep.len() as u32).max(1);
+            let capacity = needed.next_multiple_of(8).min(total.max(1));
+            *current = None;
+            let mut photos = Self::allocate(device, frame, store_id, capacity)?;
+            photos.fill(queue, frame, &keep)?;
+            *current = Some(photos);
+            return Ok(());
+        }
+        match current {
+            Some(photos) => photos.fill(queue, frame, wanted),
+            None => Ok(()),
+        }
+    }
+
+    fn allocate(
+        device: &wgpu::Device,
+        frame: &Frame<'_>,
+        store_id: u64,
+        capacity: u32,
+    ) -> Result<Self, RenderError> {
+        let sources = &frame.lumigraph.sources;
+        let largest = |side: fn(&calibrate::View) -> u32| {
+            let longest = sources.iter().map(|s| side(&s.view)).max().unwrap_or(1);
+            longest.next_multiple_of(ALIGNMENT)
+        };
+        let size = [largest(|v| v.width), largest(|v| v.height)];
+        let limits = device.limits();
+        let side = limits.max_texture_dimension_2d;
+        if size[0] > side || size[1] > side || capacity > limits.max_texture_array_layers {
+            return Err(RenderError::Gpu(format!(
+                "{capacity} photos of {} × {} do not fit a texture array of this device \
+                 (at most {} of {side} × {side}); use --device cpu",
+                size[0], size[1], limits.max_texture_array_layers
+            )));
+        }
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("photos"),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: capacity,
+            },
+            mip_level_count: MAX_LEVELS as u32,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        let layers = vec![None; sources.len()];
+        let levels = MAX_LEVELS;
+        Ok(Self {
+            texture,
+            view,
+            size,
+            store_id,
+            layers,
+            used_layers: 0,
+            capacity,
+            levels,
+        })
+    }
+
+    fn fill(
+        &mut self,
+        queue: &wgpu::Queue,
+        frame: &Frame<'_>,
+        wanted: &[usize],
+    ) -> Result<(), RenderError> {
+        for &source_idx in wanted {
+            if self.layers[source_idx].is_none() {
+                let photo = frame.lumigraph.photos.get(source_idx)?;
+                self.upload(queue, photo, self.used_layers);
+                self.layers[source_idx] = Some(self.used_layers);
+                self.used_layers += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn upload(&self, queue: &wgpu::Queue, photo: &Pyramid, layer: u32) {
+        for (level, image) in photo.levels.iter().enumerate() {
+            let padded = pad(image, self.size[0] >> level, self.size[1] >> level);
+            let (width, height) = padded.dimensions();
+            queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &self.texture,
+                    mip_level: level as u32,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: 0,
+                        z: layer,
+                    },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                padded.as_raw(),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(width * 4),
+                    rows_per_image: Some(height),
+                },
+                wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
+            );
+        }
+    }
+
+    /// The layer of a photo; the first where it is not on the device.
+    pub(crate) fn layer(&self, source_idx: usize) -> u32 {
+        self.layers[source_idx].unwrap_or(0)
+    }
+
+    /// Whether every photo is on the device.
+    pub(crate) fn complete(&self, store_id: u64) -> bool {
+        self.store_id == store_id && self.layers.iter().all(Option::is_some)
+    }
+
+    /// The coarsest mip level that a photo of this size has.
+    pub(crate) fn last_level(&self, frame: &Frame<'_>, source_idx: usize) -> usize {
+        let view = &frame.lumigraph.sources[source_idx].view;
+        let halvings = view
+            .width
+            .max(view.height)
+            .next_power_of_two()
+            .trailing_zeros() as usize;
+        halvings.min(self.levels - 1)
+    }
+}
+
+/// Repeats the last column and row once, where there is room.
+fn pad(image: &RgbaImage, room_width: u32, room_height: u32) -> RgbaImage {
+    let (width, height) = image.dimensions();
+    let padded_width = (width + 1).min(room_width);
+    let padded_height = (height + 1).min(room_height);
+    RgbaImage::from_fn(padded_width, padded_height, |x, y| {
+        *image.get_pixel(x.min(width - 1), y.min(height - 1))
+    })
+}
