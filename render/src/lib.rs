@@ -13,10 +13,13 @@ pub mod gpu;
 mod image_out;
 mod lumigraph;
 mod options;
+pub mod path;
 mod photos;
+pub mod picture;
 mod raster;
 mod rays;
 pub mod reference;
+pub mod score;
 pub mod triangulation;
 
 pub use engine::{DeviceChoice, Engine};
@@ -24,7 +27,9 @@ pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, ProxyPoint};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
+pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
+pub use score::Score;
 
 /// Why a frame could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,0 +1,282 @@
+//! Path files, version 1: JSON with either frames or keyframes.
+
+use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
+use calibrate::{Camera, ModelKind, Rigid3};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a path file.
+#[derive(Debug, thiserror::Error)]
+pub enum PathFileError {
+    /// It cannot be read or written.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Io(PathBuf, std::io::Error),
+    /// It is not the JSON that was expected.
+    #[error("{path}: not a path file: {error}", path = .0.display(), error = .1)]
+    Json(PathBuf, serde_json::Error),
+    /// It is from a later version.
+    #[error("{path}: path file version {found}; this program reads version 1", path = .0.display(), found = .1)]
+    Version(PathBuf, u64),
+    /// It holds neither frames nor keyframes, or both.
+    #[error("{path}: a path has either \"frames\" or \"keyframes\"; found {found}", path = .0.display(), found = .1)]
+    Content(PathBuf, &'static str),
+    /// Its frames do not make a path.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Path(PathBuf, PathError),
+}
+
+/// What the file says.
+#[derive(Deserialize)]
+struct Stored {
+    version: u64,
+    fps: f64,
+    frames: Option<Vec<Value>>,
+    keyframes: Option<Vec<Value>>,
+    #[serde(default)]
+    interpolation: Option<StoredInterpolation>,
+    #[serde(flatten)]
+    extra: Map<String, Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum StoredInterpolation {
+    Spline,
+    Linear,
+}
+
+/// A frame, or a keyframe with `t_s`.
+#[derive(Serialize, Deserialize)]
+struct StoredFrame {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    t_s: Option<f64>,
+    /// Row by row.
+    camera_from_world: Vec<f64>,
+    width: u32,
+    height: u32,
+    model: String,
+    params: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    time_s: Option<f64>,
+    #[serde(flatten)]
+    extra: Map<String, Value>,
+}
+
+/// How far RᵀR of a pose may be from the identity: what six printed digits leave.
+const ROTATION_TOLERANCE: f64 = 1e-6;
+
+/// Reads a path; keyframes are sampled at its frame rate.
+///
+/// Keys that this version does not know are kept in `extra`, except those of keyframes,
+/// which end with the sampling.
+///
+/// # Errors
+/// The file, the frame by its index, and what is wrong with it.
+pub fn read(path: &Path) -> Result<CameraPath, PathFileError> {
+    let bytes = std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))?;
+    let json = |e| PathFileError::Json(path.to_owned(), e);
+    // The version first: a later one may have other keys.
+    #[derive(Deserialize)]
+    struct Version {
+        version: u64,
+    }
+    let Version { version } = serde_json::from_slice(&bytes).map_err(json)?;
+    if version != 1 {
+        return Err(PathFileError::Version(path.to_owned(), version));
+    }
+    let stored: Stored = serde_json::from_slice(&bytes).map_err(json)?;
+    debug_assert_eq!(stored.version, version);
+
+    let camera_path = match (stored.frames, stored.keyframes) {
+        (Some(frames), None) => read_frames(stored.fps, frames),
+        (None, Some(keyframes)) => {
+            let interpolation = match stored.interpolation {
+                Some(StoredInterpolation::Linear) => Interpolation::Linear,
+                Some(StoredInterpolation::Spline) | None => Interpolation::Spline,
+            };
+            read_keyframes(keyframes)
+                .and_then(|k| CameraPath::from_keyframes(&k, interpolation, stored.fps))
+        }
+        (None, None) => return Err(PathFileError::Content(path.to_owned(), "neither")),
+        (Some(_), Some(_)) => return Err(PathFileError::Content(path.to_owned(), "both")),
+    };
+    let mut camera_path = camera_path.map_err(|e| PathFileError::Path(path.to_owned(), e))?;
+    camera_path.extra = stored.extra;
+    Ok(camera_path)
+}
+
+/// Writes a path as frames, one a line. What [`read`] makes of it is equal, bit for bit,
+/// where the frames come from [`PathFrame::new`].
+///
+/// The file appears complete or not at all.
+///
+/// # Errors
+/// The file, and what is wrong with it or with the path.
+pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), PathFileError> {
+    // What could not be read is not written.
+    CameraPath::new(camera_path.fps, camera_path.frames.clone())
+        .map_err(|e| PathFileError::Path(path.to_owned(), e))?;
+    let json = |e| PathFileError::Json(path.to_owned(), e);
+
+    let fps = serde_json::to_string(&camera_path.fps).map_err(json)?;
+    let mut text = format!("{{\"version\": 1,\n\"fps\": {fps}");
+    for (key, value) in &camera_path.extra {
+        let key = serde_json::to_string(key).map_err(json)?;
+        let value = serde_json::to_string(value).map_err(json)?;
+        text += &format!(",\n{key}: {value}");
+    }
+    text += ",\n\"frames\": [";
+    for (index, frame) in camera_path.frames.iter().enumerate() {
+        let stored = serde_json::to_string(&StoredFrame::of(frame)).map_err(json)?;
+        text += if index == 0 { "\n" } else { ",\n" };
+        text += &stored;
+    }
+    text += "\n]}\n";
+
+    let io = |e| PathFileError::Io(path.to_owned(), e);
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".tmp");
+    std::fs::write(&temporary, text).map_err(io)?;
+    std::fs::rename(&temporary, path).map_err(io)
+}
+
+fn read_frames(fps: f64, frames: Vec<Value>) -> Result<CameraPath, PathError> {
+    let kind = "frame";
+    let frame = |(index, value): (usize, Value)| {
+        let stored = StoredFrame::from_value(kind, index, value)?;
+        let camera = stored.camera(kind, index)?;
+        let camera_from_world = stored.camera_from_world(kind, index)?;
+        let name = stored.name.unwrap_or_else(|| default_name(index));
+        let mut frame = PathFrame::new(name, camera, camera_from_world, stored.time_s)
+            .map_err(|error| PathError::Camera { kind, index, error })?;
+        frame.extra = stored.extra;
+        if let Some(t_s) = stored.t_s {
+            frame.extra.insert("t_s".to_owned(), t_s.into());
+        }
+        Ok(frame)
+    };
+    let frames: Result<Vec<PathFrame>, PathError> =
+        frames.into_iter().enumerate().map(frame).collect();
+    CameraPath::new(fps, frames?)
+}
+
+fn read_keyframes(keyframes: Vec<Value>) -> Result<Vec<Keyframe>, PathError> {
+    let kind = "keyframe";
+    let keyframe = |(index, value): (usize, Value)| {
+        let stored = StoredFrame::from_value(kind, index, value)?;
+        Ok(Keyframe {
+            t_s: stored.t_s.ok_or_else(|| PathError::Malformed {
+                kind,
+                index,
+                reason: "missing field `t_s`, its time in seconds".to_owned(),
+            })?,
+            camera_from_world: stored.camera_from_world(kind, index)?,
+            camera: stored.camera(kind, index)?,
+            time_s: stored.time_s,
+        })
+    };
+    keyframes.into_iter().enumerate().map(keyframe).collect()
+}
+
+impl StoredFrame {
+    fn of(frame: &PathFrame) -> Self {
+        let pose = &frame.view.camera_from_world;
+        let [x, y, z] = pose.matrix().transpose().to_cols_array_2d();
+        let t = pose.translation;
+        let rows = [
+            [x[0], x[1], x[2], t.x],
+            [y[0], y[1], y[2], t.y],
+            [z[0], z[1], z[2], t.z],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        Self {
+            name: Some(frame.name.clone()),
+            t_s: None,
+            camera_from_world: rows.concat(),
+            width: frame.camera.width,
+            height: frame.camera.height,
+            model: frame.camera.model.name().to_owned(),
+            params: frame.camera.params.clone(),
+            time_s: frame.time_s,
+            extra: frame.extra.clone(),
+        }
+    }
+
+    fn from_value(kind: &'static str, index: usize, value: Value) -> Result<Self, PathError> {
+        serde_json::from_value(value).map_err(|e| PathError::Malformed {
+            kind,
+            index,
+            reason: e.to_string(),
+        })
+    }
+
+    fn camera(&self, kind: &'static str, index: usize) -> Result<Camera, PathError> {
+        let Some(model) = ModelKind::from_name(&self.model) else {
+            let known: Vec<&str> = ModelKind::ALL.iter().map(|m| m.name()).collect();
+            return Err(PathError::Malformed {
+                kind,
+                index,
+                reason: format!(
+                    "unknown camera model {:?}; known are {}",
+                    self.model,
+                    known.join(", ")
+                ),
+            });
+        };
+        let camera = Camera {
+            model,
+            width: self.width,
+            height: self.height,
+            params: self.params.clone(),
+        };
+        match camera.lens() {
+            Ok(_) => Ok(camera),
+            Err(error) => Err(PathError::Camera { kind, index, error }),
+        }
+    }
+
+    fn camera_from_world(&self, kind: &'static str, index: usize) -> Result<Rigid3, PathError> {
+        let malformed = |reason: String| PathError::Malformed {
+            kind,
+            index,
+            reason,
+        };
+        let Ok(m) = <[f64; 16]>::try_from(self.camera_from_world.as_slice()) else {
+            return Err(malformed(format!(
+                "camera_from_world has {} numbers; 16 are expected, row by row",
+                self.camera_from_world.len()
+            )));
+        };
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            return Err(malformed(format!(
+                "the last row of camera_from_world is {:?}, not [0, 0, 0, 1]; is the matrix \
+                 written column by column?",
+                &m[12..]
+            )));
+        }
+        let row = |r: usize| DVec3::new(m[4 * r], m[4 * r + 1], m[4 * r + 2]);
+        let rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        let translation = DVec3::new(m[3], m[7], m[11]);
+        let Some(pose) = Rigid3::from_matrix(rotation, translation, ROTATION_TOLERANCE) else {
+            return Err(malformed(
+                "camera_from_world does not begin with a rotation: its rows must be of length \
+                 1, at right angles and right-handed"
+                    .to_owned(),
+            ));
+        };
+        // A matrix that [`write`] wrote gives back the very quaternion.
+        let written = Rigid3 {
+            rotation: settled(pose.rotation),
+            translation,
+        };
+        Ok(if written.matrix() == rotation {
+            written
+        } else {
+            pose
+        })
+    }
+}

@@ -1,0 +1,389 @@
+//! How close a rendered picture comes to the photo that was taken there.
+
+use image::RgbaImage;
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+
+/// What a rendered picture scores against a photo.
+///
+/// As JSON, a PSNR above [`PSNR_CAP_DB`] (infinite for identical pictures, which JSON cannot
+/// say) is written as that cap.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Score {
+    /// Peak signal-to-noise ratio in dB over the whole picture; infinite where it is
+    /// identical.
+    #[serde(serialize_with = "capped")]
+    pub psnr: f64,
+    /// Structural similarity over the whole picture; 1 where it is identical.
+    pub ssim: f64,
+    /// PSNR in dB over the covered pixels, those with half coverage or more; `None` where
+    /// there are none.
+    #[serde(serialize_with = "capped_option")]
+    pub psnr_covered: Option<f64>,
+    /// The mean alpha of the rendered picture, 0…1.
+    pub coverage: f64,
+}
+
+/// No PSNR counts for more than this in [`mean`] and in JSON, so that one photo reproduced
+/// exactly does not outweigh all others.
+pub const PSNR_CAP_DB: f64 = 99.0;
+
+/// A rendered pixel is covered when its alpha is at least this: half.
+const COVERED_ALPHA: u8 = 128;
+
+/// Wang et al. 2004, "Image quality assessment: from error visibility to structural
+/// similarity", §III: an 11 × 11 Gaussian window with σ = 1.5, K₁ = 0.01, K₂ = 0.03.
+const WINDOW: usize = 11;
+const SIGMA: f64 = 1.5;
+const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+
+/// Why two pictures cannot be compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ScoreError {
+    /// They differ in size.
+    #[error(
+        "the rendered picture has {} × {} pixels and the photo {} × {}; render at the photo's size",
+        rendered.0, rendered.1, photo.0, photo.1
+    )]
+    Size {
+        /// Width and height in pixels.
+        rendered: (u32, u32),
+        /// Width and height in pixels.
+        photo: (u32, u32),
+    },
+    /// They are smaller than the window of SSIM.
+    #[error("the pictures have {0} × {1} pixels; SSIM needs at least {WINDOW} × {WINDOW}")]
+    TooSmall(u32, u32),
+}
+
+/// Scores a rendered picture (straight alpha, alpha = coverage) against its photo.
+///
+/// Both are composited on black and rounded to 8-bit sRGB, so what is not covered counts as
+/// black. PSNR is 10·log₁₀(255²/MSE), the mean over all pixels and their three channels.
+/// SSIM is computed in each of R, G and B with a Gaussian window, only where the window lies
+/// within the picture, and averaged over places and channels: scikit-image's
+/// `structural_similarity` with `gaussian_weights`, `channel_axis`, `data_range=255` and
+/// without `use_sample_covariance`.
+///
+/// # Errors
+/// The sizes differ, or are below 11 × 11 pixels.
+pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreError> {
+    let (width, height) = rendered.dimensions();
+    if photo.dimensions() != (width, height) {
+        return Err(ScoreError::Size {
+            rendered: (width, height),
+            photo: photo.dimensions(),
+        });
+    }
+    if (width.min(height) as usize) < WINDOW {
+        return Err(ScoreError::TooSmall(width, height));
+    }
+
+    let (ours, theirs) = (on_black(rendered), on_black(photo));
+    let squared_error =
+        |i: usize| -> u64 { (0..3).map(|c| squared(ours[i][c], theirs[i][c])).sum() };
+    let alphas = || rendered.pixels().map(|p| p.0[3]);
+    let count = ours.len();
+    let total: u64 = (0..count).map(squared_error).sum();
+    let covered = || {
+        (0..count)
+            .zip(alphas())
+            .filter(|(_, a)| *a >= COVERED_ALPHA)
+    };
+    let covered_count = covered().count();
+    let covered_total: u64 = covered().map(|(i, _)| squared_error(i)).sum();
+    let alpha_sum: u64 = alphas().map(u64::from).sum();
+    Ok(Score {
+        psnr: psnr(total, count),
+        ssim: ssim(&ours, &theirs, width as usize),
+        psnr_covered: (covered_count > 0).then(|| psnr(covered_total, covered_count)),
+        coverage: alpha_sum as f64 / (255.0 * count as f64),
+    })
+}
+
+/// The mean of per-photo scores, PSNR as the mean of dB values of at most [`PSNR_CAP_DB`];
+/// `psnr_covered` over those that have one. `None` of nothing.
+pub fn mean(scores: &[Score]) -> Option<Score> {
+    let mean_of = |values: &[f64]| {
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let all = |value: fn(&Score) -> f64| mean_of(&scores.iter().map(value).collect::<Vec<_>>());
+    let covered: Vec<f64> = scores
+        .iter()
+        .filter_map(|s| Some(s.psnr_covered?.min(PSNR_CAP_DB)))
+        .collect();
+    Some(Score {
+        psnr: all(|s| s.psnr.min(PSNR_CAP_DB))?,
+        ssim: all(|s| s.ssim)?,
+        psnr_covered: mean_of(&covered),
+        coverage: all(|s| s.coverage)?,
+    })
+}
+
+fn capped<S: Serializer>(psnr: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(psnr.min(PSNR_CAP_DB))
+}
+
+fn capped_option<S: Serializer>(psnr: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    psnr.map(|p| p.min(PSNR_CAP_DB)).serialize(serializer)
+}
+
+/// The colours over black, rounded to the nearest byte.
+fn on_black(image: &RgbaImage) -> Vec<[u8; 3]> {
+    let pixels = image.pixels().map(|p| {
+        let [r, g, b, a] = p.0;
+        [r, g, b].map(|v| ((u32::from(v) * u32::from(a) + 127) / 255) as u8)
+    });
+    pixels.collect()
+}
+
+fn squared(a: u8, b: u8) -> u64 {
+    let difference = u64::from(a.abs_diff(b));
+    difference * difference
+}
+
+/// In dB, from the sum of squared differences of `count` pixels' three channels.
+fn psnr(sum: u64, count: usize) -> f64 {
+    let mean_squared_error = sum as f64 / (3.0 * count as f64);
+    10.0 * (255.0 * 255.0 / mean_squared_error).log10()
+}
+
+/// The window along one axis; it sums to one.
+fn window() -> [f64; WINDOW] {
+    let weights: [f64; WINDOW] = std::array::from_fn(|i| {
+        let x = i as f64 - (WINDOW / 2) as f64;
+        (-x * x / (2.0 * SIGMA * SIGMA)).exp()
+    });
+    let sum: f64 = weights.iter().sum();
+    weights.map(|w| w / sum)
+}
+
+/// Mean SSIM. One row of windows at a time: first down the columns, then along the row.
+/// Rows are summed in order, so the result does not depend on the threads.
+fn ssim(ours: &[[u8; 3]], theirs: &[[u8; 3]], width: usize) -> f64 {
+    let weights = window();
+    let rows = ours.len() / width - WINDOW + 1;
+    let columns = width - WINDOW + 1;
+    let row = |y: usize| -> f64 {
+        // x, y, x² + y² and xy of each channel, the window applied down the columns.
+        let mut down = vec![[0.0; 12]; width];
+        for (k, &weight) in weights.iter().enumerate() {
+            let row = (y + k) * width..(y + k + 1) * width;
+            let pixels = ours[row.clone()].iter().zip(&theirs[row]);
+            for (sums, (a, b)) in down.iter_mut().zip(pixels) {
+                for c in 0..3 {
+                    let (a, b) = (f64::from(a[c]), f64::from(b[c]));
+                    sums[4 * c] += weight * a;
+                    sums[4 * c + 1] += weight * b;
+                    sums[4 * c + 2] += weight * (a * a + b * b);
+                    sums[4 * c + 3] += weight * (a * b);
+                }
+            }
+        }
+        let mut total = 0.0;
+        for x in 0..columns {
+            let mut moments = [0.0; 12];
+            for (weight, sums) in weights.iter().zip(&down[x..]) {
+                for i in 0..12 {
+                    moments[i] += weight * sums[i];
+                }
+            }
+            for m in moments.as_chunks::<4>().0 {
+                total += similarity(m);
+            }
+        }
+        total
+    };
+    let totals: Vec<f64> = (0..rows).into_par_iter().map(row).collect();
+    totals.iter().sum::<f64>() / (3 * rows * columns) as f64
+}
+
+/// Wang et al. 2004, eq. 13, from the windowed means of x, y, x² + y² and xy. Exactly one
+/// where x = y.
+fn similarity(&[x, y, squares, product]: &[f64; 4]) -> f64 {
+    let means = x * x + y * y;
+    let covariance = product - x * y;
+    let variances = squares - means;
+    ((2.0 * (x * y) + C1) * (2.0 * covariance + C2)) / ((means + C1) * (variances + C2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgba;
+
+    /// Repeatable noise in 0..256.
+    fn noise(x: u32, y: u32, salt: u32) -> u8 {
+        let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ salt;
+        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+        h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+        (h >> 24) as u8
+    }
+
+    fn picture(width: u32, height: u32) -> RgbaImage {
+        RgbaImage::from_fn(width, height, |x, y| {
+            let base = 40 + 2 * x + y;
+            let at = |salt: u32| (base + u32::from(noise(x, y, salt)) / 8).min(255) as u8;
+            Rgba([at(1), at(2), at(3), 255])
+        })
+    }
+
+    #[test]
+    fn identical_pictures_score_best() {
+        let photo = picture(40, 23);
+        let s = score(&photo, &photo).unwrap();
+        assert_eq!(s.psnr, f64::INFINITY);
+        assert_eq!(s.ssim, 1.0);
+        assert_eq!(s.psnr_covered, Some(f64::INFINITY));
+        assert_eq!(s.coverage, 1.0);
+        let json = serde_json::to_string(&s).unwrap();
+        assert_eq!(
+            json,
+            r#"{"psnr":99.0,"ssim":1.0,"psnr_covered":99.0,"coverage":1.0}"#
+        );
+    }
+
+    #[test]
+    fn constants_by_hand() {
+        let gray = |v: u8| RgbaImage::from_pixel(16, 12, Rgba([v, v, v, 255]));
+        let s = score(&gray(100), &gray(110)).unwrap();
+        // 20·log₁₀(255/10), and with no variance only the term of the means.
+        assert!((s.psnr - 28.130_803_608_679_1).abs() < 1e-9);
+        let ssim = (2.0 * 100.0 * 110.0 + C1) / (100.0 * 100.0 + 110.0 * 110.0 + C1);
+        assert!((s.ssim - ssim).abs() < 1e-9);
+        let s = score(&gray(0), &gray(255)).unwrap();
+        assert_eq!(s.psnr, 0.0);
+        assert!((s.ssim - C1 / (255.0 * 255.0 + C1)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn noise_of_known_power_has_known_psnr() {
+        let photo = picture(64, 48);
+        // ±3 in every channel: the mean squared error is 9.
+        let mut rendered = photo.clone();
+        for (x, y, p) in rendered.enumerate_pixels_mut() {
+            for c in 0..3 {
+                let sign = if noise(x, y, 7 + c as u32) < 128 {
+                    3
+                } else {
+                    -3
+                };
+                p.0[c] = p.0[c].saturating_add_signed(sign);
+                assert!(p.0[c] < 255);
+            }
+        }
+        let s = score(&rendered, &photo).unwrap();
+        assert!((s.psnr - 20.0 * (255.0_f64 / 3.0).log10()).abs() < 1e-12);
+        assert!(s.ssim < 1.0 && s.ssim > 0.8, "{}", s.ssim);
+    }
+
+    #[test]
+    fn what_is_not_covered_is_black() {
+        let photo = RgbaImage::from_pixel(20, 20, Rgba([100, 100, 100, 255]));
+        let rendered = RgbaImage::from_fn(20, 20, |x, _| match x {
+            0..5 => Rgba([0, 0, 0, 0]),
+            5..10 => Rgba([200, 200, 200, 127]),
+            _ => Rgba([110, 110, 110, 255]),
+        });
+        let s = score(&rendered, &photo).unwrap();
+        // 200 · 127/255 rounds to 100: right by chance, yet less than half covered.
+        let mse = (0.25 * 100.0 * 100.0) + 0.5 * 100.0;
+        assert!((s.psnr - 10.0 * (255.0_f64.powi(2) / mse).log10()).abs() < 1e-12);
+        assert!((s.psnr_covered.unwrap() - 20.0 * 25.5_f64.log10()).abs() < 1e-12);
+        assert!((s.coverage - (0.25 * 127.0 / 255.0 + 0.5)).abs() < 1e-12);
+
+        let nothing = RgbaImage::new(20, 20);
+        let s = score(&nothing, &photo).unwrap();
+        assert_eq!((s.psnr_covered, s.coverage), (None, 0.0));
+        // A transparent photo is black as well, whatever its hidden colour.
+        let hidden = RgbaImage::from_pixel(20, 20, Rgba([9, 8, 7, 0]));
+        assert_eq!(score(&nothing, &hidden).unwrap().psnr, f64::INFINITY);
+    }
+
+    /// The definition, window by window and moment by moment.
+    fn plain_ssim(a: &RgbaImage, b: &RgbaImage) -> f64 {
+        let w = window();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for c in 0..3 {
+            for top in 0..=a.height() - 11 {
+                for left in 0..=a.width() - 11 {
+                    let mean = |value: &dyn Fn(f64, f64) -> f64| {
+                        let mut mean = 0.0;
+                        for j in 0..11 {
+                            for i in 0..11 {
+                                let at = |image: &RgbaImage| {
+                                    let pixel = image.get_pixel(left + i, top + j);
+                                    f64::from(pixel.0[c])
+                                };
+                                mean += w[i as usize] * w[j as usize] * value(at(a), at(b));
+                            }
+                        }
+                        mean
+                    };
+                    let (mx, my) = (mean(&|x, _| x), mean(&|_, y| y));
+                    let vx = mean(&|x, _| (x - mx) * (x - mx));
+                    let vy = mean(&|_, y| (y - my) * (y - my));
+                    let cov = mean(&|x, y| (x - mx) * (y - my));
+                    sum += (2.0 * mx * my + C1) * (2.0 * cov + C2)
+                        / ((mx * mx + my * my + C1) * (vx + vy + C2));
+                    count += 1.0;
+                }
+            }
+        }
+        sum / count
+    }
+
+    #[test]
+    fn ssim_equals_its_slow_twin() {
+        let photo = picture(27, 19);
+        let rendered = RgbaImage::from_fn(27, 19, |x, y| {
+            let [r, g, b, _] = photo.get_pixel(26 - x, y).0;
+            Rgba([noise(x, y, 5), g / 2, b.max(r), 255])
+        });
+        let fast = score(&rendered, &photo).unwrap().ssim;
+        let slow = plain_ssim(&rendered, &photo);
+        assert!((fast - slow).abs() < 1e-10, "{fast} {slow}");
+        let once_more = score(&photo, &rendered).unwrap().ssim;
+        assert!((fast - once_more).abs() < 1e-12, "symmetric");
+    }
+
+    #[test]
+    fn ssim_of_one_window_has_one_place() {
+        let photo = picture(11, 11);
+        let mut rendered = photo.clone();
+        rendered.get_pixel_mut(5, 5).0[0] ^= 64;
+        let fast = score(&rendered, &photo).unwrap().ssim;
+        assert!((fast - plain_ssim(&rendered, &photo)).abs() < 1e-10);
+    }
+
+    #[test]
+    fn pictures_that_cannot_be_compared_are_named() {
+        let error = score(&RgbaImage::new(20, 30), &RgbaImage::new(30, 20)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the rendered picture has 20 × 30 pixels and the photo 30 × 20; \
+             render at the photo's size"
+        );
+        let error = score(&RgbaImage::new(20, 10), &RgbaImage::new(20, 10)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the pictures have 20 × 10 pixels; SSIM needs at least 11 × 11"
+        );
+    }
+
+    #[test]
+    fn means_are_of_decibels() {
+        let one = |psnr, psnr_covered| Score {
+            psnr,
+            ssim: 0.5,
+            psnr_covered,
+            coverage: 0.25,
+        };
+        assert_eq!(mean(&[]), None);
+        let scores = [one(20.0, Some(30.0)), one(30.0, None)];
+        assert_eq!(mean(&scores), Some(one(25.0, Some(30.0))));
+        let with_perfect = [one(1.0, None), one(f64::INFINITY, None)];
+        assert_eq!(mean(&with_perfect).unwrap().psnr, 50.0);
+    }
+}
