@@ -41,18 +41,19 @@ const PARTS: [(&str, &str); 5] = [
     ),
 ];
 
-/// The photo whose field is shown: in the middle of the grid.
-const SHOWN: &str = "shelf_08.png";
+/// The photo whose field is shown: one of those held out.
+const SHOWN: &str = "0008.png";
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = &args.output;
     clear(folder)?;
     let at = |part: &str| folder.join(part).display().to_string();
     let [capture, scene, frames, field, evaluation] = PARTS.map(|(part, _)| at(part));
+    let split = at("capture/split.json");
     let commands: [&[&str]; 6] = [
         &["generate", "shelf", "-o", &capture],
         &["import", &capture, "-o", &scene],
-        &["proxy", &scene, "plane"],
+        &["proxy", &scene, "plane", "--hold-out", &split],
         &[
             "render", &scene, "--path", "orbit", "--frames", "12", "-o", &frames,
         ],

@@ -4,7 +4,8 @@ use super::Usage;
 use super::session::Session;
 use calibrate::{View, colmap};
 use lumigraph::scene::SceneError;
-use render::path;
+use render::path::{self, CameraPath, PathFrame};
+use render::trajectory::{self, Trajectory};
 use std::path::{Path, PathBuf};
 
 /// Which views to render.
@@ -44,10 +45,9 @@ pub(super) fn frames(
     }
     let asked = args.path.as_deref().unwrap_or_default();
     match asked {
-        "orbit" | "dolly" | "sweep" => {
-            let _ = (session, count);
-            Err(Usage("not yet".into()).into())
-        }
+        "orbit" => derived(Trajectory::Orbit, count, session),
+        "dolly" => derived(Trajectory::Dolly, count, session),
+        "sweep" => derived(Trajectory::Sweep, count, session),
         _ => {
             let file = Path::new(asked);
             if file.extension().is_none() && !file.exists() {
@@ -58,6 +58,22 @@ pub(super) fn frames(
             of_file(file)
         }
     }
+}
+
+/// Frames a second of derived paths. Only a film made of the frames would show it.
+const FPS: f64 = 30.0;
+
+/// The frames of a path that follows from where the photos were taken.
+fn derived(
+    trajectory: Trajectory,
+    count: u32,
+    session: &Session,
+) -> anyhow::Result<Vec<NamedView>> {
+    let sources = &session.lumigraph().sources;
+    let points = session.points();
+    let proxy = &session.proxy.proxy;
+    let path = trajectory::derive(trajectory, sources, &points, proxy, count as usize, FPS)?;
+    Ok(named(path))
 }
 
 /// The images of a COLMAP model, by name.
@@ -86,10 +102,13 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
 
 /// The frames of a path file.
 fn of_file(file: &Path) -> anyhow::Result<Vec<NamedView>> {
-    let frames = path::read(file)?.frames.into_iter();
-    let named = |frame: path::PathFrame| NamedView {
+    Ok(named(path::read(file)?))
+}
+
+fn named(path: CameraPath) -> Vec<NamedView> {
+    let named = |frame: PathFrame| NamedView {
         name: frame.name,
         view: frame.view,
     };
-    Ok(frames.map(named).collect())
+    path.frames.into_iter().map(named).collect()
 }

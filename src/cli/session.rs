@@ -4,6 +4,7 @@ use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, S
 use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
+use glam::DVec3;
 use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::Scene;
@@ -77,6 +78,12 @@ impl Session {
 
     pub(super) fn lumigraph(&self) -> &Lumigraph {
         &self.lumigraph
+    }
+
+    /// The sparse points that do not rest on held-out photos, in the world.
+    pub(super) fn points(&self) -> Vec<DVec3> {
+        let rest = self.scene.reconstruction.without_images(&self.without);
+        rest.points.values().map(|p| p.position).collect()
     }
 
     /// What draws, for people.
