@@ -77,14 +77,17 @@ pub struct Lens {
     /// Principal point, in pixels.
     pub principal: DVec2,
     distortion: Distortion,
-    /// Beyond this the radial mapping turns back on itself: a limit of the undistorted
-    /// radius (rational) or of θ (fisheye).
+    /// Up to here the mapping is one to one: a limit of the undistorted radius (rational)
+    /// or of θ (fisheye).
     limit: f64,
 }
 
 /// Newton's method stops when a step is this small (normalised coordinates), or fails.
 const STEP_TOLERANCE: f64 = 1e-15;
 const MAX_STEPS: usize = 50;
+/// Newton's method inside a bracket may need to double its way out of a pole, or bisect
+/// all bits of the bracket.
+const MAX_BRACKETED_STEPS: usize = 200;
 /// A root is believed when the distorted point returns to within this.
 const RESIDUAL_TOLERANCE: f64 = 1e-12;
 
@@ -239,11 +242,11 @@ fn fisheye(theta: f64, k: &[f64; 4]) -> (f64, f64) {
     (value, slope)
 }
 
-/// How far from the axis the radial mapping keeps growing.
+/// How far from the axis the mapping is one to one.
 fn monotone_limit(distortion: &Distortion) -> f64 {
-    // A mapping is scanned in small steps for the first place where its slope is not
-    // positive (a pole of the rational term shows as one, or as a change of sign of the
-    // value), and that place is then bisected.
+    // A mapping is scanned in small steps for the first place where it stops growing (a
+    // pole of the rational term shows as a slope or a value that is not positive), and
+    // that place is then bisected.
     fn scan(end: f64, steps: u32, at_end: f64, grows: impl Fn(f64) -> bool) -> f64 {
         let mut good = 0.0;
         for step in 1..=steps {
@@ -267,11 +270,18 @@ fn monotone_limit(distortion: &Distortion) -> f64 {
     }
     match distortion {
         Distortion::None => f64::INFINITY,
-        // Radius 50 is 88.9° off the axis.
-        Distortion::Rational { k, .. } => scan(50.0, 20_000, f64::INFINITY, |r| {
-            let (value, slope) = rational_radius(r, k);
-            value > 0.0 && slope > 0.0
-        }),
+        Distortion::Rational { k, p } => {
+            // The tangential terms' Jacobian is 2(q·x)I + 2(qxᵀ + xqᵀ) with q = (p₂, p₁):
+            // symmetric, its eigenvalues at least −6|q|r. The radial terms' is symmetric
+            // too, with the eigenvalues f/r and f'. Where the sum is positive definite on
+            // a disc, which is convex, the mapping is one to one there.
+            let tangential = 6.0 * p[0].hypot(p[1]);
+            // Radius 50 is 88.9° off the axis.
+            scan(50.0, 20_000, f64::INFINITY, |r| {
+                let (value, slope) = rational_radius(r, k);
+                slope.min(value / r) > tangential * r
+            })
+        }
         Distortion::Fisheye { k } => {
             let pi = std::f64::consts::PI;
             scan(pi, 4_000, pi, |theta| fisheye(theta, k).1 > 0.0)
@@ -301,27 +311,44 @@ fn invert_monotone(value: f64, limit: f64, f: impl Fn(f64) -> (f64, f64)) -> Opt
         // The image's corners often lie a rounding error beyond the fold.
         return (value <= reachable * (1.0 + 1e-12)).then_some(high);
     }
-    let mut x = value.min(high);
-    for _ in 0..200 {
+    let mut x = if value < high {
+        value
+    } else {
+        0.5 * (low + high)
+    };
+    for _ in 0..MAX_BRACKETED_STEPS {
         let (fx, slope) = f(x);
+        if (fx - value).abs() <= f64::EPSILON * value {
+            return Some(x);
+        }
         if fx > value {
             high = x
         } else {
             low = x
         }
         let newton = x - (fx - value) / slope;
-        let next = if newton > low && newton < high {
+        // Close to a pole Newton's steps are tiny though the root is far: a step that
+        // changes nothing ends the search only where the value is met, and gives way to
+        // bisection, which ends with the bracket, elsewhere.
+        let moves = (newton - x).abs() > 4.0 * f64::EPSILON * x;
+        let near = (fx - value).abs() <= RESIDUAL_TOLERANCE * (1.0 + value);
+        if near && !moves {
+            return Some(newton.clamp(0.0, limit));
+        }
+        let next = if newton > low && newton < high && moves {
             newton
         } else {
             0.5 * (low + high)
         };
-        if (next - x).abs() <= f64::EPSILON * x.abs() {
-            return Some(next);
+        if (next - x).abs() <= f64::EPSILON * x {
+            x = next;
+            break;
         }
         x = next;
     }
-    // Bisection halves the bracket at least every other step: 200 are enough.
-    Some(x)
+    // Believe it only where it gives the value.
+    let found = (f(x).0 - value).abs() <= RESIDUAL_TOLERANCE * (1.0 + value);
+    found.then_some(x)
 }
 
 /// Solves the rational model for the undistorted point.
@@ -369,4 +396,42 @@ fn invert_rational(distorted: DVec2, k: &[f64; 6], p: &[f64; 2], limit: f64) -> 
         && x.length() <= limit
         && rational(x, k, p).1.determinant() > 0.0;
     found.then_some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Central differences of a mapping of the plane.
+    fn difference(f: impl Fn(DVec2) -> DVec2, at: DVec2) -> DMat2 {
+        let h = 1e-6;
+        let along = |step: DVec2| (f(at + step) - f(at - step)) / (2.0 * h);
+        DMat2::from_cols(along(DVec2::new(h, 0.0)), along(DVec2::new(0.0, h)))
+    }
+
+    #[test]
+    fn derivatives_meet_finite_differences() {
+        let k = [-0.3, 0.1, -0.02, 0.2, 0.05, -0.01];
+        let p = [0.01, -0.02];
+        for x in [-0.9, -0.2, 0.0, 0.35, 0.7] {
+            for y in [-0.6, 0.0, 0.15, 0.8] {
+                let at = DVec2::new(x, y);
+                let expected = difference(|point| rational(point, &k, &p).0, at);
+                let found = rational(at, &k, &p).1;
+                assert!(
+                    (found - expected)
+                        .to_cols_array()
+                        .iter()
+                        .all(|e| e.abs() < 1e-8),
+                    "at {at}: {found} instead of {expected}"
+                );
+            }
+        }
+        let k = [-0.1, 0.05, -0.02, 0.003];
+        for theta in [0.0, 0.1, 0.7, 1.5, 2.0] {
+            let h = 1e-6;
+            let expected = (fisheye(theta + h, &k).0 - fisheye(theta - h, &k).0) / (2.0 * h);
+            assert!((fisheye(theta, &k).1 - expected).abs() < 1e-8, "at {theta}");
+        }
+    }
 }

@@ -101,6 +101,21 @@ pub fn blend(candidates: &[Candidate], options: &FieldOptions) -> Vec<Contributo
     weighted
 }
 
+impl FieldOptions {
+    /// The threshold t among views that all see the whole of what matters (a = 1), from
+    /// their differences. More views can only lower it.
+    pub(crate) fn threshold_of_seen(&self, mut diffs: Vec<f64>) -> f64 {
+        diffs.sort_by(f64::total_cmp);
+        match self.blend {
+            Blend::Paper => diffs.get(self.k - 1).copied().unwrap_or(f64::INFINITY),
+            Blend::Consistent => {
+                let sorted: Vec<(f64, f64)> = diffs.into_iter().map(|d| (d, 1.0)).collect();
+                threshold(&sorted, self.full_weight())
+            }
+        }
+    }
+}
+
 fn contributors(
     relevant: &[(usize, f64, f64)],
     weight: impl Fn(f64, f64) -> f64,

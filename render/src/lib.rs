@@ -20,6 +20,7 @@ mod raster;
 mod rays;
 pub mod reference;
 pub mod score;
+pub mod trajectory;
 pub mod triangulation;
 
 pub use engine::{DeviceChoice, Engine};
@@ -30,6 +31,7 @@ pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
+pub use trajectory::Trajectory;
 
 /// Why a frame could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -198,8 +198,8 @@ fn lacks(incomplete: &[Incomplete]) -> String {
         .collect()
 }
 
-/// Names and ids of the camera models in COLMAP that `models` may lack: an error can then
-/// call them by both.
+/// What an error calls a camera model that [`ModelKind`] lacks: its id in COLMAP and,
+/// where known, its name.
 pub(super) fn foreign_model(id: i32) -> String {
     let name = match id {
         7 => "FOV",
@@ -207,6 +207,12 @@ pub(super) fn foreign_model(id: i32) -> String {
         9 => "RADIAL_FISHEYE",
         10 => "THIN_PRISM_FISHEYE",
         11 => "RAD_TAN_THIN_PRISM_FISHEYE",
+        12 => "SIMPLE_DIVISION",
+        13 => "DIVISION",
+        14 => "SIMPLE_FISHEYE",
+        15 => "FISHEYE",
+        16 => "EUCM",
+        17 => "EQUIRECTANGULAR",
         _ => return id.to_string(),
     };
     format!("{id} ({name})")

@@ -179,6 +179,8 @@ fn an_unknown_camera_model_is_named() {
          OPENCV_FISHEYE, FULL_OPENCV; undistort the photos with `colmap image_undistorter` and \
          use the model it writes"
     );
+    let error = binary_error("cameras.bin", put(8 + 4, 17_i32.to_le_bytes()));
+    assert!(error.contains("camera 1 has the camera model 17 (EQUIRECTANGULAR), which is not"));
     let error = text_error("cameras.txt", "SIMPLE_RADIAL", "MY_LENS");
     assert!(
         error.starts_with(

@@ -89,9 +89,11 @@ pub fn render_field(frame: &Frame<'_>, field: &TriangulatedField) -> Result<Rgba
         let mut triangle_of = [None; LANES];
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let x0 = tile_idx * LANES;
-            // 1. The interpolated weights of the triangles that cross the tile.
+            // 1. The interpolated weights, or differences, of the triangles that cross the
+            // tile.
             triangle_of.fill(None);
-            let mut active: Vec<(usize, Lane)> = Vec::with_capacity(16);
+            let mut active: Vec<Interpolated> = Vec::with_capacity(16);
+            let mut any_bordered = false;
             for span in spans.iter().filter(|s| s.start < x0 + LANES && s.end > x0) {
                 let (start, end) = (span.start.max(x0), span.end.min(x0 + LANES));
                 let mut shares = [[0.0; LANES]; 3];
@@ -100,34 +102,85 @@ pub fn render_field(frame: &Frame<'_>, field: &TriangulatedField) -> Result<Rgba
                     let share = raster.barycentric(span.triangle_idx, x, row);
                     (0..3).for_each(|corner| shares[corner][x - x0] = share[corner]);
                 }
+                let bordered = field.triangles[span.triangle_idx].bordered;
+                any_bordered |= bordered;
                 for entry in field.entries_of(span.triangle_idx) {
                     let i = entry.source_idx as usize;
-                    let at = active.iter().position(|(j, _)| *j == i).unwrap_or_else(|| {
-                        active.push((i, [0.0; LANES]));
-                        active.len() - 1
-                    });
-                    let weight = &mut active[at].1;
-                    for k in 0..LANES {
-                        weight[k] += shares[0][k] * entry.weights[0]
-                            + shares[1][k] * entry.weights[1]
-                            + shares[2][k] * entry.weights[2];
+                    let at = active
+                        .iter()
+                        .position(|s| s.source_idx == i)
+                        .unwrap_or_else(|| {
+                            active.push(Interpolated::nothing(i));
+                            active.len() - 1
+                        });
+                    let into = &mut active[at];
+                    let [v0, v1, v2] = entry.values;
+                    let values = if bordered {
+                        &mut into.diff
+                    } else {
+                        &mut into.weight
+                    };
+                    for k in start - x0..end - x0 {
+                        values[k] = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
+                    }
+                    if bordered {
+                        into.blended[start - x0..end - x0].fill(1.0);
                     }
                 }
             }
-            // 2. The pixel's own share of them: fovBlend where the photo sees the point.
+            // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
+            // triangle a term of the blend.
             let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
-            active.sort_by_key(|(i, _)| *i);
+            active.sort_by_key(|s| s.source_idx);
             let mut seen: Vec<(usize, Sight)> = Vec::with_capacity(active.len());
-            for (i, weight) in active {
-                if let Some(mut sight) = engine.sources[i].see(&tile) {
-                    sight.a = each(|k| sight.a[k] * weight[k]);
-                    seen.push((i, sight));
+            let mut terms: Vec<Term> = Vec::new();
+            for source in active {
+                let Some(mut sight) = engine.sources[source.source_idx].see(&tile) else {
+                    continue;
+                };
+                if any_bordered {
+                    let a = each(|k| sight.a[k] * source.blended[k]);
+                    terms.push(Term {
+                        diff: source.diff,
+                        a,
+                        weight: [0.0; LANES],
+                    });
+                }
+                sight.a = each(|k| sight.a[k] * source.weight[k]);
+                seen.push((source.source_idx, sight));
+            }
+            if any_bordered {
+                weigh(&mut terms, &frame.options);
+                for ((_, sight), term) in seen.iter_mut().zip(&terms) {
+                    sight.a = each(|k| sight.a[k] + term.weight[k]);
                 }
             }
             engine.shade(seen.iter().map(|(i, sight)| (*i, sight, &sight.a)), out)?;
         }
         Ok(())
     })
+}
+
+/// What a field says of one source view over a tile.
+struct Interpolated {
+    source_idx: usize,
+    /// In triangles that no photo's border crosses; zero elsewhere.
+    weight: Lane,
+    /// In the others.
+    diff: Lane,
+    /// One where `diff` counts, else zero.
+    blended: Lane,
+}
+
+impl Interpolated {
+    fn nothing(source_idx: usize) -> Self {
+        Self {
+            source_idx,
+            weight: [0.0; LANES],
+            diff: [1.0; LANES],
+            blended: [0.0; LANES],
+        }
+    }
 }
 
 /// What all pixels of a frame share.

@@ -95,24 +95,24 @@ fn ray_through(pixel: vec2u) -> vec3f {
     return vec3f((vec2f(pixel) + 0.5 - params.ray_offset) * params.ray_scale, 1.0);
 }
 
-fn see(source: ptr<storage, Source, read>, ray: vec3f, s: f32) -> Sight {
+fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
     let p = vec3f(
-        dot((*source).x_axis.xyz, ray) + (*source).x_axis.w * s,
-        dot((*source).y_axis.xyz, ray) + (*source).y_axis.w * s,
-        dot((*source).z_axis.xyz, ray) + (*source).z_axis.w * s,
+        dot(sources[source_idx].x_axis.xyz, ray) + sources[source_idx].x_axis.w * s,
+        dot(sources[source_idx].y_axis.xyz, ray) + sources[source_idx].y_axis.w * s,
+        dot(sources[source_idx].z_axis.xyz, ray) + sources[source_idx].z_axis.w * s,
     );
     var sight = Sight(vec2f(0.0), 0.0, p);
 
     // 1. Through the lens.
     var bent: vec2f;
-    let lens = (*source).lens;
+    let lens = sources[source_idx].lens;
     if lens == LENS_FISHEYE {
         let radius = length(p.xy);
         let theta = angle(radius, p.z);
-        if theta > (*source).limit || (radius == 0.0 && p.z <= 0.0) {
+        if theta > sources[source_idx].limit || (radius == 0.0 && p.z <= 0.0) {
             return sight;
         }
-        let k = (*source).k1234;
+        let k = sources[source_idx].k1234;
         let t2 = theta * theta;
         let r = theta * (1.0 + t2 * (k.x + t2 * (k.y + t2 * (k.z + t2 * k.w))));
         bent = p.xy * select(1.0 / p.z, r / radius, radius > 0.0);
@@ -123,28 +123,28 @@ fn see(source: ptr<storage, Source, read>, ray: vec3f, s: f32) -> Sight {
         let n = p.xy / p.z;
         bent = n;
         if lens != LENS_PINHOLE {
-            let k = (*source).k1234;
+            let k = sources[source_idx].k1234;
             let r2 = dot(n, n);
-            if r2 > (*source).limit {
+            if r2 > sources[source_idx].limit {
                 return sight;
             }
             let above = 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
             bent = n * above;
             if lens == LENS_RATIONAL {
-                let h = (*source).k56p12;
+                let h = sources[source_idx].k56p12;
                 let below = 1.0 + r2 * (k.w + r2 * (h.x + r2 * h.y));
                 bent = n * (above / below)
                     + 2.0 * h.zw * n.x * n.y + h.wz * (r2 + 2.0 * n * n);
             }
         }
     }
-    sight.pixel = bent * (*source).focal + (*source).principal;
+    sight.pixel = bent * sources[source_idx].focal + sources[source_idx].principal;
 
     // 2. fovBlend. On the very edge a view counts where there is no other.
-    let to_border = min(sight.pixel, (*source).size - sight.pixel);
+    let to_border = min(sight.pixel, sources[source_idx].size - sight.pixel);
     let border = min(to_border.x, to_border.y);
     if border >= 0.0 {
-        let f = clamp(border * (*source).inverse_feather, 0.0, 1.0);
+        let f = clamp(border * sources[source_idx].inverse_feather, 0.0, 1.0);
         sight.a = max(f * f * (3.0 - 2.0 * f), 1e-12);
     }
     return sight;
@@ -154,25 +154,25 @@ fn see(source: ptr<storage, Source, read>, ray: vec3f, s: f32) -> Sight {
 fn sample_photo(
     photos: texture_2d_array<f32>,
     photo_sampler: sampler,
-    source: ptr<storage, Source, read>,
+    source_idx: u32,
     sight: Sight,
     ray: vec3f,
 ) -> vec4f {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
-    let there = select(sight.in_camera.z, length(sight.in_camera), (*source).lens == LENS_FISHEYE);
+    let there = select(sight.in_camera.z, length(sight.in_camera), sources[source_idx].lens == LENS_FISHEYE);
     let ratio = here / there;
-    let area = (*source).area_scale * ratio * ratio * ratio;
+    let area = sources[source_idx].area_scale * ratio * ratio * ratio;
     var level = 0.0;
     if area > 1.0 {
-        level = min(0.5 * log2(area), (*source).gain.w);
+        level = min(0.5 * log2(area), sources[source_idx].gain.w);
     }
     let uv = sight.pixel / params.array_size;
-    return textureSampleLevel(photos, photo_sampler, uv, (*source).layer, level);
+    return textureSampleLevel(photos, photo_sampler, uv, sources[source_idx].layer, level);
 }
 
 // angDiff + beta * resDiff.
-fn difference(source: ptr<storage, Source, read>, ray: vec3f, s: f32) -> f32 {
-    let c = (*source).center.xyz;
+fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
+    let c = sources[source_idx].center.xyz;
     let across = s * length(cross(c, ray));
     let towards = dot(ray, c);
     let ray_squared = dot(ray, ray);
@@ -181,9 +181,9 @@ fn difference(source: ptr<storage, Source, read>, ray: vec3f, s: f32) -> f32 {
         let squares = s * dot(c, c) - 2.0 * towards;
         resolution = squares / (length(ray - s * c) + sqrt(ray_squared));
     } else {
-        let g = (*source).center.w;
+        let g = sources[source_idx].center.w;
         let excess = (s * s * dot(c, c) - 2.0 * s * towards) / ray_squared;
-        resolution = ((*source).footprint_excess + g * g * excess)
+        resolution = (sources[source_idx].footprint_excess + g * g * excess)
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
     return angle(across, ray_squared - s * towards) + params.beta * max(resolution, 0.0);

@@ -19,11 +19,11 @@ struct Nearest {
 fn nearest_sources(ray: vec3f, s: f32) -> Nearest {
     var nearest: Nearest;
     for (var i = 0u; i < params.source_count; i++) {
-        let sight = see(&sources[i], ray, s);
+        let sight = see(i, ray, s);
         if sight.a <= 0.0 {
             continue;
         }
-        let diff = difference(&sources[i], ray, s);
+        let diff = difference(i, ray, s);
         var at = nearest.count;
         if at == LISTED {
             if diff >= nearest.diff[LISTED - 1u] {

@@ -24,10 +24,10 @@ fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
         if nearest.a[n] <= 0.0 {
             continue;
         }
-        let source = &sources[nearest.source_idx[n]];
-        let sight = see(source, ray, s);
-        let color = sample_photo(photos, photo_sampler, source, sight, ray);
-        add(&mix, nearest.a[n], color, (*source).gain.rgb);
+        let source_idx = nearest.source_idx[n];
+        let sight = see(source_idx, ray, s);
+        let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
+        add(&mix, nearest.a[n], color, sources[source_idx].gain.rgb);
     }
     return resolve(mix);
 }

@@ -60,7 +60,7 @@ pub(crate) struct Corner {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Entry {
     pub source_idx: u32,
-    pub weights: [f32; 3],
+    pub values: [f32; 3],
 }
 
 const LENS_PINHOLE: u32 = 0;

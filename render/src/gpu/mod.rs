@@ -137,27 +137,31 @@ impl Gpu {
         wanted.dedup();
         let shared = self.prepare(frame, &wanted)?;
 
-        let corners: Vec<Corner> = field
-            .triangles
-            .iter()
-            .flat_map(|triangle| {
-                let list = [triangle.first_entry, triangle.entry_count];
-                let pixel = |i: u32| field.vertices[i as usize].as_vec2().to_array();
-                triangle.corners.map(|i| Corner {
-                    pixel: pixel(i),
-                    list,
+        let corners_of = |bordered: bool| -> Vec<Corner> {
+            let triangles = field.triangles.iter().filter(|t| t.bordered == bordered);
+            triangles
+                .flat_map(|triangle| {
+                    let list = [triangle.first_entry, triangle.entry_count];
+                    let pixel = |i: u32| field.vertices[i as usize].as_vec2().to_array();
+                    triangle.corners.map(|i| Corner {
+                        pixel: pixel(i),
+                        list,
+                    })
                 })
-            })
-            .collect();
+                .collect()
+        };
+        let plain = corners_of(false);
+        let bordered = corners_of(true);
         let entries: Vec<Entry> = field
             .entries
             .iter()
             .map(|e| Entry {
                 source_idx: e.source_idx,
-                weights: e.weights,
+                values: e.values,
             })
             .collect();
-        let corners_buffer = self.buffer("corners", &corners, wgpu::BufferUsages::VERTEX);
+        let plain_buffer = self.buffer("corners", &plain, wgpu::BufferUsages::VERTEX);
+        let bordered_buffer = self.buffer("corners", &bordered, wgpu::BufferUsages::VERTEX);
         let entries_buffer = self.buffer("entries", &entries, wgpu::BufferUsages::STORAGE);
         let photos = self.photos.as_ref().expect("prepared above");
         let own = self.pipelines.triangulated_group(
@@ -167,11 +171,14 @@ impl Gpu {
             &entries_buffer,
         );
         self.draw(frame, |pass, pipelines| {
-            pass.set_pipeline(&pipelines.triangulated);
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
-            pass.set_vertex_buffer(0, corners_buffer.slice(..));
-            pass.draw(0..corners.len() as u32, 0..1);
+            pass.set_pipeline(&pipelines.triangles);
+            pass.set_vertex_buffer(0, plain_buffer.slice(..));
+            pass.draw(0..plain.len() as u32, 0..1);
+            pass.set_pipeline(&pipelines.bordered_triangles);
+            pass.set_vertex_buffer(0, bordered_buffer.slice(..));
+            pass.draw(0..bordered.len() as u32, 0..1);
         })
     }
 

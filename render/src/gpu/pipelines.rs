@@ -21,7 +21,8 @@ pub(crate) const SHADERS: [(&str, &[&str]); 3] = [
 
 /// Pipelines and the layouts of what they read.
 pub(crate) struct Pipelines {
-    pub triangulated: wgpu::RenderPipeline,
+    pub triangles: wgpu::RenderPipeline,
+    pub bordered_triangles: wgpu::RenderPipeline,
     pub exact: wgpu::RenderPipeline,
     pub mark: wgpu::ComputePipeline,
     shared_layout: BindGroupLayout,
@@ -113,14 +114,19 @@ impl Pipelines {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Uint32x2],
         };
-        Self {
-            triangulated: render(
+        let field_pipeline = |fragment| {
+            let corners = [Some(corner_layout.clone())];
+            render(
                 &triangulated_layout,
                 &triangulated,
                 "corner",
-                "triangle",
-                &[Some(corner_layout)],
-            ),
+                fragment,
+                &corners,
+            )
+        };
+        Self {
+            triangles: field_pipeline("triangle"),
+            bordered_triangles: field_pipeline("bordered_triangle"),
             exact: render(&exact_layout, &exact_draw, "whole_image", "draw", &[]),
             mark: device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some("mark"),

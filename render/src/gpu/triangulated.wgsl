@@ -3,8 +3,16 @@
 
 struct Entry {
     source_idx: u32,
-    weights: array<f32, 3>,
+    // At the corners: weights, or in a bordered triangle differences.
+    values: array<f32, 3>,
 }
+
+// MAX_LISTED of field.rs.
+const LISTED = 32u;
+const CONTRIBUTORS = 16u;
+const SAME_RAY = 1e-12;
+const SMALLEST_THRESHOLD = 1e-30;
+const INFINITY = 3e38;
 
 @group(1) @binding(0) var photos: texture_2d_array<f32>;
 @group(1) @binding(1) var photo_sampler: sampler;
@@ -30,6 +38,11 @@ fn corner(
     return Corner(vec4f(ndc, 0.0, 1.0), shares, list);
 }
 
+fn interpolate(entry_idx: u32, shares: vec3f) -> f32 {
+    let v = entries[entry_idx].values;
+    return shares.x * v[0] + shares.y * v[1] + shares.z * v[2];
+}
+
 @fragment
 fn triangle(in: Corner) -> @location(0) vec4f {
     let ray = ray_through(vec2u(in.position.xy));
@@ -39,18 +52,124 @@ fn triangle(in: Corner) -> @location(0) vec4f {
     }
     var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
     for (var i = in.list.x; i < in.list.x + in.list.y; i++) {
-        let w = entries[i].weights;
-        let weight = in.shares.x * w[0] + in.shares.y * w[1] + in.shares.z * w[2];
+        let weight = interpolate(i, in.shares);
         if weight <= 0.0 {
             continue;
         }
-        let source = &sources[entries[i].source_idx];
-        let sight = see(source, ray, s);
+        let source_idx = entries[i].source_idx;
+        let sight = see(source_idx, ray, s);
         let a = weight * sight.a;
         if a > 0.0 {
-            let color = sample_photo(photos, photo_sampler, source, sight, ray);
-            add(&mix, a, color, (*source).gain.rgb);
+            let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
+            add(&mix, a, color, sources[source_idx].gain.rgb);
         }
     }
     return resolve(mix);
+}
+
+// One view's terms of the blend at a pixel.
+struct Terms {
+    diff: array<f32, LISTED>,
+    a: array<f32, LISTED>,
+}
+
+// Where the border of a photo crosses the triangle: interpolated differences, the pixel's
+// own fovBlend, and the blend of the exact field. A pipeline of its own, because software
+// drivers pay for its arrays in every pixel.
+@fragment
+fn bordered_triangle(in: Corner) -> @location(0) vec4f {
+    let ray = ray_through(vec2u(in.position.xy));
+    let s = dot(params.plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
+        return vec4f(0.0);
+    }
+    let first = in.list.x;
+    let count = in.list.y;
+    var terms: Terms;
+    var nearest = INFINITY;
+    for (var n = 0u; n < count; n++) {
+        terms.diff[n] = max(interpolate(first + n, in.shares), 0.0);
+        terms.a[n] = see(entries[first + n].source_idx, ray, s).a;
+        if terms.a[n] > 0.0 {
+            nearest = min(nearest, terms.diff[n]);
+        }
+    }
+    let t = max(threshold(&terms, count), SMALLEST_THRESHOLD);
+    var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
+    for (var n = 0u; n < count; n++) {
+        var weight = terms.a[n] * max(1.0 - terms.diff[n] / t, 0.0);
+        if params.blend == BLEND_CONSISTENT {
+            weight /= max(terms.diff[n], SAME_RAY);
+        }
+        // Where the nearest is as far as the threshold, all are tied.
+        if nearest >= t && terms.diff[n] <= nearest {
+            weight = terms.a[n];
+        }
+        if weight > 0.0 {
+            let source_idx = entries[first + n].source_idx;
+            let sight = see(source_idx, ray, s);
+            let color = sample_photo(photos, photo_sampler, source_idx, sight, ray);
+            add(&mix, weight, color, sources[source_idx].gain.rgb);
+        }
+    }
+    return resolve(mix);
+}
+
+fn threshold(terms: ptr<function, Terms>, count: u32) -> f32 {
+    if params.blend == BLEND_PAPER {
+        return nth_smallest(terms, count, params.k);
+    }
+    // Newton's method in 1/t, from above; it lands on the root (see weights.rs).
+    var t = INFINITY;
+    var contributors = 0u;
+    for (var step = 0u; step <= count; step++) {
+        var sum_a = 0.0;
+        var sum_a_diff = 0.0;
+        contributors = 0u;
+        for (var n = 0u; n < count; n++) {
+            let a = (*terms).a[n];
+            if (*terms).diff[n] < t && a > 0.0 {
+                sum_a += a;
+                sum_a_diff += a * (*terms).diff[n];
+                contributors++;
+            }
+        }
+        if sum_a <= params.full_weight {
+            break;
+        }
+        let next = max(sum_a_diff / (sum_a - params.full_weight), SMALLEST_THRESHOLD);
+        if next >= t {
+            break;
+        }
+        t = next;
+    }
+    if contributors > CONTRIBUTORS {
+        t = min(t, nth_smallest(terms, count, CONTRIBUTORS + 1u));
+    }
+    return t;
+}
+
+// The n-th smallest difference among the views that see the point, or the largest.
+fn nth_smallest(terms: ptr<function, Terms>, count: u32, nth: u32) -> f32 {
+    var value = -1.0;
+    var found = 0u;
+    while found < nth {
+        var next = INFINITY;
+        var ties = 0u;
+        for (var n = 0u; n < count; n++) {
+            let diff = (*terms).diff[n];
+            if (*terms).a[n] <= 0.0 || diff <= value {
+                continue;
+            }
+            ties = select(ties, 0u, diff < next);
+            next = min(next, diff);
+            ties += u32(diff == next);
+        }
+        if ties == 0u {
+            break;
+        }
+        value = next;
+        found += ties;
+    }
+    return value;
 }

@@ -4,7 +4,7 @@ mod file;
 mod spline;
 
 pub use file::{PathFileError, read, write};
-pub(crate) use spline::Curve;
+pub(crate) use spline::{Curve, mean_rotation};
 
 use calibrate::{Camera, CameraError, ModelKind, Rigid3, View};
 use glam::DQuat;
@@ -268,7 +268,7 @@ impl CameraPath {
     /// Camera centres and rotations are interpolated (not translations, which would swing
     /// about the world's origin); focal lengths and all other lens parameters linearly. A
     /// frame's `time_s` is interpolated where every keyframe has one, and is the time on
-    /// the path otherwise. A frame at a keyframe's time has its pose exactly.
+    /// the path otherwise. A frame at a keyframe's time has its pose (see [`PathFrame::new`]).
     ///
     /// # Errors
     /// No keyframes; times not increasing; cameras unusable or of different model or size;

@@ -2,7 +2,7 @@
 
 use super::Interpolation;
 use calibrate::Rigid3;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
 /// Poses at increasing times, and what lies between them.
 ///
@@ -236,6 +236,5 @@ mod tests {
         assert_eq!(mean_rotation(&[(0.0, about(1.0))]), None);
         let opposite = mean_rotation(&[(1.0, about(0.0)), (1.0, about(PI))]).unwrap();
         assert!(opposite.is_finite());
-        assert!(DMat3::from_quat(opposite).is_finite());
     }
 }

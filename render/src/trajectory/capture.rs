@@ -1,0 +1,341 @@
+//! What a path needs to know of a capture's geometry.
+
+use super::PI;
+use crate::lumigraph::SourceView;
+use crate::path::mean_rotation;
+use calibrate::Rigid3;
+use glam::{DMat3, DQuat, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+use proxy::Proxy;
+
+/// Positions here are relative to the reference camera's centre, axes are the world's.
+pub(super) struct Capture {
+    /// The reference camera's centre.
+    pub(super) origin_in_world: DVec3,
+    pub(super) centers: Vec<DVec3>,
+    /// `camera_from_world`.
+    rotations: Vec<DQuat>,
+    /// The camera nearest to the middle of them all.
+    reference_idx: usize,
+    /// Principal axes of the centres, the longest first; right-handed.
+    pub(super) axes: [DVec3; 3],
+    /// Half of the range of the centres along each.
+    pub(super) half_extents: [f64; 3],
+    /// Whether they lie further apart than rounding errors.
+    has_extent: bool,
+    /// Distance to the third-nearest camera, in the median.
+    pub(super) spacing: f64,
+    /// What the reference camera looks at.
+    pub(super) focus: DVec3,
+    /// The distance to the nearer of proxy and median point ahead of it.
+    pub(super) nearest_scene: f64,
+}
+
+/// More than this many are thinned out where all pairs are looked at.
+const MANY: usize = 512;
+
+impl Capture {
+    pub(super) fn new(sources: &[SourceView], points_in_world: &[DVec3], proxy: &Proxy) -> Self {
+        // 1. The middle, robustly, and the camera nearest to it.
+        let first = sources[0].view.center();
+        let centers: Vec<DVec3> = sources.iter().map(|s| s.view.center() - first).collect();
+        let middle = geometric_median(&centers);
+        let from_middle = || centers.iter().map(|c| c.distance(middle));
+        let nearest = from_middle().fold(f64::INFINITY, f64::min);
+        // The first of those that are equally near but for rounding.
+        let reference_idx = from_middle()
+            .position(|d| d <= nearest * (1.0 + 1e-6))
+            .unwrap_or(0);
+        let reference = &sources[reference_idx].view;
+        let origin_in_world = reference.center();
+        let centers: Vec<DVec3> = sources
+            .iter()
+            .map(|s| s.view.center() - origin_in_world)
+            .collect();
+        let rotation = reference.camera_from_world.rotation;
+        let forward = reference.forward();
+
+        // 2. Principal axes. Ties are broken in favour of the reference camera's x axis,
+        // signs by it and by its y axis.
+        let mean = centers.iter().sum::<DVec3>() / centers.len() as f64;
+        let right = rotation.conjugate() * DVec3::X;
+        let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
+        let mut covariance = DMat3::ZERO;
+        for c in &centers {
+            covariance += outer(*c - mean);
+        }
+        let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+        covariance += outer(right) * (0.01 * trace);
+        let mut axes = eigenvectors(covariance).map(|(_, v)| v);
+        let signed = |v: DVec3, like: DVec3| if v.dot(like) < 0.0 { -v } else { v };
+        axes[0] = signed(axes[0], right + 0.5 * forward);
+        axes[1] = signed(axes[1], rotation.conjugate() * (DVec3::Y + 0.5 * DVec3::Z));
+        axes[2] = axes[0].cross(axes[1]);
+        let half_extents = axes.map(|a| {
+            let along = || centers.iter().map(|c| c.dot(a));
+            0.5 * (along().fold(f64::NEG_INFINITY, f64::max)
+                - along().fold(f64::INFINITY, f64::min))
+        });
+        let farthest = centers.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let rounding = 1e-10 * origin_in_world.length();
+
+        // 3. How far the scene is ahead of the reference camera.
+        let depth = |p: &DVec3| {
+            let pixel = reference.project(*p)?;
+            let depth = forward.dot(*p - origin_in_world);
+            (p.is_finite() && reference.contains(pixel)).then_some(depth)
+        };
+        let to_points = median(points_in_world.iter().filter_map(depth).collect());
+        let hit = match proxy {
+            Proxy::Plane(plane) => plane.intersect(origin_in_world, forward),
+        };
+        let to_proxy = hit.map(|p| p.distance(origin_in_world));
+        // With nothing ahead, as far as the capture is wide.
+        let unknown = if farthest > rounding {
+            2.0 * farthest
+        } else {
+            1.0
+        };
+        let distance = to_points.or(to_proxy).unwrap_or(unknown);
+
+        Self {
+            origin_in_world,
+            rotations: sources
+                .iter()
+                .map(|s| s.view.camera_from_world.rotation)
+                .collect(),
+            reference_idx,
+            axes,
+            half_extents,
+            has_extent: half_extents[0] > rounding && farthest > 0.0,
+            spacing: spacing(&centers),
+            focus: forward * distance,
+            nearest_scene: to_proxy.map_or(distance, |d| d.min(distance)),
+            centers,
+        }
+    }
+
+    pub(super) fn has_extent(&self) -> bool {
+        self.has_extent
+    }
+
+    /// The reference camera's pose, its centre the origin.
+    pub(super) fn reference_pose(&self) -> Rigid3 {
+        Rigid3::new(self.rotations[self.reference_idx], DVec3::ZERO)
+    }
+
+    pub(super) fn reference_up(&self) -> DVec3 {
+        self.rotations[self.reference_idx].conjugate() * DVec3::NEG_Y
+    }
+
+    pub(super) fn distance_to_nearest(&self, at: DVec3) -> f64 {
+        let distances = self.centers.iter().map(|c| c.distance(at));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Gaussian weights of the cameras about a place, by index. The window is as wide as
+    /// the cameras are sparse: it holds a few wherever it is.
+    fn weights(&self, at: DVec3) -> Vec<f64> {
+        let squares: Vec<f64> = self
+            .centers
+            .iter()
+            .map(|c| c.distance_squared(at))
+            .collect();
+        let mut sorted = squares.clone();
+        let third = 2.min(sorted.len() - 1);
+        let third_nearest = *sorted.select_nth_unstable_by(third, f64::total_cmp).1;
+        let width = third_nearest.max(self.spacing * self.spacing);
+        squares.iter().map(|s| (-0.5 * s / width).exp()).collect()
+    }
+
+    pub(super) fn mean_center(&self, at: DVec3) -> DVec3 {
+        let weights = self.weights(at);
+        let weighted = self.centers.iter().zip(&weights).map(|(&c, &w)| c * w);
+        weighted.sum::<DVec3>() / weights.iter().sum::<f64>()
+    }
+
+    /// The mean rotation of the cameras about a place that look much the same way as
+    /// `like` does.
+    pub(super) fn mean_rotation(&self, at: DVec3, like: DQuat) -> DQuat {
+        let forward = |q: DQuat| q.conjugate() * DVec3::Z;
+        let ahead = forward(like);
+        let weighted: Vec<(f64, DQuat)> = self
+            .weights(at)
+            .into_iter()
+            .zip(&self.rotations)
+            .map(|(w, &q)| (w * (4.0 * (forward(q).dot(ahead) - 1.0)).exp(), q))
+            .collect();
+        mean_rotation(&weighted).unwrap_or(like)
+    }
+
+    /// The ring of cameras around an object, if that is what they are: most look at one
+    /// place, from directions more than 120° apart.
+    pub(super) fn ring(&self) -> Option<Ring> {
+        let forwards: Vec<DVec3> = self
+            .rotations
+            .iter()
+            .map(|q| q.conjugate() * DVec3::Z)
+            .collect();
+        let count = forwards.len() as f64;
+
+        // 1. The place nearest to all optical axes: Σ (I − ddᵀ)(x − c) = 0.
+        let (mut a, mut b) = (DMat3::ZERO, DVec3::ZERO);
+        for (d, c) in forwards.iter().zip(&self.centers) {
+            let across = DMat3::IDENTITY - DMat3::from_cols(*d * d.x, *d * d.y, *d * d.z);
+            a += across;
+            b += across * *c;
+        }
+        let [_, _, (smallest, _)] = eigenvectors(a);
+        if !self.has_extent || smallest < 0.05 * count {
+            return None; // Their axes are all but parallel.
+        }
+        let focus = a.inverse() * b;
+        let looking = forwards.iter().zip(&self.centers);
+        let looking = looking.filter(|(d, c)| d.angle_between(focus - **c) < PI / 4.0);
+        if (looking.count() as f64) < 0.7 * count {
+            return None;
+        }
+        let step = self.centers.len().div_ceil(MANY);
+        let from_focus = self.centers.iter().step_by(step);
+        let from_focus: Vec<DVec3> = from_focus
+            .filter_map(|c| (*c - focus).try_normalize())
+            .collect();
+        let apart = |(i, u): (usize, &DVec3)| from_focus[..i].iter().any(|v| u.dot(*v) < -0.5);
+        if !from_focus.iter().enumerate().any(apart) {
+            return None;
+        }
+
+        // 2. Its axis: up as the cameras have it, or else across the ring.
+        let ups = self.rotations.iter().map(|q| q.conjugate() * DVec3::NEG_Y);
+        let up = ups.sum::<DVec3>() / count;
+        let up = if up.length() > 0.3 {
+            up.normalize()
+        } else {
+            self.axes[2] * self.axes[2].dot(self.reference_up()).signum()
+        };
+
+        // 3. The cameras in spherical coordinates about it.
+        let toward = -focus;
+        let zero = toward - up * toward.dot(up);
+        let zero = zero.try_normalize().unwrap_or(up.any_orthonormal_vector());
+        let quarter = up.cross(zero);
+        let spherical = |c: &DVec3| {
+            let v = *c - focus;
+            let (x, y, z) = (v.dot(zero), v.dot(quarter), v.dot(up));
+            [y.atan2(x), z.atan2(x.hypot(y)), v.length()]
+        };
+        Some(Ring {
+            focus,
+            up,
+            zero,
+            quarter,
+            cameras: self.centers.iter().map(spherical).collect(),
+        })
+    }
+}
+
+/// Cameras around a place.
+pub(super) struct Ring {
+    pub(super) focus: DVec3,
+    pub(super) up: DVec3,
+    zero: DVec3,
+    quarter: DVec3,
+    /// Azimuth, elevation and distance.
+    cameras: Vec<[f64; 3]>,
+}
+
+impl Ring {
+    /// Azimuths from where to where, and whether that is all around: it is where no gap
+    /// reaches 90°. Otherwise the gap is left out, and a tenth of the rest at both ends.
+    pub(super) fn arc(&self) -> (f64, f64, bool) {
+        let mut azimuths: Vec<f64> = self.cameras.iter().map(|c| c[0]).collect();
+        azimuths.sort_by(f64::total_cmp);
+        let mut widest = (0.0, 0.0);
+        for (i, &a) in azimuths.iter().enumerate() {
+            let next = azimuths
+                .get(i + 1)
+                .copied()
+                .unwrap_or(azimuths[0] + 2.0 * PI);
+            if next - a > widest.0 {
+                widest = (next - a, next);
+            }
+        }
+        let (gap, start) = widest;
+        if gap < PI / 2.0 {
+            return (0.0, 2.0 * PI, true);
+        }
+        let span = 2.0 * PI - gap;
+        (start + 0.1 * span, start + 0.9 * span, false)
+    }
+
+    /// The place at an azimuth, its distance and elevation the mean of the cameras'
+    /// thereabouts (a window of some 20°).
+    pub(super) fn at(&self, azimuth: f64) -> DVec3 {
+        const SHARPNESS: f64 = 8.0;
+        let off = |c: &[f64; 3]| 1.0 - (c[0] - azimuth).cos();
+        let nearest = self.cameras.iter().map(off).fold(f64::INFINITY, f64::min);
+        let (mut sum, mut elevation, mut distance) = (0.0, 0.0, 0.0);
+        for c in &self.cameras {
+            let weight = (SHARPNESS * (nearest - off(c))).exp();
+            sum += weight;
+            elevation += weight * c[1];
+            distance += weight * c[2];
+        }
+        // Just short of the pole, where there would be no up.
+        let elevation = (elevation / sum).clamp(-0.47 * PI, 0.47 * PI);
+        let level = self.zero * azimuth.cos() + self.quarter * azimuth.sin();
+        let direction = level * elevation.cos() + self.up * elevation.sin();
+        self.focus + direction * (distance / sum)
+    }
+}
+
+/// Eigenvalues and vectors of a symmetric matrix, the largest first.
+fn eigenvectors(m: DMat3) -> [(f64, DVec3); 3] {
+    let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&m.to_cols_array()));
+    let mut pairs = [0, 1, 2].map(|i| {
+        let v = eigen.eigenvectors.column(i);
+        (eigen.eigenvalues[i], DVec3::new(v[0], v[1], v[2]))
+    });
+    pairs.sort_by(|x, y| y.0.total_cmp(&x.0));
+    pairs
+}
+
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// The point of least summed distance, by Weiszfeld's iteration.
+fn geometric_median(points: &[DVec3]) -> DVec3 {
+    let mut at = points.iter().sum::<DVec3>() / points.len() as f64;
+    let scale = points.iter().map(|p| p.distance(at)).fold(0.0, f64::max);
+    for _ in 0..50 {
+        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+        for p in points {
+            let weight = 1.0 / p.distance(at).max(1e-6 * scale).max(f64::MIN_POSITIVE);
+            sum += weight * *p;
+            weights += weight;
+        }
+        let next = sum / weights;
+        if !next.is_finite() {
+            break;
+        }
+        at = next;
+    }
+    at
+}
+
+/// The distance to the third-nearest other point, in the median.
+fn spacing(points: &[DVec3]) -> f64 {
+    if points.len() < 2 {
+        return 0.0;
+    }
+    let third = 3.min(points.len() - 1);
+    let step = points.len().div_ceil(MANY);
+    let distance = |at: &DVec3| {
+        let mut distances: Vec<f64> = points.iter().map(|p| p.distance(*at)).collect();
+        // The nearest of all is the point itself.
+        *distances.select_nth_unstable_by(third, f64::total_cmp).1
+    };
+    median(points.iter().step_by(step).map(distance).collect()).unwrap_or(0.0)
+}
