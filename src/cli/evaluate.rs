@@ -2,7 +2,7 @@
 
 use super::options::{DrawArgs, FieldArgs, ProxyArgs, SceneArgs, resized};
 use super::output::{frame_files, print, print_json};
-use super::report::Report;
+use super::report::{Report, Start};
 use super::session::{Session, progress};
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
@@ -13,7 +13,6 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Score held-out photos: render each at its own pose and compare
 ///
@@ -61,7 +60,7 @@ struct Line {
 const EVERY: usize = 8;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let start = Instant::now();
+    let start = Start::now();
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
     let mut session = Session::new(
@@ -80,7 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return print_json(&result);
     }
     eprintln!("proxy: {}", session.proxy.text());
-    eprintln!("{}", Report::new(&session, start).text());
+    eprintln!("{}", Report::new(&session, &start).text());
     print(&table(&lines))
 }
 

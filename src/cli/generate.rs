@@ -3,6 +3,7 @@
 use super::Usage;
 use super::options::size;
 use super::output::print;
+use super::session::spinner;
 use datasets::{DatasetError, Options};
 use std::path::PathBuf;
 
@@ -40,7 +41,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
         error => anyhow::Error::new(error),
     })?;
-    let written = datasets::write(&dataset, &args.output)?;
+    let bar = spinner("rendering the photos");
+    let written = datasets::write(&dataset, &args.output);
+    bar.finish_and_clear();
+    let written = written?;
     print(&format!(
         "{}: {} photos ({} to hold out), {} points\n",
         written.folder.display(),

@@ -3,11 +3,10 @@
 use super::frames::{ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::{frame_files, print, print_json};
-use super::report::Report;
+use super::report::{Report, Start};
 use super::session::{Session, progress};
 use serde_json::json;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Render novel views
 ///
@@ -42,7 +41,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let start = Instant::now();
+    let start = Start::now();
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,
@@ -62,7 +61,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
 
-    let report = Report::new(&session, start);
+    let report = Report::new(&session, &start);
     if args.json {
         let listed = frames
             .iter()

@@ -1,8 +1,24 @@
 //! What a run has cost.
 
 use super::session::Session;
+use cpu_time::ProcessTime;
 use serde::Serialize;
 use std::time::Instant;
+
+/// When a command began.
+pub(super) struct Start {
+    wall: Instant,
+    cpu: ProcessTime,
+}
+
+impl Start {
+    pub(super) fn now() -> Self {
+        Self {
+            wall: Instant::now(),
+            cpu: ProcessTime::now(),
+        }
+    }
+}
 
 /// The run report, printed at the end and part of `--json`.
 #[derive(Serialize)]
@@ -18,16 +34,15 @@ pub(super) struct Report {
 }
 
 impl Report {
-    pub(super) fn new(session: &Session, since: Instant) -> Self {
+    pub(super) fn new(session: &Session, start: &Start) -> Self {
         let photos = &session.lumigraph().photos;
-        let cpu = cpu_time::ProcessTime::now().as_duration();
         Self {
             device: session.device(),
             photos_decoded: photos.decoded(),
             photos_total: photos.len(),
             photos_bytes: photos.bytes(),
-            seconds: since.elapsed().as_secs_f64(),
-            cpu_seconds: cpu.as_secs_f64(),
+            seconds: start.wall.elapsed().as_secs_f64(),
+            cpu_seconds: start.cpu.elapsed().as_secs_f64(),
             peak_memory_bytes: peak_memory_bytes(),
         }
     }

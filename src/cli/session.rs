@@ -180,3 +180,11 @@ pub(super) fn progress(total: usize, doing: &'static str) -> ProgressBar {
     bar.set_message(doing);
     bar
 }
+
+/// A sign of life on stderr, where that is a terminal, while something takes its time.
+pub(super) fn spinner(doing: &'static str) -> ProgressBar {
+    let spinner = ProgressBar::new_spinner();
+    spinner.set_message(doing);
+    spinner.enable_steady_tick(Duration::from_millis(200));
+    spinner
+}
