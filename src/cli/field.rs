@@ -5,7 +5,9 @@ use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size
 use super::output::{make_parent, print, write_file};
 use calibrate::Pixel;
 use glam::{DVec2, DVec3};
+use image::RgbaImage;
 use render::blend::Contributor;
+use render::field::FieldTriangle;
 use render::picture::{contributors_exact, field_picture, palette};
 use render::triangulation::{Triangulation, to_svg};
 use render::{Frame, Method, TriangulatedField};
@@ -71,9 +73,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     // 2. Its pictures.
     let colors = palette(frame.sources.len());
+    let picture = field_picture(&frame, &contributors, &colors);
     let mut written = vec![&args.output];
     make_parent(&args.output)?;
-    capture::write_png(&args.output, &field_picture(&frame, &contributors, &colors))?;
+    capture::write_png(&args.output, &picture)?;
     if let Some(file) = &args.weights {
         write_weights(file, &frame, &contributors)?;
         written.push(file);
@@ -83,7 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             Some(field) => field,
             None => triangulated()?,
         };
-        write_file(file, svg(&frame, &field, &colors).as_bytes())?;
+        write_file(file, svg(&field, &picture).as_bytes())?;
         written.push(file);
     }
     let lines: Vec<String> = written
@@ -119,28 +122,22 @@ fn write_weights(
     write_file(file, &bytes)
 }
 
-/// The triangles, each in the mix of its photos' colours, and the epipoles.
-fn svg(frame: &Frame<'_>, field: &TriangulatedField, colors: &[[u8; 3]]) -> String {
-    let fill = |triangle_idx: usize| {
-        let mut mix = [0.0_f32; 3];
-        let mut sum = 0.0;
-        for entry in field.entries_of(triangle_idx) {
-            let weight: f32 = entry.weights.iter().sum();
-            let color = colors[entry.source_idx as usize];
-            for c in 0..3 {
-                mix[c] += weight * f32::from(color[c]);
-            }
-            sum += weight;
-        }
-        mix.map(|v| (v / sum.max(f32::MIN_POSITIVE)) as u8)
+/// The triangles, each in the colour of the field at its centre, and the epipoles.
+fn svg(field: &TriangulatedField, picture: &RgbaImage) -> String {
+    let (width, height) = picture.dimensions();
+    let fill = |triangle: &FieldTriangle| {
+        let corners = triangle.corners.map(|i| field.vertices[i as usize]);
+        let center = corners.iter().sum::<DVec2>() / 3.0;
+        let (x, y) = (center.x as u32, center.y as u32);
+        let [r, g, b, _] = picture.get_pixel(x.min(width - 1), y.min(height - 1)).0;
+        [r, g, b]
     };
-    let fills: Vec<[u8; 3]> = (0..field.triangles.len()).map(fill).collect();
+    let fills: Vec<[u8; 3]> = field.triangles.iter().map(fill).collect();
     let epipoles: Vec<DVec2> = field.epipoles.iter().map(|(_, at)| *at).collect();
     let triangulation = Triangulation {
         vertices: field.vertices.clone(),
         triangles: field.triangles.iter().map(|t| t.corners).collect(),
         ..Triangulation::default()
     };
-    let (width, height) = (frame.desired.width, frame.desired.height);
     to_svg(&triangulation, width, height, Some(&fills), &epipoles)
 }
