@@ -5,6 +5,8 @@ use npyz::npz::NpzWriter;
 use npyz::{DType, TypeStr, WriterBuilder};
 use render::blend::Contributor;
 use std::io::Cursor;
+use zip::DateTime;
+use zip::write::FileOptions;
 
 /// A field over the pixels of a picture, row by row.
 pub(super) struct Weights<'a> {
@@ -41,11 +43,13 @@ pub(super) fn npz(field: &Weights<'_>) -> anyhow::Result<Vec<u8>> {
     let (height, width) = (u64::from(field.height), u64::from(field.width));
     let by_slot = [height, width, slots as u64];
 
+    // The same field gives the same bytes: no time of day.
+    let options = FileOptions::default().last_modified_time(DateTime::default());
     let mut archive = NpzWriter::new(Cursor::new(Vec::new()));
     let longest = field.camera_names.iter().map(|name| name.chars().count());
     let text: TypeStr = format!("<U{}", longest.max().unwrap_or_default().max(1)).parse()?;
     let mut names = archive
-        .array::<str>("camera_names", Default::default())?
+        .array::<str>("camera_names", options)?
         .dtype(DType::new_scalar(text))
         .shape(&[field.camera_names.len() as u64])
         .begin_nd()?;
@@ -54,21 +58,21 @@ pub(super) fn npz(field: &Weights<'_>) -> anyhow::Result<Vec<u8>> {
     }
     names.finish()?;
     let mut array = archive
-        .array("ids", Default::default())?
+        .array("ids", options)?
         .default_dtype()
         .shape(&by_slot)
         .begin_nd()?;
     array.extend(ids)?;
     array.finish()?;
     let mut array = archive
-        .array("weights", Default::default())?
+        .array("weights", options)?
         .default_dtype()
         .shape(&by_slot)
         .begin_nd()?;
     array.extend(weights)?;
     array.finish()?;
     let mut array = archive
-        .array("points", Default::default())?
+        .array("points", options)?
         .default_dtype()
         .shape(&[height, width, 3])
         .begin_nd()?;
