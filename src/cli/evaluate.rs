@@ -1,6 +1,7 @@
 //! `lumigraph evaluate`
 
 use super::options::{DrawArgs, FieldArgs, ProxyArgs, SceneArgs, resized};
+use super::output::say;
 use super::output::{frame_files, print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
@@ -78,8 +79,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.json {
         return print_json(&result);
     }
-    eprintln!("proxy: {}", session.proxy.text());
-    eprintln!("{}", Report::new(&session, &start).text());
+    say!("proxy: {}", session.proxy.text());
+    say!("{}", Report::new(&session, &start).text());
     print(&table(&lines))
 }
 

@@ -3,6 +3,7 @@
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
+use super::session::spinner;
 use calibrate::Pixel;
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
@@ -63,6 +64,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     // 1. The field, as the renderer asked for has it.
     let triangulated = || TriangulatedField::new(&frame, args.field.grid);
+    let bar = spinner("weighting photos");
     let (contributors, field) = match args.field.method() {
         Method::Exact => (contributors_exact(&frame), None),
         Method::Triangulated { .. } => {
@@ -70,6 +72,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             (field.contributors(&frame), Some(field))
         }
     };
+
+    bar.finish_and_clear();
 
     // 2. Its pictures.
     let colors = palette(frame.sources.len());

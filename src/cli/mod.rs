@@ -18,6 +18,7 @@ mod session;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
+use output::say;
 use std::fmt::Write as _;
 use std::num::NonZero;
 use std::process::ExitCode;
@@ -66,7 +67,7 @@ pub(super) fn main() -> ExitCode {
     if output::is_closed_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    eprintln!("error: {}", one_line(&error));
+    say!("error: {}", one_line(&error));
     ExitCode::from(1)
 }
 

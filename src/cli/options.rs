@@ -1,6 +1,7 @@
 //! Options that several subcommands share.
 
 use super::Usage;
+use super::output::say;
 use anyhow::Context;
 use calibrate::View;
 use clap::builder::RangedU64ValueParser;
@@ -38,12 +39,12 @@ const WARNINGS_SHOWN: usize = 10;
 pub(super) fn print_warnings(warnings: &[Warning]) {
     for warning in warnings.iter().take(WARNINGS_SHOWN) {
         match warning {
-            Warning::LeftOut { .. } => eprintln!("warning: {warning}"),
-            Warning::Uncalibrated { .. } => eprintln!("note: {warning}"),
+            Warning::LeftOut { .. } => say!("warning: {warning}"),
+            Warning::Uncalibrated { .. } => say!("note: {warning}"),
         }
     }
     if let Some(more) = warnings.len().checked_sub(WARNINGS_SHOWN + 1) {
-        eprintln!("warning: and {} more photos are left out", more + 1);
+        say!("warning: and {} more photos are left out", more + 1);
     }
 }
 
@@ -112,7 +113,7 @@ impl ProxyArgs {
                         .as_ref()
                         .and_then(|unseen| without.iter().find(|name| !unseen.contains(name)));
                     if let Some(name) = saw {
-                        eprintln!(
+                        say!(
                             "note: the scene's own proxy was fitted with held-out {name}; \
                              fitting another without"
                         );

@@ -6,6 +6,15 @@ use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
+/// Prints a line to stderr, whether or not anybody still reads it.
+macro_rules! say {
+    ($($arguments:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($arguments)*);
+    }};
+}
+pub(super) use say;
+
 /// Prints to stdout.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();

@@ -2,6 +2,7 @@
 
 use super::frames::{ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::output::say;
 use super::output::{frame_files, print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
@@ -73,8 +74,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "report": report,
         }));
     }
-    eprintln!("proxy: {}", session.proxy.text());
-    eprintln!("{}", report.text());
+    say!("proxy: {}", session.proxy.text());
+    say!("{}", report.text());
     print(&format!(
         "{}: {} frames\n",
         args.output.display(),

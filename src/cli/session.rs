@@ -1,13 +1,14 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
 use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::output::say;
 use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
 use glam::DVec3;
 use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use lumigraph::scene::Scene;
+use lumigraph::scene::{Scene, SceneError};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, PhotoError, RenderError,
 };
@@ -47,6 +48,9 @@ impl Session {
         field: &FieldArgs,
         draw: &DrawArgs,
     ) -> anyhow::Result<Self> {
+        if scene.photos.iter().all(|p| without.contains(&p.name)) {
+            return Err(SceneError::NothingLeft(scene.photos.len()).into());
+        }
         let proxy = proxy.choose(&scene, &without)?;
         let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
         Ok(Self {
@@ -100,7 +104,7 @@ impl Session {
         }
         let engine = Engine::open(self.device)?;
         if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu) {
-            eprintln!("note: no graphics processor answers; drawing on the CPU");
+            say!("note: no graphics processor answers; drawing on the CPU");
         }
         self.engine = Some(engine);
         let mut source_idx = 0;
@@ -153,7 +157,7 @@ impl Session {
             Ok(pixels) => Ok(Some(pixels)),
             Err(error) if self.strict => Err(error.into()),
             Err(error) => {
-                eprintln!("warning: photo {name} is left out: {error}");
+                say!("warning: photo {name} is left out: {error}");
                 Ok(None)
             }
         }
@@ -164,7 +168,7 @@ impl Session {
         if self.strict {
             bail!("photo {name}: {error}; without --strict it would be left out");
         }
-        eprintln!("warning: photo {name} is left out: {error}");
+        say!("warning: photo {name} is left out: {error}");
         self.without.insert(name);
         self.lumigraph = self.scene.lumigraph(&self.without, self.proxy.proxy)?;
         Ok(())

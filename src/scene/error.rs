@@ -124,7 +124,7 @@ pub enum SceneError {
     #[error("{}: \"test\" names no photo; name some to hold out", .0.display())]
     EmptySplit(PathBuf),
     /// Every photo is held out or corrupt.
-    #[error("no photo is left to render from: {0} of {0} are held out or corrupt")]
+    #[error("no photo is left to render from: all {0} are held out or corrupt")]
     NothingLeft(usize),
 }
 

@@ -2,7 +2,7 @@
 
 use super::file::{Extra, Settings};
 use super::{Photo, Scene, SceneError, Warning};
-use calibrate::{Reconstruction, colmap};
+use calibrate::colmap;
 use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -91,16 +91,18 @@ impl Scene {
 
     /// Compares every photo's size with its camera's, and leaves out what cannot be used.
     pub(super) fn leave_out_unusable(&mut self, strict: bool) -> Result<Vec<Warning>, SceneError> {
+        let images = self.images_by_name();
         let mut unusable: Vec<(String, CaptureError)> = Vec::new();
         for photo in &self.photos {
-            let expected = calibrated_size(&self.reconstruction, &photo.name);
+            let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
+            let expected = (camera.width, camera.height);
             match photo_size(&photo.path) {
-                Ok(found) if Some(found) == expected => {}
+                Ok(found) if found == expected => {}
                 Ok(found) => {
                     return Err(SceneError::Capture(CaptureError::Size {
                         path: photo.path.clone(),
                         found,
-                        expected: expected.unwrap_or_default(),
+                        expected,
                     }));
                 }
                 Err(error) => unusable.push((photo.name.clone(), error)),
@@ -131,10 +133,4 @@ impl Scene {
         };
         Ok(unusable.into_iter().map(warning).collect())
     }
-}
-
-fn calibrated_size(reconstruction: &Reconstruction, name: &str) -> Option<(u32, u32)> {
-    let image = reconstruction.images.values().find(|i| i.name == name)?;
-    let camera = reconstruction.cameras.get(&image.camera_id)?;
-    Some((camera.width, camera.height))
 }

@@ -1,10 +1,10 @@
 //! From a scene to what the engine draws from.
 
 use super::{Scene, SceneError};
-use calibrate::View;
+use calibrate::{Image, View};
 use proxy::{PlaneFit, Proxy};
 use render::{Lumigraph, PhotoStore, SourceView};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 impl Scene {
     /// A photo's camera and pose.
@@ -17,9 +17,13 @@ impl Scene {
             name: name.to_owned(),
             known: self.names(),
         })?;
+        self.view_of(image)
+    }
+
+    fn view_of(&self, image: &Image) -> Result<View, SceneError> {
         let camera = &self.reconstruction.cameras[&image.camera_id];
         let lens = camera.lens().map_err(|source| SceneError::Camera {
-            name: name.to_owned(),
+            name: image.name.clone(),
             source,
         })?;
         Ok(View {
@@ -28,6 +32,12 @@ impl Scene {
             height: camera.height,
             camera_from_world: image.camera_from_world,
         })
+    }
+
+    /// Its posed images by name.
+    pub(super) fn images_by_name(&self) -> BTreeMap<&str, &Image> {
+        let images = self.reconstruction.images.values();
+        images.map(|image| (image.name.as_str(), image)).collect()
     }
 
     /// The plane that fits the sparse points when the photos of the given names were never
@@ -60,10 +70,11 @@ impl Scene {
         without: &BTreeSet<String>,
         proxy: Proxy,
     ) -> Result<Lumigraph, SceneError> {
+        let images = self.images_by_name();
         let mut sources = Vec::new();
         let mut files = Vec::new();
         for photo in self.photos.iter().filter(|p| !without.contains(&p.name)) {
-            let view = self.view(&photo.name)?;
+            let view = self.view_of(images[photo.name.as_str()])?;
             files.push((photo.path.clone(), (view.width, view.height)));
             sources.push(SourceView {
                 name: photo.name.clone(),

@@ -39,6 +39,28 @@ fn usage_errors_exit_with_2() {
 }
 
 #[test]
+fn the_demo_ends_with_scores_and_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = folder.path().join("lumigraph-demo");
+    std::fs::create_dir_all(old.join("frames")).unwrap();
+    for file in ["lumigraph-demo.txt", "frames/of-last-time.png", "mine.txt"] {
+        std::fs::write(old.join(file), "").unwrap();
+    }
+    let ran = lumigraph(folder.path(), "demo").ok();
+    let (_, end) = ran.stdout.split_once("psnr_covered").unwrap();
+    assert!(end.contains("\nmean "), "{end}");
+    for part in ["capture", "scene", "frames", "field.png", "evaluation"] {
+        assert!(
+            end.contains(&format!("\n  lumigraph-demo/{part} ")),
+            "{end}"
+        );
+        assert!(old.join(part).exists());
+    }
+    assert!(old.join("mine.txt").exists());
+    assert!(!old.join("frames/of-last-time.png").exists());
+}
+
+#[test]
 fn a_demo_replaces_its_own_output_alone() {
     let folder = with_wall();
     let before = crate::run::files(folder.path());
