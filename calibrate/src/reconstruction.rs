@@ -1,6 +1,6 @@
-use crate::{Camera, CameraId, Rigid3};
+use crate::{Camera, CameraError, CameraId, Pixel, Rigid3};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The id of an image in a reconstruction: sparse, chosen by whoever made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -57,4 +57,151 @@ pub struct Point3D {
     pub error_px: f64,
     /// The images that see it, each with the index of its keypoint there.
     pub track: Vec<(ImageId, u32)>,
+}
+
+impl Reconstruction {
+    /// What is left when the images of these names were never taken: a sparse point stays
+    /// only where two or more of the remaining images see it, and a keypoint of one that
+    /// went loses its link. Cameras stay. Unknown names are no matter.
+    #[must_use]
+    pub fn without_images(&self, names: &BTreeSet<String>) -> Self {
+        let mut images = self.images.clone();
+        images.retain(|_, image| !names.contains(&image.name));
+        let mut points = self.points.clone();
+        points.retain(|_, point| {
+            let seen_before = point.track.len();
+            point
+                .track
+                .retain(|(image_id, _)| images.contains_key(image_id));
+            let seen_by: BTreeSet<ImageId> = point.track.iter().map(|(id, _)| *id).collect();
+            point.track.len() == seen_before || seen_by.len() >= 2
+        });
+        for keypoint in images.values_mut().flat_map(|image| &mut image.keypoints) {
+            keypoint.point = keypoint.point.filter(|id| points.contains_key(id));
+        }
+        Self {
+            cameras: self.cameras.clone(),
+            images,
+            points,
+        }
+    }
+
+    /// The distances in pixels between a camera's keypoints and the projections of the
+    /// sparse points that they observe; infinite where a point lies behind the camera.
+    ///
+    /// # Errors
+    /// The camera has no lens.
+    pub fn reprojection_errors_px(&self, camera_id: CameraId) -> Result<Vec<f64>, CameraError> {
+        let Some(camera) = self.cameras.get(&camera_id) else {
+            return Ok(Vec::new());
+        };
+        let lens = camera.lens()?;
+        let mut errors = Vec::new();
+        for image in self.images.values().filter(|i| i.camera_id == camera_id) {
+            for keypoint in &image.keypoints {
+                let Some(point) = keypoint.point.and_then(|id| self.points.get(&id)) else {
+                    continue;
+                };
+                let projected = lens.project(image.camera_from_world * point.position);
+                let observed = Pixel::new(keypoint.x, keypoint.y);
+                errors.push(projected.map_or(f64::INFINITY, |pixel| pixel.distance(observed)));
+            }
+        }
+        Ok(errors)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ModelKind;
+
+    /// Three images in a row that look along z; point 1 seen by all, 2 by a and b, 3 by a
+    /// and c; c sees point 1 half a pixel off.
+    fn three_images() -> Reconstruction {
+        let camera = Camera {
+            model: ModelKind::SimplePinhole,
+            width: 100,
+            height: 100,
+            params: vec![100.0, 50.0, 50.0],
+        };
+        let mut whole = Reconstruction::default();
+        whole.cameras.insert(CameraId(7), camera);
+        let seen: [(&str, &[u64]); 3] = [("a", &[1, 2, 3]), ("b", &[1, 2]), ("c", &[1, 3])];
+        for (i, (name, points)) in seen.into_iter().enumerate() {
+            let image_id = ImageId(10 + i as u32);
+            let camera_from_world =
+                Rigid3::new(glam::DQuat::IDENTITY, DVec3::new(-(i as f64), 0.0, 0.0));
+            let mut keypoints = Vec::new();
+            for &id in points {
+                let position = DVec3::new(id as f64, 0.0, 10.0);
+                let in_camera = camera_from_world * position;
+                let slip = if (name, id) == ("c", 1) { 0.5 } else { 0.0 };
+                let point = whole.points.entry(Point3DId(id)).or_insert(Point3D {
+                    position,
+                    color: [0; 3],
+                    error_px: -1.0,
+                    track: Vec::new(),
+                });
+                point.track.push((image_id, keypoints.len() as u32));
+                keypoints.push(Keypoint {
+                    x: 50.0 + 10.0 * in_camera.x,
+                    y: 50.0 + slip,
+                    point: Some(Point3DId(id)),
+                });
+            }
+            let image = Image {
+                name: name.to_owned(),
+                camera_id: CameraId(7),
+                camera_from_world,
+                keypoints,
+            };
+            whole.images.insert(image_id, image);
+        }
+        whole
+    }
+
+    fn named(names: &[&str]) -> BTreeSet<String> {
+        names.iter().map(|&n| n.to_owned()).collect()
+    }
+
+    #[test]
+    fn points_stay_where_two_remaining_images_see_them() {
+        let rest = three_images().without_images(&named(&["b", "unknown"]));
+        let ids: Vec<u64> = rest.points.keys().map(|id| id.0).collect();
+        assert_eq!(ids, [1, 3], "point 2 is left to a alone");
+        assert_eq!(rest.images.len(), 2);
+        assert_eq!(
+            rest.points[&Point3DId(1)].track,
+            [(ImageId(10), 0), (ImageId(12), 0)]
+        );
+        let links: Vec<_> = rest.images[&ImageId(10)]
+            .keypoints
+            .iter()
+            .map(|k| k.point.map(|id| id.0))
+            .collect();
+        assert_eq!(links, [Some(1), None, Some(3)]);
+    }
+
+    #[test]
+    fn leaving_nothing_out_changes_nothing() {
+        let mut whole = three_images();
+        // Given, not triangulated: a point that no image is known to see stays.
+        whole.points.get_mut(&Point3DId(2)).unwrap().track.clear();
+        for image in whole.images.values_mut() {
+            image.keypoints.retain(|k| k.point != Some(Point3DId(2)));
+        }
+        assert_eq!(whole.without_images(&named(&[])), whole);
+    }
+
+    #[test]
+    fn reprojection_errors_are_distances_in_pixels() {
+        let mut errors = three_images().reprojection_errors_px(CameraId(7)).unwrap();
+        errors.sort_by(f64::total_cmp);
+        assert_eq!(errors.len(), 7);
+        assert!(errors[5] < 1e-12);
+        assert!((errors[6] - 0.5).abs() < 1e-12);
+        let none = three_images().reprojection_errors_px(CameraId(8)).unwrap();
+        assert!(none.is_empty());
+    }
 }

@@ -1,0 +1,147 @@
+//! `lumigraph field`
+
+use super::npz::{Weights, npz};
+use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
+use super::output::{make_parent, print, write_file};
+use super::session::spinner;
+use calibrate::Pixel;
+use glam::{DVec2, DVec3};
+use image::RgbaImage;
+use render::blend::Contributor;
+use render::field::FieldTriangle;
+use render::picture::{contributors_exact, field_picture, palette};
+use render::triangulation::{Triangulation, to_svg};
+use render::{Frame, Method, TriangulatedField};
+use std::path::{Path, PathBuf};
+
+/// Picture the blending field: which photo paints which pixel
+///
+/// One colour a photo, mixed by weight, as seen from the photo NAME. That photo itself
+/// paints its own view alone; --without-view shows who would stand in for it.
+///
+///     lumigraph field my-capture --view a.jpg --without-view -o field.png
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// The photo from whose place to look
+    #[arg(long, value_name = "NAME")]
+    view: String,
+    /// Leave out that photo, as if it were held out
+    #[arg(long)]
+    without_view: bool,
+    #[command(flatten)]
+    hold_out: HoldOutArgs,
+    #[command(flatten)]
+    proxy: ProxyArgs,
+    #[command(flatten)]
+    field: FieldArgs,
+    /// Size of the picture in pixels [default: the photo's]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<(u32, u32)>,
+    /// Also write the weights, for numpy: camera_names, ids, weights, points
+    #[arg(long, value_name = "FILE.npz")]
+    weights: Option<PathBuf>,
+    /// Also draw the triangulation
+    #[arg(long, value_name = "FILE.svg")]
+    triangulation: Option<PathBuf>,
+    /// The picture
+    #[arg(short, long, value_name = "FILE.png")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let scene = args.scene.open()?;
+    let mut without = args.hold_out.names(&scene)?;
+    let view = resized(scene.view(&args.view)?, args.size);
+    if args.without_view {
+        without.insert(args.view.clone());
+    }
+    let proxy = args.proxy.choose(&scene, &without)?;
+    let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+    let frame = Frame::new(&lumigraph, view, args.field.options());
+
+    // 1. The field, as the renderer asked for has it.
+    let triangulated = || TriangulatedField::new(&frame, args.field.grid);
+    let bar = spinner("weighting photos");
+    let (contributors, field) = match args.field.method() {
+        Method::Exact => (contributors_exact(&frame), None),
+        Method::Triangulated { .. } => {
+            let field = triangulated()?;
+            (field.contributors(&frame), Some(field))
+        }
+    };
+
+    bar.finish_and_clear();
+
+    // 2. Its pictures.
+    let colors = palette(frame.sources.len());
+    let picture = field_picture(&frame, &contributors, &colors);
+    let mut written = vec![&args.output];
+    make_parent(&args.output)?;
+    capture::write_png(&args.output, &picture)?;
+    if let Some(file) = &args.weights {
+        write_weights(file, &frame, &contributors)?;
+        written.push(file);
+    }
+    if let Some(file) = &args.triangulation {
+        let field = match field {
+            Some(field) => field,
+            None => triangulated()?,
+        };
+        write_file(file, svg(&field, &picture).as_bytes())?;
+        written.push(file);
+    }
+    let lines: Vec<String> = written
+        .iter()
+        .map(|f| format!("{}\n", f.display()))
+        .collect();
+    print(&lines.concat())
+}
+
+fn write_weights(
+    file: &Path,
+    frame: &Frame<'_>,
+    contributors: &[Vec<Contributor>],
+) -> anyhow::Result<()> {
+    let (width, height) = (frame.desired.width, frame.desired.height);
+    let world_from_camera = frame.desired.camera_from_world.inverse();
+    let point = |i: usize| {
+        let (x, y) = (i as u32 % width, i as u32 / width);
+        let point = frame.proxy_point(Pixel::center_of(x, y));
+        let in_world = point.map(|p| world_from_camera * (p.ray / p.inverse_distance));
+        // At the plane's horizon there is no point that numbers could name.
+        in_world.filter(|p| p.is_finite()).unwrap_or(DVec3::NAN)
+    };
+    let points: Vec<DVec3> = (0..contributors.len()).map(point).collect();
+    let sources = &frame.lumigraph.sources;
+    let bytes = npz(&Weights {
+        width,
+        height,
+        camera_names: sources.iter().map(|s| s.name.as_str()).collect(),
+        contributors,
+        points: &points,
+    })?;
+    write_file(file, &bytes)
+}
+
+/// The triangles, each in the colour of the field at its centre, and the epipoles.
+fn svg(field: &TriangulatedField, picture: &RgbaImage) -> String {
+    let (width, height) = picture.dimensions();
+    let fill = |triangle: &FieldTriangle| {
+        let corners = triangle.corners.map(|i| field.vertices[i as usize]);
+        let center = corners.iter().sum::<DVec2>() / 3.0;
+        let (x, y) = (center.x as u32, center.y as u32);
+        let [r, g, b, _] = picture.get_pixel(x.min(width - 1), y.min(height - 1)).0;
+        [r, g, b]
+    };
+    let fills: Vec<[u8; 3]> = field.triangles.iter().map(fill).collect();
+    let epipoles: Vec<DVec2> = field.epipoles.iter().map(|(_, at)| *at).collect();
+    let triangulation = Triangulation {
+        vertices: field.vertices.clone(),
+        triangles: field.triangles.iter().map(|t| t.corners).collect(),
+        ..Triangulation::default()
+    };
+    to_svg(&triangulation, width, height, Some(&fills), &epipoles)
+}

@@ -1,0 +1,114 @@
+//! Which views to render.
+
+use super::Usage;
+use super::session::Session;
+use calibrate::{View, colmap};
+use lumigraph::scene::SceneError;
+use render::path::{self, CameraPath, PathFrame};
+use render::trajectory::{self, Trajectory};
+use std::path::{Path, PathBuf};
+
+/// Which views to render.
+#[derive(clap::Args)]
+#[group(required = true, multiple = false)]
+pub(super) struct ViewArgs {
+    /// The views of a COLMAP model, or of a path file
+    #[arg(long, value_name = "MODEL|FILE")]
+    views: Option<PathBuf>,
+    /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
+    /// file
+    #[arg(long, value_name = "KIND|FILE")]
+    path: Option<String>,
+}
+
+/// A view to render and what to call it.
+pub(super) struct NamedView {
+    pub(super) name: String,
+    pub(super) view: View,
+}
+
+/// The views asked for.
+///
+/// # Errors
+/// They cannot be read or derived.
+pub(super) fn frames(
+    args: &ViewArgs,
+    count: u32,
+    session: &Session,
+) -> anyhow::Result<Vec<NamedView>> {
+    if let Some(views) = &args.views {
+        return if views.is_dir() {
+            of_model(views)
+        } else {
+            of_file(views)
+        };
+    }
+    let asked = args.path.as_deref().unwrap_or_default();
+    match asked {
+        "orbit" => derived(Trajectory::Orbit, count, session),
+        "dolly" => derived(Trajectory::Dolly, count, session),
+        "sweep" => derived(Trajectory::Sweep, count, session),
+        _ => {
+            let file = Path::new(asked);
+            if file.extension().is_none() && !file.exists() {
+                let message =
+                    format!("--path {asked}: expected orbit, dolly, sweep or a path file");
+                return Err(Usage(message).into());
+            }
+            of_file(file)
+        }
+    }
+}
+
+/// Frames a second of derived paths. Only a film made of the frames would show it.
+const FPS: f64 = 30.0;
+
+/// The frames of a path that follows from where the photos were taken.
+fn derived(
+    trajectory: Trajectory,
+    count: u32,
+    session: &Session,
+) -> anyhow::Result<Vec<NamedView>> {
+    let sources = &session.lumigraph().sources;
+    let points = session.points();
+    let proxy = &session.proxy.proxy;
+    let path = trajectory::derive(trajectory, sources, &points, proxy, count as usize, FPS)?;
+    Ok(named(path))
+}
+
+/// The images of a COLMAP model, by name.
+fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
+    let model = colmap::read_model(&colmap::find_model(folder)?)?;
+    let mut views = Vec::new();
+    for image in model.images.values() {
+        let camera = &model.cameras[&image.camera_id];
+        let lens = camera.lens().map_err(|source| SceneError::Camera {
+            name: image.name.clone(),
+            source,
+        })?;
+        views.push(NamedView {
+            name: image.name.clone(),
+            view: View {
+                lens,
+                width: camera.width,
+                height: camera.height,
+                camera_from_world: image.camera_from_world,
+            },
+        });
+    }
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(views)
+}
+
+/// The frames of a path file.
+fn of_file(file: &Path) -> anyhow::Result<Vec<NamedView>> {
+    Ok(named(path::read(file)?))
+}
+
+fn named(path: CameraPath) -> Vec<NamedView> {
+    let named = |frame: PathFrame| NamedView {
+        name: frame.name,
+        view: frame.view,
+    };
+    path.frames.into_iter().map(named).collect()
+}

@@ -1,0 +1,48 @@
+//! `lumigraph import`
+
+use super::options::print_warnings;
+use super::output::print;
+use lumigraph::scene::{ImportOptions, Scene};
+use std::path::PathBuf;
+
+/// Make a scene of photos and their calibration
+///
+/// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
+/// `dense/sparse` or itself), or the photo folder alone, with --calibration. Photos are not
+/// copied.
+///
+///     lumigraph import my-capture -o my-scene
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    /// The capture, or its photos
+    photos: PathBuf,
+    /// The COLMAP model, or a folder with one in the usual places [default: PHOTOS]
+    #[arg(long, value_name = "PATH")]
+    calibration: Option<PathBuf>,
+    /// Fail on a missing or corrupt photo instead of leaving it out
+    #[arg(long)]
+    strict: bool,
+    /// Replace the scene that OUTPUT holds
+    #[arg(long)]
+    force: bool,
+    /// The scene's folder
+    #[arg(short, long, value_name = "SCENE")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let options = ImportOptions {
+        calibration: args.calibration.clone(),
+        strict: args.strict,
+    };
+    let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
+    print_warnings(&warnings);
+    scene.save(&args.output, args.force)?;
+    print(&format!(
+        "{}: {} photos, {} points\n",
+        args.output.display(),
+        scene.photos.len(),
+        scene.reconstruction.points.len()
+    ))
+}

@@ -1,0 +1,141 @@
+//! `lumigraph info`
+
+use super::options::{SceneArgs, proxy_json, proxy_text};
+use super::output::{print, print_json};
+use super::report::megabytes;
+use glam::DVec3;
+use lumigraph::scene::{Scene, SceneError};
+use serde_json::{Value, json};
+
+/// Photos, cameras, points, reprojection error per camera, proxy, memory
+///
+///     lumigraph info my-capture
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// A photo and its mip levels: 4 bytes a pixel, a third more for the levels.
+const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let scene = args.scene.open()?;
+    let info = gather(&scene)?;
+    if args.json {
+        return print_json(&info);
+    }
+    print(&text(&scene, &info))
+}
+
+fn gather(scene: &Scene) -> anyhow::Result<Value> {
+    let reconstruction = &scene.reconstruction;
+    let mut cameras = Vec::new();
+    let mut photo_bytes = 0.0;
+    for (id, camera) in &reconstruction.cameras {
+        let photos = reconstruction
+            .images
+            .values()
+            .filter(|i| i.camera_id == *id)
+            .count();
+        if photos == 0 {
+            continue;
+        }
+        photo_bytes +=
+            photos as f64 * f64::from(camera.width) * f64::from(camera.height) * BYTES_PER_PIXEL;
+        let errors = reconstruction.reprojection_errors_px(*id);
+        let errors = errors.map_err(|source| SceneError::Camera {
+            name: format!("id {}", id.0),
+            source,
+        })?;
+        cameras.push(json!({
+            "id": id.0,
+            "model": camera.model.name(),
+            "width": camera.width,
+            "height": camera.height,
+            "params": camera.params,
+            "photos": photos,
+            "reprojection_px": reprojection(errors),
+        }));
+    }
+    let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
+    let cloud = proxy::statistics(&positions);
+    let own = scene.proxy.as_ref().map(|own| {
+        let mut value = proxy_json(&own.proxy);
+        value["file"] = json!(own.file);
+        value["fitted_without"] = json!(own.fitted_without);
+        value
+    });
+    Ok(json!({
+        "photos": scene.photos.len(),
+        "left_out": scene.left_out,
+        "cameras": cameras,
+        "points": positions.len(),
+        "spacing": cloud.map(|c| c.spacing),
+        "isolated": cloud.map(|c| c.isolated),
+        "proxy": own,
+        "memory_bytes": photo_bytes as u64,
+    }))
+}
+
+/// Mean and median of the finite errors; how many there are, and how many points lie
+/// behind the camera that is said to see them.
+fn reprojection(errors_px: Vec<f64>) -> Value {
+    let behind = errors_px.iter().filter(|e| !e.is_finite()).count();
+    let mut finite: Vec<f64> = errors_px.into_iter().filter(|e| e.is_finite()).collect();
+    finite.sort_by(f64::total_cmp);
+    let mean = finite.iter().sum::<f64>() / finite.len() as f64;
+    json!({
+        "mean": (!finite.is_empty()).then_some(mean),
+        "median": finite.get(finite.len() / 2),
+        "observations": finite.len(),
+        "behind": behind,
+    })
+}
+
+fn text(scene: &Scene, info: &Value) -> String {
+    let mut text = format!("photos   {}\n", info["photos"]);
+    for camera in info["cameras"].as_array().into_iter().flatten() {
+        let params: Vec<String> = camera["params"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .map(ToString::to_string)
+            .collect();
+        let error = &camera["reprojection_px"];
+        let error = match (error["mean"].as_f64(), error["median"].as_f64()) {
+            (Some(mean), Some(median)) => format!(
+                "reprojection error {mean:.3} px mean, {median:.3} px median over {} observations",
+                error["observations"]
+            ),
+            _ => "no observations of points".to_owned(),
+        };
+        text += &format!(
+            "camera   {}: {} {}×{} [{}], {} photos, {error}\n",
+            camera["id"],
+            camera["model"].as_str().unwrap_or_default(),
+            camera["width"],
+            camera["height"],
+            params.join(", "),
+            camera["photos"],
+        );
+    }
+    text += &format!("points   {}", info["points"]);
+    if let (Some(spacing), Some(isolated)) = (info["spacing"].as_f64(), info["isolated"].as_u64()) {
+        text += &format!(", median spacing {spacing:.4} world units, {isolated} isolated");
+    }
+    text += &match &scene.proxy {
+        Some(own) => format!("\nproxy    {}\n", proxy_text(&own.proxy)),
+        None => "\nproxy    none of its own; a plane is fitted when needed\n".to_owned(),
+    };
+    let bytes = info["memory_bytes"].as_u64().unwrap_or_default();
+    text += &format!(
+        "memory   {} at most, if a frame needs every photo\n",
+        megabytes(bytes)
+    );
+    text
+}

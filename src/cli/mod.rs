@@ -1,0 +1,125 @@
+//! One file a subcommand. Options, progress, reports and messages live here and nowhere
+//! else; results go to stdout, all else to stderr.
+
+mod demo;
+mod evaluate;
+mod field;
+mod frames;
+mod generate;
+mod import;
+mod info;
+mod npz;
+mod options;
+mod output;
+mod proxy;
+mod render;
+mod report;
+mod session;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
+use output::say;
+use std::fmt::Write as _;
+use std::num::NonZero;
+use std::process::ExitCode;
+
+/// Unstructured lumigraph rendering: calibrated photos in, novel views out.
+#[derive(Parser)]
+#[command(name = "lumigraph", version, arg_required_else_help = true)]
+struct Cli {
+    /// Worker threads [default: one a processor core]; pictures do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<NonZero<usize>>,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Import(import::Args),
+    Info(info::Args),
+    Proxy(proxy::Args),
+    Render(render::Args),
+    Field(field::Args),
+    Evaluate(evaluate::Args),
+    Generate(generate::Args),
+}
+
+/// What is asked for makes no sense, whatever the data: exit code 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
+/// Parses the command line, runs the command, and says what went wrong: exit code 2 for
+/// usage, 1 for bad data.
+pub(super) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let Err(error) = run(cli) else {
+        return ExitCode::SUCCESS;
+    };
+    if let Some(Usage(message)) = error.downcast_ref() {
+        let _ = Cli::command()
+            .error(ErrorKind::ValueValidation, message)
+            .print();
+        return ExitCode::from(2);
+    }
+    if output::is_closed_pipe(&error) {
+        return ExitCode::SUCCESS;
+    }
+    say!("error: {}", one_line(&error));
+    ExitCode::from(1)
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
+    if let Some(threads) = cli.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.get())
+            .build_global()?;
+    }
+    match cli.command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Proxy(args) => proxy::run(&args),
+        Command::Render(args) => render::run(&args),
+        Command::Field(args) => field::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Generate(args) => generate::run(&args),
+    }
+}
+
+/// An error and its causes, but for those that the text before already quotes.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string();
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            let _ = write!(text, ": {cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn causes_are_said_once() {
+        let io = std::io::Error::other("disk on fire");
+        let error = anyhow::Error::new(io).context("a.jpg: cannot read: disk on fire");
+        let error = error.context("importing");
+        assert_eq!(
+            one_line(&error),
+            "importing: a.jpg: cannot read: disk on fire"
+        );
+    }
+}

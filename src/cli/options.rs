@@ -1,0 +1,340 @@
+//! Options that several subcommands share.
+
+use super::Usage;
+use super::output::say;
+use anyhow::Context;
+use calibrate::View;
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use lumigraph::scene::{Scene, Warning};
+use proxy::Proxy;
+use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Which photo set.
+#[derive(Args)]
+pub(super) struct SceneArgs {
+    /// A scene written by `import`, or a capture: photos with a COLMAP model
+    pub(super) scene: PathBuf,
+    /// Fail on a missing or corrupt photo instead of leaving it out
+    #[arg(long)]
+    pub(super) strict: bool,
+}
+
+impl SceneArgs {
+    /// Opens it, and says which photos are not used.
+    pub(super) fn open(&self) -> anyhow::Result<Scene> {
+        let (scene, warnings) = Scene::open(&self.scene, self.strict)?;
+        print_warnings(&warnings);
+        Ok(scene)
+    }
+}
+
+/// Warnings printed one by one; more than these are only counted.
+const WARNINGS_SHOWN: usize = 10;
+
+pub(super) fn print_warnings(warnings: &[Warning]) {
+    for warning in warnings.iter().take(WARNINGS_SHOWN) {
+        match warning {
+            Warning::LeftOut { .. } => say!("warning: {warning}"),
+            Warning::Uncalibrated { .. } => say!("note: {warning}"),
+        }
+    }
+    if let Some(more) = warnings.len().checked_sub(WARNINGS_SHOWN + 1) {
+        say!("warning: and {} more photos are left out", more + 1);
+    }
+}
+
+/// Which photos to leave out of everything.
+#[derive(Args)]
+pub(super) struct HoldOutArgs {
+    /// Leave out the photos named in this file: {"test": ["a.jpg", …]}
+    #[arg(long, value_name = "SPLIT.json")]
+    pub(super) hold_out: Option<PathBuf>,
+}
+
+impl HoldOutArgs {
+    /// Their names; none without the option.
+    pub(super) fn names(&self, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
+        match &self.hold_out {
+            Some(split) => Ok(scene.held_out(split)?),
+            None => Ok(BTreeSet::new()),
+        }
+    }
+}
+
+/// Which surface.
+#[derive(Args)]
+pub(super) struct ProxyArgs {
+    /// plane, auto, or a proxy's file (.json or .glb) [default: the scene's own, else auto]
+    #[arg(long, value_name = "KIND|FILE")]
+    pub(super) proxy: Option<String>,
+}
+
+/// A proxy and where it came from.
+pub(super) struct ChosenProxy {
+    pub(super) proxy: Proxy,
+    origin: String,
+}
+
+impl ProxyArgs {
+    /// The proxy asked for. A fitted one rests on none of the photos in `without`.
+    pub(super) fn choose(
+        &self,
+        scene: &Scene,
+        without: &BTreeSet<String>,
+    ) -> anyhow::Result<ChosenProxy> {
+        let fitted = || {
+            let proxy = scene
+                .fit_proxy(without)
+                .context("no proxy can be fitted to this scene")?;
+            Ok(ChosenProxy {
+                proxy,
+                origin: "fitted".to_owned(),
+            })
+        };
+        match self.proxy.as_deref() {
+            Some("plane" | "auto") => fitted(),
+            Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
+                proxy: proxy::read(Path::new(file))?,
+                origin: file.to_owned(),
+            }),
+            Some(other) => Err(Usage(format!(
+                "--proxy {other}: expected plane, auto, or a file ending in .json or .glb"
+            ))
+            .into()),
+            None => match &scene.proxy {
+                Some(own) => {
+                    let saw = own
+                        .fitted_without
+                        .as_ref()
+                        .and_then(|unseen| without.iter().find(|name| !unseen.contains(name)));
+                    if let Some(name) = saw {
+                        say!(
+                            "note: the scene's own proxy was fitted with held-out {name}; \
+                             fitting another without"
+                        );
+                        return fitted();
+                    }
+                    Ok(ChosenProxy {
+                        proxy: own.proxy,
+                        origin: "the scene's own".to_owned(),
+                    })
+                }
+                None => fitted(),
+            },
+        }
+    }
+}
+
+fn is_proxy_file(name: &str) -> bool {
+    let extension = Path::new(name).extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("json") || extension.eq_ignore_ascii_case("glb")
+}
+
+impl ChosenProxy {
+    pub(super) fn json(&self) -> Value {
+        let mut value = proxy_json(&self.proxy);
+        value["from"] = json!(self.origin);
+        value
+    }
+
+    pub(super) fn text(&self) -> String {
+        format!("{} ({})", proxy_text(&self.proxy), self.origin)
+    }
+}
+
+pub(super) fn proxy_json(proxy: &Proxy) -> Value {
+    let Proxy::Plane(plane) = proxy;
+    json!({
+        "kind": proxy.kind(),
+        "point": plane.point().to_array(),
+        "normal": plane.normal().to_array(),
+    })
+}
+
+pub(super) fn proxy_text(proxy: &Proxy) -> String {
+    let Proxy::Plane(plane) = proxy;
+    let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
+    format!(
+        "plane through {} across {}",
+        triple(plane.point()),
+        triple(plane.normal())
+    )
+}
+
+/// How source views are weighted.
+#[derive(Args)]
+pub(super) struct FieldArgs {
+    /// The blending field at every pixel, or at vertices and interpolated
+    #[arg(long, value_enum, default_value = "triangulated")]
+    renderer: Renderer,
+    /// Cells of the triangulation's grid across the image's longer side
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) grid: u32,
+    /// The formula for the weights
+    #[arg(long, value_enum, default_value = "consistent")]
+    blend: BlendName,
+    /// What a photo's lack of resolution is measured by
+    #[arg(long, value_enum, default_value = "footprint")]
+    resolution: ResolutionName,
+    /// How many photos share a ray, roughly: Buehler's k
+    #[arg(long, default_value_t = 5,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CONTRIBUTORS as u64))]
+    k: usize,
+    /// Radians of angular difference that half the resolution is worth: Buehler's β/α
+    #[arg(long, default_value_t = 0.1, value_parser = zero_or_more, allow_negative_numbers = true)]
+    beta: f64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Renderer {
+    /// At vertices, and interpolated: fast
+    Triangulated,
+    /// At every pixel
+    Exact,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BlendName {
+    /// Exact at source views, continuous where views come and go
+    Consistent,
+    /// Buehler et al. 2001, literally
+    Paper,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ResolutionName {
+    /// The ratio of pixel footprints
+    Footprint,
+    /// The ratio of distances
+    Distance,
+    /// The difference of distances, in world units: Buehler et al. 2001, literally
+    Length,
+}
+
+impl FieldArgs {
+    pub(super) fn options(&self) -> FieldOptions {
+        FieldOptions {
+            k: self.k,
+            beta: self.beta,
+            blend: match self.blend {
+                BlendName::Consistent => Blend::Consistent,
+                BlendName::Paper => Blend::Paper,
+            },
+            resolution: match self.resolution {
+                ResolutionName::Footprint => Resolution::Footprint,
+                ResolutionName::Distance => Resolution::Distance,
+                ResolutionName::Length => Resolution::Length,
+            },
+            ..FieldOptions::default()
+        }
+    }
+
+    pub(super) fn method(&self) -> Method {
+        match self.renderer {
+            Renderer::Exact => Method::Exact,
+            Renderer::Triangulated => Method::Triangulated {
+                cells_across: self.grid,
+            },
+        }
+    }
+}
+
+/// Where and how large.
+#[derive(Args)]
+pub(super) struct DrawArgs {
+    /// What draws; without a graphics processor, auto is cpu
+    #[arg(long, value_enum, default_value = "auto")]
+    device: DeviceName,
+    /// Size of the pictures in pixels [default: each view's own]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(super) size: Option<(u32, u32)>,
+    /// Do all the work that could be skipped: the same bytes, later
+    #[arg(long)]
+    pub(super) no_skip: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DeviceName {
+    Auto,
+    Gpu,
+    Cpu,
+    /// Plain f64: slow, the specification
+    Reference,
+}
+
+impl DrawArgs {
+    pub(super) fn device(&self) -> DeviceChoice {
+        match self.device {
+            DeviceName::Auto => DeviceChoice::Auto,
+            DeviceName::Gpu => DeviceChoice::Gpu,
+            DeviceName::Cpu => DeviceChoice::Cpu,
+            DeviceName::Reference => DeviceChoice::Reference,
+        }
+    }
+
+    /// A view at the size asked for.
+    pub(super) fn resized(&self, view: View) -> View {
+        resized(view, self.size)
+    }
+}
+
+pub(super) fn resized(view: View, size: Option<(u32, u32)>) -> View {
+    match size {
+        Some((width, height)) if (width, height) != (view.width, view.height) => {
+            view.resized(width, height)
+        }
+        _ => view,
+    }
+}
+
+/// Pictures larger than this on a side are refused: the triangulation's lattice ends here.
+const MAX_SIDE: u32 = 16384;
+
+/// `640x480`.
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let parse = || {
+        let (width, height) = text.split_once(['x', 'X', '×'])?;
+        Some((width.trim().parse().ok()?, height.trim().parse().ok()?))
+    };
+    let (width, height) = parse().ok_or("expected two numbers, as in 640x480")?;
+    let sides = 1..=MAX_SIDE;
+    if !sides.contains(&width) || !sides.contains(&height) {
+        return Err(format!("each side must lie in 1..={MAX_SIDE}"));
+    }
+    Ok((width, height))
+}
+
+/// `1.5,-2,0`.
+pub(super) fn triple(text: &str) -> Result<DVec3, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
+        _ => Err("expected three numbers, as in 0,-1.5,2".to_owned()),
+    }
+}
+
+fn zero_or_more(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
+        _ => Err("expected a number, zero or more".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_triples() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        assert!(size("0x480").is_err() && size("640").is_err() && size("-3x4").is_err());
+        assert_eq!(triple("1, -2,3e-1"), Ok(DVec3::new(1.0, -2.0, 0.3)));
+        assert!(triple("1,2").is_err() && triple("1,2,NaN").is_err());
+        assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());
+    }
+}

@@ -1,0 +1,84 @@
+//! `lumigraph render`
+
+use super::frames::{ViewArgs, frames};
+use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::output::say;
+use super::output::{frame_files, print, print_json};
+use super::report::{Report, Start};
+use super::session::{Session, progress};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Render novel views
+///
+/// A frame is a PNG with the view's name; its alpha is coverage.
+///
+///     lumigraph render my-capture --path orbit --frames 60 -o frames
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    views: ViewArgs,
+    /// Frames of a derived path
+    #[arg(long, value_name = "N", default_value_t = 30,
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    #[command(flatten)]
+    hold_out: HoldOutArgs,
+    #[command(flatten)]
+    proxy: ProxyArgs,
+    #[command(flatten)]
+    field: FieldArgs,
+    #[command(flatten)]
+    draw: DrawArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// The folder for the frames
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let start = Start::now();
+    let mut session = Session::open(
+        &args.scene,
+        &args.hold_out,
+        &args.proxy,
+        &args.field,
+        &args.draw,
+    )?;
+    let frames = frames(&args.views, args.frames, &session)?;
+    let files = frame_files(frames.iter().map(|f| f.name.as_str()), &args.output)?;
+    session.prepare()?;
+
+    let bar = progress(frames.len(), "rendering");
+    for (frame, file) in frames.iter().zip(&files) {
+        let drawn = session.draw(&args.draw.resized(frame.view.clone()))?;
+        capture::write_png(file, &drawn.picture)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+
+    let report = Report::new(&session, &start);
+    if args.json {
+        let listed = frames
+            .iter()
+            .zip(&files)
+            .map(|(frame, file)| json!({"name": frame.name, "file": file}));
+        return print_json(&json!({
+            "frames": listed.collect::<Vec<_>>(),
+            "proxy": session.proxy.json(),
+            "report": report,
+        }));
+    }
+    say!("proxy: {}", session.proxy.text());
+    say!("{}", report.text());
+    print(&format!(
+        "{}: {} frames\n",
+        args.output.display(),
+        files.len()
+    ))
+}

@@ -1,0 +1,194 @@
+//! A scene, a proxy and an engine, drawing views one after the other.
+
+use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::output::say;
+use anyhow::bail;
+use calibrate::View;
+use cpu_time::ProcessTime;
+use glam::DVec3;
+use image::RgbaImage;
+use indicatif::{ProgressBar, ProgressStyle};
+use lumigraph::scene::{Scene, SceneError};
+use render::{
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, PhotoError, RenderError,
+};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Everything needed to draw.
+pub(super) struct Session {
+    pub(super) scene: Scene,
+    pub(super) proxy: ChosenProxy,
+    pub(super) options: FieldOptions,
+    pub(super) method: Method,
+    /// Held-out photos, and those found corrupt.
+    without: BTreeSet<String>,
+    lumigraph: Lumigraph,
+    engine: Option<Engine>,
+    device: DeviceChoice,
+    strict: bool,
+    no_skip: bool,
+}
+
+/// A view drawn.
+pub(super) struct Drawn {
+    pub(super) picture: RgbaImage,
+    /// Processor time for the picture, decoding photos not included.
+    pub(super) cpu: Duration,
+}
+
+impl Session {
+    /// A session without the photos of the given names; they play no part in fitting the
+    /// proxy either.
+    pub(super) fn new(
+        scene: Scene,
+        without: BTreeSet<String>,
+        strict: bool,
+        proxy: &ProxyArgs,
+        field: &FieldArgs,
+        draw: &DrawArgs,
+    ) -> anyhow::Result<Self> {
+        if scene.photos.iter().all(|p| without.contains(&p.name)) {
+            return Err(SceneError::NothingLeft(scene.photos.len()).into());
+        }
+        let proxy = proxy.choose(&scene, &without)?;
+        let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+        Ok(Self {
+            scene,
+            proxy,
+            options: field.options(),
+            method: field.method(),
+            without,
+            lumigraph,
+            engine: None,
+            device: draw.device(),
+            strict,
+            no_skip: draw.no_skip,
+        })
+    }
+
+    /// A session from the options that `render` and `field` share.
+    pub(super) fn open(
+        scene: &SceneArgs,
+        hold_out: &HoldOutArgs,
+        proxy: &ProxyArgs,
+        field: &FieldArgs,
+        draw: &DrawArgs,
+    ) -> anyhow::Result<Self> {
+        let opened = scene.open()?;
+        let without = hold_out.names(&opened)?;
+        Self::new(opened, without, scene.strict, proxy, field, draw)
+    }
+
+    pub(super) fn lumigraph(&self) -> &Lumigraph {
+        &self.lumigraph
+    }
+
+    /// The sparse points that do not rest on held-out photos, in the world.
+    pub(super) fn points(&self) -> Vec<DVec3> {
+        let rest = self.scene.reconstruction.without_images(&self.without);
+        rest.points.values().map(|p| p.position).collect()
+    }
+
+    /// What draws, for people.
+    pub(super) fn device(&self) -> String {
+        let engine = self.engine.as_ref();
+        engine.map_or_else(|| "nothing yet".to_owned(), Engine::description)
+    }
+
+    /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
+    /// but messages look better before a progress bar than in it.
+    pub(super) fn prepare(&mut self) -> anyhow::Result<()> {
+        if self.engine.is_some() {
+            return Ok(());
+        }
+        let engine = Engine::open(self.device)?;
+        if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu) {
+            say!("note: no graphics processor answers; drawing on the CPU");
+        }
+        self.engine = Some(engine);
+        let mut source_idx = 0;
+        while self.no_skip && source_idx < self.lumigraph.photos.len() {
+            match self.lumigraph.photos.get(source_idx) {
+                Ok(_) => source_idx += 1,
+                Err(error) => {
+                    self.leave_out(&error)?;
+                    source_idx = 0;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws a view. A photo that turns out corrupt is reported and left out from then on
+    /// and the view drawn again, unless `--strict`.
+    pub(super) fn draw(&mut self, desired: &View) -> anyhow::Result<Drawn> {
+        self.prepare()?;
+        loop {
+            let decoded_before = self.lumigraph.photos.decoded();
+            let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            let Some(engine) = &mut self.engine else {
+                bail!("the engine was opened above");
+            };
+            let mut start = ProcessTime::now();
+            let mut drawn = engine.render(&frame, self.method);
+            if drawn.is_ok() && self.lumigraph.photos.decoded() > decoded_before {
+                // That included decoding photos. Once more, for the time alone.
+                start = ProcessTime::now();
+                drawn = engine.render(&frame, self.method);
+            }
+            let cpu = start.elapsed();
+            match drawn {
+                Ok(picture) => return Ok(Drawn { picture, cpu }),
+                Err(RenderError::Photo(error)) => self.leave_out(&error)?,
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+
+    /// The pixels of a photo of the scene; `None`, with a warning, for one that is corrupt,
+    /// unless `--strict`.
+    pub(super) fn decode(&self, name: &str, size: (u32, u32)) -> anyhow::Result<Option<RgbaImage>> {
+        let photo = self.scene.photos.iter().find(|p| p.name == name);
+        let Some(photo) = photo else {
+            bail!("photo {name} is not in the scene");
+        };
+        match capture::decode(&photo.path, Some(size)) {
+            Ok(pixels) => Ok(Some(pixels)),
+            Err(error) if self.strict => Err(error.into()),
+            Err(error) => {
+                say!("warning: photo {name} is left out: {error}");
+                Ok(None)
+            }
+        }
+    }
+
+    fn leave_out(&mut self, error: &PhotoError) -> anyhow::Result<()> {
+        let name = self.lumigraph.sources[error.source_idx].name.clone();
+        if self.strict {
+            bail!("photo {name}: {error}; without --strict it would be left out");
+        }
+        say!("warning: photo {name} is left out: {error}");
+        self.without.insert(name);
+        self.lumigraph = self.scene.lumigraph(&self.without, self.proxy.proxy)?;
+        Ok(())
+    }
+}
+
+/// A progress bar on stderr, where that is a terminal.
+pub(super) fn progress(total: usize, doing: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
+        bar.set_style(style);
+    }
+    bar.set_message(doing);
+    bar
+}
+
+/// A sign of life on stderr, where that is a terminal, while something takes its time.
+pub(super) fn spinner(doing: &'static str) -> ProgressBar {
+    let spinner = ProgressBar::new_spinner();
+    spinner.set_message(doing);
+    spinner.enable_steady_tick(Duration::from_millis(200));
+    spinner
+}

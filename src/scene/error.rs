@@ -1,0 +1,177 @@
+use std::fmt;
+use std::path::PathBuf;
+
+/// Why a scene cannot be made, read, written or rendered from.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The calibration cannot be found or read.
+    #[error(transparent)]
+    Calibration(#[from] calibrate::colmap::ColmapError),
+    /// A camera is unusable.
+    #[error("camera of {name}: {source}")]
+    Camera {
+        /// The photo.
+        name: String,
+        /// What is wrong with its camera.
+        source: calibrate::CameraError,
+    },
+    /// The photos cannot be listed, or one of them is not as calibrated.
+    #[error(transparent)]
+    Capture(#[from] capture::CaptureError),
+    /// The scene's proxy cannot be read or written.
+    #[error(transparent)]
+    ProxyFile(#[from] proxy::FileError),
+    /// No proxy can be fitted.
+    #[error(transparent)]
+    Fit(#[from] proxy::FitError),
+    /// There is nothing at the given path.
+    #[error("{}: there is no such folder; check the path", .0.display())]
+    NoFolder(PathBuf),
+    /// The capture holds no photos.
+    #[error(
+        "{}: no photos here, neither in it nor in `images`; give the folder that holds the \
+         photos, and their calibration with --calibration", .0.display()
+    )]
+    NoPhotos(PathBuf),
+    /// A photo is missing or corrupt and none may be.
+    #[error("photo {name}: {reason}; without --strict it would be left out")]
+    Strict {
+        /// The photo.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Too many photos are missing or corrupt.
+    #[error(
+        "{left_out} of {total} calibrated photos cannot be used, and too few remain (at least 2 \
+         are needed): {name}: {reason}; check that the calibration belongs to these photos"
+    )]
+    TooFew {
+        /// How many are missing or corrupt.
+        left_out: usize,
+        /// How many are calibrated.
+        total: usize,
+        /// The first of them.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file or folder cannot be read or written.
+    #[error("{}: cannot {doing}: {source}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// What was tried.
+        doing: &'static str,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// A file is not the JSON that was expected.
+    #[error("{}: not {expected}: {source}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What it should be.
+        expected: &'static str,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// The scene is from a later version of the program.
+    #[error("{}: scene version {found}; this program reads version 1", path.display())]
+    Version {
+        /// Its `scene.json`.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// `scene.json` contradicts itself or the model.
+    #[error("{}: {problem}; import the photos again", path.display())]
+    Inconsistent {
+        /// Its `scene.json`.
+        path: PathBuf,
+        /// What does not fit.
+        problem: String,
+    },
+    /// The output folder holds something else.
+    #[error("{}: {problem}", path.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+        /// What is in the way, and what to do.
+        problem: String,
+    },
+    /// A photo is asked for that the scene does not have.
+    #[error("no photo is called {name}; the scene has {}", examples(known))]
+    UnknownPhoto {
+        /// The name asked for.
+        name: String,
+        /// The scene's.
+        known: Vec<String>,
+    },
+    /// Photos are to be held out that the scene does not have.
+    #[error(
+        "{}: the scene has no {}; it has {}", path.display(), names.join(", "), examples(known)
+    )]
+    UnknownHeldOut {
+        /// The split file.
+        path: PathBuf,
+        /// What it names.
+        names: Vec<String>,
+        /// The scene's photos.
+        known: Vec<String>,
+    },
+    /// A split that names no photo.
+    #[error("{}: \"test\" names no photo; name some to hold out", .0.display())]
+    EmptySplit(PathBuf),
+    /// Every photo is held out or corrupt.
+    #[error("no photo is left to render from: all {0} are held out or corrupt")]
+    NothingLeft(usize),
+}
+
+/// The first few names, for people.
+fn examples(known: &[String]) -> String {
+    match known {
+        [] => "none".to_owned(),
+        [a] => a.clone(),
+        [a, b] => format!("{a} and {b}"),
+        [a, b, rest @ ..] => format!("{a}, {b} and {} more", rest.len()),
+    }
+}
+
+/// What the user should know about photos that are not used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Warning {
+    /// A calibrated photo is missing or corrupt.
+    LeftOut {
+        /// The photo.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Photos without a camera.
+    Uncalibrated {
+        /// How many.
+        count: usize,
+        /// How many photos there are.
+        total: usize,
+        /// One of them.
+        example: String,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LeftOut { name, reason } => write!(f, "photo {name} is left out: {reason}"),
+            Self::Uncalibrated {
+                count,
+                total,
+                example,
+            } => write!(
+                f,
+                "{count} of {total} photos are not in the calibration and stay unused \
+                 ({example}, for one)"
+            ),
+        }
+    }
+}

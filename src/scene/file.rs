@@ -1,0 +1,104 @@
+//! `scene.json`, version 1.
+//!
+//! ```json
+//! {
+//!   "version": 1,
+//!   "photos": [{"name": "a.jpg", "path": "../capture/images/a.jpg"}],
+//!   "model": "model",
+//!   "proxy": {"kind": "plane", "file": "proxy.json", "fitted_without": []},
+//!   "settings": {"capture": "../capture"}
+//! }
+//! ```
+//!
+//! Paths are relative to the scene's folder, with `/` between their parts. Keys that this
+//! version does not know are kept when the file is written again.
+
+use serde::{Deserialize, Serialize};
+
+/// Keys that this version does not know, with their values.
+pub type Extra = serde_json::Map<String, serde_json::Value>;
+
+/// The file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SceneFile {
+    /// Of the format: 1.
+    pub version: u32,
+    /// By name.
+    pub photos: Vec<PhotoEntry>,
+    /// The folder of the COLMAP model.
+    pub model: String,
+    /// The scene's own proxy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proxy: Option<ProxyEntry>,
+    /// How the scene was made.
+    #[serde(default)]
+    pub settings: Settings,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Extra,
+}
+
+/// A photo.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PhotoEntry {
+    /// As in the model.
+    pub name: String,
+    /// The photo's file.
+    pub path: String,
+    /// The file of a mask of what to ignore.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ignore_mask: Option<String>,
+    /// The file of an object's silhouette.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object_matte: Option<String>,
+    /// The file of a depth map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_map: Option<String>,
+    /// World units a step of the depth map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_scale: Option<f64>,
+    /// Seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Exposure of red, green and blue, relative to the other photos.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<[f64; 3]>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Extra,
+}
+
+/// The scene's own proxy.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ProxyEntry {
+    /// Of the surface: `plane`.
+    pub kind: String,
+    /// Its file.
+    pub file: String,
+    /// For a fitted one, the photos that were held out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted_without: Option<Vec<String>>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Extra,
+}
+
+/// How a scene was made.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The folder that was imported.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<String>,
+    /// The calibration that was given beside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// Whether a missing or corrupt photo was an error.
+    #[serde(default)]
+    pub strict: bool,
+    /// The program and its version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Extra,
+}

@@ -1,0 +1,136 @@
+//! From a capture to a scene.
+
+use super::file::{Extra, Settings};
+use super::{Photo, Scene, SceneError, Warning};
+use calibrate::colmap;
+use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// How photos are imported.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportOptions {
+    /// Where the calibration is; `None`: in the capture's folder.
+    pub calibration: Option<PathBuf>,
+    /// A missing or corrupt photo is an error rather than left out.
+    pub strict: bool,
+}
+
+/// Photos that must remain for others to be left out.
+const ENOUGH: usize = 2;
+
+impl Scene {
+    /// Imports a capture, a folder of photos with a calibration in it or beside it.
+    ///
+    /// Every photo's size is compared with its camera's, from the file's header; nothing
+    /// is decoded. A calibrated photo that is missing, or whose header cannot be read, is
+    /// left out with a warning as long as two others remain.
+    ///
+    /// # Errors
+    /// No calibration or no photos where they should be; a damaged calibration; a photo of
+    /// another size than calibrated; too few photos left, or with
+    /// [`ImportOptions::strict`] any missing or corrupt one.
+    pub fn import(
+        capture: &Path,
+        options: &ImportOptions,
+    ) -> Result<(Self, Vec<Warning>), SceneError> {
+        if !capture.is_dir() {
+            return Err(SceneError::NoFolder(capture.to_owned()));
+        }
+        // 1. The calibration.
+        let calibration = options.calibration.as_deref().unwrap_or(capture);
+        let model = colmap::find_model(calibration)?;
+        let reconstruction = colmap::read_model(&model)?;
+
+        // 2. The photos, matched by name.
+        let folder =
+            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
+        let found = PhotoSet::open(&folder)?;
+        let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
+        names.sort();
+        let photos = names.iter().map(|name| Photo {
+            name: (*name).clone(),
+            path: folder.join(name),
+            ignore_mask: None,
+            object_matte: None,
+            depth_map: None,
+            depth_scale: None,
+            time_s: None,
+            gain: None,
+            other: Extra::new(),
+        });
+        let mut warnings = Vec::new();
+        let unused = |photo: &&capture::PhotoFile| names.binary_search(&&photo.name).is_err();
+        if let Some(example) = found.photos.iter().find(unused) {
+            warnings.push(Warning::Uncalibrated {
+                count: found.photos.iter().filter(unused).count(),
+                total: found.photos.len(),
+                example: example.name.clone(),
+            });
+        }
+
+        let mut scene = Self {
+            photos: photos.collect(),
+            reconstruction,
+            proxy: None,
+            settings: Settings {
+                strict: options.strict,
+                program: Some(concat!("lumigraph ", env!("CARGO_PKG_VERSION")).to_owned()),
+                ..Settings::default()
+            },
+            folder: None,
+            capture: Some(capture.to_owned()),
+            calibration: options.calibration.clone(),
+            left_out: Vec::new(),
+            other: Extra::new(),
+        };
+        // 3. Are they what was calibrated?
+        warnings.extend(scene.leave_out_unusable(options.strict)?);
+        Ok((scene, warnings))
+    }
+
+    /// Compares every photo's size with its camera's, and leaves out what cannot be used.
+    pub(super) fn leave_out_unusable(&mut self, strict: bool) -> Result<Vec<Warning>, SceneError> {
+        let images = self.images_by_name();
+        let mut unusable: Vec<(String, CaptureError)> = Vec::new();
+        for photo in &self.photos {
+            let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
+            let expected = (camera.width, camera.height);
+            match photo_size(&photo.path) {
+                Ok(found) if found == expected => {}
+                Ok(found) => {
+                    return Err(SceneError::Capture(CaptureError::Size {
+                        path: photo.path.clone(),
+                        found,
+                        expected,
+                    }));
+                }
+                Err(error) => unusable.push((photo.name.clone(), error)),
+            }
+        }
+        let Some((name, reason)) = unusable.first() else {
+            return Ok(Vec::new());
+        };
+        let (name, reason) = (name.clone(), reason.to_string());
+        if strict {
+            return Err(SceneError::Strict { name, reason });
+        }
+        if self.photos.len() - unusable.len() < ENOUGH {
+            return Err(SceneError::TooFew {
+                left_out: unusable.len(),
+                total: self.photos.len(),
+                name,
+                reason,
+            });
+        }
+        let names: BTreeSet<String> = unusable.iter().map(|(name, _)| name.clone()).collect();
+        self.photos.retain(|photo| !names.contains(&photo.name));
+        self.reconstruction = self.reconstruction.without_images(&names);
+        self.left_out = names.into_iter().collect();
+        let warning = |(name, error): (String, CaptureError)| Warning::LeftOut {
+            name,
+            reason: error.to_string(),
+        };
+        Ok(unusable.into_iter().map(warning).collect())
+    }
+}

@@ -1,0 +1,98 @@
+//! From a scene to what the engine draws from.
+
+use super::{Scene, SceneError};
+use calibrate::{Image, View};
+use proxy::{PlaneFit, Proxy};
+use render::{Lumigraph, PhotoStore, SourceView};
+use std::collections::{BTreeMap, BTreeSet};
+
+impl Scene {
+    /// A photo's camera and pose.
+    ///
+    /// # Errors
+    /// No such photo, or its camera has no lens.
+    pub fn view(&self, name: &str) -> Result<View, SceneError> {
+        let image = self.reconstruction.images.values().find(|i| i.name == name);
+        let image = image.ok_or_else(|| SceneError::UnknownPhoto {
+            name: name.to_owned(),
+            known: self.names(),
+        })?;
+        self.view_of(image)
+    }
+
+    fn view_of(&self, image: &Image) -> Result<View, SceneError> {
+        let camera = &self.reconstruction.cameras[&image.camera_id];
+        let lens = camera.lens().map_err(|source| SceneError::Camera {
+            name: image.name.clone(),
+            source,
+        })?;
+        Ok(View {
+            lens,
+            width: camera.width,
+            height: camera.height,
+            camera_from_world: image.camera_from_world,
+        })
+    }
+
+    /// Its posed images by name.
+    pub(super) fn images_by_name(&self) -> BTreeMap<&str, &Image> {
+        let images = self.reconstruction.images.values();
+        images.map(|image| (image.name.as_str(), image)).collect()
+    }
+
+    /// The plane that fits the sparse points when the photos of the given names were never
+    /// taken.
+    ///
+    /// # Errors
+    /// No points to fit to.
+    pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
+        Ok(proxy::fit_plane(
+            &self.reconstruction.without_images(without),
+        )?)
+    }
+
+    /// The best surface that can be fitted without the photos of the given names; today
+    /// the plane.
+    ///
+    /// # Errors
+    /// No points to fit to.
+    pub fn fit_proxy(&self, without: &BTreeSet<String>) -> Result<Proxy, SceneError> {
+        Ok(Proxy::Plane(self.fit_plane(without)?.plane))
+    }
+
+    /// Everything that views are rendered from: the photos but those of the given names,
+    /// in the order of their names, decoded when first needed.
+    ///
+    /// # Errors
+    /// No photo is left, or a camera has no lens.
+    pub fn lumigraph(
+        &self,
+        without: &BTreeSet<String>,
+        proxy: Proxy,
+    ) -> Result<Lumigraph, SceneError> {
+        let images = self.images_by_name();
+        let mut sources = Vec::new();
+        let mut files = Vec::new();
+        for photo in self.photos.iter().filter(|p| !without.contains(&p.name)) {
+            let view = self.view_of(images[photo.name.as_str()])?;
+            files.push((photo.path.clone(), (view.width, view.height)));
+            sources.push(SourceView {
+                name: photo.name.clone(),
+                view,
+                gain: photo.gain.unwrap_or([1.0; 3]),
+            });
+        }
+        if sources.is_empty() {
+            return Err(SceneError::NothingLeft(self.photos.len()));
+        }
+        let photos = PhotoStore::new(files.len(), move |source_idx| {
+            let (path, size) = &files[source_idx];
+            capture::decode(path, Some(*size)).map_err(|error| error.to_string())
+        });
+        Ok(Lumigraph {
+            sources,
+            photos,
+            proxy,
+        })
+    }
+}

@@ -1,0 +1,82 @@
+//! A photo set made ready for rendering, in memory and as a folder.
+//!
+//! The folder holds `scene.json` (format: [`mod@file`]), a COLMAP text model in `model/`
+//! and, once there is one, the proxy's file. Photos stay where they are and are named by
+//! their path relative to the folder.
+
+mod error;
+pub mod file;
+mod import;
+mod lumigraph;
+mod relative;
+mod split;
+mod store;
+
+pub use error::{SceneError, Warning};
+pub use import::ImportOptions;
+
+use calibrate::Reconstruction;
+use file::{Extra, Settings};
+use proxy::Proxy;
+use std::path::PathBuf;
+
+/// A photo set made ready for rendering.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Photos with a camera and a pose, by name.
+    pub photos: Vec<Photo>,
+    /// Their cameras and poses, and the sparse points.
+    pub reconstruction: Reconstruction,
+    /// The surface that was made for this scene, if any.
+    pub proxy: Option<SceneProxy>,
+    /// How the scene was made.
+    pub settings: Settings,
+    /// The folder it was read from or saved to; `None` for a capture that was imported in
+    /// memory.
+    pub folder: Option<PathBuf>,
+    /// The folder with the photos and their calibration, where known.
+    pub capture: Option<PathBuf>,
+    /// The calibration that was given beside it, if one was.
+    pub calibration: Option<PathBuf>,
+    /// Photos that are calibrated but missing or corrupt.
+    pub left_out: Vec<String>,
+    /// What `scene.json` says beyond this version's keys.
+    pub other: Extra,
+}
+
+/// One calibrated photo and what belongs to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photo {
+    /// As in the reconstruction: the path relative to the photo folder, `/` between parts.
+    pub name: String,
+    /// Where the file is.
+    pub path: PathBuf,
+    /// A mask of what to ignore (people, cars), if any.
+    pub ignore_mask: Option<PathBuf>,
+    /// The silhouette of the object that the photo is about, if any.
+    pub object_matte: Option<PathBuf>,
+    /// Depth along z, if known.
+    pub depth_map: Option<PathBuf>,
+    /// World units a step of the depth map.
+    pub depth_scale: Option<f64>,
+    /// When it was taken, in seconds from any moment common to the scene.
+    pub time_s: Option<f64>,
+    /// Exposure per colour channel, relative to the other photos.
+    pub gain: Option<[f64; 3]>,
+    /// What `scene.json` says beyond this version's keys.
+    pub other: Extra,
+}
+
+/// A scene's own proxy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneProxy {
+    /// The surface.
+    pub proxy: Proxy,
+    /// Its file, relative to the scene's folder.
+    pub file: String,
+    /// For one fitted to the scene's points: the photos that were held out. `None` for one
+    /// given by hand.
+    pub fitted_without: Option<Vec<String>>,
+    /// What `scene.json` says beyond this version's keys.
+    pub other: Extra,
+}

@@ -1,0 +1,71 @@
+//! Held-out photos: `split.json`, `{"test": ["a.jpg", …]}`.
+
+use super::{Scene, SceneError};
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+#[derive(Deserialize)]
+struct Split {
+    test: Vec<String>,
+}
+
+impl Scene {
+    /// The photos that a split file holds out. Those that this scene had to leave out
+    /// anyway are passed over.
+    ///
+    /// # Errors
+    /// The file cannot be read, names no photo, or names one the scene does not have.
+    pub fn held_out(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
+        let bytes = std::fs::read(split).map_err(|source| SceneError::Io {
+            path: split.to_owned(),
+            doing: "read the split",
+            source,
+        })?;
+        let read: Split = serde_json::from_slice(&bytes).map_err(|source| SceneError::Json {
+            path: split.to_owned(),
+            expected: "a split, {\"test\": [\"a.jpg\", …]}",
+            source,
+        })?;
+        if read.test.is_empty() {
+            return Err(SceneError::EmptySplit(split.to_owned()));
+        }
+        let known: BTreeSet<&str> = self.photos.iter().map(|p| p.name.as_str()).collect();
+        let (here, not_here): (BTreeSet<String>, BTreeSet<String>) = read
+            .test
+            .into_iter()
+            .partition(|name| known.contains(name.as_str()));
+        let unknown: Vec<String> = not_here
+            .into_iter()
+            .filter(|name| !self.left_out.contains(name))
+            .collect();
+        if !unknown.is_empty() {
+            return Err(SceneError::UnknownHeldOut {
+                path: split.to_owned(),
+                names: unknown,
+                known: self.names(),
+            });
+        }
+        Ok(here)
+    }
+
+    /// The split file that came with the photos: in the scene's own folder, else in the
+    /// capture's.
+    pub fn own_split(&self) -> Option<PathBuf> {
+        [&self.folder, &self.capture]
+            .into_iter()
+            .flatten()
+            .map(|folder| folder.join("split.json"))
+            .find(|path| path.is_file())
+    }
+
+    /// Every `step`-th photo by name, the first included.
+    pub fn every(&self, step: usize) -> BTreeSet<String> {
+        self.names().into_iter().step_by(step.max(1)).collect()
+    }
+
+    /// The photos' names, sorted.
+    pub fn names(&self) -> Vec<String> {
+        self.photos.iter().map(|p| p.name.clone()).collect()
+    }
+}

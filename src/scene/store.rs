@@ -1,0 +1,290 @@
+//! A scene's folder.
+
+use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
+use super::relative::relative;
+use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
+use calibrate::colmap;
+use proxy::Proxy;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The file that makes a folder a scene.
+const SCENE_FILE: &str = "scene.json";
+const MODEL_FOLDER: &str = "model";
+const PROXY_FILE: &str = "proxy.json";
+
+impl Scene {
+    /// Opens a scene's folder, or imports a capture's in memory with the defaults.
+    ///
+    /// Photos are checked as by [`Scene::import`].
+    ///
+    /// # Errors
+    /// As for [`Scene::import`]; a damaged `scene.json`.
+    pub fn open(folder: &Path, strict: bool) -> Result<(Self, Vec<Warning>), SceneError> {
+        let path = folder.join(SCENE_FILE);
+        if !path.is_file() {
+            let options = ImportOptions {
+                calibration: None,
+                strict,
+            };
+            return Self::import(folder, &options);
+        }
+        let bytes = std::fs::read(&path).map_err(|e| io(&path, "read the scene", e))?;
+        let json = |source| SceneError::Json {
+            path: path.clone(),
+            expected: "a scene",
+            source,
+        };
+        // The version first: of a later one nothing else need be readable.
+        let value: serde_json::Value = serde_json::from_slice(&bytes).map_err(json)?;
+        let version = value.get("version").and_then(serde_json::Value::as_u64);
+        if let Some(version) = version.filter(|&v| v != 1) {
+            return Err(SceneError::Version {
+                path,
+                found: u32::try_from(version).unwrap_or(u32::MAX),
+            });
+        }
+        let file: SceneFile = serde_json::from_slice(&bytes).map_err(json)?;
+        let mut scene = Self::from_file(file, folder, &path)?;
+        let warnings = scene.leave_out_unusable(strict)?;
+        Ok((scene, warnings))
+    }
+
+    fn from_file(file: SceneFile, folder: &Path, path: &Path) -> Result<Self, SceneError> {
+        let inconsistent = |problem: String| SceneError::Inconsistent {
+            path: path.to_owned(),
+            problem,
+        };
+        let reconstruction = colmap::read_model(&folder.join(&file.model))?;
+        let posed: BTreeSet<&str> = reconstruction
+            .images
+            .values()
+            .map(|i| i.name.as_str())
+            .collect();
+        let at = |path: &Option<String>| path.as_ref().map(|p| folder.join(p));
+        let mut photos = Vec::new();
+        for entry in file.photos {
+            if !posed.contains(entry.name.as_str()) {
+                let problem = format!("photo {} is not in the model", entry.name);
+                return Err(inconsistent(problem));
+            }
+            let is_exposure = |g: f64| g > 0.0 && g.is_finite();
+            if !entry.gain.iter().flatten().all(|&g| is_exposure(g)) {
+                let problem = format!("photo {}: a gain must be positive", entry.name);
+                return Err(inconsistent(problem));
+            }
+            photos.push(Photo {
+                path: folder.join(&entry.path),
+                ignore_mask: at(&entry.ignore_mask),
+                object_matte: at(&entry.object_matte),
+                depth_map: at(&entry.depth_map),
+                depth_scale: entry.depth_scale,
+                time_s: entry.time_s,
+                gain: entry.gain,
+                other: entry.other,
+                name: entry.name,
+            });
+        }
+        photos.sort_by(|a, b| a.name.cmp(&b.name));
+        if let Some(pair) = photos.windows(2).find(|pair| pair[0].name == pair[1].name) {
+            return Err(inconsistent(format!(
+                "photo {} is listed twice",
+                pair[0].name
+            )));
+        }
+        if photos.is_empty() {
+            return Err(inconsistent("no photo is listed".to_owned()));
+        }
+        let proxy = match file.proxy {
+            Some(entry) => Some(SceneProxy {
+                proxy: proxy::read(&folder.join(&entry.file))?,
+                file: entry.file,
+                fitted_without: entry.fitted_without,
+                other: entry.other,
+            }),
+            None => None,
+        };
+        // Images without a photo take no part, just as at the import.
+        let listed: BTreeSet<&str> = photos.iter().map(|p| p.name.as_str()).collect();
+        let unlisted: BTreeSet<String> = posed
+            .difference(&listed)
+            .map(|&name| name.to_owned())
+            .collect();
+        let reconstruction = if unlisted.is_empty() {
+            reconstruction
+        } else {
+            reconstruction.without_images(&unlisted)
+        };
+        Ok(Self {
+            photos,
+            reconstruction,
+            proxy,
+            capture: at(&file.settings.capture),
+            calibration: at(&file.settings.calibration),
+            settings: file.settings,
+            folder: Some(folder.to_owned()),
+            left_out: Vec::new(),
+            other: file.other,
+        })
+    }
+
+    /// Writes the scene as a new folder, complete or not at all.
+    ///
+    /// # Errors
+    /// The folder holds something: an earlier scene, unless `replace`; anything that is no
+    /// part of a scene, always. Files that cannot be written.
+    pub fn save(&mut self, folder: &Path, replace: bool) -> Result<(), SceneError> {
+        check_free(folder, replace)?;
+        let parent = match folder.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        std::fs::create_dir_all(parent).map_err(|e| io(parent, "make the folder", e))?;
+
+        // 1. Everything into a folder beside it, which goes away on errors.
+        let made = tempfile::Builder::new()
+            .prefix(".lumigraph-")
+            .tempdir_in(parent)
+            .map_err(|e| io(parent, "make a folder within", e))?;
+        let new = made.path().join("scene");
+        std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
+        colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
+        if let Some(own) = &mut self.proxy {
+            own.file = PROXY_FILE.to_owned();
+            proxy::write(&new.join(PROXY_FILE), &own.proxy, &[])?;
+        }
+        self.write_file(&new.join(SCENE_FILE), folder)?;
+
+        // 2. It takes the destination's place.
+        if folder.exists() {
+            let old = made.path().join("old");
+            std::fs::rename(folder, &old).map_err(|e| io(folder, "replace the folder", e))?;
+        }
+        std::fs::rename(&new, folder).map_err(|e| io(folder, "rename a folder to this", e))?;
+        self.folder = Some(folder.to_owned());
+        Ok(())
+    }
+
+    /// Makes a proxy the scene's own, in its folder.
+    ///
+    /// # Errors
+    /// The scene has no folder; files that cannot be written.
+    pub fn set_proxy(
+        &mut self,
+        proxy: Proxy,
+        fitted_without: Option<&BTreeSet<String>>,
+    ) -> Result<PathBuf, SceneError> {
+        let Some(folder) = self.folder.clone() else {
+            let capture = self.capture.clone().unwrap_or_default();
+            return Err(SceneError::NoFolder(capture.join(SCENE_FILE)));
+        };
+        let path = folder.join(PROXY_FILE);
+        proxy::write(&path, &proxy, &[])?;
+        let own = SceneProxy {
+            proxy,
+            file: PROXY_FILE.to_owned(),
+            fitted_without: fitted_without.map(|names| names.iter().cloned().collect()),
+            other: self.proxy.take().map(|own| own.other).unwrap_or_default(),
+        };
+        // Only this key changes: photos left out today may be back tomorrow.
+        let file = folder.join(SCENE_FILE);
+        let json = |source| SceneError::Json {
+            path: file.clone(),
+            expected: "a scene",
+            source,
+        };
+        let bytes = std::fs::read(&file).map_err(|e| io(&file, "read the scene", e))?;
+        let mut whole: Extra = serde_json::from_slice(&bytes).map_err(json)?;
+        let entry = serde_json::to_value(proxy_entry(&own)).map_err(json)?;
+        whole.insert("proxy".to_owned(), entry);
+        write_json(&file, &whole)?;
+        self.proxy = Some(own);
+        Ok(path)
+    }
+
+    /// Writes `scene.json` to `path`, its paths relative to `folder`.
+    fn write_file(&self, path: &Path, folder: &Path) -> Result<(), SceneError> {
+        let from_here = |path: &Option<PathBuf>| path.as_ref().map(|p| relative(folder, p));
+        let entry = |photo: &Photo| PhotoEntry {
+            name: photo.name.clone(),
+            path: relative(folder, &photo.path),
+            ignore_mask: from_here(&photo.ignore_mask),
+            object_matte: from_here(&photo.object_matte),
+            depth_map: from_here(&photo.depth_map),
+            depth_scale: photo.depth_scale,
+            time_s: photo.time_s,
+            gain: photo.gain,
+            other: photo.other.clone(),
+        };
+        let mut settings = self.settings.clone();
+        settings.capture = from_here(&self.capture);
+        settings.calibration = from_here(&self.calibration);
+        let file = SceneFile {
+            version: 1,
+            photos: self.photos.iter().map(entry).collect(),
+            model: MODEL_FOLDER.to_owned(),
+            proxy: self.proxy.as_ref().map(proxy_entry),
+            settings,
+            other: self.other.clone(),
+        };
+        write_json(path, &file)
+    }
+}
+
+fn proxy_entry(own: &SceneProxy) -> ProxyEntry {
+    ProxyEntry {
+        kind: own.proxy.kind().to_owned(),
+        file: own.file.clone(),
+        fitted_without: own.fitted_without.clone(),
+        other: own.other.clone(),
+    }
+}
+
+/// Complete or not at all.
+fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneError> {
+    let text = serde_json::to_string_pretty(value).map_err(|source| SceneError::Json {
+        path: path.to_owned(),
+        expected: "writable as JSON",
+        source,
+    })?;
+    let temporary = path.with_extension("json.tmp");
+    std::fs::write(&temporary, text + "\n").map_err(|e| io(&temporary, "write", e))?;
+    std::fs::rename(&temporary, path).map_err(|e| io(path, "write", e))
+}
+
+/// Whether a scene may be written to a folder.
+fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let occupied = |problem: String| SceneError::Occupied {
+        path: folder.to_owned(),
+        problem,
+    };
+    let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
+    let mut is_scene = false;
+    for entry in entries {
+        let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        is_scene |= name == SCENE_FILE;
+        if ![SCENE_FILE, MODEL_FOLDER, PROXY_FILE].contains(&name.as_str()) {
+            return Err(occupied(format!(
+                "holds {name}, which is no part of a scene; choose another folder"
+            )));
+        }
+    }
+    if is_scene && !replace {
+        return Err(occupied(
+            "holds a scene already; replace it with --force, or choose another folder".to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {
+    SceneError::Io {
+        path: path.to_owned(),
+        doing,
+        source,
+    }
+}

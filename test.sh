@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change goes in: formatting, lints, documentation and
+# all tests, those on the graphics device included. On Debian and Ubuntu it installs the
+# software Vulkan driver where there is no driver at all.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+step() { printf '\n== %s\n' "$*"; }
+
+has_vulkan_driver() {
+    local folder
+    for folder in /usr/share/vulkan/icd.d /etc/vulkan/icd.d /usr/local/share/vulkan/icd.d; do
+        # Drivers for absent hardware do not count: the software one, or NVIDIA's, which is
+        # only installed where its hardware is.
+        compgen -G "$folder/lvp_icd*.json" >/dev/null && return
+        compgen -G "$folder/nvidia_icd*.json" >/dev/null && return
+    done
+    return 1
+}
+
+has_vulkan_loader() {
+    # Read to the end: under pipefail, stopping early would look like a failure.
+    { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep 'libvulkan\.so\.1' >/dev/null
+}
+
+if [ "$(uname -s)" = Linux ] && ! { has_vulkan_driver && has_vulkan_loader; }; then
+    step "installing the software Vulkan driver"
+    as_root=()
+    if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
+    "${as_root[@]}" apt-get update
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
+fi
+
+step "formatting"
+cargo fmt --all --check
+
+step "lints"
+cargo clippy --workspace --all-targets -- -D warnings
+
+step "documentation"
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+step "tests"
+LUMIGRAPH_REQUIRE_GPU=1 cargo test --workspace
+
+step "all is well"

@@ -1,0 +1,237 @@
+//! Bad data: one clear error, exit code 1, no panic, nothing half-written.
+
+use crate::run::{files, lumigraph, with_wall};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Runs every command on the capture; all must fail alike and leave nothing. Returns the
+/// error.
+#[track_caller]
+fn all_fail(folder: &TempDir) -> String {
+    let before = files(folder.path());
+    let errors: Vec<String> = [
+        "import wall -o out",
+        "info wall --json",
+        "render wall --path orbit --frames 2 -o out",
+        "evaluate wall --json -o out",
+        "field wall --view 0001.png -o out/f.png --weights out/w.npz",
+        "proxy wall plane -o out/p.json",
+    ]
+    .map(|line| {
+        let ran = lumigraph(folder.path(), line);
+        assert_eq!(ran.stdout, "", "{line}");
+        ran.error(1)
+    })
+    .to_vec();
+    assert!(errors.iter().all(|e| *e == errors[0]), "{errors:#?}");
+    assert!(files(folder.path()) == before, "something was left behind");
+    assert!(!folder.path().join("out").exists());
+    errors[0].clone()
+}
+
+fn model_file(folder: &TempDir, stem: &str) -> std::path::PathBuf {
+    folder.path().join(format!("wall/sparse/0/{stem}.bin"))
+}
+
+#[test]
+fn truncated_empty_and_garbled_models() {
+    for stem in ["cameras", "images", "points3D"] {
+        let folder = with_wall();
+        let path = model_file(&folder, stem);
+        let whole = fs::read(&path).unwrap();
+        let named = format!("{stem}.bin");
+
+        for keep in [whole.len() - 1, whole.len() / 2, 9, 1] {
+            fs::write(&path, &whole[..keep]).unwrap();
+            let error = all_fail(&folder);
+            assert!(error.contains(&named), "{error}");
+        }
+        fs::write(&path, b"").unwrap();
+        let error = all_fail(&folder);
+        assert!(error.contains(&named) && error.contains("empty"), "{error}");
+        // A count of records that no memory could hold, and noise.
+        fs::write(&path, [0xff; 64]).unwrap();
+        assert!(all_fail(&folder).contains(&named));
+        let noise: Vec<u8> = (0..whole.len()).map(|i| (i * i * 31 + i) as u8).collect();
+        fs::write(&path, noise).unwrap();
+        assert!(all_fail(&folder).contains(&named));
+    }
+}
+
+#[test]
+fn no_model_and_no_photos() {
+    let folder = with_wall();
+    fs::remove_dir_all(folder.path().join("wall/sparse")).unwrap();
+    let error = all_fail(&folder);
+    assert!(
+        error.contains("wall") && error.contains("no COLMAP model"),
+        "{error}"
+    );
+
+    let folder = with_wall();
+    fs::remove_dir_all(folder.path().join("wall/images")).unwrap();
+    let error = all_fail(&folder);
+    assert!(error.contains("no photos"), "{error}");
+
+    let folder = with_wall();
+    fs::remove_dir_all(folder.path().join("wall")).unwrap();
+    assert_eq!(
+        all_fail(&folder),
+        "wall: there is no such folder; check the path"
+    );
+}
+
+#[test]
+fn a_photo_of_the_wrong_size() {
+    let folder = with_wall();
+    let path = folder.path().join("wall/images/0003.png");
+    image::RgbImage::new(95, 72).save(&path).unwrap();
+    let error = all_fail(&folder);
+    assert!(error.contains("0003.png"), "{error}");
+    assert!(
+        error.contains("95 × 72") && error.contains("96 × 72"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_missing_or_headless_photo_is_left_out_unless_strict() {
+    type Spoil = fn(&Path);
+    let spoils: [Spoil; 3] = [
+        |path| fs::remove_file(path).unwrap(),
+        |path| fs::write(path, b"").unwrap(),
+        |path| fs::write(path, b"not a picture at all, whatever its name").unwrap(),
+    ];
+    for spoil in spoils {
+        let folder = with_wall();
+        spoil(&folder.path().join("wall/images/0003.png"));
+        let ran = lumigraph(folder.path(), "info wall --json").ok();
+        assert!(
+            ran.stderr.contains("warning: photo 0003.png is left out"),
+            "{}",
+            ran.stderr
+        );
+        assert_eq!(ran.json()["photos"], 8);
+        assert_eq!(ran.json()["left_out"][0], "0003.png");
+
+        let error = lumigraph(folder.path(), "info wall --strict").error(1);
+        assert!(error.starts_with("photo 0003.png: "), "{error}");
+        assert!(error.contains("--strict"), "{error}");
+    }
+}
+
+#[test]
+fn too_few_photos_left() {
+    let folder = with_wall();
+    for i in 1..9 {
+        fs::remove_file(folder.path().join(format!("wall/images/000{i}.png"))).unwrap();
+    }
+    let error = all_fail(&folder);
+    assert!(
+        error.starts_with("8 of 9 calibrated photos cannot be used"),
+        "{error}"
+    );
+    assert!(error.contains("0001.png"), "{error}");
+}
+
+#[test]
+fn a_photo_with_a_good_header_and_a_corrupt_body() {
+    let folder = with_wall();
+    let path = folder.path().join("wall/images/0004.png");
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+
+    // Found out only when drawn: reported, left out, and the frame drawn again.
+    let ran = lumigraph(folder.path(), "render wall --views wall --json -o left").ok();
+    assert_eq!(
+        ran.stderr
+            .matches("warning: photo 0004.png is left out")
+            .count(),
+        1,
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(ran.json()["report"]["photos_total"], 8);
+    let left = files(&folder.path().join("left"));
+    assert_eq!(left.len(), 9);
+
+    // Decoding everything at once finds it too, and the frames are the same.
+    let line = "render wall --views wall --no-skip -o all";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(
+        ran.stderr.contains("0004.png is left out"),
+        "{}",
+        ran.stderr
+    );
+    assert!(left == files(&folder.path().join("all")));
+
+    let line = "render wall --views wall --strict -o strict";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert!(error.contains("0004.png"), "{error}");
+}
+
+#[test]
+fn a_corrupt_held_out_photo_cannot_be_scored() {
+    let folder = with_wall();
+    let path = folder.path().join("wall/images/0008.png");
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let ran = lumigraph(folder.path(), "evaluate wall --json").ok();
+    assert_eq!(ran.json()["photos"].as_array().unwrap().len(), 1);
+    assert!(
+        ran.stderr.contains("0008.png is left out"),
+        "{}",
+        ran.stderr
+    );
+    let error = lumigraph(folder.path(), "evaluate wall --strict").error(1);
+    assert!(error.contains("0008.png"), "{error}");
+}
+
+#[test]
+fn splits_must_name_photos() {
+    let folder = with_wall();
+    let split = folder.path().join("s.json");
+    let error = |text: &str| {
+        fs::write(&split, text).unwrap();
+        lumigraph(folder.path(), "evaluate wall --hold-out s.json").error(1)
+    };
+    assert_eq!(
+        error(r#"{"test": ["0001.png", "0010.png", "x.jpg"]}"#),
+        "s.json: the scene has no 0010.png, x.jpg; it has 0000.png, 0001.png and 7 more"
+    );
+    assert_eq!(
+        error(r#"{"test": []}"#),
+        "s.json: \"test\" names no photo; name some to hold out"
+    );
+    assert!(error("{").starts_with("s.json: not a split"));
+    let all: Vec<String> = (0..9).map(|i| format!("\"000{i}.png\"")).collect();
+    let none = error(&format!("{{\"test\": [{}]}}", all.join(",")));
+    assert_eq!(
+        none,
+        "no photo is left to render from: all 9 are held out or corrupt"
+    );
+    let missing = lumigraph(folder.path(), "evaluate wall --hold-out none.json").error(1);
+    assert!(
+        missing.starts_with("none.json: cannot read the split"),
+        "{missing}"
+    );
+}
+
+#[test]
+fn a_scene_without_points_says_how_to_go_on() {
+    let folder = with_wall();
+    let wall = folder.path().join("wall");
+    let mut model = calibrate::colmap::read_model(&wall.join("sparse/0")).unwrap();
+    model.points.clear();
+    for image in model.images.values_mut() {
+        image.keypoints.clear();
+    }
+    fs::remove_dir_all(wall.join("sparse")).unwrap();
+    calibrate::colmap::write_text(&model, &wall.join("sparse/0")).unwrap();
+    let error = lumigraph(folder.path(), "evaluate wall").error(1);
+    assert!(error.contains("proxy SCENE plane --point"), "{error}");
+    let by_hand = "proxy wall plane --point 0,0,2 --normal 0,0,1 -o p.json";
+    lumigraph(folder.path(), by_hand).ok();
+    lumigraph(folder.path(), "evaluate wall --proxy p.json").ok();
+}

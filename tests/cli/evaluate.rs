@@ -1,0 +1,149 @@
+//! Held-out scores.
+
+use crate::run::{files, lumigraph, with_wall};
+use serde_json::Value;
+use std::fs;
+
+fn names(result: &Value) -> Vec<&str> {
+    let photos = result["photos"].as_array().unwrap();
+    photos.iter().map(|p| p["name"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn the_json_is_as_documented() {
+    let folder = with_wall();
+    let ran = lumigraph(folder.path(), "evaluate wall --json -o frames").ok();
+    let result = ran.json();
+    assert_eq!(names(&result), ["0000.png", "0008.png"]);
+    let keys = |value: &Value| {
+        value
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect::<Vec<_>>()
+    };
+    let scores = ["psnr", "ssim", "psnr_covered", "coverage", "cpu_ms"];
+    for photo in result["photos"].as_array().unwrap() {
+        assert_eq!(keys(photo)[1..], scores);
+        assert!(scores.iter().all(|&score| photo[score].is_f64()), "{photo}");
+        // The wall is a plane, so the other photos must give it back.
+        assert!(photo["psnr_covered"].as_f64().unwrap() > 30.0, "{photo}");
+    }
+    for score in scores {
+        let photos = result["photos"].as_array().unwrap();
+        let sum: f64 = photos.iter().map(|p| p[score].as_f64().unwrap()).sum();
+        assert!((result["mean"][score].as_f64().unwrap() - sum / 2.0).abs() < 1e-9);
+    }
+    assert_eq!(result["proxy"]["kind"], "plane");
+    let frames = files(&folder.path().join("frames"));
+    assert_eq!(frames.len(), 2);
+}
+
+#[test]
+fn which_photos_are_held_out() {
+    let folder = with_wall();
+    let evaluated = |line: &str| {
+        let result = lumigraph(folder.path(), &format!("evaluate {line} --json"))
+            .ok()
+            .json();
+        names(&result).join(" ")
+    };
+    assert_eq!(evaluated("wall --every 3"), "0000.png 0003.png 0006.png");
+    fs::write(
+        folder.path().join("s.json"),
+        r#"{"test": ["0005.png"], "train": []}"#,
+    )
+    .unwrap();
+    assert_eq!(evaluated("wall --hold-out s.json"), "0005.png");
+    // The capture's own split serves a scene made of it too.
+    fs::copy(
+        folder.path().join("s.json"),
+        folder.path().join("wall/split.json"),
+    )
+    .unwrap();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    assert_eq!(evaluated("wall"), "0005.png");
+    assert_eq!(evaluated("scene"), "0005.png");
+    fs::remove_file(folder.path().join("wall/split.json")).unwrap();
+    assert_eq!(evaluated("wall"), "0000.png 0008.png");
+}
+
+#[test]
+fn held_out_photos_are_nowhere_used() {
+    let folder = with_wall();
+    let evaluate = |out: &str| {
+        let line = format!("evaluate wall --hold-out wall/split.json --json -o {out}");
+        lumigraph(folder.path(), &line).ok().json()
+    };
+    let honest = evaluate("a");
+    // With the held-out photos blackened the renderings and the proxy stay the same.
+    for name in ["0000.png", "0008.png"] {
+        let path = folder.path().join("wall/images").join(name);
+        image::RgbImage::new(96, 72).save(path).unwrap();
+    }
+    let blackened = evaluate("b");
+    assert!(files(&folder.path().join("a")) == files(&folder.path().join("b")));
+    assert_eq!(honest["proxy"], blackened["proxy"]);
+    assert_ne!(honest["mean"]["psnr"], blackened["mean"]["psnr"]);
+}
+
+#[test]
+fn a_proxy_that_saw_held_out_photos_is_fitted_again() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let alone = lumigraph(folder.path(), "evaluate scene --json")
+        .ok()
+        .json();
+    lumigraph(folder.path(), "proxy scene plane").ok();
+    let ran = lumigraph(folder.path(), "evaluate scene --json").ok();
+    assert!(
+        ran.stderr.contains("fitted with held-out 0000.png"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(ran.json()["proxy"], alone["proxy"]);
+
+    let line = "proxy scene plane --hold-out wall/split.json";
+    lumigraph(folder.path(), line).ok();
+    let ran = lumigraph(folder.path(), "evaluate scene --json").ok();
+    assert_eq!(ran.json()["proxy"]["from"], "the scene's own");
+    assert_eq!(ran.json()["proxy"]["point"], alone["proxy"]["point"]);
+}
+
+#[test]
+fn smaller_pictures_score_against_reduced_photos() {
+    let folder = with_wall();
+    let line = "evaluate wall --size 48x36 --json -o small";
+    let result = lumigraph(folder.path(), line).ok().json();
+    assert!(
+        result["mean"]["psnr_covered"].as_f64().unwrap() > 30.0,
+        "{result}"
+    );
+    let frame = image::open(folder.path().join("small/0008.png")).unwrap();
+    assert_eq!((frame.width(), frame.height()), (48, 36));
+}
+
+#[test]
+fn every_renderer_and_blend_scores_about_alike() {
+    let folder = with_wall();
+    let psnr = |options: &str| {
+        let line = format!("evaluate wall --json {options}");
+        let result = lumigraph(folder.path(), &line).ok().json();
+        result["mean"]["psnr_covered"].as_f64().unwrap()
+    };
+    let usual = psnr("--device cpu");
+    for options in [
+        "--renderer exact --device cpu",
+        "--renderer exact --device reference",
+        "--renderer triangulated --device reference",
+        "--grid 8 --device cpu",
+        "--blend paper --k 3 --beta 0 --resolution length --device cpu",
+    ] {
+        let other = psnr(options);
+        assert!(
+            (other - usual).abs() < 1.5,
+            "{options}: {other} and {usual} dB"
+        );
+    }
+}

@@ -1,0 +1,11 @@
+//! The built program, end to end, on small synthetic captures.
+
+mod bad_input;
+mod captures;
+mod evaluate;
+mod field;
+mod help;
+mod render;
+mod repeat;
+mod run;
+mod scene;

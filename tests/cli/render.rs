@@ -1,0 +1,161 @@
+//! Frames and where they come from.
+
+use crate::run::{files, lumigraph, with_wall};
+use calibrate::{Rigid3, colmap};
+use render::path::{CameraPath, PathFrame};
+use std::fs;
+
+#[test]
+fn a_source_view_gives_its_photo_back() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "render wall --views wall/sparse/0 -o frames").ok();
+    let open = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgba8();
+    for i in 0..9 {
+        let photo = open(&format!("wall/images/000{i}.png"));
+        let frame = open(&format!("frames/000{i}.png"));
+        let score = render::score::score(&frame, &photo).unwrap();
+        assert!(score.psnr_covered.unwrap() >= 50.0, "{i}: {score:?}");
+    }
+}
+
+#[test]
+fn held_out_photos_do_not_paint() {
+    let folder = with_wall();
+    let render = |options: &str, out: &str| {
+        let line = format!("render wall --views wall --json -o {out}{options}");
+        lumigraph(folder.path(), &line).ok().json()
+    };
+    assert_eq!(render("", "all")["report"]["photos_total"], 9);
+    let rest = render(" --hold-out wall/split.json", "rest");
+    assert_eq!(rest["report"]["photos_total"], 7);
+    let frame = |folder: &std::path::Path| fs::read(folder.join("0008.png")).unwrap();
+    assert_ne!(
+        frame(&folder.path().join("all")),
+        frame(&folder.path().join("rest"))
+    );
+}
+
+#[test]
+fn path_files_render_what_they_say() {
+    let folder = with_wall();
+    let model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
+    let frames: Vec<PathFrame> = model
+        .images
+        .values()
+        .map(|image| {
+            let camera = model.cameras[&image.camera_id].clone();
+            let name = format!("sub/{}", image.name);
+            PathFrame::new(name, camera, image.camera_from_world, None).unwrap()
+        })
+        .collect();
+    let path = CameraPath::new(30.0, frames).unwrap();
+    render::path::write(&folder.path().join("path.json"), &path).unwrap();
+
+    lumigraph(folder.path(), "render wall --views wall -o model").ok();
+    lumigraph(folder.path(), "render wall --views path.json -o views").ok();
+    lumigraph(folder.path(), "render wall --path path.json -o path").ok();
+    let [of_model, of_views, of_path] =
+        ["model", "views/sub", "path/sub"].map(|out| files(&folder.path().join(out)));
+    assert_eq!(of_model.len(), 9);
+    assert!(of_views == of_path);
+    // A path's rotations are matrices: the last digit of a pose may differ, no more.
+    for (name, bytes) in &of_model {
+        let open = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().into_rgba8();
+        let (a, b) = (open(bytes), open(&of_path[name]));
+        let off = a.iter().zip(b.iter()).filter(|(a, b)| a.abs_diff(**b) > 2);
+        assert!(off.count() * 1000 < a.len(), "{}", name.display());
+    }
+
+    fs::write(folder.path().join("bad.json"), "{}").unwrap();
+    let error = lumigraph(folder.path(), "render wall --path bad.json -o bad").error(1);
+    assert!(error.starts_with("bad.json: "), "{error}");
+    assert!(!folder.path().join("bad").exists());
+}
+
+#[test]
+fn derived_paths_stay_within_cover() {
+    let folder = with_wall();
+    for kind in ["orbit", "dolly", "sweep"] {
+        let line = format!("render wall --path {kind} --frames 4 --size 64x48 --json -o {kind}");
+        let result = lumigraph(folder.path(), &line).ok().json();
+        assert_eq!(result["frames"].as_array().unwrap().len(), 4);
+        let frames = files(&folder.path().join(kind));
+        assert_eq!(frames.len(), 4);
+        for bytes in frames.values() {
+            let frame = image::load_from_memory(bytes).unwrap().into_rgba8();
+            assert_eq!(frame.dimensions(), (64, 48));
+            let covered = frame.pixels().filter(|p| p.0[3] > 127).count();
+            assert!(covered * 10 > 64 * 48 * 8, "{kind}: {covered}");
+        }
+    }
+}
+
+#[test]
+fn names_that_clash_are_refused_before_rendering() {
+    let folder = with_wall();
+    let mut model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
+    for (image, name) in model.images.values_mut().zip(["a/x.png", "a/x.jpg"]) {
+        image.name = name.to_owned();
+    }
+    colmap::write_text(&model, &folder.path().join("views")).unwrap();
+    let error = lumigraph(folder.path(), "render wall --views views -o out").error(1);
+    assert!(
+        error.contains("a/x.jpg") && error.contains("a/x.png") && error.contains("rename"),
+        "{error}"
+    );
+    assert!(!folder.path().join("out").exists());
+
+    model.images.values_mut().next().unwrap().name = "../../x.png".to_owned();
+    colmap::write_text(&model, &folder.path().join("views")).unwrap();
+    let error = lumigraph(folder.path(), "render wall --views views -o out").error(1);
+    assert!(error.contains("leads out of the output folder"), "{error}");
+}
+
+#[test]
+fn only_photos_in_use_are_decoded() {
+    let folder = with_wall();
+    let mut model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
+    // From a source photo's place through a longer lens: that photo alone paints it all.
+    let first = *model.images.keys().next().unwrap();
+    model.images.retain(|id, _| *id == first);
+    model.images.get_mut(&first).unwrap().keypoints.clear();
+    model.points.clear();
+    for camera in model.cameras.values_mut() {
+        camera.params[..2].fill(480.0);
+    }
+    colmap::write_text(&model, &folder.path().join("one")).unwrap();
+    let render = |options: &str| {
+        let line = format!("render wall --views one --json -o out{options}");
+        lumigraph(folder.path(), &line).ok().json()["report"].clone()
+    };
+    let lazy = render("");
+    let eager = render("-all --no-skip");
+    assert_eq!(eager["photos_decoded"], 9);
+    assert_eq!(lazy["photos_decoded"], 1);
+    assert!(files(&folder.path().join("out")) == files(&folder.path().join("out-all")));
+    if cfg!(target_os = "linux") {
+        assert!(lazy["peak_memory_bytes"].as_u64() > Some(1 << 20), "{lazy}");
+    }
+}
+
+#[test]
+fn a_view_that_sees_nothing_is_transparent() {
+    let folder = with_wall();
+    let model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
+    let image = model.images.values().next().unwrap();
+    let camera = model.cameras[&image.camera_id].clone();
+    // Turned around.
+    let about = Rigid3::new(
+        glam::DQuat::from_rotation_y(std::f64::consts::PI),
+        glam::DVec3::ZERO,
+    );
+    let pose = about * image.camera_from_world;
+    let frame = PathFrame::new("back".to_owned(), camera, pose, None).unwrap();
+    let path = CameraPath::new(30.0, vec![frame]).unwrap();
+    render::path::write(&folder.path().join("path.json"), &path).unwrap();
+    lumigraph(folder.path(), "render wall --path path.json -o out").ok();
+    let frame = image::open(folder.path().join("out/back.png"))
+        .unwrap()
+        .into_rgba8();
+    assert!(frame.pixels().all(|p| p.0 == [0; 4]));
+}

@@ -1,0 +1,100 @@
+//! Running the program, and captures to run it on.
+
+use datasets::Options;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// What a run left.
+pub(crate) struct Ran {
+    pub(crate) code: i32,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl Ran {
+    /// The result of a run that must have worked.
+    #[track_caller]
+    pub(crate) fn ok(self) -> Self {
+        assert_eq!(self.code, 0, "{}", self.stderr);
+        self
+    }
+
+    /// The one `error: …` line of a run that must have failed with an exit code.
+    #[track_caller]
+    pub(crate) fn error(&self, code: i32) -> String {
+        assert_eq!(self.code, code, "{}", self.stderr);
+        assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
+        let errors: Vec<&str> = self
+            .stderr
+            .lines()
+            .filter_map(|line| line.strip_prefix("error: "))
+            // Some graphics libraries have their say first.
+            .filter(|line| !line.starts_with("XDG_RUNTIME_DIR"))
+            .collect();
+        assert_eq!(errors.len(), 1, "{}", self.stderr);
+        errors[0].to_owned()
+    }
+
+    #[track_caller]
+    pub(crate) fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.stdout).expect("stdout holds JSON and nothing else")
+    }
+}
+
+/// Runs `lumigraph` in a folder, on the CPU path whatever the machine has, with words
+/// separated by spaces.
+pub(crate) fn lumigraph(folder: &Path, line: &str) -> Ran {
+    run(folder, &line.split(' ').collect::<Vec<_>>(), &[])
+}
+
+pub(crate) fn run(folder: &Path, words: &[&str], variables: &[(&str, &str)]) -> Ran {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lumigraph"));
+    command.current_dir(folder).args(words);
+    if matches!(words[0], "render" | "evaluate") && !words.contains(&"--device") {
+        command.args(["--device", "cpu"]);
+    }
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = command.envs(variables.iter().copied()).output().unwrap();
+    Ran {
+        code: status.code().expect("the program was not killed"),
+        stdout: String::from_utf8(stdout).unwrap(),
+        stderr: String::from_utf8(stderr).unwrap(),
+    }
+}
+
+/// A folder with `wall`, a capture of nine 96 × 72 photos of which 0000.png and 0008.png
+/// are to be held out.
+pub(crate) fn with_wall() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options {
+        size: Some((96, 72)),
+        samples_per_side: Some(1),
+        ..Options::default()
+    };
+    let wall = datasets::by_name("wall", &options).unwrap();
+    datasets::write(&wall, &folder.path().join("wall")).unwrap();
+    folder
+}
+
+/// Every file below a folder with its bytes.
+pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(next) = open.pop() {
+        for entry in std::fs::read_dir(&next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_owned();
+                found.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}

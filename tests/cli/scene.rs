@@ -1,0 +1,185 @@
+//! The scene's folder.
+
+use crate::run::{files, lumigraph, with_wall};
+use serde_json::{Value, json};
+use std::fs;
+
+fn read(path: &std::path::Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_scene_renders_like_its_capture_and_copies_no_photo() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o deep/scene").ok();
+    let scene = folder.path().join("deep/scene");
+    let names: Vec<String> = files(&scene)
+        .into_keys()
+        .map(|p| p.display().to_string())
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "model/cameras.txt",
+            "model/images.txt",
+            "model/points3D.txt",
+            "scene.json"
+        ]
+    );
+    let file = read(&scene.join("scene.json"));
+    assert_eq!(file["version"], 1);
+    assert_eq!(file["photos"][0]["path"], "../../wall/images/0000.png");
+    assert_eq!(file["settings"]["capture"], "../../wall");
+
+    let line = |scene: &str, out: &str| format!("render {scene} --path sweep --frames 3 -o {out}");
+    lumigraph(folder.path(), &line("wall", "a")).ok();
+    lumigraph(folder.path(), &line("deep/scene", "b")).ok();
+    let frames = files(&folder.path().join("a"));
+    assert_eq!(frames.len(), 3);
+    assert!(frames == files(&folder.path().join("b")));
+}
+
+#[test]
+fn photos_and_calibration_may_lie_apart() {
+    let folder = with_wall();
+    fs::rename(
+        folder.path().join("wall/sparse"),
+        folder.path().join("model"),
+    )
+    .unwrap();
+    let line = "import wall/images --calibration model/0 -o scene";
+    lumigraph(folder.path(), line).ok();
+    let info = lumigraph(folder.path(), "info scene --json").ok().json();
+    assert_eq!(info["photos"], 9);
+}
+
+#[test]
+fn unknown_keys_survive() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let path = folder.path().join("scene/scene.json");
+    let mut file = read(&path);
+    file["later"] = json!({"deep": [1, 0.1]});
+    file["photos"][2]["mood"] = json!("gloomy");
+    file["photos"][2]["gain"] = json!([1.0, 0.1, 1.0 / 3.0]);
+    file["settings"]["masks"] = json!("m");
+    fs::write(&path, file.to_string()).unwrap();
+
+    lumigraph(folder.path(), "proxy scene plane").ok();
+    let mut after = read(&path);
+    assert_eq!(after["proxy"]["kind"], "plane");
+    assert_eq!(after["proxy"]["fitted_without"], json!([]));
+    after.as_object_mut().unwrap().remove("proxy");
+    assert_eq!(after, file);
+}
+
+#[test]
+fn an_earlier_scene_is_replaced_only_by_force_and_other_folders_never() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let error = lumigraph(folder.path(), "import wall -o scene").error(1);
+    assert!(error.contains("--force"), "{error}");
+    lumigraph(folder.path(), "import wall -o scene --force").ok();
+
+    let before = files(folder.path());
+    let error = lumigraph(folder.path(), "import wall -o wall --force").error(1);
+    assert!(error.contains("no part of a scene"), "{error}");
+    assert!(files(folder.path()) == before);
+}
+
+#[test]
+fn a_scene_whose_photos_went_or_that_lies_says_so() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let path = folder.path().join("scene/scene.json");
+    let whole = read(&path);
+    let error = |file: &Value| {
+        fs::write(&path, file.to_string()).unwrap();
+        lumigraph(folder.path(), "info scene").error(1)
+    };
+    let mut file = whole.clone();
+    file["version"] = json!(2);
+    assert_eq!(
+        error(&file),
+        "scene/scene.json: scene version 2; this program reads version 1"
+    );
+    let mut file = whole.clone();
+    file["photos"][0]["name"] = json!("x.png");
+    assert!(error(&file).contains("photo x.png is not in the model"));
+    let mut file = whole.clone();
+    file["photos"][0] = file["photos"][1].clone();
+    assert!(error(&file).contains("photo 0001.png is listed twice"));
+    let mut file = whole.clone();
+    file.as_object_mut().unwrap().remove("photos");
+    assert!(error(&file).contains("missing field `photos`"));
+
+    fs::write(&path, whole.to_string()).unwrap();
+    fs::remove_file(folder.path().join("wall/images/0002.png")).unwrap();
+    let ran = lumigraph(folder.path(), "info scene --json").ok();
+    assert!(
+        ran.stderr.contains("0002.png is left out"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(ran.json()["photos"], 8);
+    // Setting a proxy meanwhile forgets no photo.
+    lumigraph(folder.path(), "proxy scene plane").ok();
+    assert_eq!(read(&path)["photos"], whole["photos"]);
+}
+
+#[test]
+fn photos_without_calibration_are_counted() {
+    let folder = with_wall();
+    for name in ["extra.png", "sub/more.png"] {
+        let path = folder.path().join("wall/images").join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        image::RgbImage::new(4, 4).save(path).unwrap();
+    }
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    assert!(
+        ran.stderr.contains(
+            "note: 2 of 11 photos are not in the calibration and stay unused (extra.png, for one)"
+        ),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn info_measures() {
+    let folder = with_wall();
+    let info = lumigraph(folder.path(), "info wall --json").ok().json();
+    assert_eq!(info["cameras"][0]["model"], "PINHOLE");
+    assert_eq!(info["cameras"][0]["width"], 96);
+    assert_eq!(info["cameras"][0]["photos"], 9);
+    let error = &info["cameras"][0]["reprojection_px"];
+    assert!(error["mean"].as_f64().unwrap() < 1e-9, "{error}");
+    assert!(error["median"].as_f64().unwrap() < 1e-9);
+    assert!(error["observations"].as_u64().unwrap() > 1000);
+    assert!(info["spacing"].as_f64().unwrap() > 0.0);
+    assert_eq!(info["isolated"], 0);
+    assert_eq!(info["memory_bytes"], 9 * 96 * 72 * 16 / 3);
+    assert!(info["proxy"].is_null());
+    let text = lumigraph(folder.path(), "info wall").ok().stdout;
+    assert!(
+        text.starts_with("photos   9\ncamera   1: PINHOLE 96×72 ["),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_plane_by_hand_reads_back_to_the_last_digit() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let by_hand = "plane --point -0.1,2e-3,3 --normal -1,0.1,-2";
+    lumigraph(folder.path(), &format!("proxy scene {by_hand}")).ok();
+    lumigraph(folder.path(), &format!("proxy wall {by_hand} -o p.glb")).ok();
+    let own = lumigraph(folder.path(), "info scene --json").ok().json()["proxy"].clone();
+    assert_eq!(own["point"], json!([-0.1, 2e-3, 3.0]));
+    assert!(own["fitted_without"].is_null());
+    let used = lumigraph(folder.path(), "evaluate wall --proxy p.glb --json")
+        .ok()
+        .json();
+    assert_eq!(used["proxy"]["point"], own["point"]);
+    assert_eq!(used["proxy"]["normal"], own["normal"]);
+}
