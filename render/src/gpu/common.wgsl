@@ -171,11 +171,13 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
     return max(f * f * (3.0 - 2.0 * f), 1e-12);
 }
 
-// The mip level of the projected footprint.
+// The mip level of the projected footprint; see LEVEL_BIAS of frame.rs.
+const LEVEL_BIAS = 0.25;
+
 fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
     let ratio = here / sight.depth;
-    return 0.5 * log2(max(ratio * ratio * ratio, 1.0));
+    return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
 // angDiff + beta * resDiff.
