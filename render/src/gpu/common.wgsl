@@ -57,10 +57,10 @@ const GAIN = 9u;
 // pipeline is made, so that no pixel pays for lenses that are not there.
 override COMMON_LENS: f32 = -1.0;
 
-const LENS_PINHOLE = 0.0;
-const LENS_RATIONAL = 1.0;
-const LENS_FISHEYE = 2.0;
-const LENS_POLYNOMIAL = 3.0;
+const LENS_PINHOLE: f32 = 0.0;
+const LENS_RATIONAL: f32 = 1.0;
+const LENS_FISHEYE: f32 = 2.0;
+const LENS_POLYNOMIAL: f32 = 3.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
