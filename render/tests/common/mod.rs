@@ -175,30 +175,34 @@ pub(crate) fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
     psnr_where(a, b, |_, _| true)
 }
 
+/// Colour on black, and coverage.
+fn as_seen([r, g, b, alpha]: [u8; 4]) -> [f64; 4] {
+    let share = f64::from(alpha) / 255.0;
+    let on_black = |v: u8| f64::from(v) * share;
+    [on_black(r), on_black(g), on_black(b), f64::from(alpha)]
+}
+
 fn psnr_where(a: &RgbaImage, b: &RgbaImage, counts: impl Fn([u8; 4], [u8; 4]) -> bool) -> f64 {
     assert_eq!(a.dimensions(), b.dimensions());
-    let on_black = |[r, g, b, alpha]: [u8; 4]| {
-        let share = f64::from(alpha) / 255.0;
-        [r, g, b].map(|v| f64::from(v) * share)
-    };
     let (mut sum, mut count) = (0.0, 0);
     for (p, q) in a.pixels().zip(b.pixels()).filter(|(p, q)| counts(p.0, q.0)) {
-        let (p_rgb, q_rgb) = (on_black(p.0), on_black(q.0));
-        sum += (0..3).map(|c| (p_rgb[c] - q_rgb[c]).powi(2)).sum::<f64>();
-        sum += f64::from(p.0[3].abs_diff(q.0[3])).powi(2);
+        let (p, q) = (as_seen(p.0), as_seen(q.0));
+        sum += (0..4).map(|c| (p[c] - q[c]).powi(2)).sum::<f64>();
         count += 4;
     }
     assert!(count > 0, "nothing to compare");
     10.0 * (255.0_f64.powi(2) * f64::from(count) / sum).log10()
 }
 
-/// The pixels that differ by more than 2/255 in any channel.
+/// The pixels that differ by more than 2/255 in coverage or in a colour as it is seen:
+/// where coverage is small, so is the matter of its colour, and texture units filter
+/// premultiplied bytes.
 pub(crate) fn differing(a: &RgbaImage, b: &RgbaImage) -> Vec<(u32, u32)> {
     assert_eq!(a.dimensions(), b.dimensions());
     a.enumerate_pixels()
         .filter(|(x, y, p)| {
-            let q = b.get_pixel(*x, *y);
-            (0..4).any(|c| p.0[c].abs_diff(q.0[c]) > 2)
+            let (p, q) = (as_seen(p.0), as_seen(b.get_pixel(*x, *y).0));
+            (0..4).any(|c| (p[c] - q[c]).abs() > 2.0)
         })
         .map(|(x, y, _)| (x, y))
         .collect()
