@@ -57,11 +57,11 @@ const GAIN = 9u;
 // pipeline is made, so that no pixel pays for lenses that are not there.
 override COMMON_LENS: f32 = -1.0;
 
-const LENS_PINHOLE = 0.0;
-const LENS_RATIONAL = 1.0;
-const LENS_FISHEYE = 2.0;
+const LENS_PINHOLE: f32 = 0.0;
+const LENS_RATIONAL: f32 = 1.0;
+const LENS_FISHEYE: f32 = 2.0;
 // Rational with k3 to k6 zero.
-const LENS_BROWN = 3.0;
+const LENS_BROWN: f32 = 3.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
@@ -172,7 +172,7 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
 }
 
 // The mip level of the projected footprint; see LEVEL_BIAS of frame.rs.
-const LEVEL_BIAS = 0.25;
+const LEVEL_BIAS: f32 = 0.25;
 
 fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);

@@ -72,10 +72,10 @@ pub(crate) const SOURCE_ROW: u32 = 128 * (size_of::<Source>() / 16) as u32;
 /// See [`SOURCE_ROW`].
 pub(crate) const ENTRY_ROW: u32 = 1024;
 
-const LENS_PINHOLE: f32 = 0.0;
-const LENS_RATIONAL: f32 = 1.0;
-const LENS_FISHEYE: f32 = 2.0;
-const LENS_BROWN: f32 = 3.0;
+pub(super) const LENS_PINHOLE: f32 = 0.0;
+pub(super) const LENS_RATIONAL: f32 = 1.0;
+pub(super) const LENS_FISHEYE: f32 = 2.0;
+pub(super) const LENS_BROWN: f32 = 3.0;
 
 impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {

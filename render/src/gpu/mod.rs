@@ -3,6 +3,8 @@
 mod layout;
 mod photos;
 mod pipelines;
+#[cfg(test)]
+mod shader_tests;
 mod target;
 
 use crate::RenderError;

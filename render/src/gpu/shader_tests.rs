@@ -1,0 +1,208 @@
+//! The shaders, and the Rust side of every struct and number that they share.
+
+use super::layout::{self, Corner, ENTRY_ROW, Entry, Params, SOURCE_ROW, Source};
+use super::pipelines::SHADERS;
+use crate::blend::SAME_RAY;
+use crate::field::MAX_LISTED;
+use crate::options::MAX_CONTRIBUTORS;
+use naga::proc::Layouter;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{Expression, Literal, Module, TypeInner};
+use std::collections::BTreeMap;
+use std::mem::offset_of;
+
+fn parse((name, parts): (&str, &[&str])) -> Module {
+    let source = parts.concat();
+    naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)))
+}
+
+fn shader(name: &str) -> Module {
+    let found = SHADERS.into_iter().find(|shader| shader.0 == name);
+    parse(found.expect("SHADERS has it"))
+}
+
+/// A module's `const`s that are numbers.
+fn constants(module: &Module) -> BTreeMap<String, f64> {
+    let value = |constant: &naga::Constant| match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::U32(v)) => Some(f64::from(v)),
+        Expression::Literal(Literal::F32(v)) => Some(f64::from(v)),
+        _ => None,
+    };
+    let named = module.constants.iter();
+    named
+        .filter_map(|(_, constant)| Some((constant.name.clone()?, value(constant)?)))
+        .collect()
+}
+
+/// A struct's members with their offsets, and its size.
+fn members(module: &Module, name: &str) -> (Vec<(String, usize)>, usize) {
+    let is_it = |ty: &naga::Type| ty.name.as_deref() == Some(name);
+    let (handle, ty) = module.types.iter().find(|(_, ty)| is_it(ty)).unwrap();
+    let TypeInner::Struct { members, .. } = &ty.inner else {
+        panic!("{name} is no struct");
+    };
+    let mut layouter = Layouter::default();
+    layouter.update(module.to_ctx()).unwrap();
+    let named = members.iter();
+    (
+        named
+            .map(|m| (m.name.clone().unwrap(), m.offset as usize))
+            .collect(),
+        layouter[handle].size as usize,
+    )
+}
+
+#[test]
+fn every_shader_is_valid() {
+    for shader in SHADERS {
+        let module = parse(shader);
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        if let Err(error) = validator.validate(&module) {
+            panic!("{}: {}", shader.0, error.emit_to_string(&shader.1.concat()));
+        }
+    }
+}
+
+#[test]
+fn every_entry_point_that_pipelines_name_exists() {
+    for (name, expected) in [
+        (
+            "triangulated",
+            &["corner", "triangle", "bordered_triangle"][..],
+        ),
+        ("exact_draw", &["whole_image", "draw"]),
+        ("exact_mark", &["mark"]),
+    ] {
+        let module = shader(name);
+        let names: Vec<&str> = module
+            .entry_points
+            .iter()
+            .map(|e| e.name.as_str())
+            .collect();
+        assert_eq!(names, expected, "{name}");
+    }
+}
+
+#[test]
+fn params_lie_where_the_shaders_read_them() {
+    macro_rules! offsets {
+        ($($field:ident)*) => {
+            vec![$((stringify!($field).to_owned(), offset_of!(Params, $field)),)*]
+        };
+    }
+    let expected = offsets!(
+        plane rays_in_table ray_scale ray_offset array_size size source_count
+        desired_by_distance beta full_weight k blend resolution plane_seen gains_differ
+    );
+    for shader in SHADERS {
+        let (found, size) = members(&parse(shader), "Params");
+        assert_eq!(found, expected, "{}", shader.0);
+        assert_eq!(size, size_of::<Params>(), "{}", shader.0);
+    }
+}
+
+#[test]
+fn a_source_is_the_texels_that_the_shaders_name() {
+    const TEXEL: usize = size_of::<[f32; 4]>();
+    for shader in SHADERS {
+        let constants = constants(&parse(shader));
+        let texels = constants["SOURCE_TEXELS"] as usize;
+        assert_eq!(size_of::<Source>(), texels * TEXEL);
+        assert_eq!(
+            SOURCE_ROW as usize,
+            constants["SOURCES_PER_ROW"] as usize * texels
+        );
+        for (name, offset) in [
+            ("X_AXIS", offset_of!(Source, axes)),
+            ("Y_AXIS", offset_of!(Source, axes) + TEXEL),
+            ("Z_AXIS", offset_of!(Source, axes) + 2 * TEXEL),
+            ("CENTER", offset_of!(Source, center)),
+            ("PINHOLE", offset_of!(Source, focal)),
+            ("IMAGE", offset_of!(Source, size)),
+            ("LENS", offset_of!(Source, lens)),
+            ("LENS_REST", offset_of!(Source, lens_rest)),
+            ("KIND", offset_of!(Source, kind)),
+            ("GAIN", offset_of!(Source, gain)),
+        ] {
+            assert_eq!(constants[name] as usize * TEXEL, offset, "{name}");
+        }
+    }
+    // What shares a texel, by component.
+    let within = |field: usize, texel: usize| (field - texel) / size_of::<f32>();
+    let image = offset_of!(Source, size);
+    assert_eq!(within(offset_of!(Source, inverse_feather), image), 2);
+    assert_eq!(within(offset_of!(Source, limit), image), 3);
+    let kind = offset_of!(Source, kind);
+    assert_eq!(within(offset_of!(Source, layer), kind), 1);
+    assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
+    let pinhole = offset_of!(Source, focal);
+    assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
+}
+
+#[test]
+fn corners_and_entries_are_what_the_shaders_take() {
+    let module = shader("triangulated");
+    assert_eq!(constants(&module)["ENTRIES_PER_ROW"] as u32, ENTRY_ROW);
+    // An entry is one texel: the source view in x, the corners' values in y, z and w.
+    assert_eq!(size_of::<Entry>(), size_of::<[f32; 4]>());
+    assert_eq!(offset_of!(Entry, source_idx), 0);
+    assert_eq!(offset_of!(Entry, values), size_of::<f32>());
+    // Vertex attributes follow each other without gaps: two floats, two integers.
+    let entry = module.entry_points.iter().find(|e| e.name == "corner");
+    let inputs: Vec<(u32, &TypeInner)> = entry
+        .unwrap()
+        .function
+        .arguments
+        .iter()
+        .filter_map(|argument| match argument.binding {
+            Some(naga::Binding::Location { location, .. }) => {
+                Some((location, &module.types[argument.ty].inner))
+            }
+            _ => None,
+        })
+        .collect();
+    let pair = |scalar| TypeInner::Vector {
+        size: naga::VectorSize::Bi,
+        scalar,
+    };
+    let expected = [pair(naga::Scalar::F32), pair(naga::Scalar::U32)];
+    assert_eq!(inputs, [(0, &expected[0]), (1, &expected[1])]);
+    assert_eq!(offset_of!(Corner, pixel), 0);
+    assert_eq!(offset_of!(Corner, list), 8);
+    assert_eq!(size_of::<Corner>(), 16);
+}
+
+#[test]
+fn shared_numbers_are_the_same() {
+    let triangulated = constants(&shader("triangulated"));
+    assert_eq!(triangulated["LISTED"] as usize, MAX_LISTED);
+    for name in ["exact_draw", "exact_mark"] {
+        let exact = constants(&shader(name));
+        assert_eq!(exact["LISTED"] as usize, MAX_CONTRIBUTORS + 1, "{name}");
+    }
+    for shader in SHADERS {
+        let constants = constants(&parse(shader));
+        for (name, value) in [
+            ("CONTRIBUTORS", MAX_CONTRIBUTORS as f64),
+            ("SAME_RAY", f64::from(SAME_RAY as f32)),
+            ("BLEND_CONSISTENT", 0.0),
+            ("BLEND_PAPER", 1.0),
+            ("RESOLUTION_RATIO", 0.0),
+            ("RESOLUTION_LENGTH", 1.0),
+            ("LEVEL_BIAS", crate::LEVEL_BIAS),
+            ("LENS_PINHOLE", f64::from(layout::LENS_PINHOLE)),
+            ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),
+            ("LENS_FISHEYE", f64::from(layout::LENS_FISHEYE)),
+            ("LENS_BROWN", f64::from(layout::LENS_BROWN)),
+        ] {
+            // Only a typed constant is left in the module.
+            let found = constants.get(name).copied().unwrap_or(f64::NAN);
+            assert!(
+                (found - value).abs() <= 1e-6 * value.abs(),
+                "{}: {name} is {found}, not {value}",
+                shader.0
+            );
+        }
+    }
+}
