@@ -13,10 +13,12 @@ pub mod colmap;
 mod lens;
 mod reconstruction;
 mod rigid;
+mod ties;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};
 pub use lens::{Distortion, Lens, Pixel};
 pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};
 pub use rigid::Rigid3;
+pub use ties::{TRUSTED_TIE, WeakGroup};
 pub use view::View;

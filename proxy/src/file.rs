@@ -71,7 +71,7 @@ impl Stored {
     }
 }
 
-/// Reads a proxy that [`write`] wrote.
+/// Reads a proxy that [`write()`] wrote.
 ///
 /// # Errors
 /// The file, and what is wrong with it.

@@ -1,8 +1,9 @@
 //! `lumigraph info`
 
-use super::options::{SceneArgs, proxy_json, proxy_text};
-use super::output::{print, print_json};
+use super::options::{SceneArgs, proxy_json, proxy_text, tie_text};
+use super::output::{print, print_json, say};
 use super::report::megabytes;
+use calibrate::TRUSTED_TIE;
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError};
 use serde_json::{Value, json};
@@ -29,7 +30,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.json {
         return print_json(&info);
     }
-    print(&text(&scene, &info))
+    print(&text(&scene, &info))?;
+    for group in scene.reconstruction.weakly_tied(TRUSTED_TIE) {
+        say!("warning: {}; --drop-weak leaves out", tie_text(&group));
+    }
+    Ok(())
 }
 
 fn gather(scene: &Scene) -> anyhow::Result<Value> {
@@ -73,6 +78,10 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
     Ok(json!({
         "photos": scene.photos.len(),
         "left_out": scene.left_out,
+        "weakly_tied": reconstruction.weakly_tied(TRUSTED_TIE).iter().map(|group| json!({
+            "photos": group.names,
+            "shared_points": group.shared_points,
+        })).collect::<Vec<_>>(),
         "cameras": cameras,
         "points": positions.len(),
         "spacing": cloud.map(|c| c.spacing),
@@ -82,7 +91,7 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
     }))
 }
 
-/// Mean and median of the finite errors; how many there are, and how many points lie
+/// Mean, median and 95th percentile of the finite errors; how many there are, and how many points lie
 /// behind the camera that is said to see them.
 fn reprojection(errors_px: Vec<f64>) -> Value {
     let behind = errors_px.iter().filter(|e| !e.is_finite()).count();
@@ -92,6 +101,7 @@ fn reprojection(errors_px: Vec<f64>) -> Value {
     json!({
         "mean": (!finite.is_empty()).then_some(mean),
         "median": finite.get(finite.len() / 2),
+        "p95": finite.get(finite.len() * 95 / 100),
         "observations": finite.len(),
         "behind": behind,
     })

@@ -4,6 +4,7 @@ use super::Usage;
 use super::output::say;
 use anyhow::Context;
 use calibrate::View;
+use calibrate::WeakGroup;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -22,14 +23,31 @@ pub(super) struct SceneArgs {
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     pub(super) strict: bool,
+    /// Leave out photos that share too few points with the rest to be placed surely
+    #[arg(long)]
+    pub(super) drop_weak: bool,
 }
 
 impl SceneArgs {
     /// Opens it, and says which photos are not used.
     pub(super) fn open(&self) -> anyhow::Result<Scene> {
-        let (scene, warnings) = Scene::open(&self.scene, self.strict)?;
+        let (mut scene, warnings) = Scene::open(&self.scene, self.strict)?;
         print_warnings(&warnings);
+        if self.drop_weak {
+            for group in scene.drop_weak() {
+                say!("note: left out: {}", tie_text(&group));
+            }
+        }
         Ok(scene)
+    }
+}
+
+/// How little ties a group of photos to the rest.
+pub(super) fn tie_text(group: &WeakGroup) -> String {
+    let (names, points) = (group.names.join(", "), group.shared_points);
+    match group.names.len() {
+        1 => format!("photo {names} shares only {points} points with the others"),
+        n => format!("{n} photos share only {points} points with the others: {names}"),
     }
 }
 

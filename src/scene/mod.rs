@@ -15,9 +15,10 @@ mod store;
 pub use error::{SceneError, Warning};
 pub use import::ImportOptions;
 
-use calibrate::Reconstruction;
+use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{Extra, Settings};
 use proxy::Proxy;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// A photo set made ready for rendering.
@@ -38,7 +39,7 @@ pub struct Scene {
     pub capture: Option<PathBuf>,
     /// The calibration that was given beside it, if one was.
     pub calibration: Option<PathBuf>,
-    /// Photos that are calibrated but missing or corrupt.
+    /// Photos that are calibrated but missing or corrupt, or dropped as weakly tied.
     pub left_out: Vec<String>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
@@ -79,4 +80,17 @@ pub struct SceneProxy {
     pub fitted_without: Option<Vec<String>>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
+}
+
+impl Scene {
+    /// Leaves out the photos that share too few points with the rest to be placed surely,
+    /// and returns them. The rest must be the majority; see [`Reconstruction::weakly_tied`].
+    pub fn drop_weak(&mut self) -> Vec<WeakGroup> {
+        let weak = self.reconstruction.weakly_tied(TRUSTED_TIE);
+        let names: BTreeSet<String> = weak.iter().flat_map(|g| g.names.iter().cloned()).collect();
+        self.photos.retain(|photo| !names.contains(&photo.name));
+        self.reconstruction = self.reconstruction.without_images(&names);
+        self.left_out.extend(names);
+        weak
+    }
 }
