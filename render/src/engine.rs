@@ -1,10 +1,11 @@
 //! One door to the three engines.
 
+use crate::cpu::Cpu;
 use crate::field::{self, TriangulatedField};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::options::Method;
-use crate::{RenderError, cpu, reference};
+use crate::{RenderError, reference};
 use image::RgbaImage;
 
 /// What is asked for.
@@ -26,7 +27,7 @@ pub enum Engine {
     /// wgpu.
     Gpu(Box<Gpu>),
     /// f32, all threads.
-    Cpu,
+    Cpu(Cpu),
     /// f64.
     Reference,
 }
@@ -41,10 +42,10 @@ impl Engine {
         Ok(match choice {
             DeviceChoice::Auto => match Gpu::open() {
                 Ok(gpu) if !gpu.is_software() => Self::Gpu(Box::new(gpu)),
-                _ => Self::Cpu,
+                _ => Self::Cpu(Cpu::default()),
             },
             DeviceChoice::Gpu => Self::Gpu(Box::new(Gpu::open()?)),
-            DeviceChoice::Cpu => Self::Cpu,
+            DeviceChoice::Cpu => Self::Cpu(Cpu::default()),
             DeviceChoice::Reference => Self::Reference,
         })
     }
@@ -53,7 +54,7 @@ impl Engine {
     pub fn description(&self) -> String {
         match self {
             Self::Gpu(gpu) => gpu.description().to_owned(),
-            Self::Cpu => "CPU".to_owned(),
+            Self::Cpu(_) => "CPU".to_owned(),
             Self::Reference => "CPU, reference".to_owned(),
         }
     }
@@ -65,7 +66,7 @@ impl Engine {
     pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
         match (self, method) {
             (Self::Gpu(gpu), method) => gpu.render(frame, method),
-            (Self::Cpu, method) => cpu::render(frame, method),
+            (Self::Cpu(cpu), method) => cpu.render(frame, method),
             (Self::Reference, Method::Exact) => Ok(reference::render_exact(frame)?),
             (Self::Reference, Method::Triangulated { cells_across }) => {
                 let field = TriangulatedField::new(frame, cells_across)?;

@@ -19,6 +19,11 @@ pub struct ProxyPoint {
     pub inverse_distance: f64,
 }
 
+/// Mip levels by which photos are sampled sharper than their footprint asks for. A desired
+/// pixel of up to 1.19 × 1.19 source pixels is then sampled from the photo alone, at half
+/// the cost; no capture's held-out score changed by more than 0.02 dB, even with 0.5.
+pub const LEVEL_BIAS: f64 = 0.25;
+
 /// A source view, relative to the desired one.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameSource {
@@ -175,7 +180,7 @@ impl<'a> Frame<'a> {
     }
 
     /// The mip level at which a source photo is sampled: half the binary logarithm of how
-    /// many source pixels one desired pixel covers.
+    /// many source pixels one desired pixel covers, less [`LEVEL_BIAS`].
     ///
     /// A patch of the proxy covers, in an image of focal length f whose centre lies at
     /// distance h from the patch's plane and which sees it at depth z, f²·h/z³ times its
@@ -188,7 +193,7 @@ impl<'a> Frame<'a> {
         let ratio =
             depth_for_area(&self.desired.lens, point.ray) / depth_for_area(&source.lens, in_source);
         let area = scale * ratio * ratio * ratio;
-        (0.5 * area.log2()).max(0.0)
+        (0.5 * area.log2() - LEVEL_BIAS).max(0.0)
     }
 
     /// What the cube of the ratio of depths is multiplied by to give the ratio of areas,

@@ -25,7 +25,7 @@ pub mod triangulation;
 
 pub use engine::{DeviceChoice, Engine};
 pub use field::TriangulatedField;
-pub use frame::{Frame, FrameSource, ProxyPoint};
+pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use path::{CameraPath, PathFrame};

@@ -1,10 +1,26 @@
 //! The ray through each pixel of the desired image.
 
-use calibrate::{Distortion, Pixel, View};
+use calibrate::{Distortion, Lens, Pixel, View};
 use rayon::prelude::*;
+
+/// The rays of the last lens and image size, for the next frame along a path.
+#[derive(Debug, Default)]
+pub(crate) struct RayCache {
+    last: Option<(Lens, [u32; 2], RayMap)>,
+}
+
+impl RayCache {
+    pub(crate) fn of(&mut self, view: &View) -> &RayMap {
+        let size = [view.width, view.height];
+        let last = self.last.take().filter(|l| (l.0, l.1) == (view.lens, size));
+        let last = last.unwrap_or_else(|| (view.lens, size, RayMap::of(view)));
+        &self.last.insert(last).2
+    }
+}
 
 /// Rays through pixel centres, in the desired camera's frame. A pinhole's are computed as
 /// they are needed; any other lens has them in a table, inverted in f64.
+#[derive(Debug)]
 pub(crate) enum RayMap {
     Pinhole {
         scale: [f64; 2],

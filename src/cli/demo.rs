@@ -3,7 +3,11 @@
 use super::Cli;
 use super::output::{print, write_file};
 use anyhow::{Context, bail};
+use calibrate::Rigid3;
 use clap::Parser;
+use lumigraph::scene::Scene;
+use render::{CameraPath, PathFrame};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A built-in scene from photos to novel views, a field picture and scores
@@ -24,7 +28,7 @@ pub(super) struct Args {
 const MARKER: &str = "lumigraph-demo.txt";
 
 /// What a demo leaves in its folder, in order, and what it is.
-const PARTS: [(&str, &str); 5] = [
+const PARTS: [(&str, &str); 6] = [
     (
         "capture",
         "the photos, their calibration, and the truth about them",
@@ -34,21 +38,31 @@ const PARTS: [(&str, &str); 5] = [
         "frames",
         "novel views, along a path through the photos' places",
     ),
-    ("field.png", "the blending field: a colour for each photo"),
+    (
+        "forward.json",
+        "a path of one frame, a third of the way from the photos on",
+    ),
+    (
+        "field.png",
+        "the blending field there: a colour for each photo",
+    ),
     (
         "evaluation",
         "the held-out photos as rendered from the others",
     ),
 ];
 
-/// The photo whose field is shown: one of those held out.
-const SHOWN: &str = "0008.png";
+/// The photo from which the step forward is taken: one in the middle.
+const MIDDLE: &str = "0008.png";
+/// How far it goes towards the proxy. The photos' places lie behind the viewer then, near
+/// the line of sight, and the field shows each as a spot of its colour.
+const STEP: f64 = 0.33;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = &args.output;
     clear(folder)?;
     let at = |part: &str| folder.join(part).display().to_string();
-    let [capture, scene, frames, field, evaluation] = PARTS.map(|(part, _)| at(part));
+    let [capture, scene, frames, forward, field, evaluation] = PARTS.map(|(part, _)| at(part));
     let split = at("capture/split.json");
     let commands: [&[&str]; 6] = [
         &["generate", "shelf", "-o", &capture],
@@ -58,13 +72,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "render", &scene, "--path", "orbit", "--frames", "12", "-o", &frames,
         ],
         &[
-            "field",
-            &scene,
-            "--view",
-            SHOWN,
-            "--without-view",
-            "-o",
-            &field,
+            "field", &scene, "--path", &forward, "--view", "forward", "-o", &field,
         ],
         &["evaluate", &scene, "-o", &evaluation],
     ];
@@ -72,6 +80,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     write_file(&folder.join(MARKER), shown.concat().as_bytes())?;
     for (words, shown) in commands.into_iter().zip(&shown) {
         print(&format!("$ {shown}"))?;
+        if words[0] == "field" {
+            step_forward(Path::new(&scene), Path::new(&forward))?;
+        }
         let line = std::iter::once("lumigraph").chain(words.iter().copied());
         super::run(Cli::try_parse_from(line)?)?;
     }
@@ -80,6 +91,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for (part, what) in PARTS {
         print(&format!("  {:32} {what}\n", at(part)))?;
     }
+    Ok(())
+}
+
+/// Writes a path whose only frame lies ahead of a photo's place.
+fn step_forward(scene: &Path, path: &Path) -> anyhow::Result<()> {
+    let (scene, _) = Scene::open(scene, true)?;
+    let image = scene
+        .reconstruction
+        .images
+        .values()
+        .find(|i| i.name == MIDDLE);
+    let image = image.with_context(|| format!("photo {MIDDLE} is not in the scene"))?;
+    let camera = &scene.reconstruction.cameras[&image.camera_id];
+    let view = scene.view(MIDDLE)?;
+    let plane = scene.fit_plane(&BTreeSet::new())?.plane;
+    let ahead = plane.intersect(view.center(), view.forward());
+    let ahead = ahead.context("the photo looks away from the proxy")?;
+    let center = view.center().lerp(ahead, STEP);
+    let rotation = view.camera_from_world.rotation;
+    let pose = Rigid3::new(rotation, -(rotation * center));
+    let frame = PathFrame::new("forward".to_owned(), camera.clone(), pose, None)?;
+    render::path::write(path, &CameraPath::new(1.0, vec![frame])?)?;
     Ok(())
 }
 

@@ -122,7 +122,7 @@ fn score_photos(
         };
         let desired = resized(view, size);
         let photo = at_size(photo, (desired.width, desired.height));
-        let drawn = session.draw(&desired)?;
+        let drawn = session.draw_timed(&desired)?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;
         }

@@ -1,10 +1,12 @@
 //! `lumigraph field`
 
+use super::frames::{NamedView, of_path};
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
-use super::session::spinner;
-use calibrate::Pixel;
+use super::session::{points, spinner};
+use anyhow::anyhow;
+use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
 use render::blend::Contributor;
@@ -16,21 +18,31 @@ use std::path::{Path, PathBuf};
 
 /// Picture the blending field: which photo paints which pixel
 ///
-/// One colour a photo, mixed by weight, as seen from the photo NAME. That photo itself
-/// paints its own view alone; --without-view shows who would stand in for it.
+/// One colour a photo, mixed by weight, as seen from the photo NAME, or from the frame NAME
+/// of a path. A photo paints its own view alone; --without-view shows who would stand in
+/// for it.
 ///
 ///     lumigraph field my-capture --view a.jpg --without-view -o field.png
+///     lumigraph field my-capture --path dolly --view frame_0008 -o field.png
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// The photo from whose place to look
+    /// The photo from whose place to look, or the frame of --path
     #[arg(long, value_name = "NAME")]
     view: String,
     /// Leave out that photo, as if it were held out
-    #[arg(long)]
+    #[arg(long, conflicts_with = "path")]
     without_view: bool,
+    /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
+    /// file
+    #[arg(long, value_name = "KIND|FILE")]
+    path: Option<String>,
+    /// Frames of a derived path
+    #[arg(long, value_name = "N", default_value_t = 30, requires = "path",
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
     #[command(flatten)]
     hold_out: HoldOutArgs,
     #[command(flatten)]
@@ -54,12 +66,19 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let scene = args.scene.open()?;
     let mut without = args.hold_out.names(&scene)?;
-    let view = resized(scene.view(&args.view)?, args.size);
     if args.without_view {
         without.insert(args.view.clone());
     }
     let proxy = args.proxy.choose(&scene, &without)?;
     let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+    let view = match &args.path {
+        None => scene.view(&args.view)?,
+        Some(path) => {
+            let points = || points(&scene, &without);
+            frame_of(of_path(path, args.frames, &lumigraph, points)?, &args.view)?
+        }
+    };
+    let view = resized(view, args.size);
     let frame = Frame::new(&lumigraph, view, args.field.options());
 
     // 1. The field, as the renderer asked for has it.
@@ -98,6 +117,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .map(|f| format!("{}\n", f.display()))
         .collect();
     print(&lines.concat())
+}
+
+/// The view of one frame of a path.
+fn frame_of(frames: Vec<NamedView>, name: &str) -> anyhow::Result<View> {
+    let count = frames.len();
+    let names: Vec<String> = frames.iter().take(2).map(|f| f.name.clone()).collect();
+    let found = frames.into_iter().find(|f| f.name == name);
+    found.map(|f| f.view).ok_or_else(|| {
+        let names = names.join(", ");
+        anyhow!("--view {name}: the path has {count} frames of other names: {names}, …")
+    })
 }
 
 fn write_weights(

@@ -1,9 +1,10 @@
 //! Which views to render.
 
 use super::Usage;
-use super::session::Session;
 use calibrate::{View, colmap};
+use glam::DVec3;
 use lumigraph::scene::SceneError;
+use render::Lumigraph;
 use render::path::{self, CameraPath, PathFrame};
 use render::trajectory::{self, Trajectory};
 use std::path::{Path, PathBuf};
@@ -27,27 +28,40 @@ pub(super) struct NamedView {
     pub(super) view: View,
 }
 
-/// The views asked for.
+/// The views asked for. `points_in_world` are the sparse points, for derived paths.
 ///
 /// # Errors
 /// They cannot be read or derived.
 pub(super) fn frames(
     args: &ViewArgs,
     count: u32,
-    session: &Session,
+    lumigraph: &Lumigraph,
+    points_in_world: impl FnOnce() -> Vec<DVec3>,
 ) -> anyhow::Result<Vec<NamedView>> {
-    if let Some(views) = &args.views {
-        return if views.is_dir() {
-            of_model(views)
-        } else {
-            of_file(views)
-        };
+    match (&args.views, &args.path) {
+        (Some(views), _) if views.is_dir() => of_model(views),
+        (Some(views), _) => of_file(views),
+        (None, path) => {
+            let asked = path.as_deref().unwrap_or_default();
+            of_path(asked, count, lumigraph, points_in_world)
+        }
     }
-    let asked = args.path.as_deref().unwrap_or_default();
-    match asked {
-        "orbit" => derived(Trajectory::Orbit, count, session),
-        "dolly" => derived(Trajectory::Dolly, count, session),
-        "sweep" => derived(Trajectory::Sweep, count, session),
+}
+
+/// The frames of a path: a kind of derived path, or a file.
+///
+/// # Errors
+/// It cannot be read or derived.
+pub(super) fn of_path(
+    asked: &str,
+    count: u32,
+    lumigraph: &Lumigraph,
+    points_in_world: impl FnOnce() -> Vec<DVec3>,
+) -> anyhow::Result<Vec<NamedView>> {
+    let kind = match asked {
+        "orbit" => Trajectory::Orbit,
+        "dolly" => Trajectory::Dolly,
+        "sweep" => Trajectory::Sweep,
         _ => {
             let file = Path::new(asked);
             if file.extension().is_none() && !file.exists() {
@@ -55,26 +69,23 @@ pub(super) fn frames(
                     format!("--path {asked}: expected orbit, dolly, sweep or a path file");
                 return Err(Usage(message).into());
             }
-            of_file(file)
+            return of_file(file);
         }
-    }
+    };
+    let points = points_in_world();
+    let (sources, proxy) = (&lumigraph.sources, &lumigraph.proxy);
+    Ok(named(trajectory::derive(
+        kind,
+        sources,
+        &points,
+        proxy,
+        count as usize,
+        FPS,
+    )?))
 }
 
 /// Frames a second of derived paths. Only a film made of the frames would show it.
 const FPS: f64 = 30.0;
-
-/// The frames of a path that follows from where the photos were taken.
-fn derived(
-    trajectory: Trajectory,
-    count: u32,
-    session: &Session,
-) -> anyhow::Result<Vec<NamedView>> {
-    let sources = &session.lumigraph().sources;
-    let points = session.points();
-    let proxy = &session.proxy.proxy;
-    let path = trajectory::derive(trajectory, sources, &points, proxy, count as usize, FPS)?;
-    Ok(named(path))
-}
 
 /// The images of a COLMAP model, by name.
 fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {

@@ -50,14 +50,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.field,
         &args.draw,
     )?;
-    let frames = frames(&args.views, args.frames, &session)?;
+    let points = || session.points();
+    let frames = frames(&args.views, args.frames, session.lumigraph(), points)?;
     let files = frame_files(frames.iter().map(|f| f.name.as_str()), &args.output)?;
     session.prepare()?;
 
     let bar = progress(frames.len(), "rendering");
     for (frame, file) in frames.iter().zip(&files) {
-        let drawn = session.draw(&args.draw.resized(frame.view.clone()))?;
-        capture::write_png(file, &drawn.picture)?;
+        let picture = session.draw(&args.draw.resized(frame.view.clone()))?;
+        capture::write_png(file, &picture)?;
         bar.inc(1);
     }
     bar.finish_and_clear();

@@ -30,8 +30,8 @@ pub(super) struct Session {
     no_skip: bool,
 }
 
-/// A view drawn.
-pub(super) struct Drawn {
+/// A view drawn, and how long that took.
+pub(super) struct Timed {
     pub(super) picture: RgbaImage,
     /// Processor time for the picture, decoding photos not included.
     pub(super) cpu: Duration,
@@ -86,8 +86,7 @@ impl Session {
 
     /// The sparse points that do not rest on held-out photos, in the world.
     pub(super) fn points(&self) -> Vec<DVec3> {
-        let rest = self.scene.reconstruction.without_images(&self.without);
-        rest.points.values().map(|p| p.position).collect()
+        points(&self.scene, &self.without)
     }
 
     /// What draws, for people.
@@ -103,7 +102,7 @@ impl Session {
             return Ok(());
         }
         let engine = Engine::open(self.device)?;
-        if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu) {
+        if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu(_)) {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
         self.engine = Some(engine);
@@ -122,28 +121,32 @@ impl Session {
 
     /// Draws a view. A photo that turns out corrupt is reported and left out from then on
     /// and the view drawn again, unless `--strict`.
-    pub(super) fn draw(&mut self, desired: &View) -> anyhow::Result<Drawn> {
+    pub(super) fn draw(&mut self, desired: &View) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let decoded_before = self.lumigraph.photos.decoded();
             let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
-            let mut start = ProcessTime::now();
-            let mut drawn = engine.render(&frame, self.method);
-            if drawn.is_ok() && self.lumigraph.photos.decoded() > decoded_before {
-                // That included decoding photos. Once more, for the time alone.
-                start = ProcessTime::now();
-                drawn = engine.render(&frame, self.method);
-            }
-            let cpu = start.elapsed();
-            match drawn {
-                Ok(picture) => return Ok(Drawn { picture, cpu }),
+            match engine.render(&frame, self.method) {
+                Ok(picture) => return Ok(picture),
                 Err(RenderError::Photo(error)) => self.leave_out(&error)?,
                 Err(error) => return Err(error.into()),
             }
         }
+    }
+
+    /// Draws a view and takes the time; twice where the first drawing had photos to decode.
+    pub(super) fn draw_timed(&mut self, desired: &View) -> anyhow::Result<Timed> {
+        let decoded_before = self.lumigraph.photos.decoded();
+        let mut start = ProcessTime::now();
+        let mut picture = self.draw(desired)?;
+        if self.lumigraph.photos.decoded() != decoded_before {
+            start = ProcessTime::now();
+            picture = self.draw(desired)?;
+        }
+        let cpu = start.elapsed();
+        Ok(Timed { picture, cpu })
     }
 
     /// The pixels of a photo of the scene; `None`, with a warning, for one that is corrupt,
@@ -173,6 +176,12 @@ impl Session {
         self.lumigraph = self.scene.lumigraph(&self.without, self.proxy.proxy)?;
         Ok(())
     }
+}
+
+/// A scene's sparse points that do not rest on the photos left out, in the world.
+pub(super) fn points(scene: &Scene, without: &BTreeSet<String>) -> Vec<DVec3> {
+    let rest = scene.reconstruction.without_images(without);
+    rest.points.values().map(|p| p.position).collect()
 }
 
 /// A progress bar on stderr, where that is a terminal.

@@ -4,6 +4,7 @@ mod bad_input;
 mod captures;
 mod evaluate;
 mod field;
+mod gpu;
 mod help;
 mod render;
 mod repeat;

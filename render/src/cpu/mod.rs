@@ -15,7 +15,7 @@ use crate::image_out::straight_rgba8;
 use crate::options::Method;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, Span};
-use crate::rays::RayMap;
+use crate::rays::{RayCache, RayMap};
 use glam::DVec3;
 use image::RgbaImage;
 use lanes::{LANES, Lane, each};
@@ -26,26 +26,40 @@ use weights::{Term, weigh};
 /// Rows that one thread does in one go.
 const BAND: usize = 8;
 
-/// Draws a frame.
-///
-/// # Errors
-/// A photo that is needed cannot be decoded; the triangulation refuses the view.
-pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
-    match method {
-        Method::Exact => Ok(render_exact(frame)?),
-        Method::Triangulated { cells_across } => {
-            let field = TriangulatedField::new(frame, cells_across)?;
-            Ok(render_field(frame, &field)?)
+/// The engine, with what it keeps between frames.
+#[derive(Debug, Default)]
+pub struct Cpu {
+    rays: RayCache,
+}
+
+impl Cpu {
+    /// Draws a frame.
+    ///
+    /// # Errors
+    /// A photo that is needed cannot be decoded; the triangulation refuses the view.
+    pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+        let rays = self.rays.of(&frame.desired);
+        match method {
+            Method::Exact => Ok(draw_exact(frame, rays)?),
+            Method::Triangulated { cells_across } => {
+                let field = TriangulatedField::new(frame, cells_across)?;
+                Ok(draw_field(frame, &field, rays)?)
+            }
         }
     }
 }
 
-/// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
+/// Draws a single frame, keeping nothing for the next.
 ///
 /// # Errors
-/// A photo that is needed cannot be decoded.
-pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
-    let engine = Engine::new(frame);
+/// As [`Cpu::render`].
+pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+    Cpu::default().render(frame, method)
+}
+
+/// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
+fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
+    let engine = Engine::new(frame, rays);
     let sources: Vec<usize> = (0..engine.sources.len()).collect();
     draw(frame, |row, _: &mut (), pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
@@ -78,11 +92,12 @@ pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
 
 /// The field interpolated over triangles. What changes faster than that (fovBlend, the
 /// proxy point, the photos) is evaluated at every pixel.
-///
-/// # Errors
-/// A photo that is needed cannot be decoded.
-pub fn render_field(frame: &Frame<'_>, field: &TriangulatedField) -> Result<RgbaImage, PhotoError> {
-    let engine = Engine::new(frame);
+fn draw_field(
+    frame: &Frame<'_>,
+    field: &TriangulatedField,
+    rays: &RayMap,
+) -> Result<RgbaImage, PhotoError> {
+    let engine = Engine::new(frame, rays);
     let raster = Raster::new(field);
     draw(frame, |row, spans: &mut Vec<Span>, pixels| {
         raster.spans(row, spans);
@@ -187,19 +202,19 @@ impl Interpolated {
 struct Engine<'a> {
     frame: &'a Frame<'a>,
     sources: Vec<Source>,
-    rays: RayMap,
+    rays: &'a RayMap,
     plane: [f32; 3],
     no_plane: bool,
     gains: bool,
 }
 
 impl<'a> Engine<'a> {
-    fn new(frame: &'a Frame<'a>) -> Self {
+    fn new(frame: &'a Frame<'a>, rays: &'a RayMap) -> Self {
         let sources = &frame.lumigraph.sources;
         Self {
             frame,
             sources: (0..sources.len()).map(|i| Source::new(frame, i)).collect(),
-            rays: RayMap::of(&frame.desired),
+            rays,
             plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
             no_plane: frame.plane.is_none(),
             gains: frame.gains_differ(),

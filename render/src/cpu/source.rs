@@ -1,7 +1,7 @@
 //! What the source views see of a tile of pixels.
 
 use super::lanes::{LANES, Lane, angle, each, log2};
-use crate::frame::Frame;
+use crate::frame::{Frame, LEVEL_BIAS};
 use crate::options::Resolution;
 use calibrate::Distortion;
 use glam::DVec3;
@@ -226,7 +226,7 @@ impl Source {
             };
             let ratio = here / there;
             let area = self.area_scale * ratio * ratio * ratio;
-            if area > 1.0 { 0.5 * log2(area) } else { 0.0 }
+            (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
         });
         Some(Sight { u, v, a, level })
     }

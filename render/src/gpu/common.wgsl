@@ -33,23 +33,23 @@ const RESOLUTION_LENGTH = 1u;
 // drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
 const SOURCE_TEXELS = 10u;
 const SOURCES_PER_ROW = 128u;
-// Rows of the rotation from the desired camera's frame; w: the translation.
+// Rows of the rotation from the desired camera's frame; w: the translation. All are scaled
+// so that a patch of the proxy at equal depth in both cameras covers equally many pixels.
 const X_AXIS = 0u;
 const Y_AXIS = 1u;
 const Z_AXIS = 2u;
-// The source's centre in the desired camera's frame; w: footprint ratio g.
-const CENTER = 3u;
 // Focal lengths, principal point.
-const PINHOLE = 4u;
-// Image size; inverse feather; area scale.
-const IMAGE = 5u;
-// k1..k4.
-const K1234 = 6u;
-// k5, k6, p1, p2.
-const K56P12 = 7u;
-// Limit of the squared radius, or of theta for a fisheye; g squared less one; LENS_*;
-// layer of the photos' array.
-const KIND = 8u;
+const PINHOLE = 3u;
+// k1, k2, p1, p2; of a fisheye k1, k2.
+const LENS = 4u;
+// k3, k4, k5, k6; of a fisheye k3, k4.
+const LENS_REST = 5u;
+// Image size; inverse feather; limit of the squared radius, or of theta for a fisheye.
+const IMAGE = 6u;
+// LENS_*; layer of the photos' array; g squared less one.
+const KIND = 7u;
+// The source's centre in the desired camera's frame; w: footprint ratio g.
+const CENTER = 8u;
 // rgb.
 const GAIN = 9u;
 
@@ -60,7 +60,8 @@ override COMMON_LENS: f32 = -1.0;
 const LENS_PINHOLE: f32 = 0.0;
 const LENS_RATIONAL: f32 = 1.0;
 const LENS_FISHEYE: f32 = 2.0;
-const LENS_POLYNOMIAL: f32 = 3.0;
+// Rational with k3 to k6 zero.
+const LENS_BROWN: f32 = 3.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
@@ -74,12 +75,11 @@ fn source_data(source_idx: u32, texel: u32) -> vec4f {
 // Where a proxy point falls in a photo.
 struct Sight {
     pixel: vec2f,
-    // Depth, or distance for a fisheye.
+    // Depth, or distance for a fisheye, scaled as the axes are; 0 where the camera looks
+    // the other way.
     depth: f32,
-    // Whether the lens sees that way at all; the pixel may still lie outside the photo.
-    seen: bool,
-    // Of the photos' array.
-    layer: u32,
+    // Squared radius, or theta for a fisheye; beyond the lens' limit the pixel means nothing.
+    reach: f32,
 }
 
 // atan2 for y >= 0; the polynomial is Cephes' atanf.
@@ -114,24 +114,25 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
         dot(y_axis.xyz, ray) + y_axis.w * s,
         dot(z_axis.xyz, ray) + z_axis.w * s,
     );
-    let kind = source_data(source_idx, KIND);
-    let limit = kind.x;
-    let lens = select(kind.z, COMMON_LENS, COMMON_LENS >= 0.0);
-    var sight = Sight(vec2f(0.0), p.z, false, u32(kind.w));
-
-    // 1. Through the lens.
+    var lens = COMMON_LENS;
+    if COMMON_LENS < 0.0 {
+        lens = source_data(source_idx, KIND).x;
+    }
+    var sight = Sight(vec2f(0.0), 0.0, 0.0);
     var bent: vec2f;
     if lens == LENS_FISHEYE {
         let radius = length(p.xy);
         let theta = angle(radius, p.z);
-        if theta > limit || (radius == 0.0 && p.z <= 0.0) {
+        if radius == 0.0 && p.z <= 0.0 {
             return sight;
         }
-        let k = source_data(source_idx, K1234);
+        let k12 = source_data(source_idx, LENS);
+        let k34 = source_data(source_idx, LENS_REST);
         let t2 = theta * theta;
-        let r = theta * (1.0 + t2 * (k.x + t2 * (k.y + t2 * (k.z + t2 * k.w))));
+        let r = theta * (1.0 + t2 * (k12.x + t2 * (k12.y + t2 * (k34.x + t2 * k34.y))));
         bent = p.xy * select(1.0 / p.z, r / radius, radius > 0.0);
         sight.depth = length(p);
+        sight.reach = theta;
     } else {
         if p.z <= 0.0 {
             return sight;
@@ -139,24 +140,21 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
         let n = p.xy / p.z;
         bent = n;
         if lens != LENS_PINHOLE {
-            let k = source_data(source_idx, K1234);
+            let k = source_data(source_idx, LENS);
             let r2 = dot(n, n);
-            if r2 > limit {
-                return sight;
-            }
-            let above = 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
-            bent = n * above;
+            var radial = 1.0 + r2 * (k.x + r2 * k.y);
             if lens == LENS_RATIONAL {
-                let h = source_data(source_idx, K56P12);
-                let below = 1.0 + r2 * (k.w + r2 * (h.x + r2 * h.y));
-                bent = n * (above / below)
-                    + 2.0 * h.zw * n.x * n.y + h.wz * (r2 + 2.0 * n * n);
+                let rest = source_data(source_idx, LENS_REST);
+                let below = 1.0 + r2 * (rest.y + r2 * (rest.z + r2 * rest.w));
+                radial = (radial + r2 * r2 * r2 * rest.x) / below;
             }
+            bent = n * radial + 2.0 * k.zw * n.x * n.y + k.wz * (r2 + 2.0 * n * n);
+            sight.reach = r2;
         }
+        sight.depth = p.z;
     }
     let pinhole = source_data(source_idx, PINHOLE);
     sight.pixel = bent * pinhole.xy + pinhole.zw;
-    sight.seen = true;
     return sight;
 }
 
@@ -166,19 +164,20 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
     let image = source_data(source_idx, IMAGE);
     let to_border = min(sight.pixel, image.xy - sight.pixel);
     let border = min(to_border.x, to_border.y);
-    if !sight.seen || border < 0.0 {
+    if sight.depth <= 0.0 || sight.reach > image.w || border < 0.0 {
         return 0.0;
     }
     let f = clamp(border * image.z, 0.0, 1.0);
     return max(f * f * (3.0 - 2.0 * f), 1e-12);
 }
 
-// The mip level of the projected footprint.
-fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
+// The mip level of the projected footprint; see LEVEL_BIAS of frame.rs.
+const LEVEL_BIAS: f32 = 0.25;
+
+fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
     let ratio = here / sight.depth;
-    let area = source_data(source_idx, IMAGE).w * ratio * ratio * ratio;
-    return 0.5 * log2(max(area, 1.0));
+    return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
 // angDiff + beta * resDiff.
@@ -195,7 +194,7 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
     } else {
         let g = center.w;
         let excess = (s * s * dot(c, c) - 2.0 * s * towards) / ray_squared;
-        resolution = (source_data(source_idx, KIND).y + g * g * excess)
+        resolution = (source_data(source_idx, KIND).z + g * g * excess)
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
     return angle(across, ray_squared - s * towards) + params.beta * max(resolution, 0.0);

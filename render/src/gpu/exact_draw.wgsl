@@ -26,9 +26,10 @@ fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
         }
         let source_idx = nearest.source_idx[n];
         let sight = see(source_idx, ray, s);
+        let layer = u32(source_data(source_idx, KIND).y);
         let uv = sight.pixel / params.array_size;
-        let level = level_of_detail(source_idx, sight, ray);
-        let color = textureSampleLevel(photos, photo_sampler, uv, sight.layer, level);
+        let level = level_of_detail(sight, ray);
+        let color = textureSampleLevel(photos, photo_sampler, uv, layer, level);
         add(&mix, nearest.a[n], color, source_idx);
     }
     return resolve(mix);

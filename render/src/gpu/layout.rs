@@ -34,18 +34,20 @@ pub(crate) struct Params {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Source {
     pub axes: [[f32; 4]; 3],
-    pub center: [f32; 4],
     pub focal: [f32; 2],
     pub principal: [f32; 2],
+    /// k₁, k₂, p₁, p₂.
+    pub lens: [f32; 4],
+    /// k₃ to k₆.
+    pub lens_rest: [f32; 4],
     pub size: [f32; 2],
     pub inverse_feather: f32,
-    pub area_scale: f32,
-    pub k1234: [f32; 4],
-    pub k56p12: [f32; 4],
     pub limit: f32,
-    pub footprint_excess: f32,
-    pub lens: f32,
+    pub kind: f32,
     pub layer: f32,
+    pub footprint_excess: f32,
+    pub padding: f32,
+    pub center: [f32; 4],
     pub gain: [f32; 4],
 }
 
@@ -73,7 +75,7 @@ pub(crate) const ENTRY_ROW: u32 = 1024;
 pub(super) const LENS_PINHOLE: f32 = 0.0;
 pub(super) const LENS_RATIONAL: f32 = 1.0;
 pub(super) const LENS_FISHEYE: f32 = 2.0;
-pub(super) const LENS_POLYNOMIAL: f32 = 3.0;
+pub(super) const LENS_BROWN: f32 = 3.0;
 
 impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
@@ -108,38 +110,41 @@ impl Params {
 impl Source {
     pub(crate) fn of(frame: &Frame<'_>, source_idx: usize, layer: u32) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
+        // Depths scaled by the cube root of the ratio of areas make the ratio's cube the
+        // area. In the plane of the proxy that is zero, but nothing is seen from there.
+        let area = frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO));
+        let scale = area.clamp(1e-12, 1e12).cbrt().recip();
         let axis = |r: usize| {
-            let w = source.translation[r] as f32;
-            source.rotation.row(r).as_vec3().extend(w).to_array()
+            let row = source.rotation.row(r).extend(source.translation[r]);
+            (row * scale).as_vec4().to_array()
         };
         let g = source.footprint_ratio;
         let limit = source.lens.limit();
         let f = |v: f64| v as f32;
-        let lens = lens_kind(source.lens.distortion());
-        let (k1234, k56p12, limit) = match source.lens.distortion() {
+        let (lens, lens_rest, limit) = match source.lens.distortion() {
             Distortion::None => ([0.0; 4], [0.0; 4], f64::INFINITY),
             Distortion::Rational { k, p } => (
-                [k[0], k[1], k[2], k[3]],
-                [k[4], k[5], p[0], p[1]],
+                [k[0], k[1], p[0], p[1]],
+                [k[2], k[3], k[4], k[5]],
                 limit * limit,
             ),
-            Distortion::Fisheye { k } => (k, [0.0; 4], limit),
+            Distortion::Fisheye { k } => ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], limit),
         };
         let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
         Self {
             axes: [axis(0), axis(1), axis(2)],
-            center: source.center.as_vec3().extend(f(g)).to_array(),
             focal: source.lens.focal.as_vec2().to_array(),
             principal: source.lens.principal.as_vec2().to_array(),
+            lens: lens.map(f),
+            lens_rest: lens_rest.map(f),
             size: source.size.map(f),
             inverse_feather: f(1.0 / source.feather_px.max(1e-9)),
-            area_scale: f(frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO))),
-            k1234: k1234.map(f),
-            k56p12: k56p12.map(f),
             limit: f(limit.min(1e30)),
-            footprint_excess: f(g * g - 1.0),
-            lens,
+            kind: lens_kind(source.lens.distortion()),
             layer: layer as f32,
+            footprint_excess: f(g * g - 1.0),
+            padding: 0.0,
+            center: source.center.as_vec3().extend(f(g)).to_array(),
             gain: gain.extend(0.0).to_array(),
         }
     }
@@ -155,7 +160,7 @@ pub(crate) fn common_lens(frame: &Frame<'_>) -> Option<f32> {
 fn lens_kind(distortion: Distortion) -> f32 {
     match distortion {
         Distortion::None => LENS_PINHOLE,
-        Distortion::Rational { k, p } if k[3..] == [0.0; 3] && p == [0.0; 2] => LENS_POLYNOMIAL,
+        Distortion::Rational { k, .. } if k[2..] == [0.0; 4] => LENS_BROWN,
         Distortion::Rational { .. } => LENS_RATIONAL,
         Distortion::Fisheye { .. } => LENS_FISHEYE,
     }

@@ -8,7 +8,7 @@ mod shader_tests;
 mod target;
 
 use crate::RenderError;
-use crate::field::TriangulatedField;
+use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
 use crate::rays::RayMap;
@@ -35,6 +35,15 @@ pub struct Gpu {
     rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
     target: Option<Target>,
     failure: Arc<Mutex<Option<String>>>,
+}
+
+/// How the shaders number source views.
+#[derive(Clone, Copy)]
+enum Order {
+    /// As the lumigraph does.
+    AsGiven,
+    /// By their layer of the photos' array, those that have one.
+    ByLayer,
 }
 
 impl fmt::Debug for Gpu {
@@ -137,7 +146,7 @@ impl Gpu {
             .collect();
         wanted.sort_unstable();
         wanted.dedup();
-        let shared = self.prepare(frame, &wanted)?;
+        let shared = self.prepare(frame, &wanted, Order::ByLayer)?;
 
         let corners_of = |bordered: bool| -> Vec<Corner> {
             let triangles = field.triangles.iter().filter(|t| t.bordered == bordered);
@@ -154,14 +163,12 @@ impl Gpu {
         };
         let plain = corners_of(false);
         let bordered = corners_of(true);
-        let entries: Vec<Entry> = field
-            .entries
-            .iter()
-            .map(|e| Entry {
-                source_idx: e.source_idx as f32,
-                values: e.values,
-            })
-            .collect();
+        let photos = self.photos.as_ref().expect("prepared above");
+        let entry = |e: &FieldEntry| Entry {
+            source_idx: photos.layer(e.source_idx as usize) as f32,
+            values: e.values,
+        };
+        let entries: Vec<Entry> = field.entries.iter().map(entry).collect();
         let plain_buffer = self.buffer("corners", &plain, wgpu::BufferUsages::VERTEX);
         let bordered_buffer = self.buffer("corners", &bordered, wgpu::BufferUsages::VERTEX);
         let entries = self.table("entries", bytemuck::cast_slice(&entries), layout::ENTRY_ROW);
@@ -191,9 +198,9 @@ impl Gpu {
         let store_id = frame.lumigraph.photos.id();
         if !self.photos.as_ref().is_some_and(|p| p.complete(store_id)) {
             let used = self.mark(frame)?;
-            self.prepare(frame, &used)?;
+            self.prepare(frame, &used, Order::AsGiven)?;
         }
-        let shared = self.prepare(frame, &[])?;
+        let shared = self.prepare(frame, &[], Order::AsGiven)?;
         let photos = self.photos.as_ref().expect("prepared above");
         let own = self
             .pipelines
@@ -210,7 +217,7 @@ impl Gpu {
 
     /// The source views that the exact field samples anywhere in the picture.
     fn mark(&mut self, frame: &Frame<'_>) -> Result<Vec<usize>, RenderError> {
-        let shared = self.prepare(frame, &[])?;
+        let shared = self.prepare(frame, &[], Order::AsGiven)?;
         let zeros = vec![0_u32; frame.sources.len().max(1)];
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let used = self.buffer("used photos", &zeros, usage);
@@ -244,13 +251,18 @@ impl Gpu {
         &mut self,
         frame: &Frame<'_>,
         wanted: &[usize],
+        order: Order,
     ) -> Result<wgpu::BindGroup, RenderError> {
         Photos::ensure(&mut self.photos, &self.device, &self.queue, frame, wanted)?;
         let rays = self.rays(frame)?;
         let photos = self.photos.as_ref().expect("ensured above");
         let params = Params::of(frame, photos.size);
         let source = |i| Source::of(frame, i, photos.layer(i));
-        let sources: Vec<Source> = (0..frame.sources.len()).map(source).collect();
+        let listed = match order {
+            Order::AsGiven => (0..frame.sources.len()).collect(),
+            Order::ByLayer => photos.by_layer(),
+        };
+        let sources: Vec<Source> = listed.into_iter().map(source).collect();
         let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
         let sources = self.table(
             "sources",

@@ -169,6 +169,17 @@ impl Photos {
         self.layers[source_idx].unwrap_or(0)
     }
 
+    /// The source views on the device, by layer.
+    pub(crate) fn by_layer(&self) -> Vec<usize> {
+        let mut sources = vec![0; self.used_layers as usize];
+        for (source_idx, layer) in self.layers.iter().enumerate() {
+            if let Some(layer) = layer {
+                sources[*layer as usize] = source_idx;
+            }
+        }
+        sources
+    }
+
     /// Whether every photo is on the device.
     pub(crate) fn complete(&self, store_id: u64) -> bool {
         self.store_id == store_id && self.layers.iter().all(Option::is_some)

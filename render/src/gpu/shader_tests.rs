@@ -120,9 +120,9 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("CENTER", offset_of!(Source, center)),
             ("PINHOLE", offset_of!(Source, focal)),
             ("IMAGE", offset_of!(Source, size)),
-            ("K1234", offset_of!(Source, k1234)),
-            ("K56P12", offset_of!(Source, k56p12)),
-            ("KIND", offset_of!(Source, limit)),
+            ("LENS", offset_of!(Source, lens)),
+            ("LENS_REST", offset_of!(Source, lens_rest)),
+            ("KIND", offset_of!(Source, kind)),
             ("GAIN", offset_of!(Source, gain)),
         ] {
             assert_eq!(constants[name] as usize * TEXEL, offset, "{name}");
@@ -132,11 +132,10 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     let within = |field: usize, texel: usize| (field - texel) / size_of::<f32>();
     let image = offset_of!(Source, size);
     assert_eq!(within(offset_of!(Source, inverse_feather), image), 2);
-    assert_eq!(within(offset_of!(Source, area_scale), image), 3);
-    let kind = offset_of!(Source, limit);
-    assert_eq!(within(offset_of!(Source, footprint_excess), kind), 1);
-    assert_eq!(within(offset_of!(Source, lens), kind), 2);
-    assert_eq!(within(offset_of!(Source, layer), kind), 3);
+    assert_eq!(within(offset_of!(Source, limit), image), 3);
+    let kind = offset_of!(Source, kind);
+    assert_eq!(within(offset_of!(Source, layer), kind), 1);
+    assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
 }
@@ -191,10 +190,11 @@ fn shared_numbers_are_the_same() {
             ("BLEND_PAPER", 1.0),
             ("RESOLUTION_RATIO", 0.0),
             ("RESOLUTION_LENGTH", 1.0),
+            ("LEVEL_BIAS", crate::LEVEL_BIAS),
             ("LENS_PINHOLE", f64::from(layout::LENS_PINHOLE)),
             ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),
             ("LENS_FISHEYE", f64::from(layout::LENS_FISHEYE)),
-            ("LENS_POLYNOMIAL", f64::from(layout::LENS_POLYNOMIAL)),
+            ("LENS_BROWN", f64::from(layout::LENS_BROWN)),
         ] {
             // Only a typed constant is left in the module.
             let found = constants.get(name).copied().unwrap_or(f64::NAN);

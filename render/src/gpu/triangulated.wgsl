@@ -11,7 +11,7 @@ const INFINITY: f32 = 3e38;
 @group(1) @binding(0) var photos: texture_2d_array<f32>;
 @group(1) @binding(1) var photo_sampler: sampler;
 // A texel an entry: the source view, then its values at the corners: weights, or in a
-// bordered triangle differences.
+// bordered triangle differences. Source views are numbered by their layer of the array.
 @group(1) @binding(2) var entries: texture_2d<f32>;
 const ENTRIES_PER_ROW = 1024u;
 
@@ -35,9 +35,9 @@ fn corner(
     return Corner(vec4f(ndc, 0.0, 1.0), shares, list);
 }
 
-fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, layer: u32, texel: vec3f) {
+fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, texel: vec3f) {
     let uv = texel.xy / params.array_size;
-    let color = textureSampleLevel(photos, photo_sampler, uv, layer, texel.z);
+    let color = textureSampleLevel(photos, photo_sampler, uv, source_idx, texel.z);
     add(mix, weight, color, source_idx);
 }
 
@@ -62,9 +62,9 @@ fn triangle(in: Corner) -> @location(0) vec4f {
         let source_idx = u32(listed.x);
         // Every listed view sees all of the triangle: fovBlend is one.
         let sight = see(source_idx, ray, s);
-        if sight.seen {
-            let level = level_of_detail(source_idx, sight, ray);
-            add_photo(&mix, weight, source_idx, sight.layer, vec3f(sight.pixel, level));
+        if sight.depth > 0.0 {
+            let level = level_of_detail(sight, ray);
+            add_photo(&mix, weight, source_idx, vec3f(sight.pixel, level));
         }
     }
     return resolve(mix);
@@ -104,7 +104,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
             nearest = min(nearest, diff);
             terms.diff[count] = diff;
             terms.a[count] = a;
-            terms.texel[count] = vec3f(sight.pixel, level_of_detail(source_idx, sight, ray));
+            terms.texel[count] = vec3f(sight.pixel, level_of_detail(sight, ray));
             terms.source_idx[count] = source_idx;
             count++;
         }
@@ -126,8 +126,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
             weight = terms.a[n];
         }
         if weight > 0.0 {
-            let layer = u32(source_data(terms.source_idx[n], KIND).w);
-            add_photo(&mix, weight, terms.source_idx[n], layer, terms.texel[n]);
+            add_photo(&mix, weight, terms.source_idx[n], terms.texel[n]);
         }
     }
     return resolve(mix);
