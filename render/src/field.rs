@@ -205,6 +205,8 @@ pub fn render_reference(
 
 /// The field at a vertex.
 struct Vertex {
+    /// In pixels of the desired image.
+    at: DVec2,
     /// By source view; empty where the lens has no ray.
     sources: Vec<VertexSource>,
     /// The exact blend, by source view.
@@ -219,24 +221,7 @@ struct VertexSource {
 
 impl Vertex {
     fn new(frame: &Frame<'_>, at: DVec2) -> Self {
-        let Some(ray) = frame.desired.lens.unproject(Pixel::new(at.x, at.y)) else {
-            return Self {
-                sources: Vec::new(),
-                weights: Vec::new(),
-            };
-        };
-        // Snapping may have put a vertex of the horizon a little beyond it.
-        let inverse_distance = frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0);
-        let point = ProxyPoint {
-            ray,
-            inverse_distance,
-        };
-        let sources: Vec<VertexSource> = (0..frame.sources.len())
-            .map(|source_idx| VertexSource {
-                diff: frame.difference(source_idx, &point),
-                pixel: frame.project(source_idx, &point),
-            })
-            .collect();
+        let sources = sources_at(frame, at);
         let candidates: Vec<Candidate> = sources
             .iter()
             .enumerate()
@@ -250,10 +235,31 @@ impl Vertex {
             })
             .collect();
         Self {
+            at,
             sources,
             weights: blend(&candidates, &frame.options),
         }
     }
+}
+
+/// What every source view makes of the proxy point at a position in the desired image;
+/// empty where the lens has no ray.
+fn sources_at(frame: &Frame<'_>, at: DVec2) -> Vec<VertexSource> {
+    let Some(ray) = frame.desired.lens.unproject(Pixel::new(at.x, at.y)) else {
+        return Vec::new();
+    };
+    // Snapping may have put a vertex of the horizon a little beyond it.
+    let inverse_distance = frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0);
+    let point = ProxyPoint {
+        ray,
+        inverse_distance,
+    };
+    (0..frame.sources.len())
+        .map(|source_idx| VertexSource {
+            diff: frame.difference(source_idx, &point),
+            pixel: frame.project(source_idx, &point),
+        })
+        .collect()
 }
 
 /// The source views of one triangle.
@@ -308,8 +314,17 @@ impl List {
                 )
             })
             .collect();
-        listed.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        listed.truncate(MAX_LISTED);
+        if listed.len() > MAX_LISTED {
+            // More borders than there is room for: the nearest of each part of the triangle
+            // come first, then the second nearest. (The nearest of all alone left holes
+            // beyond their borders.)
+            let ranks = ranks_within(frame, corners);
+            listed.sort_by(|x, y| {
+                let by_rank = ranks[x.1].cmp(&ranks[y.1]);
+                by_rank.then(x.0.total_cmp(&y.0)).then(x.1.cmp(&y.1))
+            });
+            listed.truncate(MAX_LISTED);
+        }
         listed.sort_by_key(|(_, i)| *i);
         let entry = |(_, i): (f64, usize)| FieldEntry {
             source_idx: i as u32,
@@ -352,6 +367,29 @@ impl List {
             bordered: false,
         }
     }
+}
+
+/// For each source view the best rank, by difference, that it has among the views that see
+/// a point, for points spread over a triangle.
+fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
+    // Steps between points, along each side.
+    const STEPS: u32 = 4;
+    let [a, b, c] = corners.map(|corner| corner.at);
+    let step = |i: u32| f64::from(i) / f64::from(STEPS);
+    let mut ranks = vec![usize::MAX; frame.sources.len()];
+    for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))) {
+        let sources = sources_at(frame, a + step(i) * (b - a) + step(j) * (c - a));
+        let seeing = sources.iter().enumerate().filter_map(|(i, source)| {
+            let sees = frame.fov_blend(i, source.pixel?) >= 0.0;
+            sees.then_some((source.diff, i))
+        });
+        let mut seeing: Vec<(f64, usize)> = seeing.collect();
+        seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for (rank, (_, i)) in seeing.into_iter().enumerate() {
+            ranks[i] = ranks[i].min(rank);
+        }
+    }
+    ranks
 }
 
 fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [Option<Pixel>; 3]) -> Sees {
