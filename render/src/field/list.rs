@@ -1,0 +1,160 @@
+//! Which source views a triangle carries, and with what.
+
+use super::vertex::{Vertex, sources_at};
+use super::{FieldEntry, MAX_LISTED};
+use crate::frame::Frame;
+use calibrate::Pixel;
+
+/// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
+/// straight in the desired image are not quite so in a photo.
+const CLEARANCE_PX: f64 = 2.0;
+
+/// The source views of one triangle.
+pub(super) struct List {
+    pub(super) entries: Vec<FieldEntry>,
+    pub(super) bordered: bool,
+}
+
+/// How a source view sees a triangle.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sees {
+    /// With fovBlend one all over.
+    All,
+    Nothing,
+    Part,
+}
+
+impl List {
+    pub(super) fn of(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
+        if corners.iter().any(|c| c.sources.is_empty()) {
+            // The lens ends inside the triangle. With nothing known beyond, only what the
+            // other corners say counts.
+            return Self::of_weights(corners);
+        }
+        let sees: Vec<Sees> = (0..frame.sources.len())
+            .map(|i| how_it_sees(frame, i, corners.map(|c| c.sources[i].pixel)))
+            .collect();
+        if !sees.contains(&Sees::Part) {
+            return Self::of_weights(corners);
+        }
+
+        // Those that see all of it bound the threshold at each corner from above; a view
+        // beyond that everywhere cannot contribute anywhere.
+        let bound = |corner: &Vertex| {
+            let all = (0..sees.len()).filter(|&i| sees[i] == Sees::All);
+            let diffs = all.map(|i| corner.sources[i].diff).collect();
+            frame.options.threshold_of_seen(diffs)
+        };
+        let bounds = corners.map(bound);
+        let within = |&i: &usize| {
+            sees[i] != Sees::Nothing && (0..3).any(|c| corners[c].sources[i].diff <= bounds[c])
+        };
+        let mut listed: Vec<(f64, usize)> = (0..sees.len())
+            .filter(within)
+            .map(|i| {
+                (
+                    corners
+                        .iter()
+                        .map(|c| c.sources[i].diff)
+                        .fold(f64::MAX, f64::min),
+                    i,
+                )
+            })
+            .collect();
+        if listed.len() > MAX_LISTED {
+            // More borders than there is room for: the nearest of each part of the triangle
+            // come first, then the second nearest. (The nearest of all alone left holes
+            // beyond their borders.)
+            let ranks = ranks_within(frame, corners);
+            listed.sort_by(|x, y| {
+                let by_rank = ranks[x.1].cmp(&ranks[y.1]);
+                by_rank.then(x.0.total_cmp(&y.0)).then(x.1.cmp(&y.1))
+            });
+            listed.truncate(MAX_LISTED);
+        }
+        listed.sort_by_key(|(_, i)| *i);
+        let entry = |(_, i): (f64, usize)| FieldEntry {
+            source_idx: i as u32,
+            values: corners.map(|c| c.sources[i].diff as f32),
+        };
+        Self {
+            entries: listed.into_iter().map(entry).collect(),
+            bordered: true,
+        }
+    }
+
+    /// The union of the corners' contributors, with their weights.
+    fn of_weights(corners: [&Vertex; 3]) -> Self {
+        let mut listed: Vec<usize> = corners
+            .iter()
+            .flat_map(|c| c.weights.iter().map(|w| w.source_idx))
+            .collect();
+        listed.sort_unstable();
+        listed.dedup();
+        let weight = |corner: &Vertex, i: usize| {
+            corner
+                .weights
+                .iter()
+                .find(|w| w.source_idx == i)
+                .map_or(0.0, |w| w.weight as f32)
+        };
+        let entry = |i: usize| FieldEntry {
+            source_idx: i as u32,
+            values: corners.map(|c| weight(c, i)),
+        };
+        let mut entries: Vec<FieldEntry> = listed.into_iter().map(entry).collect();
+        if entries.len() > MAX_LISTED {
+            let total = |e: &FieldEntry| e.values.iter().sum::<f32>();
+            entries.sort_by(|x, y| total(y).total_cmp(&total(x)));
+            entries.truncate(MAX_LISTED);
+            entries.sort_by_key(|e| e.source_idx);
+        }
+        Self {
+            entries,
+            bordered: false,
+        }
+    }
+}
+
+/// For each source view the best rank, by difference, that it has among the views that see
+/// a point, for points spread over a triangle.
+fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
+    // Steps between points, along each side.
+    const STEPS: u32 = 4;
+    let [a, b, c] = corners.map(|corner| corner.at);
+    let step = |i: u32| f64::from(i) / f64::from(STEPS);
+    let mut ranks = vec![usize::MAX; frame.sources.len()];
+    for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))) {
+        let sources = sources_at(frame, a + step(i) * (b - a) + step(j) * (c - a));
+        let seeing = sources.iter().enumerate().filter_map(|(i, source)| {
+            let sees = frame.fov_blend(i, source.pixel?) >= 0.0;
+            sees.then_some((source.diff, i))
+        });
+        let mut seeing: Vec<(f64, usize)> = seeing.collect();
+        seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for (rank, (_, i)) in seeing.into_iter().enumerate() {
+            ranks[i] = ranks[i].min(rank);
+        }
+    }
+    ranks
+}
+
+fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [Option<Pixel>; 3]) -> Sees {
+    let [Some(a), Some(b), Some(c)] = corners else {
+        let none = corners.iter().all(Option::is_none);
+        return if none { Sees::Nothing } else { Sees::Part };
+    };
+    let source = &frame.sources[source_idx];
+    let [width, height] = source.size;
+    let (left, right) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+    let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+    let beyond = (-right).max(left - width).max(-bottom).max(top - height);
+    let inside = left.min(width - right).min(top).min(height - bottom);
+    if inside >= source.feather_px + CLEARANCE_PX {
+        Sees::All
+    } else if beyond > CLEARANCE_PX {
+        Sees::Nothing
+    } else {
+        Sees::Part
+    }
+}
