@@ -16,7 +16,7 @@ mod rigid;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};
-pub use lens::{Distortion, Lens, Pixel};
+pub use lens::{Distortion, Lens, Pixel, Projection};
 pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};
 pub use rigid::Rigid3;
 pub use view::View;
