@@ -50,6 +50,18 @@ pub enum CameraError {
         /// Its value.
         value: f64,
     },
+    /// A parameter lies outside what its formula allows.
+    #[error("parameter {name} of {} is {value}; it must be {expected}", model.name())]
+    Range {
+        /// The model.
+        model: ModelKind,
+        /// Which parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be, in words.
+        expected: &'static str,
+    },
     /// The image has no pixels.
     #[error("the image size is {width} × {height}")]
     Size {
@@ -100,6 +112,28 @@ models! {
     FullOpenCv 6 "FULL_OPENCV"
         ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
         "A rational radial term and two tangential ones.";
+    Fov 7 "FOV" ["fx", "fy", "cx", "cy", "omega"] "The field-of-view model.";
+    SimpleRadialFisheye 8 "SIMPLE_RADIAL_FISHEYE" ["f", "cx", "cy", "k"]
+        "Equidistant with one radial term.";
+    RadialFisheye 9 "RADIAL_FISHEYE" ["f", "cx", "cy", "k1", "k2"]
+        "Equidistant with two radial terms.";
+    ThinPrismFisheye 10 "THIN_PRISM_FISHEYE"
+        ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"]
+        "Equidistant with radial, tangential and thin-prism terms.";
+    RadTanThinPrismFisheye 11 "RAD_TAN_THIN_PRISM_FISHEYE"
+        ["fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1",
+            "s0", "s1", "s2", "s3"]
+        "Equidistant with radial terms, then tangential and thin-prism ones.";
+    SimpleDivision 12 "SIMPLE_DIVISION" ["f", "cx", "cy", "k"]
+        "The division model with one focal length.";
+    Division 13 "DIVISION" ["fx", "fy", "cx", "cy", "k"]
+        "The division model with two focal lengths.";
+    SimpleFisheye 14 "SIMPLE_FISHEYE" ["f", "cx", "cy"] "Equidistant with one focal length.";
+    Fisheye 15 "FISHEYE" ["fx", "fy", "cx", "cy"] "Equidistant with two focal lengths.";
+    Eucm 16 "EUCM" ["fx", "fy", "cx", "cy", "alpha", "beta"]
+        "The enhanced unified camera model.";
+    Equirectangular 17 "EQUIRECTANGULAR" ["w", "h"]
+        "All round, by azimuth and elevation; the parameters are the image's size.";
 }
 
 impl ModelKind {
@@ -121,8 +155,8 @@ impl Camera {
     /// Checks the parameters and returns the lens they describe.
     ///
     /// # Errors
-    /// A wrong number of parameters, one that is not finite, a focal length that is not
-    /// positive, or an empty image.
+    /// A wrong number of parameters, one that is not finite or not in its range, a focal
+    /// length that is not positive, or an empty image.
     pub fn lens(&self) -> Result<Lens, CameraError> {
         let (model, p) = (self.model, &self.params);
         let names = model.parameter_names();
@@ -139,6 +173,14 @@ impl Camera {
             if name.starts_with('f') && value <= 0.0 {
                 return Err(CameraError::Focal { model, name, value });
             }
+            if let Some(expected) = violated_range(name, value) {
+                return Err(CameraError::Range {
+                    model,
+                    name,
+                    value,
+                    expected,
+                });
+            }
         }
         if self.width == 0 || self.height == 0 {
             return Err(CameraError::Size {
@@ -154,6 +196,7 @@ impl Camera {
             k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
             p: [0.0; 2],
         };
+        let fisheye = |k| Distortion::Fisheye { k };
         Ok(match model {
             ModelKind::SimplePinhole => one_focal(Distortion::None),
             ModelKind::Pinhole => two_focals(Distortion::None),
@@ -163,13 +206,55 @@ impl Camera {
                 k: [p[4], p[5], 0.0, 0.0, 0.0, 0.0],
                 p: [p[6], p[7]],
             }),
-            ModelKind::OpenCvFisheye => two_focals(Distortion::Fisheye {
-                k: [p[4], p[5], p[6], p[7]],
-            }),
+            ModelKind::OpenCvFisheye => two_focals(fisheye([p[4], p[5], p[6], p[7]])),
             ModelKind::FullOpenCv => two_focals(Distortion::Rational {
                 k: [p[4], p[5], p[8], p[9], p[10], p[11]],
                 p: [p[6], p[7]],
             }),
+            ModelKind::Fov => two_focals(Distortion::Fov { omega: p[4] }),
+            ModelKind::SimpleRadialFisheye => one_focal(fisheye([p[3], 0.0, 0.0, 0.0])),
+            ModelKind::RadialFisheye => one_focal(fisheye([p[3], p[4], 0.0, 0.0])),
+            ModelKind::ThinPrismFisheye => two_focals(Distortion::ThinPrismFisheye {
+                k: [p[4], p[5], p[8], p[9]],
+                p: [p[6], p[7]],
+                s: [p[10], p[11]],
+            }),
+            ModelKind::RadTanThinPrismFisheye => two_focals(Distortion::RadTanThinPrismFisheye {
+                k: [p[4], p[5], p[6], p[7], p[8], p[9]],
+                p: [p[10], p[11]],
+                s: [p[12], p[13], p[14], p[15]],
+            }),
+            ModelKind::SimpleDivision => one_focal(Distortion::Division { k: p[3] }),
+            ModelKind::Division => two_focals(Distortion::Division { k: p[4] }),
+            ModelKind::SimpleFisheye => one_focal(fisheye([0.0; 4])),
+            ModelKind::Fisheye => two_focals(fisheye([0.0; 4])),
+            ModelKind::Eucm => two_focals(Distortion::Eucm {
+                alpha: p[4],
+                beta: p[5],
+            }),
+            // Azimuth runs from −π to π over the width, elevation from −π/2 to π/2 over
+            // the height.
+            ModelKind::Equirectangular => Lens::new(
+                DVec2::new(0.5 * p[0], p[1]) / std::f64::consts::PI,
+                DVec2::new(0.5 * p[0], 0.5 * p[1]),
+                Distortion::Equirectangular,
+            ),
         })
     }
+}
+
+/// What a parameter must be, if its value is something else. Names mean the same in every
+/// model that has them.
+fn violated_range(name: &str, value: f64) -> Option<&'static str> {
+    let (holds, expected) = match name {
+        "omega" => (
+            value.abs() < std::f64::consts::PI,
+            "an angle in radians between −π and π",
+        ),
+        "alpha" => ((0.0..=1.0).contains(&value), "between 0 and 1"),
+        "beta" => (value > 0.0, "positive"),
+        "w" | "h" => (value > 0.0, "the image's size, which is positive"),
+        _ => (true, ""),
+    };
+    (!holds).then_some(expected)
 }

@@ -17,7 +17,7 @@ mod ties;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};
-pub use lens::{Distortion, Lens, Pixel};
+pub use lens::{Distortion, Lens, Pixel, Projection};
 pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};
 pub use rigid::Rigid3;
 pub use ties::{TRUSTED_TIE, WeakGroup};

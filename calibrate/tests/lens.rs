@@ -4,6 +4,7 @@ use calibrate::{Camera, Distortion, Lens, ModelKind, Pixel};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use serde_json::Value;
+use std::f64::consts::{PI, TAU};
 use std::fs;
 
 const CAMERA_MODELS: &str = concat!(
@@ -11,7 +12,7 @@ const CAMERA_MODELS: &str = concat!(
     "/../../shared/captures/camera-models.json"
 );
 
-const CASES: u32 = 1000;
+const CASES: u32 = 4000;
 
 fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
     let numbers: Vec<f64> = value
@@ -52,11 +53,10 @@ fn every_model_projects_and_unprojects_as_colmap_does() {
             let point = DVec3::from_array(numbers(&sample["xyz"]).unwrap());
             let projected = lens.project(point);
             let Some([x, y]) = numbers(&sample["pixel"]) else {
-                // COLMAP lets no camera look back; our fisheyes see beyond 90°.
-                let looks_back = matches!(lens.distortion(), Distortion::Fisheye { .. });
+                // COLMAP lets most cameras not look back; our wide ones see beyond 90°.
                 assert!(point.z <= 0.0, "{}: {point}", model.name());
                 assert!(
-                    projected.is_none() || looks_back,
+                    projected.is_none() || looks_back(&lens),
                     "{}: {point}",
                     model.name()
                 );
@@ -66,28 +66,52 @@ fn every_model_projects_and_unprojects_as_colmap_does() {
             let Some(projected) = projected else {
                 refused += 1;
                 let radius = point.truncate().length();
-                let beyond = match lens.distortion() {
-                    Distortion::Fisheye { .. } => radius.atan2(point.z) > lens.limit(),
-                    _ => radius > lens.limit() * point.z,
+                let beyond = if on_plane(&lens) {
+                    radius > lens.limit() * point.z
+                } else {
+                    radius.atan2(point.z) > lens.limit()
                 };
                 assert!(beyond, "{}: {point}", model.name());
                 continue;
             };
-            worst_px = worst_px.max(projected.distance(pixel));
+            worst_px = worst_px.max(projected.distance(pixel) / (1.0 + 1e-3 * x.hypot(y)));
             let ray = DVec3::from_array(numbers(&sample["ray"]).unwrap());
             worst_ray = worst_ray.max((lens.unproject(pixel).unwrap() - ray).length());
+        }
+        let pixel_samples = entry["pixel_samples"].as_array().unwrap();
+        for sample in pixel_samples {
+            let [x, y] = numbers(&sample["pixel"]).unwrap();
+            let ray = DVec3::from_array(numbers(&sample["ray"]).unwrap());
+            let Some(found) = lens.unproject(Pixel::new(x, y)) else {
+                refused += 1;
+                continue;
+            };
+            worst_ray = worst_ray.max((found - ray).length());
         }
         println!(
             "{}: {} samples, {refused} refused, worst {worst_px:.1e} px, ray {worst_ray:.1e}",
             model.name(),
-            samples.len(),
+            samples.len() + pixel_samples.len(),
         );
+        // 1e-9 px, or 1e-12 of the pixel's coordinates.
         assert!(worst_px < 1e-9, "{}", model.name());
         assert!(worst_ray < 1e-9, "{}", model.name());
         assert!(refused <= 2, "{}", model.name());
         met += 1;
     }
     assert_eq!(met, ModelKind::ALL.len());
+}
+
+/// Whether the limit is a radius on the plane z = 1, not an angle.
+fn on_plane(lens: &Lens) -> bool {
+    matches!(
+        lens.distortion(),
+        Distortion::None | Distortion::Rational { .. }
+    )
+}
+
+fn looks_back(lens: &Lens) -> bool {
+    !on_plane(lens) && lens.limit() > 0.5 * PI
 }
 
 /// An image 1000 pixels wide and up to as high, seen at a width of 40° to 90°.
@@ -140,12 +164,43 @@ fn fisheye() -> impl Strategy<Value = Distortion> {
     [-0.1..0.1, -0.05..0.05, -0.02..0.02, -0.005..0.005].prop_map(|k| Distortion::Fisheye { k })
 }
 
+fn thin_prism() -> impl Strategy<Value = Distortion> {
+    (
+        [-0.1..0.1, -0.05..0.05, -0.02..0.02, -0.005..0.005],
+        [-0.01..0.01, -0.01..0.01],
+        [-0.01..0.01, -0.01..0.01],
+    )
+        .prop_map(|(k, p, s)| Distortion::ThinPrismFisheye { k, p, s })
+}
+
+fn rad_tan_thin_prism() -> impl Strategy<Value = Distortion> {
+    (
+        [
+            -0.1..0.1,
+            -0.05..0.05,
+            -0.02..0.02,
+            -0.005..0.005,
+            -0.001..0.001,
+            -0.0001..0.0001,
+        ],
+        [-0.01..0.01, -0.01..0.01],
+        [-0.01..0.01, -0.003..0.003, -0.01..0.01, -0.003..0.003],
+    )
+        .prop_map(|(k, p, s)| Distortion::RadTanThinPrismFisheye { k, p, s })
+}
+
 fn any_lens() -> impl Strategy<Value = Lens> {
     lens(prop_oneof![
         Just(Distortion::None),
         radial(),
         brown_conrady(),
-        fisheye()
+        fisheye(),
+        thin_prism(),
+        rad_tan_thin_prism(),
+        (0.01..1.6).prop_map(|omega| Distortion::Fov { omega }),
+        (-0.5..0.5).prop_map(|k| Distortion::Division { k }),
+        (0.0..1.0, 0.5..2.0).prop_map(|(alpha, beta)| Distortion::Eucm { alpha, beta }),
+        Just(Distortion::Equirectangular),
     ])
 }
 
@@ -178,17 +233,21 @@ proptest! {
     fn a_pixel_leads_back_to_its_point(
         lens in any_lens(),
         share in 0.0..0.9,
-        around in 0.0..std::f64::consts::TAU,
+        around in 0.0..TAU,
         depth in 0.01..1e4,
     ) {
-        let fisheye = matches!(lens.distortion(), Distortion::Fisheye { .. });
-        // Up to 60° off the axis, 110° for a fisheye.
-        let radius: f64 = share * lens.limit().min(if fisheye { 1.92 } else { 1.73 });
+        // Up to 60° off the axis, 110° where lenses see that, 180° for the whole sphere.
         let (sin, cos) = around.sin_cos();
-        let ray = if fisheye {
-            DVec3::new(cos * radius.sin(), sin * radius.sin(), radius.cos())
-        } else {
+        let ray = if on_plane(&lens) {
+            let radius: f64 = share * lens.limit().min(1.73);
             DVec3::new(cos * radius, sin * radius, 1.0).normalize()
+        } else {
+            let most = match lens.distortion() {
+                Distortion::Equirectangular => PI,
+                _ => 1.92,
+            };
+            let angle: f64 = share * lens.limit().min(most);
+            DVec3::new(cos * angle.sin(), sin * angle.sin(), angle.cos())
         };
         let Some(pixel) = lens.project(ray * depth) else {
             return Err(TestCaseError::fail(format!("{ray} is not projected")));
@@ -197,6 +256,34 @@ proptest! {
             return Err(TestCaseError::fail(format!("{ray} → {pixel:?} → nothing")));
         };
         prop_assert!((again - ray).length() < 1e-9, "{} → {:?} → {}", ray, pixel, again);
+    }
+
+    /// Gradients are central differences of the projection, wherever it is smooth.
+    #[test]
+    fn gradients_meet_finite_differences(
+        lens in any_lens(),
+        share in 0.0..0.8,
+        around in 0.0..TAU,
+        depth in 0.1..10.0,
+    ) {
+        let most = if on_plane(&lens) { lens.limit().atan().min(1.05) } else { lens.limit().min(1.92) };
+        let angle: f64 = share * most;
+        let (sin, cos) = around.sin_cos();
+        let point = depth * DVec3::new(cos * angle.sin(), sin * angle.sin(), angle.cos());
+        let projection = lens.project_with_gradients(point).unwrap();
+        prop_assert!(projection.pixel.distance(lens.project(point).unwrap()) < 1e-9);
+        let h: f64 = 1e-5 * depth;
+        for (axis, step) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            let [ahead, behind] = [1.0, -1.0].map(|sign| lens.project(point + sign * h * step));
+            let (Some(ahead), Some(behind)) = (ahead, behind) else { continue };
+            let expected = DVec2::new(ahead.x - behind.x, ahead.y - behind.y) / (2.0 * h);
+            let found = DVec2::new(projection.gradients[0][axis], projection.gradients[1][axis]);
+            let scale = lens.focal.x / depth;
+            prop_assert!(
+                found.distance(expected) < 1e-6 * scale,
+                "{} by axis {}: {} instead of {}", point, axis, found, expected
+            );
+        }
     }
 }
 
@@ -221,6 +308,24 @@ fn realistic_lenses_unproject_every_pixel() {
         Distortion::Fisheye {
             k: [-0.02, 0.01, -0.007, 0.0015],
         },
+        Distortion::ThinPrismFisheye {
+            k: [0.02, -0.009, 0.003, -0.001],
+            p: [0.0004, -0.0006],
+            s: [0.0005, -0.0004],
+        },
+        Distortion::RadTanThinPrismFisheye {
+            k: [0.087, -0.031, 0.008, -0.0027, 0.0006, -5e-5],
+            p: [0.0003, -0.0002],
+            s: [0.0002, -0.0001, 0.0002, 0.0001],
+        },
+        Distortion::Fov { omega: 0.92 },
+        Distortion::Division { k: -0.18 },
+        Distortion::Division { k: 0.1 },
+        Distortion::Eucm {
+            alpha: 0.59,
+            beta: 1.09,
+        },
+        Distortion::Equirectangular,
     ] {
         let lens = Lens::new(focal, center, distortion);
         for row in (0..=750).step_by(25) {
@@ -298,4 +403,164 @@ fn tangential_terms_end_the_range_too() {
     let limit = |p| Lens::new(DVec2::ONE, DVec2::ZERO, Distortion::Rational { k, p }).limit();
     assert!(limit([0.0; 2]).is_infinite());
     assert!(limit([0.002, 0.0]) < 1.4);
+}
+
+/// Formulas go on beyond what a camera sees; numbers do not.
+#[test]
+fn new_models_see_as_far_as_their_formula_is_one_to_one() {
+    let lens = |distortion| Lens::new(DVec2::splat(300.0), DVec2::ZERO, distortion);
+    let at = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        DVec3::new(sin, 0.0, cos)
+    };
+    for (distortion, sees, does_not, too_far) in [
+        // π/2ω
+        (Distortion::Fov { omega: 0.9 }, 89.999, 90.001, 1.7454),
+        // tan θ = 1/(2√k), at 1/√k
+        (Distortion::Division { k: 0.25 }, 44.999, 45.001, 2.0001),
+        // At 1/√(2α − 1), tan θ = −√(2α − 1)/(1 − α)
+        (
+            Distortion::Eucm {
+                alpha: 0.75,
+                beta: 1.0,
+            },
+            109.47,
+            109.48,
+            1.41422,
+        ),
+        (
+            Distortion::Eucm {
+                alpha: 1.0,
+                beta: 1.0,
+            },
+            89.99,
+            90.01,
+            1.0001,
+        ),
+    ] {
+        let lens = lens(distortion);
+        assert!(lens.project(at(sees)).is_some(), "{distortion:?}");
+        assert_eq!(lens.project(at(does_not)), None, "{distortion:?}");
+        assert_eq!(
+            lens.unproject(Pixel::new(300.0 * too_far, 0.0)),
+            None,
+            "{distortion:?}"
+        );
+        let last = Pixel::new(300.0 * 0.999 * too_far, 0.0);
+        assert!(lens.unproject(last).is_some(), "{distortion:?}");
+    }
+    for distortion in [
+        Distortion::Division { k: -0.2 },
+        Distortion::Eucm {
+            alpha: 0.5,
+            beta: 1.0,
+        },
+        Distortion::Equirectangular,
+    ] {
+        let lens = lens(distortion);
+        let pixel = lens.project(at(179.0)).unwrap();
+        assert!((lens.unproject(pixel).unwrap() - at(179.0)).length() < 1e-9);
+        assert_eq!(lens.project(DVec3::ZERO), None);
+        assert_eq!(lens.project(DVec3::NAN), None);
+        assert_eq!(lens.unproject(Pixel::new(f64::NAN, 0.0)), None);
+    }
+    // The sphere ends where its image does: the same rays again would lie beyond.
+    let sphere = lens(Distortion::Equirectangular);
+    assert!(
+        sphere
+            .unproject(Pixel::new(300.0 * PI, -150.0 * PI))
+            .is_some()
+    );
+    assert_eq!(sphere.unproject(Pixel::new(300.1 * PI, 0.0)), None);
+    assert_eq!(sphere.unproject(Pixel::new(0.0, 150.1 * PI)), None);
+}
+
+/// What bends too little to matter is a pinhole, whatever its name.
+#[test]
+fn parameters_that_bend_nothing_make_a_pinhole() {
+    for distortion in [
+        Distortion::Fov { omega: 0.0 },
+        Distortion::Division { k: 0.0 },
+        Distortion::Eucm {
+            alpha: 0.0,
+            beta: 2.0,
+        },
+    ] {
+        let lens = Lens::new(DVec2::ONE, DVec2::ZERO, distortion);
+        assert_eq!(lens, Lens::pinhole(DVec2::ONE, DVec2::ZERO));
+    }
+    // Weak ones are close to it.
+    let point = DVec3::new(0.5, -0.4, 1.0);
+    for distortion in [
+        Distortion::Fov { omega: 1e-5 },
+        Distortion::Division { k: 1e-10 },
+        Distortion::Eucm {
+            alpha: 1e-10,
+            beta: 2.0,
+        },
+    ] {
+        let lens = Lens::new(DVec2::ONE, DVec2::ZERO, distortion);
+        let pixel = lens.project(point).unwrap();
+        assert!(
+            pixel.distance(Pixel::new(0.5, -0.4)) < 1e-9,
+            "{distortion:?}"
+        );
+        assert!(!lens.is_wide(), "{distortion:?}");
+    }
+}
+
+#[test]
+fn parameters_out_of_their_range_are_refused_by_name() {
+    let error = |model, params: &[f64]| {
+        let camera = Camera {
+            model,
+            width: 10,
+            height: 10,
+            params: params.to_vec(),
+        };
+        camera.lens().unwrap_err().to_string()
+    };
+    assert_eq!(
+        error(ModelKind::Eucm, &[1.0, 1.0, 0.0, 0.0, 1.5, 1.0]),
+        "parameter alpha of EUCM is 1.5; it must be between 0 and 1"
+    );
+    assert_eq!(
+        error(ModelKind::Eucm, &[1.0, 1.0, 0.0, 0.0, 0.5, 0.0]),
+        "parameter beta of EUCM is 0; it must be positive"
+    );
+    assert_eq!(
+        error(ModelKind::Fov, &[1.0, 1.0, 0.0, 0.0, 3.2]),
+        "parameter omega of FOV is 3.2; it must be an angle in radians between −π and π"
+    );
+    assert_eq!(
+        error(ModelKind::Equirectangular, &[0.0, 10.0]),
+        "parameter w of EQUIRECTANGULAR is 0; it must be the image's size, which is positive"
+    );
+}
+
+/// A rounding error beside the image is nowhere, and a picture would show the gap.
+#[test]
+fn a_sphere_has_its_seam_and_its_poles_in_the_image() {
+    for (width, height) in [(1024, 512), (1000, 500), (4096, 2048), (7777, 3331)] {
+        let camera = Camera {
+            model: ModelKind::Equirectangular,
+            width,
+            height,
+            params: vec![f64::from(width), f64::from(height)],
+        };
+        let lens = camera.lens().unwrap();
+        for x in [0.0, -0.0, 1e-300, -1e-300, 1e-17, -1e-17] {
+            for y in [-1.0, -0.3, 0.0, 0.3, 1.0] {
+                for z in [-1.0, 0.0] {
+                    let Some(pixel) = lens.project(DVec3::new(x, y, z)) else {
+                        assert!(x == 0.0 && y == 0.0 && z == 0.0);
+                        continue;
+                    };
+                    let inside = (0.0..=f64::from(width)).contains(&pixel.x)
+                        && (0.0..=f64::from(height)).contains(&pixel.y);
+                    assert!(inside, "{width} × {height}: {x}, {y}, {z} → {pixel:?}");
+                }
+            }
+        }
+    }
 }

@@ -1,8 +1,11 @@
 //! One desired view, made ready: everything about the source views as seen from it.
 
+#[cfg(test)]
+pub(crate) mod every_lens;
+
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
-use calibrate::{Distortion, Lens, Pixel, View};
+use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
 use proxy::Proxy;
 
@@ -184,7 +187,7 @@ impl<'a> Frame<'a> {
     ///
     /// A patch of the proxy covers, in an image of focal length f whose centre lies at
     /// distance h from the patch's plane and which sees it at depth z, f²·h/z³ times its
-    /// area; the ratio of two such terms is exact for pinholes and planes. A fisheye has
+    /// area; the ratio of two such terms is exact for pinholes and planes. A wide lens has
     /// the distance in the depth's place.
     pub fn level_of_detail(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
         let source = &self.sources[source_idx];
@@ -206,11 +209,12 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The depth, or for a fisheye the distance, that decides a patch's area in the image.
+/// The depth, or for a wide lens the distance, that decides a patch's area in the image.
 pub(crate) fn depth_for_area(lens: &Lens, point_in_camera: DVec3) -> f64 {
-    match lens.distortion() {
-        Distortion::Fisheye { .. } => point_in_camera.length(),
-        Distortion::None | Distortion::Rational { .. } => point_in_camera.z,
+    if lens.is_wide() {
+        point_in_camera.length()
+    } else {
+        point_in_camera.z
     }
 }
 

@@ -3,7 +3,7 @@
 //! No count is believed before the bytes it announces are there.
 
 use super::check;
-use super::error::{ColmapError, Place, foreign_model, malformed};
+use super::error::{ColmapError, Place, malformed};
 use crate::{
     Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Reconstruction,
 };
@@ -34,7 +34,7 @@ pub(super) fn read_cameras(
                 path,
                 place,
                 camera_id: id,
-                model: foreign_model(model_id),
+                model: model_id.to_string(),
             }
         })?;
         let width = cursor.side("width")?;

@@ -81,7 +81,7 @@ pub enum ColmapError {
         place: Place,
         /// The camera.
         camera_id: u32,
-        /// The model's id and, where known, name.
+        /// The model's id or name.
         model: String,
     },
     /// A camera's parameters describe no lens.
@@ -196,26 +196,6 @@ fn lacks(incomplete: &[Incomplete]) -> String {
             format!("; {} lacks {}", folder.display(), missing.join(" and "))
         })
         .collect()
-}
-
-/// What an error calls a camera model that [`ModelKind`] lacks: its id in COLMAP and,
-/// where known, its name.
-pub(super) fn foreign_model(id: i32) -> String {
-    let name = match id {
-        7 => "FOV",
-        8 => "SIMPLE_RADIAL_FISHEYE",
-        9 => "RADIAL_FISHEYE",
-        10 => "THIN_PRISM_FISHEYE",
-        11 => "RAD_TAN_THIN_PRISM_FISHEYE",
-        12 => "SIMPLE_DIVISION",
-        13 => "DIVISION",
-        14 => "SIMPLE_FISHEYE",
-        15 => "FISHEYE",
-        16 => "EUCM",
-        17 => "EQUIRECTANGULAR",
-        _ => return id.to_string(),
-    };
-    format!("{id} ({name})")
 }
 
 pub(super) fn malformed(path: &Path, place: Place, problem: impl Into<String>) -> ColmapError {

@@ -24,10 +24,16 @@ fn camera() -> impl Strategy<Value = Camera> {
         prop::sample::select(ModelKind::ALL),
         1_u32..5000,
         1_u32..5000,
-        vec(0.001..2000.0, 12),
+        vec(0.001..2000.0, 16),
     )
         .prop_map(|(model, width, height, mut params)| {
             params.truncate(model.parameter_names().len());
+            for (value, name) in params.iter_mut().zip(model.parameter_names()) {
+                // These have bounds.
+                if ["omega", "alpha"].contains(name) {
+                    *value /= 2000.0;
+                }
+            }
             Camera {
                 model,
                 width,

@@ -31,7 +31,7 @@ const RESOLUTION_LENGTH = 1u;
 
 // A source view is SOURCE_TEXELS texels of a texture (`Source` of layout.rs): software
 // drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
-const SOURCE_TEXELS = 10u;
+const SOURCE_TEXELS = 11u;
 const SOURCES_PER_ROW = 128u;
 // Rows of the rotation from the desired camera's frame; w: the translation. All are scaled
 // so that a patch of the proxy at equal depth in both cameras covers equally many pixels.
@@ -40,18 +40,22 @@ const Y_AXIS = 1u;
 const Z_AXIS = 2u;
 // Focal lengths, principal point.
 const PINHOLE = 3u;
-// k1, k2, p1, p2; of a fisheye k1, k2.
+// k1, k2, p1, p2; of a fisheye k1, k2. FOV: 2 tan(omega / 2), 1 / omega. Division: k.
+// EUCM: alpha, beta, and z over the radius at its limit.
 const LENS = 4u;
 // k3, k4, k5, k6; of a fisheye k3, k4.
 const LENS_REST = 5u;
 // Image size; inverse feather; limit of the squared radius, or of theta for a fisheye.
 const IMAGE = 6u;
-// LENS_*; layer of the photos' array; g squared less one.
+// LENS_*; layer of the photos' array; g squared less one; of the rarer lenses 1 where the
+// level of detail follows the distance.
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
 // rgb.
 const GAIN = 9u;
+// Prism terms by r^2, and by r^4.
+const PRISM = 10u;
 
 // The one kind of lens that all source views have; negative where they differ. Set when a
 // pipeline is made, so that no pixel pays for lenses that are not there.
@@ -62,6 +66,13 @@ const LENS_RATIONAL: f32 = 1.0;
 const LENS_FISHEYE: f32 = 2.0;
 // Rational with k3 to k6 zero.
 const LENS_BROWN: f32 = 3.0;
+// The rarer ones.
+const LENS_THIN_PRISM: f32 = 4.0;
+const LENS_BENT_PRISM: f32 = 5.0;
+const LENS_FOV: f32 = 6.0;
+const LENS_DIVISION: f32 = 7.0;
+const LENS_EUCM: f32 = 8.0;
+const LENS_EQUIRECTANGULAR: f32 = 9.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
@@ -75,7 +86,7 @@ fn source_data(source_idx: u32, texel: u32) -> vec4f {
 // Where a proxy point falls in a photo.
 struct Sight {
     pixel: vec2f,
-    // Depth, or distance for a fisheye, scaled as the axes are; 0 where the camera looks
+    // Depth, or distance for a wide lens, scaled as the axes are; 0 where the camera looks
     // the other way.
     depth: f32,
     // Squared radius, or theta for a fisheye; beyond the lens' limit the pixel means nothing.
@@ -103,6 +114,101 @@ fn ray_through(pixel: vec2u) -> vec3f {
         return textureLoad(rays, pixel, 0).xyz;
     }
     return vec3f((vec2f(pixel) + 0.5 - params.ray_offset) * params.ray_scale, 1.0);
+}
+
+// What a rarer lens makes of a point of its camera's frame.
+struct Bent {
+    at: vec2f,
+    seen: bool,
+    // See Sight.
+    reach: f32,
+}
+
+const UNSEEN = Bent(vec2f(0.0), false, 0.0);
+
+// Fisheyes with tangential and prism terms: of the undistorted point, or of the bent one.
+fn bend_prism(source_idx: u32, p: vec3f, of_bent: bool) -> Bent {
+    let radius = length(p.xy);
+    let theta = angle(radius, p.z);
+    if radius == 0.0 && p.z <= 0.0 {
+        return UNSEEN;
+    }
+    let k = source_data(source_idx, LENS);
+    let rest = source_data(source_idx, LENS_REST);
+    let prism = source_data(source_idx, PRISM);
+    let t2 = theta * theta;
+    let higher = rest.x + t2 * (rest.y + t2 * (rest.z + t2 * rest.w));
+    let factor = 1.0 + t2 * (k.x + t2 * (k.y + t2 * higher));
+    let unbent = p.xy * select(1.0 / p.z, theta / radius, radius > 0.0);
+    let bent = unbent * factor;
+    let m = select(unbent, bent, of_bent);
+    let r2 = dot(m, m);
+    let sideways = 2.0 * k.zw * m.x * m.y + k.wz * (r2 + 2.0 * m * m);
+    return Bent(bent + sideways + r2 * (prism.xy + r2 * prism.zw), true, theta);
+}
+
+fn bend_fov(p: vec3f, c: f32, inverse_omega: f32) -> Bent {
+    if p.z <= 0.0 {
+        return UNSEEN;
+    }
+    let radius = length(p.xy);
+    let r = angle(c * radius, p.z) * inverse_omega;
+    let scale = select(c * inverse_omega / p.z, r / radius, radius > 0.0);
+    return Bent(p.xy * scale, true, 0.0);
+}
+
+fn bend_division(p: vec3f, k: f32) -> Bent {
+    let four = 4.0 * k * dot(p.xy, p.xy);
+    let square = p.z * p.z - four;
+    let root = sqrt(max(square, 0.0));
+    // z + root, without its cancelling behind.
+    let below = select(-four / (root - p.z), p.z + root, p.z >= 0.0);
+    // Straight back is nowhere.
+    if square <= 0.0 || (p.z <= 0.0 && k >= 0.0) || below <= 1e-6 * root {
+        return UNSEEN;
+    }
+    return Bent(p.xy * (2.0 / below), true, 0.0);
+}
+
+fn bend_eucm(p: vec3f, alpha: f32, beta: f32, cotangent: f32) -> Bent {
+    let r2 = dot(p.xy, p.xy);
+    let distance = sqrt(beta * r2 + p.z * p.z);
+    let a = alpha * distance;
+    let b = (1.0 - alpha) * p.z;
+    // a + b, without its cancelling behind.
+    let behind = (alpha * alpha * beta * r2 + (2.0 * alpha - 1.0) * p.z * p.z) / (a - b);
+    let below = select(behind, a + b, p.z >= 0.0);
+    if p.z < cotangent * sqrt(r2) || below <= 1e-12 * distance {
+        return UNSEEN;
+    }
+    return Bent(p.xy / below, true, 0.0);
+}
+
+// Keeps the seam and the poles in the image: no rounding error takes them across its border.
+const ALMOST_PI: f32 = 3.141591;
+
+fn bend_equirectangular(p: vec3f) -> Bent {
+    let azimuth = min(angle(abs(p.x), p.z), ALMOST_PI);
+    let elevation = min(angle(abs(p.y), length(p.xz)), 0.5 * ALMOST_PI);
+    let at = vec2f(azimuth, elevation);
+    return Bent(select(at, -at, p.xy < vec2f(0.0)), true, 0.0);
+}
+
+fn bend_rare(source_idx: u32, lens: f32, p: vec3f) -> Bent {
+    if lens <= LENS_BENT_PRISM {
+        return bend_prism(source_idx, p, lens == LENS_BENT_PRISM);
+    }
+    if lens == LENS_EQUIRECTANGULAR {
+        return bend_equirectangular(p);
+    }
+    let own = source_data(source_idx, LENS);
+    if lens == LENS_FOV {
+        return bend_fov(p, own.x, own.y);
+    }
+    if lens == LENS_DIVISION {
+        return bend_division(p, own.x);
+    }
+    return bend_eucm(p, own.x, own.y, own.z);
 }
 
 fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
@@ -133,6 +239,14 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
         bent = p.xy * select(1.0 / p.z, r / radius, radius > 0.0);
         sight.depth = length(p);
         sight.reach = theta;
+    } else if lens >= LENS_THIN_PRISM {
+        let rare = bend_rare(source_idx, lens, p);
+        if !rare.seen {
+            return sight;
+        }
+        bent = rare.at;
+        sight.depth = select(p.z, length(p), source_data(source_idx, KIND).w == 1.0);
+        sight.reach = rare.reach;
     } else {
         if p.z <= 0.0 {
             return sight;

@@ -36,7 +36,7 @@ pub(crate) struct Source {
     pub axes: [[f32; 4]; 3],
     pub focal: [f32; 2],
     pub principal: [f32; 2],
-    /// k₁, k₂, p₁, p₂.
+    /// k₁, k₂, p₁, p₂; of lenses in closed form their own parameters.
     pub lens: [f32; 4],
     /// k₃ to k₆.
     pub lens_rest: [f32; 4],
@@ -46,9 +46,10 @@ pub(crate) struct Source {
     pub kind: f32,
     pub layer: f32,
     pub footprint_excess: f32,
-    pub padding: f32,
+    pub wide: f32,
     pub center: [f32; 4],
     pub gain: [f32; 4],
+    pub prism: [f32; 4],
 }
 
 /// `Corner`'s inputs of triangulated.wgsl.
@@ -76,6 +77,12 @@ pub(super) const LENS_PINHOLE: f32 = 0.0;
 pub(super) const LENS_RATIONAL: f32 = 1.0;
 pub(super) const LENS_FISHEYE: f32 = 2.0;
 pub(super) const LENS_BROWN: f32 = 3.0;
+pub(super) const LENS_THIN_PRISM: f32 = 4.0;
+pub(super) const LENS_BENT_PRISM: f32 = 5.0;
+pub(super) const LENS_FOV: f32 = 6.0;
+pub(super) const LENS_DIVISION: f32 = 7.0;
+pub(super) const LENS_EUCM: f32 = 8.0;
+pub(super) const LENS_EQUIRECTANGULAR: f32 = 9.0;
 
 impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
@@ -88,7 +95,7 @@ impl Params {
             array_size: array_size.map(|v| v as f32),
             size: [frame.desired.width, frame.desired.height],
             source_count: frame.sources.len() as u32,
-            desired_by_distance: u32::from(is_fisheye(lens.distortion())),
+            desired_by_distance: u32::from(lens.is_wide()),
             beta: frame.options.beta as f32,
             full_weight: frame.options.full_weight() as f32,
             k: frame.options.k as u32,
@@ -121,14 +128,42 @@ impl Source {
         let g = source.footprint_ratio;
         let limit = source.lens.limit();
         let f = |v: f64| v as f32;
-        let (lens, lens_rest, limit) = match source.lens.distortion() {
-            Distortion::None => ([0.0; 4], [0.0; 4], f64::INFINITY),
+        let none = [0.0; 4];
+        let (lens, lens_rest, prism, limit) = match source.lens.distortion() {
+            Distortion::None => (none, none, none, f64::INFINITY),
             Distortion::Rational { k, p } => (
                 [k[0], k[1], p[0], p[1]],
                 [k[2], k[3], k[4], k[5]],
+                none,
                 limit * limit,
             ),
-            Distortion::Fisheye { k } => ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], limit),
+            Distortion::Fisheye { k } => {
+                ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], none, limit)
+            }
+            Distortion::ThinPrismFisheye { k, p, s } => (
+                [k[0], k[1], p[0], p[1]],
+                [k[2], k[3], 0.0, 0.0],
+                [s[0], s[1], 0.0, 0.0],
+                limit,
+            ),
+            // Its tangential terms are numbered the other way round.
+            Distortion::RadTanThinPrismFisheye { k, p, s } => (
+                [k[0], k[1], p[1], p[0]],
+                [k[2], k[3], k[4], k[5]],
+                [s[0], s[2], s[1], s[3]],
+                limit,
+            ),
+            Distortion::Fov { omega } => {
+                let omega = omega.abs();
+                let lens = [2.0 * (0.5 * omega).tan(), 1.0 / omega, 0.0, 0.0];
+                (lens, none, none, limit)
+            }
+            Distortion::Division { k } => ([k, 0.0, 0.0, 0.0], none, none, limit),
+            Distortion::Eucm { alpha, beta } => {
+                let cotangent = limit.cos() / limit.sin();
+                ([alpha, beta, cotangent, 0.0], none, none, limit)
+            }
+            Distortion::Equirectangular => (none, none, none, limit),
         };
         let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
         Self {
@@ -143,9 +178,10 @@ impl Source {
             kind: lens_kind(source.lens.distortion()),
             layer: layer as f32,
             footprint_excess: f(g * g - 1.0),
-            padding: 0.0,
+            wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
             gain: gain.extend(0.0).to_array(),
+            prism: prism.map(f),
         }
     }
 }
@@ -163,9 +199,14 @@ fn lens_kind(distortion: Distortion) -> f32 {
         Distortion::Rational { k, .. } if k[2..] == [0.0; 4] => LENS_BROWN,
         Distortion::Rational { .. } => LENS_RATIONAL,
         Distortion::Fisheye { .. } => LENS_FISHEYE,
+        Distortion::ThinPrismFisheye { .. } => LENS_THIN_PRISM,
+        Distortion::RadTanThinPrismFisheye { .. } => LENS_BENT_PRISM,
+        Distortion::Fov { .. } => LENS_FOV,
+        Distortion::Division { .. } => LENS_DIVISION,
+        Distortion::Eucm { .. } => LENS_EUCM,
+        Distortion::Equirectangular => LENS_EQUIRECTANGULAR,
     }
 }
 
-fn is_fisheye(distortion: Distortion) -> bool {
-    matches!(distortion, Distortion::Fisheye { .. })
-}
+#[cfg(test)]
+mod tests;

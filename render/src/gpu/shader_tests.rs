@@ -124,6 +124,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("LENS_REST", offset_of!(Source, lens_rest)),
             ("KIND", offset_of!(Source, kind)),
             ("GAIN", offset_of!(Source, gain)),
+            ("PRISM", offset_of!(Source, prism)),
         ] {
             assert_eq!(constants[name] as usize * TEXEL, offset, "{name}");
         }
@@ -136,6 +137,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     let kind = offset_of!(Source, kind);
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
+    assert_eq!(within(offset_of!(Source, wide), kind), 3);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
 }
@@ -195,6 +197,15 @@ fn shared_numbers_are_the_same() {
             ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),
             ("LENS_FISHEYE", f64::from(layout::LENS_FISHEYE)),
             ("LENS_BROWN", f64::from(layout::LENS_BROWN)),
+            ("LENS_THIN_PRISM", f64::from(layout::LENS_THIN_PRISM)),
+            ("LENS_BENT_PRISM", f64::from(layout::LENS_BENT_PRISM)),
+            ("LENS_FOV", f64::from(layout::LENS_FOV)),
+            ("LENS_DIVISION", f64::from(layout::LENS_DIVISION)),
+            ("LENS_EUCM", f64::from(layout::LENS_EUCM)),
+            (
+                "LENS_EQUIRECTANGULAR",
+                f64::from(layout::LENS_EQUIRECTANGULAR),
+            ),
         ] {
             // Only a typed constant is left in the module.
             let found = constants.get(name).copied().unwrap_or(f64::NAN);

@@ -171,7 +171,10 @@ fn bad_files_are_named() {
     assert_eq!(
         bad(frame(EYE, "THIN_PRISM", "50", "")),
         "DIR/p.json: frame 1: unknown camera model \"THIN_PRISM\"; known are SIMPLE_PINHOLE, \
-         PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV"
+         PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV, FOV, \
+         SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, THIN_PRISM_FISHEYE, \
+         RAD_TAN_THIN_PRISM_FISHEYE, SIMPLE_DIVISION, DIVISION, SIMPLE_FISHEYE, FISHEYE, \
+         EUCM, EQUIRECTANGULAR"
     );
     assert_eq!(
         bad(good_frame(r#", "name": "frame_0000""#)),

@@ -1,0 +1,117 @@
+//! Brown–Conrady with a rational radial term, on the plane z = 1: OpenCV's formula.
+
+use super::invert::{invert_monotone, invert_on_disc, scan};
+use glam::{DMat2, DVec2};
+
+/// The distorted point and the Jacobian of the mapping.
+pub(super) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
+    let r2 = point.length_squared();
+    let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+    let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+    let radial = above / below;
+    // d radial / d r²
+    let d_above = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
+    let d_below = k[3] + r2 * (2.0 * k[4] + r2 * 3.0 * k[5]);
+    let slope = (d_above - radial * d_below) / below;
+    let (shift, d_shift) = tangential(point, p);
+    (
+        point * radial + shift,
+        radial_jacobian(point, radial, slope) + d_shift,
+    )
+}
+
+/// The Jacobian of x ↦ x·radial(r²), where `slope` is d radial / d r².
+pub(super) fn radial_jacobian(point: DVec2, radial: f64, slope: f64) -> DMat2 {
+    let DVec2 { x, y } = point;
+    let xy = 2.0 * x * y * slope;
+    DMat2::from_cols(
+        DVec2::new(radial + 2.0 * x * x * slope, xy),
+        DVec2::new(xy, radial + 2.0 * y * y * slope),
+    )
+}
+
+/// The tangential terms, (2p₁xy + p₂(r² + 2x²), 2p₂xy + p₁(r² + 2y²)), and their Jacobian.
+///
+/// That is 2(q·x)I + 2(qxᵀ + xqᵀ) with q = (p₂, p₁): symmetric, its eigenvalues at least
+/// −6|q|r.
+pub(super) fn tangential(point: DVec2, p: &[f64; 2]) -> (DVec2, DMat2) {
+    let DVec2 { x, y } = point;
+    let r2 = x * x + y * y;
+    let dxy = 2.0 * p[0] * x + 2.0 * p[1] * y;
+    (
+        DVec2::new(
+            2.0 * p[0] * x * y + p[1] * (r2 + 2.0 * x * x),
+            2.0 * p[1] * x * y + p[0] * (r2 + 2.0 * y * y),
+        ),
+        DMat2::from_cols(
+            DVec2::new(2.0 * p[0] * y + 6.0 * p[1] * x, dxy),
+            DVec2::new(dxy, 2.0 * p[1] * x + 6.0 * p[0] * y),
+        ),
+    )
+}
+
+/// r·radial(r²) and its derivative: the model along a radius.
+fn rational_radius(r: f64, k: &[f64; 6]) -> (f64, f64) {
+    let (point, jacobian) = rational(DVec2::new(r, 0.0), k, &[0.0; 2]);
+    (point.x, jacobian.x_axis.x)
+}
+
+/// The radius up to which the model is one to one.
+///
+/// The radial terms' Jacobian is symmetric, with the eigenvalues f/r and f'; the tangential
+/// terms' is bounded by [`tangential`]. Where the sum is positive definite on a disc, which
+/// is convex, the mapping is one to one there.
+pub(super) fn rational_limit(k: &[f64; 6], p: &[f64; 2]) -> f64 {
+    let tangential = 6.0 * p[0].hypot(p[1]);
+    // Radius 50 is 88.9° off the axis.
+    scan(50.0, 20_000, f64::INFINITY, |r| {
+        let (value, slope) = rational_radius(r, k);
+        slope.min(value / r) > tangential * r
+    })
+}
+
+/// The undistorted point.
+pub(super) fn invert_rational(
+    distorted: DVec2,
+    k: &[f64; 6],
+    p: &[f64; 2],
+    limit: f64,
+) -> Option<DVec2> {
+    // Without the tangential terms the problem has one dimension and a sure answer.
+    let radius = distorted.length();
+    let start = match invert_monotone(radius, limit, |r| rational_radius(r, k)) {
+        Some(undistorted) if radius > 0.0 => distorted * (undistorted / radius),
+        Some(_) => distorted,
+        // Tangential terms may still bring the point within reach.
+        None if *p != [0.0; 2] && limit.is_finite() => distorted * (limit / radius),
+        None => return None,
+    };
+    if *p == [0.0; 2] {
+        return Some(start);
+    }
+    invert_on_disc(distorted, start, limit, |x| rational(x, k, p))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::difference;
+    use super::*;
+
+    #[test]
+    fn derivatives_meet_finite_differences() {
+        let k = [-0.3, 0.1, -0.02, 0.2, 0.05, -0.01];
+        let p = [0.01, -0.02];
+        for x in [-0.9, -0.2, 0.0, 0.35, 0.7] {
+            for y in [-0.6, 0.0, 0.15, 0.8] {
+                let at = DVec2::new(x, y);
+                let expected = difference(|point| rational(point, &k, &p).0, at);
+                let found = rational(at, &k, &p).1;
+                let close = (found - expected).to_cols_array();
+                assert!(
+                    close.iter().all(|e| e.abs() < 1e-8),
+                    "at {at}: {found} instead of {expected}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,67 @@
+use super::*;
+use crate::frame::every_lens::{self, TOLERANCE_PX};
+
+fn tile(points: &[[f32; 4]]) -> Tile {
+    let lane = |c: usize| each(|k| points[k.min(points.len() - 1)][c]);
+    Tile {
+        x: lane(0),
+        y: lane(1),
+        z: lane(2),
+        s: lane(3),
+    }
+}
+
+#[test]
+fn every_lens_projects_as_the_f64_model_does() {
+    let lumigraph = every_lens::lumigraph();
+    let frame = every_lens::frame(&lumigraph);
+    for (source_idx, view) in lumigraph.sources.iter().enumerate() {
+        let source = Source::new(&frame, source_idx);
+        let mut worst = 0.0_f64;
+        let points = every_lens::points(&frame, source_idx);
+        for chunk in points.chunks(LANES) {
+            let rays: Vec<[f32; 4]> = chunk.iter().map(|(point, _)| *point).collect();
+            let sight = source.see(&tile(&rays)).unwrap();
+            for (k, (_, pixel)) in chunk.iter().enumerate() {
+                let found = [sight.u[k], sight.v[k]];
+                let error = every_lens::distance(&frame.sources[source_idx], found, *pixel);
+                worst = worst.max(error);
+                assert!(sight.a[k] > 0.0, "{}: {pixel:?}", view.name);
+            }
+        }
+        println!("{}: {} points, {worst:.5} px", view.name, points.len());
+        assert!(worst < TOLERANCE_PX, "{}: {worst} px", view.name);
+
+        let unseen = every_lens::unseen(&frame, source_idx);
+        for chunk in unseen.chunks(LANES) {
+            assert!(source.see(&tile(chunk)).is_none(), "{}", view.name);
+        }
+    }
+}
+
+#[test]
+fn levels_of_detail_are_those_of_the_f64_model() {
+    let lumigraph = every_lens::lumigraph();
+    let frame = every_lens::frame(&lumigraph);
+    for (source_idx, view) in lumigraph.sources.iter().enumerate() {
+        let source = Source::new(&frame, source_idx);
+        for chunk in every_lens::points(&frame, source_idx).chunks(LANES) {
+            let rays: Vec<[f32; 4]> = chunk.iter().map(|(point, _)| *point).collect();
+            let sight = source.see(&tile(&rays)).unwrap();
+            for (k, [x, y, z, s]) in rays.iter().enumerate().filter(|(_, ray)| ray[2] > 0.01) {
+                let point = crate::ProxyPoint {
+                    ray: glam::Vec3::new(*x, *y, *z).as_dvec3(),
+                    inverse_distance: f64::from(*s),
+                };
+                let expected = frame.level_of_detail(source_idx, &point);
+                let error = (f64::from(sight.level[k]) - expected).abs();
+                assert!(
+                    error < 1e-3,
+                    "{}: {} is not {expected}",
+                    view.name,
+                    sight.level[k]
+                );
+            }
+        }
+    }
+}
