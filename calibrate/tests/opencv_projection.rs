@@ -36,11 +36,11 @@ fn opencv_projects_to_the_same_pixels() {
         } else {
             OpenCvDistortion::standard(&coefficients).unwrap()
         };
-        let lens = OpenCvLens {
-            focal: DVec2::new(k[0], k[4]),
-            principal: DVec2::new(k[2], k[5]) + 0.5,
+        let lens = OpenCvLens::new(
+            DVec2::new(k[0], k[4]),
+            DVec2::new(k[2], k[5]) + 0.5,
             distortion,
-        };
+        );
         let r = numbers(&case["R_rowmajor"]);
         let camera_from_world = DMat3::from_cols_slice(&r).transpose();
         let translation = DVec3::from_slice(&numbers(&case["tvec"]));
@@ -69,27 +69,25 @@ fn opencv_projects_to_the_same_pixels() {
     }
 }
 
+fn with(distortion: OpenCvDistortion) -> OpenCvLens {
+    let focal = DVec2::new(812.4, 809.9);
+    OpenCvLens::new(focal, DVec2::new(322.2, 243.7), distortion)
+}
+
 fn tilted_prism() -> OpenCvLens {
     let c = [
         0.2143, -0.0912, 0.0009, -0.0014, 0.0121, 0.3017, -0.0286, 0.0081, 0.0017, -0.0005,
         -0.0011, 0.0003, 0.0213, -0.0147,
     ];
-    OpenCvLens {
-        focal: DVec2::new(812.4, 809.9),
-        principal: DVec2::new(322.2, 243.7),
-        distortion: OpenCvDistortion::standard(&c).unwrap(),
-    }
+    with(OpenCvDistortion::standard(&c).unwrap())
 }
 
 #[test]
 fn every_pixel_of_an_image_has_its_ray() {
-    let skewed = OpenCvLens {
-        distortion: OpenCvDistortion::Fisheye {
-            k: [-0.0213, 0.0092, -0.0047, 0.0011],
-            alpha: 0.0031,
-        },
-        ..tilted_prism()
-    };
+    let skewed = with(OpenCvDistortion::Fisheye {
+        k: [-0.0213, 0.0092, -0.0047, 0.0011],
+        alpha: 0.0031,
+    });
     for lens in [tilted_prism(), skewed] {
         for row in (0..=480).step_by(20) {
             for column in (0..=640).step_by(20) {
@@ -114,10 +112,7 @@ fn nothing_is_seen_behind() {
 fn what_the_renderer_lacks_is_said() {
     let said = |c: &[f64]| {
         let distortion = OpenCvDistortion::standard(c).unwrap();
-        let lens = OpenCvLens {
-            distortion,
-            ..tilted_prism()
-        };
+        let lens = with(distortion);
         lens.camera(640, 480).map_err(|e| e.to_string())
     };
     assert_eq!(said(&[]).unwrap().model.name(), "PINHOLE");

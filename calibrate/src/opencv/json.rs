@@ -1,7 +1,7 @@
 //! OpenCV's JSON: with comments (`//`, `/* */`) and unquoted `.Nan` and `.Inf`.
 
 use super::error::{Problem, excerpt};
-use super::scalar;
+use super::matrix;
 use super::storage::{Entries, MAX_DEPTH, Node, Value};
 
 /// Reads a whole file, which must be one object.
@@ -94,7 +94,7 @@ impl<'a> Reader<'a> {
                     "true" => Value::Int(1),
                     "false" => Value::Int(0),
                     "null" => Value::Null,
-                    _ => scalar::plain(word),
+                    _ => matrix::plain(word),
                 };
                 if matches!(value, Value::Text(_)) {
                     return Err(self.unexpected("a value"));
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
             }
             Ok(())
         })?;
-        scalar::map(line, marked, entries)
+        matrix::map(line, marked, entries)
     }
 
     fn array(&mut self, depth: usize) -> Result<Value, Problem> {

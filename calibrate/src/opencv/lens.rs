@@ -14,8 +14,9 @@ pub struct OpenCvLens {
     pub focal: DVec2,
     /// Principal point in pixels, the first pixel's centre at (0.5, 0.5).
     pub principal: DVec2,
-    /// How rays are bent.
-    pub distortion: OpenCvDistortion,
+    distortion: OpenCvDistortion,
+    /// The rational model or the fisheye alone, in normalised coordinates.
+    core: Lens,
 }
 
 /// How OpenCV's lenses bend rays away from the pinhole's.
@@ -76,6 +77,25 @@ impl OpenCvDistortion {
 }
 
 impl OpenCvLens {
+    /// A lens; the range in which its distortion can be inverted is found here.
+    pub fn new(focal: DVec2, principal: DVec2, distortion: OpenCvDistortion) -> Self {
+        let core = match distortion {
+            OpenCvDistortion::Standard { k, p, .. } => Distortion::Rational { k, p },
+            OpenCvDistortion::Fisheye { k, .. } => Distortion::Fisheye { k },
+        };
+        Self {
+            focal,
+            principal,
+            distortion,
+            core: Lens::new(DVec2::ONE, DVec2::ZERO, core),
+        }
+    }
+
+    /// How rays are bent.
+    pub fn distortion(&self) -> OpenCvDistortion {
+        self.distortion
+    }
+
     /// Where a point falls in the image (or outside it); `None` behind the camera, and
     /// beyond the radius or angle where the radial terms turn back on themselves.
     pub fn project(&self, point_in_camera: DVec3) -> Option<Pixel> {
@@ -83,14 +103,13 @@ impl OpenCvLens {
             OpenCvDistortion::Standard { k, p, s, tau } => {
                 let DVec3 { x, y, z } = point_in_camera;
                 let point = DVec2::new(x, y) / z;
-                let limit = radial(k, p).limit();
-                if !(z > 0.0 && point.length() <= limit) {
+                if !(z > 0.0 && point.length() <= self.core.limit()) {
                     return None;
                 }
                 tilted(thin_prism(point, &k, &p, &s).0, tilt(tau))
             }
-            OpenCvDistortion::Fisheye { k, alpha } => {
-                let Pixel { x, y } = fisheye(k).project(point_in_camera)?;
+            OpenCvDistortion::Fisheye { alpha, .. } => {
+                let Pixel { x, y } = self.core.project(point_in_camera)?;
                 DVec2::new(x + alpha * y, y)
             }
         };
@@ -108,12 +127,12 @@ impl OpenCvLens {
         match self.distortion {
             OpenCvDistortion::Standard { k, p, s, tau } => {
                 let upright = tilted(distorted, tilt(tau).inverse());
-                let point = invert_thin_prism(upright, &k, &p, &s)?;
+                let point = invert_thin_prism(upright, &self.core, &k, &p, &s)?;
                 Some(point.extend(1.0).normalize())
             }
-            OpenCvDistortion::Fisheye { k, alpha } => {
+            OpenCvDistortion::Fisheye { alpha, .. } => {
                 let x = distorted.x - alpha * distorted.y;
-                fisheye(k).unproject(Pixel::new(x, distorted.y))
+                self.core.unproject(Pixel::new(x, distorted.y))
             }
         }
     }
@@ -170,16 +189,6 @@ impl OpenCvLens {
     }
 }
 
-/// The rational model alone, in normalised coordinates.
-fn radial(k: [f64; 6], p: [f64; 2]) -> Lens {
-    Lens::new(DVec2::ONE, DVec2::ZERO, Distortion::Rational { k, p })
-}
-
-/// The fisheye without skew, in normalised coordinates.
-fn fisheye(k: [f64; 4]) -> Lens {
-    Lens::new(DVec2::ONE, DVec2::ZERO, Distortion::Fisheye { k })
-}
-
 /// The homography from the plane z = 1 to a sensor turned by (τx, τy) around the axis:
 /// OpenCV's `computeTiltProjectionMatrix`.
 fn tilt(tau: [f64; 2]) -> DMat3 {
@@ -231,10 +240,15 @@ fn thin_prism(point: DVec2, k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> (DVec2,
 }
 
 /// Solves the rational model with thin prisms for the undistorted point.
-fn invert_thin_prism(distorted: DVec2, k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> Option<DVec2> {
+fn invert_thin_prism(
+    distorted: DVec2,
+    without_prism: &Lens,
+    k: &[f64; 6],
+    p: &[f64; 2],
+    s: &[f64; 4],
+) -> Option<DVec2> {
     // 1. Without the prisms, whose terms are small.
-    let lens = radial(*k, *p);
-    let start = lens.unproject(Pixel::new(distorted.x, distorted.y));
+    let start = without_prism.unproject(Pixel::new(distorted.x, distorted.y));
     if *s == [0.0; 4] {
         return start.map(|ray| ray.truncate() / ray.z);
     }
@@ -261,7 +275,7 @@ fn invert_thin_prism(distorted: DVec2, k: &[f64; 6], p: &[f64; 2], s: &[f64; 4])
     }
     // 3. Believe it only where it reproduces the pixel, on the near side of the fold.
     let found = error <= RESIDUAL_TOLERANCE * (1.0 + distorted.length())
-        && x.length() <= lens.limit()
+        && x.length() <= without_prism.limit()
         && thin_prism(x, k, p, s).1.determinant() > 0.0;
     found.then_some(x)
 }

@@ -2,7 +2,7 @@
 //! with blanks between them, several being a sequence; `<_>` are a sequence's elements.
 
 use super::error::{Problem, excerpt};
-use super::scalar;
+use super::matrix;
 use super::storage::{Entries, MAX_DEPTH, Node, Value};
 use roxmltree::Document;
 
@@ -87,7 +87,7 @@ impl Reader<'_> {
         }
         Ok(Node::new(
             line,
-            scalar::map(line, kind == "opencv-matrix", entries)?,
+            matrix::map(line, kind == "opencv-matrix", entries)?,
         ))
     }
 
@@ -126,7 +126,7 @@ fn split(raw: &str, mut line: usize, words: &mut Vec<Node>) -> Result<(), Proble
             (Value::Text(unescaped(&quoted[..end])), end + 2)
         } else {
             let end = trimmed.find(char::is_whitespace).unwrap_or(trimmed.len());
-            (scalar::plain(&unescaped(&trimmed[..end])), end)
+            (matrix::plain(&unescaped(&trimmed[..end])), end)
         };
         words.push(Node::new(line, value));
         line += trimmed[..length].matches('\n').count();

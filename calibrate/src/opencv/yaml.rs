@@ -6,7 +6,7 @@
 //! style, tags; not aliases.
 
 use super::error::{Problem, excerpt};
-use super::scalar;
+use super::matrix;
 use super::storage::{Entries, MAX_DEPTH, Node, Value};
 
 /// Reads a whole file, which must be a map.
@@ -159,7 +159,7 @@ impl<'a> Reader<'a> {
         }
         if self.key(true).is_some() {
             let entries = self.map(self.column(), depth)?;
-            return Ok(Node::new(line, scalar::map(line, false, entries)?));
+            return Ok(Node::new(line, matrix::map(line, false, entries)?));
         }
         self.value(least.saturating_sub(1), false, depth)
     }
@@ -250,7 +250,7 @@ impl<'a> Reader<'a> {
                 } else {
                     self.map(self.column(), depth)?
                 };
-                return Ok(Node::new(line, scalar::map(line, true, entries)?));
+                return Ok(Node::new(line, matrix::map(line, true, entries)?));
             }
             return self.block(least, depth + 1);
         }
@@ -260,7 +260,7 @@ impl<'a> Reader<'a> {
         }
         if in_sequence && self.key(false).is_some() {
             let entries = self.map(self.column(), depth)?;
-            return Ok(Node::new(line, scalar::map(line, marked, entries)?));
+            return Ok(Node::new(line, matrix::map(line, marked, entries)?));
         }
         let value = match self.peek() {
             Some('|' | '>') => return Ok(Node::new(line, self.block_text(parent))),
@@ -298,7 +298,7 @@ impl<'a> Reader<'a> {
         }
         match text.as_str() {
             "~" | "null" => Value::Null,
-            word => scalar::plain(word),
+            word => matrix::plain(word),
         }
     }
 
@@ -342,7 +342,7 @@ impl<'a> Reader<'a> {
                     entries.push((key, reader.flow(false, depth + 1)?));
                     Ok(())
                 })?;
-                scalar::map(line, marked, entries)?
+                matrix::map(line, marked, entries)?
             }
             Some('"') => Value::Text(self.double_quoted()?),
             Some('\'') => Value::Text(self.single_quoted()?),
@@ -355,7 +355,7 @@ impl<'a> Reader<'a> {
                 match word.trim_end() {
                     "" => return Err(self.unexpected("a value")),
                     "~" | "null" => Value::Null,
-                    word => scalar::plain(word),
+                    word => matrix::plain(word),
                 }
             }
         };
