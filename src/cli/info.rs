@@ -1,6 +1,7 @@
 //! `lumigraph info`
 
-use super::options::{SceneArgs, proxy_json, proxy_text};
+use super::info_of_file;
+use super::options::{KeyArgs, SceneArgs, proxy_json, proxy_text};
 use super::output::{print, print_json};
 use super::report::megabytes;
 use glam::DVec3;
@@ -9,12 +10,17 @@ use serde_json::{Value, json};
 
 /// Photos, cameras, points, reprojection error per camera, proxy, memory
 ///
+/// Of an OpenCV calibration's file alone: its cameras and poses.
+///
 ///     lumigraph info my-capture
+///     lumigraph info out_camera_data.yml
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    keys: KeyArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -24,6 +30,9 @@ pub(super) struct Args {
 const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.scene.scene.is_file() {
+        return info_of_file::run(&args.scene.scene, &args.keys.keys(), args.json);
+    }
     let scene = args.scene.open()?;
     let info = gather(&scene)?;
     if args.json {
