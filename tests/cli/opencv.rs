@@ -39,9 +39,8 @@ fn import(folder: &TempDir, line: &str) -> Ran {
     lumigraph(folder.path(), &format!("import {line} -o scene"))
 }
 
-/// The board is 9 × 6 corners, 0.025 apart; its squares reach one further out.
-const SQUARE: f64 = 0.025;
-const INNER: (f64, f64) = (8.0 * SQUARE, 5.0 * SQUARE);
+/// Between the outermost of the board's 9 × 6 corners, 0.025 apart.
+const INNER: (f64, f64) = (8.0 * 0.025, 5.0 * 0.025);
 
 /// Where a pixel's ray meets the board's plane, z = 0.
 fn on_plane(view: &View, column: u32, row: u32) -> Option<glam::DVec3> {
@@ -141,7 +140,8 @@ fn held_out_views_match_inside_the_board() {
         let (psnr, pixels) = psnr_inside(&view, &frame, &source.join("images").join(name));
         println!("{name}: {psnr:.2} dB over {pixels} pixels");
         assert!(pixels > 20_000, "{name}: {pixels} pixels");
-        assert!(psnr > 18.0, "{name}: {psnr} dB");
+        // Measured 25.8 and 24.9 dB.
+        assert!(psnr > 23.5, "{name}: {psnr} dB");
     }
 }
 
