@@ -11,6 +11,7 @@
 mod camera;
 pub mod colmap;
 mod lens;
+pub mod opencv;
 mod reconstruction;
 mod rigid;
 mod ties;

@@ -1,6 +1,6 @@
 //! `lumigraph import`
 
-use super::options::print_warnings;
+use super::options::{KeyArgs, print_warnings};
 use super::output::print;
 use lumigraph::scene::{ImportOptions, Scene};
 use std::path::PathBuf;
@@ -8,18 +8,26 @@ use std::path::PathBuf;
 /// Make a scene of photos and their calibration
 ///
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
-/// `dense/sparse` or itself), or the photo folder alone, with --calibration. Photos are not
-/// copied.
+/// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
+/// alone, with --calibration. Photos are not copied.
+///
+/// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
+/// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in
+/// the order of a list within or beside it (images.yml), else in the order of their names.
 ///
 ///     lumigraph import my-capture -o my-scene
+///     lumigraph import photos --calibration out_camera_data.yml -o my-scene
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     /// The capture, or its photos
     photos: PathBuf,
-    /// The COLMAP model, or a folder with one in the usual places [default: PHOTOS]
+    /// The COLMAP model, a folder with one in the usual places, or OpenCV's file
+    /// [default: PHOTOS]
     #[arg(long, value_name = "PATH")]
     calibration: Option<PathBuf>,
+    #[command(flatten)]
+    keys: KeyArgs,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -34,6 +42,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let options = ImportOptions {
         calibration: args.calibration.clone(),
+        keys: args.keys.keys(),
         strict: args.strict,
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;

@@ -1,6 +1,7 @@
 //! `lumigraph info`
 
-use super::options::{SceneArgs, proxy_json, proxy_text, tie_text};
+use super::info_of_file;
+use super::options::{KeyArgs, SceneArgs, proxy_json, proxy_text, tie_text};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use calibrate::TRUSTED_TIE;
@@ -10,12 +11,17 @@ use serde_json::{Value, json};
 
 /// Photos, cameras, points, reprojection error per camera, proxy, memory
 ///
+/// Of an OpenCV calibration's file alone: its cameras and poses.
+///
 ///     lumigraph info my-capture
+///     lumigraph info out_camera_data.yml
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    keys: KeyArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -25,6 +31,9 @@ pub(super) struct Args {
 const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.scene.scene.is_file() {
+        return info_of_file::run(&args.scene.scene, &args.keys.keys(), args.json);
+    }
     let scene = args.scene.open()?;
     let info = gather(&scene)?;
     if args.json {

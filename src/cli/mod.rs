@@ -8,6 +8,7 @@ mod frames;
 mod generate;
 mod import;
 mod info;
+mod info_of_file;
 mod npz;
 mod options;
 mod output;

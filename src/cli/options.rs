@@ -5,6 +5,7 @@ use super::output::say;
 use anyhow::Context;
 use calibrate::View;
 use calibrate::WeakGroup;
+use calibrate::opencv::Keys;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// Which photo set.
 #[derive(Args)]
 pub(super) struct SceneArgs {
-    /// A scene written by `import`, or a capture: photos with a COLMAP model
+    /// A scene written by `import`, or a capture: photos with a calibration
     pub(super) scene: PathBuf,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
@@ -51,6 +52,30 @@ pub(super) fn tie_text(group: &WeakGroup) -> String {
     }
 }
 
+/// Which of an OpenCV calibration's matrices to use.
+#[derive(Args)]
+pub(super) struct KeyArgs {
+    /// What an OpenCV calibration calls the camera matrix [default: a name known here]
+    #[arg(long, value_name = "KEY")]
+    camera_matrix: Option<String>,
+    /// What it calls the distortion coefficients, or none [default: a name known here]
+    #[arg(long, value_name = "KEY")]
+    distortion: Option<String>,
+    /// Its 4 distortion coefficients are those of cv::fisheye
+    #[arg(long)]
+    fisheye: bool,
+}
+
+impl KeyArgs {
+    pub(super) fn keys(&self) -> Keys {
+        Keys {
+            camera_matrix: self.camera_matrix.clone(),
+            distortion: self.distortion.clone(),
+            fisheye: self.fisheye,
+        }
+    }
+}
+
 /// Warnings printed one by one; more than these are only counted.
 const WARNINGS_SHOWN: usize = 10;
 
@@ -58,7 +83,7 @@ pub(super) fn print_warnings(warnings: &[Warning]) {
     for warning in warnings.iter().take(WARNINGS_SHOWN) {
         match warning {
             Warning::LeftOut { .. } => say!("warning: {warning}"),
-            Warning::Uncalibrated { .. } => say!("note: {warning}"),
+            Warning::Uncalibrated { .. } | Warning::Note(_) => say!("note: {warning}"),
         }
     }
     if let Some(more) = warnings.len().checked_sub(WARNINGS_SHOWN + 1) {

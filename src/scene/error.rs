@@ -7,6 +7,25 @@ pub enum SceneError {
     /// The calibration cannot be found or read.
     #[error(transparent)]
     Calibration(#[from] calibrate::colmap::ColmapError),
+    /// An OpenCV calibration cannot be read.
+    #[error(transparent)]
+    OpenCv(#[from] calibrate::opencv::OpenCvError),
+    /// An OpenCV calibration has a lens that cannot be drawn with.
+    #[error("{}: {source}", path.display())]
+    Lens {
+        /// The file.
+        path: PathBuf,
+        /// What is not supported.
+        source: calibrate::opencv::UnsupportedLens,
+    },
+    /// An OpenCV calibration's poses cannot be given to the photos.
+    #[error("{}: the file holds {problem}", path.display())]
+    Poses {
+        /// The file.
+        path: PathBuf,
+        /// What it holds, what was expected, and what to do.
+        problem: String,
+    },
     /// A camera is unusable.
     #[error("camera of {name}: {source}")]
     Camera {
@@ -138,7 +157,7 @@ fn examples(known: &[String]) -> String {
     }
 }
 
-/// What the user should know about photos that are not used.
+/// What the user should know about photos that are not used and choices that were made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Warning {
     /// A calibrated photo is missing or corrupt.
@@ -157,12 +176,15 @@ pub enum Warning {
         /// One of them.
         example: String,
     },
+    /// Something was chosen or guessed.
+    Note(String),
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::LeftOut { name, reason } => write!(f, "photo {name} is left out: {reason}"),
+            Self::Note(note) => f.write_str(note),
             Self::Uncalibrated {
                 count,
                 total,

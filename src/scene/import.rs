@@ -1,8 +1,10 @@
 //! From a capture to a scene.
 
+use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
 use super::{Photo, Scene, SceneError, Warning};
 use calibrate::colmap;
+use calibrate::opencv::Keys;
 use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,8 +12,11 @@ use std::path::{Path, PathBuf};
 /// How photos are imported.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// Where the calibration is; `None`: in the capture's folder.
+    /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV;
+    /// `None`: in the capture's folder.
     pub calibration: Option<PathBuf>,
+    /// Which of an OpenCV file's matrices to use.
+    pub keys: Keys,
     /// A missing or corrupt photo is an error rather than left out.
     pub strict: bool,
 }
@@ -38,14 +43,18 @@ impl Scene {
             return Err(SceneError::NoFolder(capture.to_owned()));
         }
         // 1. The calibration.
-        let calibration = options.calibration.as_deref().unwrap_or(capture);
-        let model = colmap::find_model(calibration)?;
-        let reconstruction = colmap::read_model(&model)?;
+        let mut warnings = Vec::new();
+        let source = calibration::find(capture, options, &mut warnings)?;
 
         // 2. The photos, matched by name.
         let folder =
             find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
         let found = PhotoSet::open(&folder)?;
+        let reconstruction = match &source {
+            Source::Colmap(model) => colmap::read_model(model)?,
+            // OpenCV may leave it to the photos which is which.
+            Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
+        };
         let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
         names.sort();
         let photos = names.iter().map(|name| Photo {
@@ -59,7 +68,6 @@ impl Scene {
             gain: None,
             other: Extra::new(),
         });
-        let mut warnings = Vec::new();
         let unused = |photo: &&capture::PhotoFile| names.binary_search(&&photo.name).is_err();
         if let Some(example) = found.photos.iter().find(unused) {
             warnings.push(Warning::Uncalibrated {

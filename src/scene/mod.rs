@@ -4,6 +4,7 @@
 //! and, once there is one, the proxy's file. Photos stay where they are and are named by
 //! their path relative to the folder.
 
+mod calibration;
 mod error;
 pub mod file;
 mod import;

@@ -24,8 +24,8 @@ impl Scene {
         let path = folder.join(SCENE_FILE);
         if !path.is_file() {
             let options = ImportOptions {
-                calibration: None,
                 strict,
+                ..ImportOptions::default()
             };
             return Self::import(folder, &options);
         }

@@ -6,6 +6,7 @@ mod evaluate;
 mod field;
 mod gpu;
 mod help;
+mod opencv;
 mod render;
 mod repeat;
 mod run;

@@ -1,0 +1,272 @@
+//! The cameras of a storage file.
+
+use super::OpenCvError;
+use super::coefficients::{coefficients_for, is_fisheye};
+use super::flat::{of_scalars, size};
+use super::lens::{OpenCvDistortion, OpenCvLens};
+use super::storage::{Matrix, Value};
+use super::values::{Named, Role, Values, plain, role};
+use glam::DVec2;
+
+/// Which of a file's matrices to use, where its names leave that open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Keys {
+    /// What the camera matrix is called; within maps, with their names and dots before it.
+    pub camera_matrix: Option<String>,
+    /// What the distortion coefficients are called; `none`: there are none.
+    pub distortion: Option<String>,
+    /// Four coefficients are those of `cv::fisheye`.
+    pub fisheye: bool,
+}
+
+/// A camera that OpenCV calibrated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenCvCamera {
+    /// What the file calls its matrix.
+    pub name: String,
+    /// Intrinsics.
+    pub lens: OpenCvLens,
+    /// Width and height in pixels, where the file says.
+    pub size: Option<(u32, u32)>,
+}
+
+/// The cameras of a file, and what had to be guessed.
+pub(super) fn cameras(
+    values: &Values<'_>,
+    keys: &Keys,
+    notes: &mut Vec<String>,
+) -> Result<Vec<OpenCvCamera>, OpenCvError> {
+    refuse_other_models(values)?;
+    let mut cameras = if let Some(key) = &keys.camera_matrix {
+        vec![of_matrix(values, asked(values, key)?, keys, notes)?]
+    } else {
+        of_known_names(values, keys, notes)?
+    };
+    if cameras.is_empty() {
+        cameras = of_scalars(values, keys)?;
+    }
+    if cameras.is_empty() {
+        return Err(OpenCvError::NoCamera {
+            path: values.file.clone(),
+            found: values.matrices(),
+        });
+    }
+    Ok(cameras)
+}
+
+/// The models of other programs that keep their calibration in storage files.
+fn refuse_other_models(values: &Values<'_>) -> Result<(), OpenCvError> {
+    let refuse = |model: String| {
+        Err(OpenCvError::Model {
+            path: values.file.clone(),
+            model,
+        })
+    };
+    let xi = values
+        .find_within(&["xi"])
+        .and_then(|v| v.node.matrix_or_number());
+    let xi = xi.unwrap_or(0.0);
+    if let Some(model) = model_name(values) {
+        let plain = plain(model);
+        if ["mei", "omni", "scaramuzza", "ocam", "eucm"]
+            .iter()
+            .any(|m| plain.contains(m))
+        {
+            return refuse(format!("{model} (omnidirectional, with a mirror)"));
+        }
+    }
+    if xi != 0.0 {
+        return refuse(format!("omnidirectional (Mei's, xi = {xi})"));
+    }
+    Ok(())
+}
+
+/// What the file calls its camera model, if it says.
+pub(super) fn model_name<'a>(values: &Values<'a>) -> Option<&'a str> {
+    let names = [
+        "modeltype",
+        "cameratype",
+        "camera1type",
+        "cameramodel",
+        "distortionmodel",
+        "distortiontype",
+        "calibrationmodel",
+    ];
+    values.find_within(&names)?.node.text()
+}
+
+pub(super) fn asked<'v, 'a>(
+    values: &'v Values<'a>,
+    key: &str,
+) -> Result<&'v Named<'a>, OpenCvError> {
+    let found = values
+        .exactly(key)
+        .filter(|named| named.node.matrix().is_some());
+    found.ok_or_else(|| OpenCvError::NoSuchKey {
+        path: values.file.clone(),
+        key: key.to_owned(),
+        found: values.matrices(),
+    })
+}
+
+/// Cameras whose matrices have names known here: one, or one a side.
+fn of_known_names(
+    values: &Values<'_>,
+    keys: &Keys,
+    notes: &mut Vec<String>,
+) -> Result<Vec<OpenCvCamera>, OpenCvError> {
+    let mut found: Vec<(String, &Named<'_>, Matrix)> = Vec::new();
+    for named in &values.all {
+        let Some((Role::CameraMatrix, side)) = role(named.last()) else {
+            continue;
+        };
+        let Some(matrix) = named.node.matrix() else {
+            continue;
+        };
+        // Short names are often something else; a long one is meant.
+        let certain = plain(named.last()).len() > 4;
+        if !certain && (matrix.rows, matrix.cols) != (3, 3) {
+            continue;
+        }
+        let group = format!("{}{side}", plain(named.prefix()));
+        match found.iter().find(|(other, ..)| *other == group) {
+            None => found.push((group, named, matrix)),
+            Some((_, _, same)) if same.data == matrix.data => {}
+            Some((_, earlier, _)) => {
+                let problem = format!(
+                    "another camera matrix stands in line {} ({}); choose with --camera-matrix \
+                     KEY, or remove one",
+                    earlier.node.line, earlier.path
+                );
+                return Err(values.refuse(named, problem));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    let of = |(_, named, _): &(String, &Named<'_>, Matrix)| of_matrix(values, named, keys, notes);
+    found.iter().map(of).collect()
+}
+
+fn of_matrix(
+    values: &Values<'_>,
+    named: &Named<'_>,
+    keys: &Keys,
+    notes: &mut Vec<String>,
+) -> Result<OpenCvCamera, OpenCvError> {
+    let k = intrinsics(values, named)?;
+    let coefficients = coefficients_for(values, named, keys, notes)?;
+    let distortion = match &coefficients {
+        None => OpenCvDistortion::standard(&[]),
+        Some((of, c)) if is_fisheye(values, keys, [named, of], c.len(), notes) => {
+            let refuse = || {
+                let problem = format!(
+                    "a fisheye's distortion has {} coefficients, expected 4 (k1 k2 k3 k4)",
+                    c.len()
+                );
+                values.refuse(of, problem)
+            };
+            Some(OpenCvDistortion::Fisheye {
+                k: c.as_slice().try_into().map_err(|_| refuse())?,
+                alpha: k.skew / k.focal.x,
+            })
+        }
+        Some((_, c)) => OpenCvDistortion::standard(c),
+    };
+    let Some(distortion) = distortion else {
+        let (of, c) = coefficients.unwrap_or((named.clone(), Vec::new()));
+        let problem = format!(
+            "distortion has {} coefficients, expected 0, 4, 5, 8, 12 or 14; choose others with \
+             --distortion KEY, or none with --distortion none",
+            c.len()
+        );
+        return Err(values.refuse(&of, problem));
+    };
+    // OpenCV's own functions ignore skew but for the fisheye.
+    if k.skew != 0.0 && !matches!(distortion, OpenCvDistortion::Fisheye { .. }) {
+        let problem = format!(
+            "the camera matrix has skew {}, which OpenCV's pinhole model does not have; set it \
+             to 0, or say --fisheye if cv::fisheye computed it",
+            k.skew
+        );
+        return Err(values.refuse(named, problem));
+    }
+    Ok(OpenCvCamera {
+        name: named.path.clone(),
+        lens: OpenCvLens::new(k.focal, k.principal + 0.5, distortion),
+        size: size(values, named.prefix())?,
+    })
+}
+
+/// What a camera matrix says, in OpenCV's pixels.
+struct Intrinsics {
+    focal: DVec2,
+    principal: DVec2,
+    skew: f64,
+}
+
+fn intrinsics(values: &Values<'_>, named: &Named<'_>) -> Result<Intrinsics, OpenCvError> {
+    let refuse = |problem: String| Err(values.refuse(named, problem));
+    let Some(matrix) = named.node.matrix() else {
+        return refuse("no matrix, expected a 3 × 3 camera matrix".to_owned());
+    };
+    let m = &matrix.data;
+    if let Some(bad) = m.iter().find(|x| !x.is_finite()) {
+        return refuse(format!(
+            "the camera matrix holds {bad}, expected finite numbers"
+        ));
+    }
+    let [fx, skew, cx, fy, cy] = match (matrix.rows, matrix.cols, matrix.channels) {
+        (3, 3, 1) => {
+            let below = [m[3], m[6], m[7], m[8]];
+            if below != [0.0, 0.0, 0.0, 1.0] {
+                let transposed = m[2] == 0.0 && m[5] == 0.0 && m[6] != 0.0 && m[7] != 0.0;
+                return refuse(format!(
+                    "the camera matrix is [{} {} {}; {} {} {}; {} {} {}], expected \
+                     [fx 0 cx; 0 fy cy; 0 0 1]{}",
+                    m[0],
+                    m[1],
+                    m[2],
+                    m[3],
+                    m[4],
+                    m[5],
+                    m[6],
+                    m[7],
+                    m[8],
+                    if transposed { "; transpose it" } else { "" }
+                ));
+            }
+            [m[0], m[1], m[2], m[4], m[5]]
+        }
+        // fx fy cx cy, as some write it.
+        (1, 4, 1) | (4, 1, 1) => [m[0], 0.0, m[2], m[1], m[3]],
+        _ => {
+            return refuse(format!(
+                "the camera matrix is {}, expected 3 × 3; choose another with --camera-matrix \
+                 KEY",
+                matrix.shape()
+            ));
+        }
+    };
+    for (name, f) in [("fx", fx), ("fy", fy)] {
+        if f <= 0.0 {
+            return refuse(format!(
+                "the focal length {name} is {f}, expected a positive number; calibrate again"
+            ));
+        }
+    }
+    Ok(Intrinsics {
+        focal: DVec2::new(fx, fy),
+        principal: DVec2::new(cx, cy),
+        skew,
+    })
+}
+
+impl super::Node {
+    /// A number, or the only one of a matrix (OpenCV writes `xi` both ways).
+    fn matrix_or_number(&self) -> Option<f64> {
+        match &self.value {
+            Value::Matrix(m) if m.data.len() == 1 => Some(m.data[0]),
+            _ => self.number(),
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! OpenCV calibrations: what `cv::FileStorage` writes, and the cameras and poses in it.
+//!
+//! OpenCV puts the first pixel's centre at (0, 0): principal points and corners are half a
+//! pixel more here.
+//!
+//! ```no_run
+//! use calibrate::opencv::{Keys, read_calibration};
+//! use std::path::Path;
+//!
+//! let calibration = read_calibration(Path::new("out_camera_data.yml"), &Keys::default())?;
+//! println!("{} poses", calibration.poses.len());
+//! # Ok::<(), calibrate::opencv::OpenCvError>(())
+//! ```
+
+mod board;
+mod calibration;
+mod cameras;
+mod coefficients;
+mod error;
+mod flat;
+mod json;
+mod lens;
+mod matrix;
+mod poses;
+mod storage;
+mod values;
+mod xml;
+mod yaml;
+
+pub use board::Board;
+pub use calibration::{OpenCvCalibration, find_calibrations, read_calibration};
+pub use cameras::{Keys, OpenCvCamera};
+pub use error::OpenCvError;
+pub use lens::{OpenCvDistortion, OpenCvLens, UnsupportedLens};
+pub use storage::{DataType, Entries, FileStorage, Matrix, Node, Value};

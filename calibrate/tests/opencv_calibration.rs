@@ -1,0 +1,428 @@
+//! Cameras and poses out of OpenCV's files, as they are met in the wild.
+
+use calibrate::opencv::{
+    Keys, OpenCvCalibration, OpenCvDistortion, OpenCvError, find_calibrations, read_calibration,
+};
+use calibrate::{ModelKind, Rigid3, colmap};
+use glam::{DVec2, DVec3};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn captures() -> Option<PathBuf> {
+    let folder = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/captures"
+    ));
+    if !folder.is_dir() {
+        eprintln!("SKIPPED: {} is not there", folder.display());
+        return None;
+    }
+    Some(folder.to_owned())
+}
+
+/// A folder with one file.
+fn with_file(name: &str, text: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn read(text: &str) -> Result<OpenCvCalibration, OpenCvError> {
+    read_with(text, &Keys::default())
+}
+
+fn read_with(text: &str, keys: &Keys) -> Result<OpenCvCalibration, OpenCvError> {
+    let (_folder, path) = with_file("c.yml", text);
+    read_calibration(&path, keys)
+}
+
+/// What is said behind the file's name.
+#[track_caller]
+fn error(text: &str) -> String {
+    let error = read(text).unwrap_err().to_string();
+    error.split_once("c.yml").unwrap().1.to_owned()
+}
+
+fn matrix(key: &str, rows: usize, cols: usize, data: &str) -> String {
+    format!(
+        "{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: [ {data} ]\n"
+    )
+}
+
+const K: &str = "500, 0, 319.5, 0, 510, 239.5, 0, 0, 1";
+
+#[test]
+fn wild_files_give_cameras() {
+    let Some(captures) = captures() else { return };
+    let mut seen = Vec::new();
+    for entry in std::fs::read_dir(captures.join("opencv-calibrations")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if name.contains(".extrinsics") || name == "README.md" || name == "expected.json" {
+            continue;
+        }
+        seen.push(match read_calibration(&path, &Keys::default()) {
+            Err(error) => {
+                let error = error.to_string();
+                format!("{name}: {}", error.split_once(": ").unwrap().1)
+            }
+            Ok(calibration) => {
+                let mut line = format!("{name}:");
+                for camera in &calibration.cameras {
+                    let size = camera
+                        .size
+                        .map_or("?".to_owned(), |(w, h)| format!("{w}x{h}"));
+                    let made = camera.lens.camera(1, 1).unwrap().model.name();
+                    line += &format!(" {} {made} {size},", camera.name);
+                }
+                let board = calibration.board.map_or(0, |board| board.corners.len());
+                line += &format!(
+                    " {} poses, {} names, {board} corners{}",
+                    calibration.poses.len(),
+                    calibration.image_names.len(),
+                    calibration.right_from_left.map_or("", |_| ", rig")
+                );
+                line
+            }
+        });
+    }
+    seen.sort();
+    let random = "camera_matrix FULL_OPENCV 1280x720, 7 poses, 0 names, 0 corners";
+    let stereo = "M1 FULL_OPENCV ?, M2 FULL_OPENCV ?, 0 poses, 0 names, 0 corners, rig";
+    let expected = [
+        "camodocal-mei.yaml: the camera model is MEI (omnidirectional, with a mirror), which is \
+         not read here; calibrate with OpenCV's pinhole or fisheye model instead",
+        "camodocal-pinhole.yaml: projection_parameters OPENCV 752x480, 0 poses, 0 names, 0 corners",
+        &format!("crlf-nodashes.intrinsics.yml: {stereo}"),
+        "fisheye-crlf.xml: camera_matrix FULL_OPENCV 640x480, 25 poses, 0 names, 48 corners",
+        "fisheye-minimal.yml: cameraMatrix OPENCV_FISHEYE ?, 0 poses, 0 names, 0 corners",
+        "minimal.xml: Camera_Matrix FULL_OPENCV ?, 0 poses, 0 names, 0 corners",
+        &format!("opencv5-base64.json: {random}"),
+        &format!("opencv5-base64.xml: {random}"),
+        &format!("opencv5-base64.yml: {random}"),
+        &format!("opencv5.json: {random}"),
+        &format!("opencv5.xml: {random}"),
+        &format!("opencv5.yml.gz: {random}"),
+        &format!("opencv5.yml: {random}"),
+        "orbslam2-rgbd-flat-keys.yaml: Camera FULL_OPENCV 640x480, 0 poses, 0 names, 0 corners",
+        "orbslam2-stereo-flat-keys.yaml: LEFT.K OPENCV 752x480, RIGHT.K OPENCV 752x480, 0 poses, \
+         0 names, 0 corners",
+        "single-camera-long.xml: camera_matrix FULL_OPENCV 720x540, 13 poses, 13 names, 54 corners",
+        "single-camera.yml: camera_matrix OPENCV 2448x2048, 0 poses, 0 names, 0 corners",
+        &format!("stereo-rational14.intrinsics.yml: {stereo}"),
+        "with-extrinsics.yml: Camera_Matrix FULL_OPENCV 640x480, 8 poses, 0 names, 54 corners",
+        &format!("zed-nodashes.intrinsics.yml: {stereo}"),
+    ];
+    assert_eq!(seen, expected, "{seen:#?}");
+}
+
+#[test]
+fn the_chessboard_is_what_colmap_says() {
+    let Some(captures) = captures() else { return };
+    let capture = captures.join("opencv-chessboard");
+    let file = capture.join("out_camera_data.yml");
+    let calibration = read_calibration(&file, &Keys::default()).unwrap();
+    assert_eq!(
+        calibration.notes,
+        ["the order of the photos is from images.yml"]
+    );
+    let names = &calibration.image_names;
+    assert_eq!((names.len(), names[9].as_str()), (13, "left11.jpg"));
+    let found = calibration.reconstruction(names, (1, 1)).unwrap();
+
+    let expected = colmap::read_model(&capture.join("sparse/0")).unwrap();
+    let (ours, theirs) = (
+        found.cameras.values().next().unwrap(),
+        expected.cameras.values().next().unwrap(),
+    );
+    assert_eq!(ours.model, ModelKind::FullOpenCv);
+    assert_eq!((ours.width, ours.height), (theirs.width, theirs.height));
+    for (a, b) in ours.params.iter().zip(&theirs.params) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    for image in expected.images.values() {
+        let same = found
+            .images
+            .values()
+            .find(|i| i.name == image.name)
+            .unwrap();
+        let motion = same.camera_from_world * image.camera_from_world.inverse();
+        assert!(motion.rotation.angle_between(glam::DQuat::IDENTITY) < 1e-7);
+        assert!(motion.translation.length() < 1e-9, "{}", image.name);
+    }
+    // Corners and poses belong together.
+    let id = *found.cameras.keys().next().unwrap();
+    let errors = found.reprojection_errors_px(id).unwrap();
+    assert_eq!(errors.len(), 13 * 54);
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!((mean - 0.175).abs() < 0.01, "{mean}");
+    assert!(found.points.values().all(|p| p.position.z == 0.0));
+    assert_eq!(find_calibrations(&capture), [file]);
+}
+
+#[test]
+fn the_principal_point_moves_by_half_a_pixel() {
+    let text = format!(
+        "%YAML:1.0\nimage_size: [ 640, 480 ]\n{}",
+        matrix("K", 3, 3, K)
+    );
+    let calibration = read(&text).unwrap();
+    let camera = &calibration.cameras[0];
+    assert_eq!(camera.lens.principal, DVec2::new(320.0, 240.0));
+    assert_eq!(camera.lens.focal, DVec2::new(500.0, 510.0));
+    assert_eq!(camera.size, Some((640, 480)));
+    assert_eq!(
+        calibration.notes,
+        ["K has no distortion coefficients: taken as a pinhole camera"]
+    );
+}
+
+#[test]
+fn coefficients_come_in_opencvs_order() {
+    let text = matrix("M1", 3, 3, K) + &matrix("D1", 1, 8, "1, 2, 3, 4, 5, 6, 7, 8");
+    assert_eq!(
+        read(&text).unwrap().cameras[0].lens.distortion(),
+        OpenCvDistortion::Standard {
+            k: [1.0, 2.0, 5.0, 6.0, 7.0, 8.0],
+            p: [3.0, 4.0],
+            s: [0.0; 4],
+            tau: [0.0; 2],
+        }
+    );
+}
+
+#[test]
+fn a_fisheye_is_known_by_what_the_file_says() {
+    let skewed = "500, 5, 319.5, 0, 510, 239.5, 0, 0, 1";
+    let fisheye = OpenCvDistortion::Fisheye {
+        k: [1.0, 2.0, 3.0, 4.0],
+        alpha: 0.01,
+    };
+    let text = |head: &str, prefix: &str| {
+        format!("{head}\n")
+            + &matrix(&format!("{prefix}K"), 3, 3, skewed)
+            + &matrix(&format!("{prefix}D"), 4, 1, "1, 2, 3, 4")
+    };
+    for (head, prefix) in [
+        ("fisheye_model: 1", ""),
+        ("distortion_model: equidistant", ""),
+        ("a: 1", "fisheye_"),
+    ] {
+        let found = read(&text(head, prefix)).unwrap();
+        assert_eq!(
+            found.cameras[0].lens.distortion(),
+            fisheye,
+            "{head} {prefix}"
+        );
+        assert!(found.notes.is_empty());
+    }
+    let keys = Keys {
+        fisheye: true,
+        ..Keys::default()
+    };
+    let found = read_with(&text("a: 1", ""), &keys).unwrap();
+    assert_eq!(found.cameras[0].lens.distortion(), fisheye);
+    assert!(error(&text("fisheye_model: 0", "")).contains("skew 5, which OpenCV's pinhole"));
+    let five = matrix("K", 3, 3, K) + &matrix("D", 5, 1, "1, 2, 3, 4, 5") + "fisheye_model: 1\n";
+    assert!(
+        error(&five)
+            .ends_with(": D: a fisheye's distortion has 5 coefficients, expected 4 (k1 k2 k3 k4)")
+    );
+}
+
+#[test]
+fn unknown_names_are_listed_and_can_be_chosen() {
+    let text = matrix("Kamera", 3, 3, K)
+        + "inner:\n"
+        + "   x: 1\n"
+        + &matrix("Verzeichnung", 1, 5, "0.1, 0, 0, 0, 0");
+    assert_eq!(
+        error(&text),
+        ": no camera matrix under a name known here (camera_matrix, cameraMatrix, K, M1, \
+         intrinsic, Camera.fx and their like); the file holds Kamera (3 × 3), Verzeichnung \
+         (1 × 5); choose with --camera-matrix KEY --distortion KEY"
+    );
+    let mut keys = Keys {
+        camera_matrix: Some("Kamera".to_owned()),
+        ..Keys::default()
+    };
+    let said = read_with(&text, &keys).unwrap_err().to_string();
+    assert!(
+        said.ends_with(
+            "line 8: Verzeichnung: these may be the distortion coefficients of Kamera, for which \
+             none have a name known here; choose with --distortion KEY, or say --distortion none"
+        ),
+        "{said}"
+    );
+    keys.distortion = Some("none".to_owned());
+    assert!(read_with(&text, &keys).is_ok());
+    keys.distortion = Some("Verzeichnung".to_owned());
+    let chosen = read_with(&text, &keys).unwrap().cameras[0].clone();
+    assert_eq!(chosen.lens.camera(640, 480).unwrap().params[4], 0.1);
+    keys.camera_matrix = Some("Camera".to_owned());
+    let said = read_with(&text, &keys).unwrap_err().to_string();
+    assert!(
+        said.contains("no matrix is called Camera; the file holds Kamera"),
+        "{said}"
+    );
+}
+
+#[test]
+fn poses_are_read_in_each_form() {
+    let camera = matrix("K", 3, 3, K) + &matrix("D", 1, 4, "0, 0, 0, 0");
+    let expected = [
+        Rigid3::new(glam::DQuat::from_rotation_z(0.5), DVec3::new(1.0, 2.0, 3.0)),
+        Rigid3::new(
+            glam::DQuat::from_rotation_x(-1.5),
+            DVec3::new(4.0, 5.0, 6.0),
+        ),
+    ];
+    let three = |key: &str, data: &str| matrix(key, 2, 1, data).replace("dt: d", "dt: \"3d\"");
+    let one = |data: &str| {
+        matrix("   -", 3, 1, data)
+            .replace("-:", "-")
+            .replace("\n   ", "\n      ")
+    };
+    for poses in [
+        matrix(
+            "extrinsic_parameters",
+            2,
+            6,
+            "0, 0, 0.5, 1, 2, 3, -1.5, 0, 0, 4, 5, 6",
+        ),
+        matrix("rvecs", 2, 3, "0, 0, 0.5, -1.5, 0, 0") + &matrix("tvecs", 2, 3, "1, 2, 3, 4, 5, 6"),
+        three("rvecs", "0, 0, 0.5, -1.5, 0, 0") + &three("tvecs", "1, 2, 3, 4, 5, 6"),
+        format!(
+            "rvecs:\n{}{}tvecs:\n{}{}",
+            one("0, 0, 0.5"),
+            one("-1.5, 0, 0"),
+            one("1, 2, 3"),
+            one("4, 5, 6")
+        ),
+        "rvecs: [[0, 0, 0.5], [-1.5, 0, 0]]\ntvecs: [[1, 2, 3], [4, 5, 6]]\n".to_owned(),
+    ] {
+        let found = read(&(camera.clone() + &poses)).unwrap().poses;
+        assert_eq!(found.len(), 2, "{poses}");
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found.translation - expected.translation).length() == 0.0);
+            assert!(
+                found.rotation.angle_between(expected.rotation) < 1e-7,
+                "{poses}"
+            );
+        }
+    }
+    let rig = format!(
+        "{}{}{}{}",
+        matrix("M1", 3, 3, K),
+        matrix("M2", 3, 3, K),
+        matrix("R", 3, 3, "0, -1, 0, 1, 0, 0, 0, 0, 1"),
+        matrix("T", 3, 1, "-0.1, 0, 0")
+    );
+    let found = read(&rig).unwrap();
+    let right = found.photo_poses()[1];
+    assert!((right * DVec3::X - DVec3::new(-0.1, 1.0, 0.0)).length() < 1e-12);
+    let whole = found
+        .reconstruction(&["l".to_owned(), "r".to_owned()], (640, 480))
+        .unwrap();
+    assert_eq!((whole.cameras.len(), whole.images.len()), (2, 2));
+}
+
+#[test]
+fn the_rigs_pose_is_found_beside_its_cameras() {
+    let Some(captures) = captures() else { return };
+    let file = captures.join("opencv-calibrations/zed-nodashes.intrinsics.yml");
+    let rig = read_calibration(&file, &Keys::default())
+        .unwrap()
+        .right_from_left
+        .unwrap();
+    assert!((rig.translation.x + 4.7232494306).abs() < 1e-9);
+}
+
+#[test]
+fn bad_values_are_named() {
+    let d = matrix("D", 1, 5, "0, 0, 0, 0, 0");
+    let k = |data: &str| matrix("camera_matrix", 3, 3, data) + &d;
+    let good = matrix("camera_matrix", 3, 3, K) + &d;
+    for (text, said) in [
+        (
+            k("500, 0, 319.5, 0, -510, 239.5, 0, 0, 1"),
+            ", line 1: camera_matrix: the focal length fy is -510, expected a positive number; \
+             calibrate again",
+        ),
+        (
+            k("500, 0, .Nan, 0, 510, 239.5, 0, 0, 1"),
+            ", line 1: camera_matrix: the camera matrix holds NaN, expected finite numbers",
+        ),
+        (
+            k("500, 0, 0, 0, 510, 0, 319.5, 239.5, 1"),
+            ", line 1: camera_matrix: the camera matrix is [500 0 0; 0 510 0; 319.5 239.5 1], \
+             expected [fx 0 cx; 0 fy cy; 0 0 1]; transpose it",
+        ),
+        (
+            matrix("camera_matrix", 2, 3, "1, 2, 3, 4, 5, 6"),
+            ", line 1: camera_matrix: the camera matrix is 2 × 3, expected 3 × 3; choose another \
+             with --camera-matrix KEY",
+        ),
+        (
+            matrix("K", 3, 3, K) + &matrix("D", 1, 7, "0, 0, 0, 0, 0, 0, 0"),
+            ", line 6: D: distortion has 7 coefficients, expected 0, 4, 5, 8, 12 or 14; choose \
+             others with --distortion KEY, or none with --distortion none",
+        ),
+        (
+            matrix("K", 3, 3, K) + &matrix("D", 1, 4, "0, .Inf, 0, 0"),
+            ", line 6: D: the distortion holds inf, expected finite numbers",
+        ),
+        (
+            good.clone() + &matrix("extrinsic_parameters", 6, 2, "1,2,3,4,5,6,7,8,9,10,11,12"),
+            ", line 11: extrinsic_parameters: the poses are 6 × 2, expected N × 6, a rotation \
+             vector and a translation in each row; transpose it",
+        ),
+        (
+            good.clone() + &matrix("extrinsic_parameters", 1, 6, "1, 2, 3, 4, .Nan, 6"),
+            ", line 11: extrinsic_parameters: view 1 is rotated by [1.0, 2.0, 3.0] and moved by \
+             [4.0, NaN, 6.0], expected finite numbers",
+        ),
+        (
+            good.clone() + "rvecs: [[0, 0, 1], [0, 0, 1]]\ntvecs: [[0, 0, 1]]\n",
+            ", line 11: rvecs: 2 rotations, but tvecs holds 1 translations; expected as many",
+        ),
+        (
+            good.clone() + &matrix("camera_matrix", 3, 3, "1, 0, 1, 0, 1, 1, 0, 0, 1"),
+            ", line 11: camera_matrix: another camera matrix stands in line 1 (camera_matrix); \
+             choose with --camera-matrix KEY, or remove one",
+        ),
+        (
+            good.clone() + "image_width: -3\nimage_height: 5\n",
+            ", line 11: image_width: the image size is -3, expected a whole number of pixels",
+        ),
+        (
+            format!(
+                "{}{}{}{}",
+                matrix("M1", 3, 3, K),
+                matrix("M2", 3, 3, K),
+                matrix("R", 3, 3, "1, 0, 0, 0, 1, 0, 0, 0, -1"),
+                matrix("T", 3, 1, "-0.1, 0, 0")
+            ),
+            ", line 11: R: no rotation (its columns are not unit vectors at right angles, it \
+             mirrors, or the translation is not finite); calibrate again",
+        ),
+    ] {
+        assert_eq!(error(&text), said);
+    }
+}
+
+/// Whatever is damaged, the answer is a calibration or an error.
+#[test]
+fn damage_never_breaks_the_reader() {
+    let Some(captures) = captures() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c");
+    let whole = std::fs::read(captures.join("opencv-calibrations/opencv5.yml")).unwrap();
+    for (i, at) in (0..whole.len()).step_by(3).enumerate() {
+        let mut bytes = whole.clone();
+        bytes[at] = b"0-:. \n[]"[i % 8];
+        std::fs::write(&path, bytes).unwrap();
+        let _ = read_calibration(&path, &Keys::default());
+    }
+}

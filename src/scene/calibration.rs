@@ -1,0 +1,182 @@
+//! Finding a capture's calibration and reading it, whichever program made it.
+
+use super::{ImportOptions, SceneError, Warning};
+use calibrate::opencv::{self, OpenCvCalibration};
+use calibrate::{Reconstruction, colmap};
+use capture::{PhotoSet, photo_size};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Where a calibration is, and whose.
+#[derive(Debug)]
+pub(super) enum Source {
+    /// The folder of a COLMAP model.
+    Colmap(PathBuf),
+    /// A file by OpenCV.
+    OpenCv(PathBuf),
+}
+
+/// The calibration of a capture: the file or folder given, else what the capture's folder
+/// holds. A COLMAP model comes before an OpenCV file; what is passed over is noted.
+pub(super) fn find(
+    capture: &Path,
+    options: &ImportOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Source, SceneError> {
+    let given = options.calibration.as_deref();
+    if let Some(file) = given.filter(|path| path.is_file()) {
+        // One of a COLMAP model's files stands for all.
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let is_colmap = ["bin", "txt"]
+            .iter()
+            .any(|e| file.extension() == Some(e.as_ref()))
+            && colmap::find_model(folder).is_ok_and(|model| model == folder);
+        return Ok(if is_colmap {
+            Source::Colmap(folder.to_owned())
+        } else {
+            Source::OpenCv(file.to_owned())
+        });
+    }
+    let folder = given.unwrap_or(capture);
+    let model = colmap::find_model(folder);
+    let files = opencv::find_calibrations(folder);
+    let (source, passed_over) = match (model, files.split_first()) {
+        (Ok(model), _) => (Source::Colmap(model), files.as_slice()),
+        (Err(_), Some((first, rest))) => (Source::OpenCv(first.clone()), rest),
+        (Err(error), None) => return Err(error.into()),
+    };
+    if let Some(other) = passed_over.first() {
+        let used = match &source {
+            Source::Colmap(model) => format!("the COLMAP model in {}", model.display()),
+            Source::OpenCv(file) => file.display().to_string(),
+        };
+        warnings.push(Warning::Note(format!(
+            "the calibration is {used}; for that in {} say --calibration {0}",
+            other.display()
+        )));
+    }
+    Ok(source)
+}
+
+/// Reads an OpenCV calibration and finds which of the photos each pose is of.
+pub(super) fn read_opencv(
+    path: &Path,
+    options: &ImportOptions,
+    photos: &PhotoSet,
+    warnings: &mut Vec<Warning>,
+) -> Result<Reconstruction, SceneError> {
+    let calibration = opencv::read_calibration(path, &options.keys)?;
+    let refuse = |problem: String| SceneError::Poses {
+        path: path.to_owned(),
+        problem,
+    };
+    let notes = calibration.notes.iter().cloned();
+    warnings.extend(notes.map(Warning::Note));
+
+    // 1. One pose a photo.
+    let count = calibration.photo_poses().len();
+    if count == 0 {
+        return Err(refuse(
+            "cameras, but no poses; expected extrinsic_parameters, rvecs and tvecs, or the R and \
+             T of two cameras; have OpenCV write the extrinsic parameters, or give a COLMAP model"
+                .to_owned(),
+        ));
+    }
+    if calibration.cameras.len() > 1 && !calibration.poses.is_empty() {
+        let names: Vec<&str> = calibration
+            .cameras
+            .iter()
+            .map(|c| c.name.as_str())
+            .collect();
+        return Err(refuse(format!(
+            "the poses of one camera, but {} cameras ({}); choose with --camera-matrix KEY",
+            names.len(),
+            names.join(", ")
+        )));
+    }
+
+    // 2. Their photos.
+    let names = photo_names(&calibration, count, path, photos, warnings).map_err(refuse)?;
+    let named: BTreeSet<&String> = names.iter().collect();
+    if named.len() < names.len() {
+        let twice = names
+            .iter()
+            .enumerate()
+            .find(|(i, name)| names[..*i].contains(name));
+        let twice = twice.map_or("", |(_, name)| name);
+        return Err(refuse(format!(
+            "poses, but the list of photos names {twice} twice; expected a photo for each of {count} poses"
+        )));
+    }
+
+    // 3. Where the file does not say, the image size is the photos'.
+    let known = names.iter().find_map(|name| photos.find(name));
+    let size = match known {
+        Some(photo) if calibration.cameras.iter().any(|c| c.size.is_none()) => {
+            photo_size(&photo.path)?
+        }
+        _ => (1, 1),
+    };
+    let whole = calibration.reconstruction(&names, size);
+    let whole = whole.map_err(|source| SceneError::Lens {
+        path: path.to_owned(),
+        source,
+    })?;
+    for (id, camera) in &whole.cameras {
+        camera.lens().map_err(|source| SceneError::Camera {
+            name: format!("{}, camera {}", path.display(), id.0),
+            source,
+        })?;
+    }
+    Ok(whole)
+}
+
+/// The photo of each pose: by the list that came with the calibration, else in the order
+/// of their names; or what is wrong.
+fn photo_names(
+    calibration: &OpenCvCalibration,
+    count: usize,
+    path: &Path,
+    photos: &PhotoSet,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<String>, String> {
+    if calibration.image_names.len() == count {
+        let names = calibration.image_names.iter();
+        return Ok(names.map(|listed| photo_of(listed, photos)).collect());
+    }
+    if photos.photos.len() != count {
+        return Err(format!(
+            "{count} poses, but {} has {} photos, and no list says which are meant; put the list \
+             that OpenCV calibrated from beside it as images.yml, or give a folder with only the \
+             calibrated photos",
+            photos.root.display(),
+            photos.photos.len()
+        ));
+    }
+    warnings.push(Warning::Note(format!(
+        "the {count} poses in {} are taken to be of the photos in the order of their names; if \
+         that is wrong, put the list of photos beside it as images.yml",
+        path.display()
+    )));
+    Ok(photos
+        .photos
+        .iter()
+        .map(|photo| photo.name.clone())
+        .collect())
+}
+
+/// The photo that a list calls by a path of whoever calibrated: the one whose name is the
+/// longest end of that path. Where there is none, the path's own end.
+fn photo_of(listed: &str, photos: &PhotoSet) -> String {
+    let listed = listed.replace('\\', "/");
+    let mut rest = listed.as_str();
+    loop {
+        if photos.find(rest).is_some() {
+            return rest.to_owned();
+        }
+        match rest.split_once('/') {
+            Some((_, shorter)) => rest = shorter,
+            None => return rest.to_owned(),
+        }
+    }
+}
