@@ -4,6 +4,7 @@ use super::invert::{invert_monotone, invert_on_disc, scan};
 use glam::{DMat2, DVec2};
 
 /// The distorted point and the Jacobian of the mapping.
+#[inline]
 pub(super) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
     let r2 = point.length_squared();
     let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
@@ -21,6 +22,7 @@ pub(super) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat
 }
 
 /// The Jacobian of x ↦ x·radial(r²), where `slope` is d radial / d r².
+#[inline]
 pub(super) fn radial_jacobian(point: DVec2, radial: f64, slope: f64) -> DMat2 {
     let DVec2 { x, y } = point;
     let xy = 2.0 * x * y * slope;
@@ -34,6 +36,7 @@ pub(super) fn radial_jacobian(point: DVec2, radial: f64, slope: f64) -> DMat2 {
 ///
 /// That is 2(q·x)I + 2(qxᵀ + xqᵀ) with q = (p₂, p₁): symmetric, its eigenvalues at least
 /// −6|q|r.
+#[inline]
 pub(super) fn tangential(point: DVec2, p: &[f64; 2]) -> (DVec2, DMat2) {
     let DVec2 { x, y } = point;
     let r2 = x * x + y * y;
