@@ -10,6 +10,7 @@
 
 mod camera;
 pub mod colmap;
+pub mod formats;
 mod lens;
 mod reconstruction;
 mod rigid;

@@ -1,0 +1,22 @@
+//! Calibrations that are neither COLMAP's nor OpenCV's.
+//!
+//! Each file here reads one format into a [`Reconstruction`](crate::Reconstruction) in our
+//! conventions (camera x right, y down, z forward; the first pixel's centre at
+//! (0.5, 0.5)), and its first lines say which conventions the format has. What a format
+//! says and we cannot represent is an error, never an approximation.
+//!
+//! Every pose that comes back is a rotation, every number finite, every camera has a lens,
+//! and no two images share a name. Matrices that are rotations to within 1e-4 become the
+//! nearest rotation.
+
+mod build;
+mod bundler;
+mod error;
+mod json;
+mod transforms;
+mod words;
+
+pub use build::SizeOf;
+pub use bundler::read_bundler;
+pub use error::FormatError;
+pub use transforms::read_transforms;

@@ -1,0 +1,6 @@
+//! Other programs' calibrations: read, and refused.
+
+mod broken;
+mod bundler;
+mod captures;
+mod transforms;
