@@ -13,10 +13,12 @@ mod build;
 mod bundler;
 mod error;
 mod json;
+mod nvm;
 mod transforms;
 mod words;
 
 pub use build::SizeOf;
 pub use bundler::read_bundler;
 pub use error::FormatError;
+pub use nvm::read_nvm;
 pub use transforms::read_transforms;

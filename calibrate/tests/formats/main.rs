@@ -3,4 +3,5 @@
 mod broken;
 mod bundler;
 mod captures;
+mod nvm;
 mod transforms;
