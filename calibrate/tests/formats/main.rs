@@ -3,5 +3,7 @@
 mod broken;
 mod bundler;
 mod captures;
+mod llff;
+mod meshroom;
 mod nvm;
 mod transforms;
