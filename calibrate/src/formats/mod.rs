@@ -11,18 +11,22 @@
 
 mod build;
 mod bundler;
+mod detect;
 mod error;
 mod json;
 mod llff;
 mod meshroom;
 mod nvm;
+mod openmvg;
 mod transforms;
 mod words;
 
 pub use build::SizeOf;
 pub use bundler::read_bundler;
+pub use detect::{Format, detect};
 pub use error::FormatError;
 pub use llff::read_llff;
 pub use meshroom::read_meshroom;
 pub use nvm::read_nvm;
+pub use openmvg::read_openmvg;
 pub use transforms::read_transforms;

@@ -3,7 +3,9 @@
 mod broken;
 mod bundler;
 mod captures;
+mod detect;
 mod llff;
 mod meshroom;
 mod nvm;
+mod openmvg;
 mod transforms;
