@@ -1,0 +1,77 @@
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+/// The formats read here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// instant-ngp's and nerfstudio's `transforms.json`.
+    Transforms,
+    /// Bundler's `bundle.out`.
+    Bundler,
+    /// VisualSFM's `.nvm`.
+    Nvm,
+    /// LLFF's `poses_bounds.npy`.
+    Llff,
+    /// Meshroom's (AliceVision's) `.sfm`.
+    Meshroom,
+    /// OpenMVG's `sfm_data.json`.
+    OpenMvg,
+}
+
+/// The keys that tell the JSON formats apart; their values are skipped, not kept.
+#[derive(Deserialize)]
+struct Keys {
+    frames: Option<Vec<Frame>>,
+    views: Option<IgnoredAny>,
+    intrinsics: Option<IgnoredAny>,
+    extrinsics: Option<IgnoredAny>,
+    poses: Option<IgnoredAny>,
+    version: Option<serde_json::Value>,
+    sfm_data_version: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    file_path: Option<IgnoredAny>,
+    transform_matrix: Option<IgnoredAny>,
+}
+
+/// Which format a file is in, told by its content, whatever its name; `None` for a file
+/// that is none of them, is cut short, or cannot be read. A JSON file is read once to its
+/// end, without keeping it; of any other only the beginning is read.
+pub fn detect(path: &Path) -> Option<Format> {
+    let mut file = File::open(path).ok()?;
+    let mut start = Vec::new();
+    file.by_ref().take(256).read_to_end(&mut start).ok()?;
+    let begins = |magic: &str| start.starts_with(magic.as_bytes());
+    if begins("# Bundle file v0.") {
+        return Some(Format::Bundler);
+    }
+    if begins("NVM_V3") {
+        return Some(Format::Nvm);
+    }
+    if start.starts_with(b"\x93NUMPY") {
+        // Two axes, the second of 17: any other array is no poses_bounds.
+        let header = String::from_utf8_lossy(&start).replace(' ', "");
+        return header.contains(",17)").then_some(Format::Llff);
+    }
+    if start.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
+        return None;
+    }
+    file.rewind().ok()?;
+    let keys: Keys = serde_json::from_reader(BufReader::new(file)).ok()?;
+    if keys.sfm_data_version.is_some() && keys.views.is_some() && keys.extrinsics.is_some() {
+        return Some(Format::OpenMvg);
+    }
+    if keys.version.is_some_and(|version| version.is_array())
+        && keys.views.is_some()
+        && (keys.intrinsics.is_some() || keys.poses.is_some())
+    {
+        return Some(Format::Meshroom);
+    }
+    let frame = keys.frames.as_ref()?.first()?;
+    (frame.file_path.is_some() && frame.transform_matrix.is_some()).then_some(Format::Transforms)
+}

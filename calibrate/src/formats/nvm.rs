@@ -1,0 +1,266 @@
+//! VisualSFM's `.nvm` files (NVM_V3; Wu's documentation at ccwu.me/vsfm/doc.html).
+//!
+//! - A camera has x right, y down, z forward; its line is NAME f q_w q_x q_y q_z c_x c_y
+//!   c_z r 0, with q the rotation camera from world and c the centre in the world.
+//! - Pixels are relative to the image's centre, y down; SiftGPU, which measures them, puts
+//!   the first pixel's centre at (0.5, 0.5) as we do. Sizes are not stored.
+//! - Distortion acts on the *measurement* (Wu, "Critical configurations for radial
+//!   distortion self-calibration", and PBA's `SetNormalizedMeasurementDistortion`): with d
+//!   the measured position over f, the undistorted one is u = d·(1 + r·|d|²). See
+//!   [`lens_of_measurement_distortion`] for how that becomes a lens.
+//! - With `NVM_V3 FixedK fx cx fy cy` all cameras share that calibration.
+//!
+//! A file may hold several models, largest first; the first one is read.
+
+use super::build::{self, Builder, SizeOf};
+use super::error::{FormatError, Problem};
+use super::words::Words;
+use crate::{Camera, ImageId, Lens, ModelKind, Pixel, Point3DId, Reconstruction};
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use std::path::Path;
+
+/// How far from 1 a quaternion's length may be.
+const QUATERNION_TOLERANCE: f64 = 1e-3;
+/// How far a converted lens may be from the file's model, anywhere in the image; the
+/// measurements themselves are off by ten times as much.
+const MAX_CONVERSION_ERROR_PX: f64 = 0.05;
+
+/// Reads the first model of an `.nvm` file. Images and points are numbered from 0, as in
+/// the file; keypoints are in the order of the points that they observe. `size_of` is
+/// asked for every image.
+///
+/// # Errors
+/// An unreadable file, another version, a quaternion that is no rotation, a camera
+/// without a lens or with a distortion too strong to be converted to 0.05 px, a photo of
+/// unknown size, two photos of one name.
+pub fn read_nvm(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
+    let text = build::read_text(path)?;
+    let mut words = Words::new(path, &text);
+    let header = words.line().unwrap_or_default();
+    let shared = fixed_calibration(header).map_err(|problem| words.error("header", problem))?;
+    let image_count: u32 = words.parse("header", "the number of images")?;
+
+    let mut builder = Builder::new(path);
+    for index in 0..image_count {
+        read_image(&mut words, &mut builder, index, shared, size_of)?;
+    }
+    let point_count: u64 = words.parse("points", "the number of points")?;
+    for id in 0..point_count {
+        read_point(&mut words, &mut builder, id, image_count)?;
+    }
+    builder.finish("images")
+}
+
+/// The calibration that all cameras share, if the first line gives one: (fx, fy) and
+/// (cx, cy).
+fn fixed_calibration(header: &str) -> Result<Option<(DVec2, DVec2)>, Problem> {
+    let mut words = header.split_whitespace();
+    if words.next() != Some("NVM_V3") {
+        return Err(Problem::new(
+            format!("found {header:.40?}, expected \"NVM_V3\""),
+            "save the model again with a VisualSFM of 2011 or later",
+        ));
+    }
+    let rest: Vec<&str> = words.collect();
+    if rest.first() != Some(&"FixedK") {
+        return Ok(None);
+    }
+    let numbers: Vec<f64> = rest[1..]
+        .iter()
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    match numbers[..] {
+        [fx, cx, fy, cy] if rest.len() == 5 => Ok(Some((DVec2::new(fx, fy), DVec2::new(cx, cy)))),
+        _ => Err(Problem::broken(format!(
+            "found {header:?}, expected \"NVM_V3 FixedK fx cx fy cy\""
+        ))),
+    }
+}
+
+fn read_image(
+    words: &mut Words<'_>,
+    builder: &mut Builder<'_>,
+    index: u32,
+    shared: Option<(DVec2, DVec2)>,
+    size_of: SizeOf<'_>,
+) -> Result<(), FormatError> {
+    let of = format!("image {index}");
+    let line = loop {
+        match words.line() {
+            None => {
+                let problem = Problem::broken("the file ends, expected an image");
+                return Err(words.error(&of, problem));
+            }
+            Some(line) if line.trim().is_empty() => {}
+            Some(line) => break line,
+        }
+    };
+    let (name, numbers) = split(line).map_err(|problem| words.error(&of, problem))?;
+    let of = format!("image {index}, {name}");
+    let refuse = |problem| words.error(&of, problem);
+    let [f, w, x, y, z, cx, cy, cz, r] = numbers;
+
+    let rotation = DQuat::from_xyzw(x, y, z, w);
+    let length = rotation.length();
+    if !((length - 1.0).abs() <= QUATERNION_TOLERANCE) {
+        return Err(refuse(Problem::broken(format!(
+            "the rotation's quaternion ({w}, {x}, {y}, {z}) has length {length}, expected 1"
+        ))));
+    }
+    let camera_axes = DMat3::from_quat(rotation.normalize().conjugate());
+    let pose = build::pose(camera_axes, DVec3::new(cx, cy, cz)).map_err(refuse)?;
+
+    let (width, height) = build::size(size_of, &name).map_err(refuse)?;
+    let center = DVec2::new(f64::from(width), f64::from(height)) / 2.0;
+    let (focal, center) = shared.unwrap_or((DVec2::splat(f), center));
+    let camera = if r == 0.0 {
+        Camera {
+            model: ModelKind::Pinhole,
+            width,
+            height,
+            params: vec![focal.x, focal.y, center.x, center.y],
+        }
+    } else {
+        lens_of_measurement_distortion(focal, center, (width, height), r).map_err(refuse)?
+    };
+    let place = words.place(&of);
+    let camera_id = builder.camera(&place, camera)?;
+    builder.image(&place, ImageId(index), &name, camera_id, pose)
+}
+
+/// An image's name and its nine numbers that mean something. VisualSFM writes a space in
+/// a name as `"`, but other programs leave it.
+fn split(line: &str) -> Result<(String, [f64; 9]), Problem> {
+    let mut words: Vec<&str> = line.rsplitn(11, char::is_whitespace).collect();
+    if line.contains('\t') || words.iter().any(|word| word.is_empty()) {
+        // Several blanks in a row: between the numbers they count as one.
+        words = line.split_whitespace().rev().take(10).collect();
+        let first = words
+            .last()
+            .map_or(0, |word| word.as_ptr() as usize - line.as_ptr() as usize);
+        words.push(&line[..first]);
+    }
+    if words.len() != 11 {
+        return Err(Problem::broken(format!(
+            "found {line:.80?}, expected a name and ten numbers"
+        )));
+    }
+    let name = build::name(&words[10].replace('"', " "))?;
+    let mut numbers = [0.0_f64; 9];
+    for (number, word) in numbers.iter_mut().zip(words[1..10].iter().rev()) {
+        *number = word
+            .parse()
+            .ok()
+            .filter(|n: &f64| n.is_finite())
+            .ok_or_else(|| Problem::broken(format!("found {word:?}, expected a finite number")))?;
+    }
+    Ok((name, numbers))
+}
+
+/// The lens whose projection undoes u = d·(1 + r·|d|²).
+///
+/// With t = r·|u|² the inverse is d = u·g, where g + t·g³ = 1, a function of t alone:
+/// g = Σ (−1)ⁿ binom(3n, n)/(2n + 1) tⁿ = 1 − t + 3t² − 12t³ + … Its [3/3] Padé
+/// approximant is a quotient of cubics in |u|², which is exactly OpenCV's rational model.
+/// It is off by less than 1e-7 for |t| ≤ 0.05 and 6e-5 at t = −0.1; what that makes in
+/// this image's pixels is checked against the definition from the centre to the corner.
+fn lens_of_measurement_distortion(
+    focal: DVec2,
+    center: DVec2,
+    (width, height): (u32, u32),
+    r: f64,
+) -> Result<Camera, Problem> {
+    let above = [113.0, 243.0, 85.0].map(|c| c / 13.0);
+    let below = [126.0, 330.0, 193.0].map(|c| c / 13.0);
+    let k = |c: [f64; 3], n: usize| c[n - 1] * r.powi(n as i32);
+    let camera = Camera {
+        model: ModelKind::FullOpenCv,
+        width,
+        height,
+        params: vec![
+            focal.x,
+            focal.y,
+            center.x,
+            center.y,
+            k(above, 1),
+            k(above, 2),
+            0.0,
+            0.0,
+            k(above, 3),
+            k(below, 1),
+            k(below, 2),
+            k(below, 3),
+        ],
+    };
+    let too_strong = |found: String| {
+        Problem::new(
+            format!(
+                "the radial distortion is {r}: {found}, expected at most \
+                 {MAX_CONVERSION_ERROR_PX} px"
+            ),
+            "undistort the photos with VisualSFM (\"export to PMVS\") and use the model it writes",
+        )
+    };
+    // A focal length that is none is refused with the camera.
+    let Ok(lens) = camera.lens() else {
+        return Ok(camera);
+    };
+    let error_px = conversion_error_px(&lens, DVec2::new(width.into(), height.into()), r);
+    match error_px {
+        Some(error_px) if error_px <= MAX_CONVERSION_ERROR_PX => Ok(camera),
+        Some(error_px) => Err(too_strong(format!(
+            "as OpenCV's model it is off by {error_px:.3} px"
+        ))),
+        None => Err(too_strong(
+            "it folds the image over itself before the corners".to_owned(),
+        )),
+    }
+}
+
+/// The greatest distance between measured positions on the diagonals and where the lens
+/// projects the rays they stand for; `None` where the definition is not one to one.
+fn conversion_error_px(lens: &Lens, size: DVec2, r: f64) -> Option<f64> {
+    const STEPS: u32 = 64;
+    let mut worst = 0.0_f64;
+    for corner in [DVec2::ZERO, size, size * DVec2::X, size * DVec2::Y] {
+        for step in 1..=STEPS {
+            let fraction = f64::from(step) / f64::from(STEPS);
+            let d = (corner - lens.principal) / lens.focal * fraction;
+            if 1.0 + 3.0 * r * d.length_squared() <= 0.0 {
+                return None;
+            }
+            let u = d * (1.0 + r * d.length_squared());
+            let measured = lens.principal + lens.focal * d;
+            let projected = lens.project(u.extend(1.0))?;
+            worst = worst.max(projected.distance(Pixel::new(measured.x, measured.y)));
+        }
+    }
+    Some(worst)
+}
+
+fn read_point(
+    words: &mut Words<'_>,
+    builder: &mut Builder<'_>,
+    id: u64,
+    image_count: u32,
+) -> Result<(), FormatError> {
+    let of = format!("point {id}");
+    let position = DVec3::from_array(words.numbers(&of, "a position of three numbers")?);
+    let color = words.color(&of)?;
+    let measurements: u64 = words.parse(&of, "the number of measurements")?;
+    let mut observations = Vec::new();
+    for _ in 0..measurements {
+        let image: u32 = words.parse(&of, "an image's number")?;
+        let _feature: u64 = words.parse(&of, "a feature's number")?;
+        let [x, y] = words.numbers(&of, "a measurement's x and y")?;
+        let Some(camera) = builder.camera_of(ImageId(image)) else {
+            let problem = format!("found image {image}, expected less than {image_count}");
+            return Err(words.error(&of, Problem::broken(problem)));
+        };
+        // The principal point is the origin of measurements.
+        let pixel = Pixel::new(camera.params[2] + x, camera.params[3] + y);
+        observations.push((ImageId(image), pixel));
+    }
+    let place = words.place(&of);
+    builder.point(&place, Point3DId(id), position, color, &observations)
+}

@@ -1,0 +1,242 @@
+//! `transforms.json`, as instant-ngp's `colmap2nerf.py` and nerfstudio write it.
+//!
+//! - Poses are `transform_matrix`, camera to world, in OpenGL's axes: x right, y up, z
+//!   back. The world is the file's own: `applied_transform` and `applied_scale` say what
+//!   was done to the poses that are in the file, so they are not applied again.
+//! - Pixels are COLMAP's, as ours: both programs copy `cx` and `cy` from it and send the
+//!   ray of the first pixel through (0.5, 0.5). Without them the centre is w/2, h/2.
+//! - Focal lengths are `fl_x`, `fl_y` in pixels, else `x_fov`, `y_fov` in degrees, else
+//!   `camera_angle_x`, `camera_angle_y` in radians. What a frame says goes before what is
+//!   said for all. With only one of the two axes, pixels are square.
+//! - Distortion is OpenCV's; with `camera_model` OPENCV_FISHEYE or `is_fisheye` its
+//!   fisheye's. nerfstudio's r⁸ term of a lens that is no fisheye (`k4`) must be zero.
+
+use super::build::{self, Builder, SizeOf};
+use super::error::{FormatError, Problem};
+use super::json::{self, Json};
+use crate::{Camera, ImageId, ModelKind, Reconstruction};
+use glam::{DMat3, DVec3};
+use std::path::Path;
+
+/// Lenses of instant-ngp that no model here can represent.
+const FOREIGN_LENSES: [&str; 4] = ["ftheta_p0", "latlong", "equirectangular", "rolling_shutter"];
+const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+
+/// Reads a `transforms.json`. Images are numbered from 1 in the order of `frames`; their
+/// names are as in the file (`./` left out), which may lack the photo's extension.
+/// `size_of` is asked where the file does not say `w` and `h`.
+///
+/// # Errors
+/// An unreadable file, a pose that is no rotation, intrinsics that are missing,
+/// impossible or of a lens that is not read here, two frames of one name.
+pub fn read_transforms(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
+    let value = json::parse(path)?;
+    let root = Json::root(path, &value);
+    let mut builder = Builder::new(path);
+    for (index, frame) in root.field("frames")?.items()?.enumerate() {
+        let file_path = frame.field("file_path")?;
+        let name = build::name(file_path.text()?).map_err(|p| file_path.error(p))?;
+        let frame = frame.called(&name);
+
+        let matrix = frame.field("transform_matrix")?;
+        let (world_from_camera, center) = camera_to_world(&matrix)?;
+        let pose = build::pose(world_from_camera, center).map_err(|p| matrix.error(p))?;
+
+        let camera = Intrinsics {
+            frame: &frame,
+            root: &root,
+        }
+        .camera(|| build::size(size_of, &name))?;
+        let camera_id = builder.camera(&frame.record, camera)?;
+        let id = ImageId(index as u32 + 1);
+        builder.image(&frame.record, id, &name, camera_id, pose)?;
+    }
+    builder.finish("frames")
+}
+
+/// The camera's axes (right, down, forward) and centre in the world.
+fn camera_to_world(matrix: &Json<'_>) -> Result<(DMat3, DVec3), FormatError> {
+    let rows: Vec<_> = matrix.items()?.collect();
+    if !(3..=4).contains(&rows.len()) {
+        return Err(matrix.error(Problem::broken(format!(
+            "found {} rows, expected 4 of 4 numbers",
+            rows.len()
+        ))));
+    }
+    let mut m = [[0.0; 4]; 3];
+    for (numbers, row) in m.iter_mut().zip(&rows) {
+        *numbers = row.numbers()?;
+    }
+    if let Some(last) = rows.get(3)
+        && last.numbers()? != [0.0, 0.0, 0.0, 1.0]
+    {
+        return Err(last.error(Problem::broken(format!(
+            "found {:?} as last row, expected [0, 0, 0, 1]",
+            last.numbers::<4>()?
+        ))));
+    }
+    let column = |j: usize| DVec3::new(m[0][j], m[1][j], m[2][j]);
+    // OpenGL's y is up and its z back.
+    let axes = DMat3::from_cols(column(0), -column(1), -column(2));
+    Ok((axes, column(3)))
+}
+
+/// A frame's own intrinsics, and those said for all frames.
+struct Intrinsics<'a> {
+    frame: &'a Json<'a>,
+    root: &'a Json<'a>,
+}
+
+impl<'a> Intrinsics<'a> {
+    fn get(&self, key: &str) -> Option<Json<'a>> {
+        self.frame.optional(key).or_else(|| self.root.optional(key))
+    }
+
+    fn number_or(&self, key: &str, default: f64) -> Result<f64, FormatError> {
+        self.get(key).map_or(Ok(default), |json| json.number())
+    }
+
+    fn camera(
+        &self,
+        size: impl FnOnce() -> Result<(u32, u32), Problem>,
+    ) -> Result<Camera, FormatError> {
+        for key in FOREIGN_LENSES {
+            if let Some(json) = self.get(key)
+                && !is_nothing(&json)
+            {
+                return Err(json.error(Problem::new(
+                    "found a lens or shutter that is not read here, expected OpenCV's models",
+                    "undistort the photos and export them as PINHOLE",
+                )));
+            }
+        }
+        let (width, height) = match (self.get("w"), self.get("h")) {
+            (Some(w), Some(h)) => (w.whole()?, h.whole()?),
+            _ => size().map_err(|problem| self.frame.error(problem))?,
+        };
+        let (fx, fy) = self.focals(width, height)?;
+        let cx = self.number_or("cx", f64::from(width) / 2.0)?;
+        let cy = self.number_or("cy", f64::from(height) / 2.0)?;
+        let (model, distortion) = self.lens()?;
+        let mut params = vec![fx, fy, cx, cy];
+        params.extend(distortion);
+        Ok(Camera {
+            model,
+            width,
+            height,
+            params,
+        })
+    }
+
+    /// The focal lengths in pixels along x and y.
+    fn focals(&self, width: u32, height: u32) -> Result<(f64, f64), FormatError> {
+        for level in [self.frame, self.root] {
+            let x = focal(level, "x", width)?;
+            let y = focal(level, "y", height)?;
+            if let Some(known) = x.or(y) {
+                return Ok((x.unwrap_or(known), y.unwrap_or(known)));
+            }
+        }
+        Err(self.frame.error(Problem::new(
+            "there is no focal length, neither here nor for all frames",
+            "add fl_x and fl_y in pixels, or camera_angle_x in radians",
+        )))
+    }
+
+    /// The model and the parameters that follow the focal lengths and the centre.
+    fn lens(&self) -> Result<(ModelKind, Vec<f64>), FormatError> {
+        let mut c = [0.0; 8];
+        for (value, key) in c.iter_mut().zip(COEFFICIENTS) {
+            *value = self.number_or(key, 0.0)?;
+        }
+        let [k1, k2, p1, p2, k3, k4, ..] = c;
+        let nonzero = COEFFICIENTS.iter().zip(c).find(|(_, value)| *value != 0.0);
+        let named = self.get("camera_model");
+        let name = named.as_ref().map(|json| json.text()).transpose()?;
+        let is_fisheye = self.get("is_fisheye").map_or(Ok(false), |f| f.flag())?;
+        let undistort = "undistort the photos and export them as PINHOLE";
+        let refuse = |problem: String, remedy: &str| {
+            let place = named.as_ref().unwrap_or(self.frame);
+            Err(place.error(Problem::new(problem, remedy)))
+        };
+        match name {
+            _ if is_fisheye => {}
+            None | Some("OPENCV" | "FULL_OPENCV" | "SIMPLE_RADIAL" | "RADIAL") => {
+                if name == Some("FULL_OPENCV") && c[5..] != [0.0; 3] {
+                    return Ok((ModelKind::FullOpenCv, c.to_vec()));
+                }
+                if k4 != 0.0 {
+                    return refuse(
+                        format!(
+                            "k4 is {k4}, an r⁸ term (or a fisheye's), which OpenCV's model lacks"
+                        ),
+                        "set camera_model to OPENCV_FISHEYE if it is one, or undistort the photos",
+                    );
+                }
+                return Ok(if nonzero.is_none() {
+                    (ModelKind::Pinhole, Vec::new())
+                } else if k3 == 0.0 {
+                    (ModelKind::OpenCv, vec![k1, k2, p1, p2])
+                } else {
+                    (
+                        ModelKind::FullOpenCv,
+                        vec![k1, k2, p1, p2, k3, 0.0, 0.0, 0.0],
+                    )
+                });
+            }
+            Some("PINHOLE" | "SIMPLE_PINHOLE") => {
+                return match nonzero {
+                    None => Ok((ModelKind::Pinhole, Vec::new())),
+                    Some((key, value)) => refuse(
+                        format!("found {name:?} with {key} = {value}, which a pinhole lacks"),
+                        "set camera_model to OPENCV, or remove the coefficients",
+                    ),
+                };
+            }
+            Some("OPENCV_FISHEYE") => {}
+            Some(other) => {
+                return refuse(
+                    format!(
+                        "found the camera model {other:?}, expected PINHOLE, OPENCV or \
+                         OPENCV_FISHEYE"
+                    ),
+                    undistort,
+                );
+            }
+        }
+        if p1 != 0.0 || p2 != 0.0 {
+            return refuse(
+                format!("found a fisheye with p1 = {p1} and p2 = {p2}, expected none"),
+                undistort,
+            );
+        }
+        Ok((ModelKind::OpenCvFisheye, vec![k1, k2, k3, k4]))
+    }
+}
+
+/// A focal length in pixels along an axis, where a level says it.
+fn focal(level: &Json<'_>, axis: &str, resolution: u32) -> Result<Option<f64>, FormatError> {
+    if let Some(focal) = level.optional(&format!("fl_{axis}")) {
+        return focal.number().map(Some);
+    }
+    let degrees = level.optional(&format!("{axis}_fov"));
+    let (json, angle) = match (degrees, level.optional(&format!("camera_angle_{axis}"))) {
+        (Some(json), _) => (json.clone(), json.number()?.to_radians()),
+        (None, Some(json)) => (json.clone(), json.number()?),
+        (None, None) => return Ok(None),
+    };
+    if !(angle > 0.0 && angle < std::f64::consts::PI) {
+        return Err(json.error(Problem::broken(format!(
+            "the field of view is {angle} radians, expected more than 0 and less than π"
+        ))));
+    }
+    Ok(Some(0.5 * f64::from(resolution) / (0.5 * angle).tan()))
+}
+
+/// Whether a key that asks for something special asks for nothing: false, or all zeros.
+fn is_nothing(json: &Json<'_>) -> bool {
+    match json.items() {
+        Ok(items) => items.into_iter().all(|item| is_nothing(&item)),
+        Err(_) => matches!(json.flag(), Ok(false)),
+    }
+}

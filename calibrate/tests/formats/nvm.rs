@@ -1,0 +1,160 @@
+use crate::broken::damage;
+use crate::captures::{capture, mean, reprojection_errors_px};
+use calibrate::formats::{FormatError, read_nvm};
+use calibrate::{ModelKind, Reconstruction};
+use glam::DVec3;
+use std::path::Path;
+
+/// Image 1 is turned by 90° about y: it looks along −x.
+const MODEL: &str = "NVM_V3
+
+2
+a\"b.jpg\t100 1 0 0 0 1 2 3 0.2 0
+.\\d\\c 1.jpg 100 0.7071067811865476 0 0.7071067811865476 0 0 0 0 0 0
+
+1
+2 4 13 10 20 30 1 0 5 9.5 19
+0
+";
+
+fn size_of(name: &str) -> Option<(u32, u32)> {
+    (name != "gone.jpg").then_some((60, 40))
+}
+
+fn parse(model: &str) -> Result<Reconstruction, FormatError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.nvm");
+    std::fs::write(&path, model).unwrap();
+    read_nvm(&path, &size_of)
+}
+
+fn error(from: &str, to: &str) -> String {
+    assert!(MODEL.contains(from));
+    let error = parse(&MODEL.replacen(from, to, 1)).unwrap_err().to_string();
+    let (_, rest) = error.split_once("model.nvm, ").unwrap();
+    rest.to_owned()
+}
+
+#[test]
+fn the_example_reprojects() {
+    let Some(path) = capture("other-formats/visualsfm-nvm/model.nvm") else {
+        return;
+    };
+    let size_of = |_: &str| Some((2592, 1944));
+    let whole = read_nvm(&path, &size_of).unwrap();
+    assert_eq!((whole.images.len(), whole.points.len()), (22, 853));
+    let mut errors = reprojection_errors_px(&whole);
+    errors.sort_by(f64::total_cmp);
+    let (mean_px, median_px) = (mean(&errors), errors[errors.len() / 2]);
+    println!(
+        "nvm: mean {mean_px:.3} px, median {median_px:.3} px of {}",
+        errors.len()
+    );
+    assert!(mean_px < 2.0 && median_px < 1.0);
+}
+
+#[test]
+fn axes_names_and_pixels_are_visualsfm_s() {
+    let whole = parse(MODEL).unwrap();
+    let images: Vec<_> = whole.images.values().collect();
+    assert_eq!(
+        [&*images[0].name, &*images[1].name],
+        ["a b.jpg", "d/c 1.jpg"]
+    );
+    let center = images[0].camera_from_world.center();
+    assert!(center.distance(DVec3::new(1.0, 2.0, 3.0)) < 1e-15);
+    // q turns the world into the camera: −x of the world is ahead.
+    let ahead = images[1].camera_from_world * DVec3::new(-1.0, 0.0, 0.0);
+    assert!(ahead.distance(DVec3::Z) < 1e-15, "{ahead}");
+    let keypoint = images[0].keypoints[0];
+    assert_eq!((keypoint.x, keypoint.y), (39.5, 39.0));
+    assert_eq!(
+        whole.cameras[&images[1].camera_id].model,
+        ModelKind::Pinhole
+    );
+}
+
+#[test]
+fn measurement_distortion_is_undone() {
+    for r in [-0.4, -0.05, 0.01, 0.3, 0.9] {
+        let whole = parse(&MODEL.replace("0.2 0\n", &format!("{r} 0\n"))).unwrap();
+        let camera = whole.cameras.values().next().unwrap();
+        assert_eq!(camera.model, ModelKind::FullOpenCv);
+        let lens = camera.lens().unwrap();
+        for (x, y) in [(3.0, 2.0), (-30.0, 20.0), (30.0, -7.0)] {
+            // The definition: the measurement, straightened, is the pinhole's image.
+            let (dx, dy) = (x / 100.0, y / 100.0);
+            let straight = 1.0 + r * (dx * dx + dy * dy);
+            let ray = DVec3::new(dx * straight, dy * straight, 1.0);
+            let pixel = lens.project(ray).unwrap();
+            let off_px = (pixel.x - 30.0 - x).hypot(pixel.y - 20.0 - y);
+            assert!(off_px < 0.01, "r = {r}: {off_px} px at ({x}, {y})");
+        }
+    }
+}
+
+#[test]
+fn a_fixed_calibration_is_shared() {
+    let text = MODEL
+        .replacen("NVM_V3", "NVM_V3 FixedK 90 31 91 22", 1)
+        .replace("0.2 0\n", "0 0\n");
+    let whole = parse(&text).unwrap();
+    assert_eq!(whole.cameras.len(), 1);
+    assert_eq!(
+        whole.cameras.values().next().unwrap().params,
+        [90.0, 91.0, 31.0, 22.0]
+    );
+    let keypoint = whole.images.values().next().unwrap().keypoints[0];
+    assert_eq!((keypoint.x, keypoint.y), (40.5, 41.0));
+}
+
+#[test]
+fn errors_name_the_line_and_a_remedy() {
+    let again = "copy the file again, or export it again from the program it is from";
+    assert_eq!(
+        error("NVM_V3", "NVM_V2"),
+        "line 1 (header): found \"NVM_V2\", expected \"NVM_V3\"; save the model again with a \
+         VisualSFM of 2011 or later"
+    );
+    assert_eq!(
+        error("1 0 0 0 1 2 3", "2 0 0 0 1 2 3"),
+        format!(
+            "line 4 (image 0, a b.jpg): the rotation's quaternion (2, 0, 0, 0) has length 2, \
+             expected 1; {again}"
+        )
+    );
+    assert_eq!(
+        error("100 1 0", "-100 1 0"),
+        "line 4 (image 0, a b.jpg): focal length fx of FULL_OPENCV is -100; it must be positive; \
+         calibrate it again, or leave its images out"
+    );
+    let remedy = "undistort the photos with VisualSFM (\"export to PMVS\") and use the model it \
+                  writes";
+    assert_eq!(
+        error("0.2 0\n", "-4 0\n"),
+        format!(
+            "line 4 (image 0, a b.jpg): the radial distortion is -4: it folds the image over \
+             itself before the corners, expected at most 0.05 px; {remedy}"
+        )
+    );
+    assert_eq!(
+        error("0.2 0\n", "nan 0\n"),
+        format!("line 4 (image 0): found \"nan\", expected a finite number; {again}")
+    );
+    assert_eq!(
+        error("1 0 5 9.5", "99999999999 0 5 9.5"),
+        format!("line 9 (point 0): the file ends, expected a feature's number; {again}")
+    );
+    assert_eq!(
+        error("1 0 5 9.5", "1 7 5 9.5"),
+        format!("line 8 (point 0): found image 7, expected less than 2; {again}")
+    );
+}
+
+#[test]
+fn damaged_files_are_refused() {
+    let needed = MODEL.find("19\n0").unwrap() + 1;
+    damage(MODEL.as_bytes(), needed, |path: &Path| {
+        read_nvm(path, &size_of)
+    });
+}

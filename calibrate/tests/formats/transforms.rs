@@ -1,0 +1,252 @@
+use crate::broken::damage;
+use crate::captures::{angle_between, capture};
+use calibrate::colmap::{find_model, read_model};
+use calibrate::formats::{FormatError, read_transforms};
+use calibrate::{Camera, ModelKind, Reconstruction};
+use glam::DVec3;
+use std::path::Path;
+
+fn no_photo(_: &str) -> Option<(u32, u32)> {
+    None
+}
+
+const FRAME: &str = r#"{"file_path": ".\\a\\b c.jpg", "transform_matrix":
+    [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}"#;
+
+/// Reads one frame with these intrinsics.
+fn parse(intrinsics: &str, frames: &str) -> Result<Reconstruction, FormatError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("transforms.json");
+    std::fs::write(&path, format!("{{{intrinsics}, \"frames\": [{frames}]}}")).unwrap();
+    read_transforms(&path, &no_photo)
+}
+
+fn camera(intrinsics: &str) -> Camera {
+    let whole = parse(intrinsics, FRAME).unwrap();
+    assert_eq!(whole.cameras.len(), 1);
+    whole.cameras.into_values().next().unwrap()
+}
+
+fn error(intrinsics: &str, frames: &str) -> String {
+    let error = parse(intrinsics, frames).unwrap_err().to_string();
+    let (_, rest) = error.split_once("transforms.json, ").unwrap();
+    rest.to_owned()
+}
+
+#[test]
+fn lego_gives_the_cameras_of_its_model() {
+    let Some(path) = capture("lego/transforms_train.json") else {
+        return;
+    };
+    let whole = read_transforms(&path, &|_| Some((400, 400))).unwrap();
+    let model = read_model(&find_model(path.parent().unwrap()).unwrap()).unwrap();
+    assert_eq!(whole.images.len(), model.images.len());
+    let (mut worst_turn, mut worst_shift) = (0.0_f64, 0.0_f64);
+    for image in whole.images.values() {
+        let stem = image.name.strip_prefix("images/").unwrap();
+        let twin = model
+            .images
+            .values()
+            .find(|twin| twin.name == format!("{stem}.png"))
+            .unwrap();
+        let (pose, expected) = (image.camera_from_world, twin.camera_from_world);
+        worst_turn = worst_turn.max(angle_between(pose, expected));
+        worst_shift = worst_shift.max(pose.center().distance(expected.center()));
+        let camera = &whole.cameras[&image.camera_id];
+        let stored = &model.cameras[&twin.camera_id];
+        assert_eq!((camera.model, camera.width), (stored.model, stored.width));
+        for (found, expected) in camera.params.iter().zip(&stored.params) {
+            assert!((found - expected).abs() < 1e-9, "{found} is not {expected}");
+        }
+    }
+    println!("worst rotation {worst_turn:.2e} rad, centre {worst_shift:.2e}");
+    assert!(worst_turn < 1e-9, "{worst_turn}");
+    assert!(worst_shift < 1e-9, "{worst_shift}");
+}
+
+#[test]
+fn fox_reads_with_its_distortion() {
+    let Some(path) = capture("other-formats/instant-ngp-fox/transforms.json") else {
+        return;
+    };
+    let whole = read_transforms(&path, &no_photo).unwrap();
+    assert_eq!(whole.images.len(), 25);
+    assert_eq!(whole.cameras.len(), 1);
+    let camera = whole.cameras.values().next().unwrap();
+    assert_eq!(camera.model, ModelKind::OpenCv);
+    assert_eq!((camera.width, camera.height), (480, 853));
+    assert_eq!(
+        camera.params[2..],
+        [
+            246.47022222222222,
+            428.84041875,
+            0.0578421,
+            -0.0805099,
+            -0.000980296,
+            0.00015575
+        ]
+    );
+    for image in whole.images.values() {
+        assert!(path.parent().unwrap().join(&image.name).is_file());
+    }
+}
+
+#[test]
+fn the_axes_are_opengl_s() {
+    let whole = parse(r#""w": 100, "h": 80, "fl_x": 90"#, FRAME).unwrap();
+    let image = whole.images.values().next().unwrap();
+    assert_eq!(image.name, "a/b c.jpg");
+    let in_camera = |x, y, z| image.camera_from_world * DVec3::new(x, y, z);
+    assert_eq!(in_camera(1.0, 2.0, 3.0), DVec3::ZERO);
+    // An OpenGL camera looks along −z with y up.
+    assert_eq!(in_camera(1.0, 2.0, -7.0), DVec3::new(0.0, 0.0, 10.0));
+    assert_eq!(in_camera(1.0, 5.0, 3.0), DVec3::new(0.0, -3.0, 0.0));
+    assert_eq!(in_camera(2.0, 2.0, 3.0), DVec3::new(1.0, 0.0, 0.0));
+}
+
+#[test]
+fn the_applied_transform_leaves_the_poses_as_they_are() {
+    let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
+    let applied = format!(
+        "{shared}, \"applied_transform\": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], \
+         \"applied_scale\": 0.5"
+    );
+    assert_eq!(
+        parse(&applied, FRAME).unwrap(),
+        parse(shared, FRAME).unwrap()
+    );
+}
+
+#[test]
+fn intrinsics_come_in_many_ways() {
+    let square = camera(r#""w": 100.0, "h": 80, "fl_x": 90"#);
+    assert_eq!(square.model, ModelKind::Pinhole);
+    assert_eq!(square.params, [90.0, 90.0, 50.0, 40.0]);
+    let angles = camera(
+        r#""w": 100, "h": 80, "camera_angle_x": 1.5707963267948966, "y_fov": 53.13010235415598"#,
+    );
+    assert!((angles.params[0] - 50.0).abs() < 1e-12, "{angles:?}");
+    assert!((angles.params[1] - 80.0).abs() < 1e-12, "{angles:?}");
+    let fisheye = camera(
+        r#""w": 100, "h": 80, "fl_x": 90, "camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2,
+           "k3": 0.3, "k4": 0.4"#,
+    );
+    assert_eq!(fisheye.model, ModelKind::OpenCvFisheye);
+    assert_eq!(fisheye.params[4..], [0.1, 0.2, 0.3, 0.4]);
+    let sixth = camera(r#""w": 100, "h": 80, "fl_x": 90, "k1": 0.1, "k3": 0.3, "p2": 0.01"#);
+    assert_eq!(sixth.model, ModelKind::FullOpenCv);
+    assert_eq!(sixth.params[4..], [0.1, 0.0, 0.0, 0.01, 0.3, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_frame_s_own_intrinsics_go_first() {
+    let own = FRAME
+        .replace("b c.jpg", "d.jpg")
+        .replacen('{', r#"{"fl_x": 70, "k1": 0.5,"#, 1);
+    let shared = r#""w": 100, "h": 80, "fl_x": 90, "fl_y": 91"#;
+    let whole = parse(
+        shared,
+        &format!("{FRAME}, {own}, {}", own.replace("d.j", "e.j")),
+    )
+    .unwrap();
+    let cameras: Vec<_> = whole
+        .cameras
+        .values()
+        .map(|c| (c.model, c.params.clone()))
+        .collect();
+    assert_eq!(
+        cameras,
+        [
+            (ModelKind::Pinhole, vec![90.0, 91.0, 50.0, 40.0]),
+            (
+                ModelKind::OpenCv,
+                vec![70.0, 70.0, 50.0, 40.0, 0.5, 0.0, 0.0, 0.0]
+            ),
+        ]
+    );
+    let used: Vec<u32> = whole
+        .images
+        .values()
+        .map(|image| image.camera_id.0)
+        .collect();
+    assert_eq!(used, [1, 2, 2], "equal cameras are one");
+}
+
+#[test]
+fn errors_name_the_frame_and_a_remedy() {
+    let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
+    let again = "copy the file again, or export it again from the program it is from";
+    assert_eq!(
+        error(r#""fl_x": 90"#, FRAME),
+        "frames[0] (a/b c.jpg): the format does not say the size of \"a/b c.jpg\", and no such \
+         photo was found; give the folder that holds the photos"
+    );
+    assert_eq!(
+        error(r#""w": 100, "h": 80"#, FRAME),
+        "frames[0] (a/b c.jpg): there is no focal length, neither here nor for all frames; add \
+         fl_x and fl_y in pixels, or camera_angle_x in radians"
+    );
+    assert_eq!(
+        error(r#""w": 100, "h": 80, "fl_x": -90"#, FRAME),
+        "frames[0] (a/b c.jpg): focal length fx of PINHOLE is -90; it must be positive; \
+         calibrate it again, or leave its images out"
+    );
+    assert_eq!(
+        error(shared, &format!("{FRAME}, {FRAME}")),
+        "frames[1] (a/b c.jpg): the image is named \"a/b c.jpg\", as frames[0] (a/b c.jpg) \
+         already is; remove one of the two, or give each photo a name of its own"
+    );
+    assert_eq!(
+        error(shared, &FRAME.replace("[1, 0, 0, 1]", "[2, 0, 0, 1]")),
+        "frames[0] (a/b c.jpg).transform_matrix: the rotation's columns have the lengths 2, 1 \
+         and 1 and RᵀR differs from the identity by up to 3.000e0, expected a rotation matrix; \
+         take the scale or shear out of the matrix, or export it again with more digits"
+    );
+    assert_eq!(
+        error(shared, &FRAME.replace("[1, 0, 0, 1]", "[-1, 0, 0, 1]")),
+        "frames[0] (a/b c.jpg).transform_matrix: the rotation mirrors (its determinant is −1), \
+         expected a rotation matrix; check that no axis was negated on the way"
+    );
+    assert_eq!(
+        error(shared, &FRAME.replace("[1, 0, 0, 1]", "[1, 0, 0]")),
+        format!(
+            "frames[0] (a/b c.jpg).transform_matrix[0]: found an array of 3, expected an array \
+             of 4; {again}"
+        )
+    );
+    assert_eq!(
+        error(
+            &format!("{shared}, \"camera_model\": \"EQUIRECTANGULAR\""),
+            FRAME
+        ),
+        "camera_model: found the camera model \"EQUIRECTANGULAR\", expected PINHOLE, OPENCV or \
+         OPENCV_FISHEYE; undistort the photos and export them as PINHOLE"
+    );
+    let nan = error(shared, &FRAME.replace("[1, 0, 0, 1]", "[NaN, 0, 0, 1]"));
+    assert!(nan.starts_with("line 2 column 7: not JSON"), "{nan}");
+    assert!(error(shared, "").starts_with("frames: the file holds no image with a pose"));
+}
+
+#[test]
+fn small_deviations_become_the_nearest_rotation() {
+    let rounded = FRAME.replace("[1, 0, 0, 1]", "[1.00003, 0.00002, 0, 1]");
+    let whole = parse(r#""w": 100, "h": 80, "fl_x": 90"#, &rounded).unwrap();
+    let rotation = whole
+        .images
+        .values()
+        .next()
+        .unwrap()
+        .camera_from_world
+        .rotation;
+    assert!((rotation.length() - 1.0).abs() < 1e-15);
+}
+
+#[test]
+fn damaged_files_are_refused() {
+    let text = format!(
+        "{{\"w\": 100, \"h\": 80, \"fl_x\": 90, \"k1\": 0.1, \"frames\": [{FRAME}, {}]}}",
+        FRAME.replace("b c", "d")
+    );
+    let read = |path: &Path| read_transforms(path, &no_photo);
+    damage(text.as_bytes(), text.len(), read);
+}
