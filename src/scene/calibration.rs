@@ -1,9 +1,10 @@
 //! Finding a capture's calibration and reading it, whichever program made it.
 
 use super::{ImportOptions, SceneError, Warning};
+use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration};
 use calibrate::{Reconstruction, colmap};
-use capture::{PhotoSet, photo_size};
+use capture::{PhotoFile, PhotoSet, photo_size};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,18 @@ pub(super) enum Source {
     Colmap(PathBuf),
     /// A file by OpenCV.
     OpenCv(PathBuf),
+    /// A file of another program.
+    Other(Format, PathBuf),
+}
+
+impl Source {
+    /// For messages.
+    fn text(&self) -> String {
+        match self {
+            Self::Colmap(model) => format!("the COLMAP model in {}", model.display()),
+            Self::OpenCv(file) | Self::Other(_, file) => file.display().to_string(),
+        }
+    }
 }
 
 /// The calibration of a capture: the file or folder given, else what the capture's folder
@@ -31,31 +44,73 @@ pub(super) fn find(
             .iter()
             .any(|e| file.extension() == Some(e.as_ref()))
             && colmap::find_model(folder).is_ok_and(|model| model == folder);
-        return Ok(if is_colmap {
-            Source::Colmap(folder.to_owned())
-        } else {
-            Source::OpenCv(file.to_owned())
+        return Ok(match formats::detect(file) {
+            _ if is_colmap => Source::Colmap(folder.to_owned()),
+            Some(format) => Source::Other(format, file.to_owned()),
+            None => Source::OpenCv(file.to_owned()),
         });
     }
     let folder = given.unwrap_or(capture);
     let model = colmap::find_model(folder);
-    let files = opencv::find_calibrations(folder);
-    let (source, passed_over) = match (model, files.split_first()) {
-        (Ok(model), _) => (Source::Colmap(model), files.as_slice()),
-        (Err(_), Some((first, rest))) => (Source::OpenCv(first.clone()), rest),
-        (Err(error), None) => return Err(error.into()),
+    let model_found = model.as_ref().ok().cloned().map(Source::Colmap);
+    let opencv_found = opencv::find_calibrations(folder)
+        .into_iter()
+        .map(Source::OpenCv);
+    let mut found = model_found
+        .into_iter()
+        .chain(opencv_found)
+        .chain(others(folder));
+    let source = match (found.next(), model) {
+        (Some(source), _) => source,
+        (None, Err(error)) => return Err(error.into()),
+        (None, Ok(model)) => Source::Colmap(model),
     };
-    if let Some(other) = passed_over.first() {
-        let used = match &source {
-            Source::Colmap(model) => format!("the COLMAP model in {}", model.display()),
-            Source::OpenCv(file) => file.display().to_string(),
-        };
+    if let Some(Source::OpenCv(other) | Source::Other(_, other)) = found.next() {
         warnings.push(Warning::Note(format!(
-            "the calibration is {used}; for that in {} say --calibration {0}",
+            "the calibration is {}; for that in {} say --calibration {1}",
+            source.text(),
             other.display()
         )));
     }
     Ok(source)
+}
+
+/// The other programs' calibrations in a folder, by name.
+fn others(folder: &Path) -> impl Iterator<Item = Source> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
+    files.sort();
+    files
+        .into_iter()
+        .filter_map(|file| Some(Source::Other(formats::detect(&file)?, file)))
+}
+
+/// Reads another program's calibration. Its photos are found by the ends of their paths.
+pub(super) fn read_other(
+    format: Format,
+    path: &Path,
+    photos: &PhotoSet,
+) -> Result<Reconstruction, SceneError> {
+    let size_of = |listed: &str| {
+        let photo = photos.find(&photo_of(listed, photos))?;
+        photo_size(&photo.path).ok()
+    };
+    let names: Vec<String> = photos.photos.iter().map(|p| p.name.clone()).collect();
+    let mut whole = formats::read(format, path, &size_of, &names)?;
+    let mut named = BTreeSet::new();
+    for image in whole.images.values_mut() {
+        image.name = photo_of(&image.name, photos);
+        if !named.insert(image.name.clone()) {
+            return Err(SceneError::Poses {
+                path: path.to_owned(),
+                problem: format!(
+                    "two poses whose paths both end in that of the photo {}",
+                    image.name
+                ),
+            });
+        }
+    }
+    Ok(whole)
 }
 
 /// Reads an OpenCV calibration and finds which of the photos each pose is of.
@@ -165,14 +220,22 @@ fn photo_names(
         .collect())
 }
 
-/// The photo that a list calls by a path of whoever calibrated: the one whose name is the
-/// longest end of that path. Where there is none, the path's own end.
+/// The photo that a list calls by a path of whoever calibrated: the one whose name, with
+/// or without its extension, is the longest end of that path. Where there is none, the
+/// path's own end.
 fn photo_of(listed: &str, photos: &PhotoSet) -> String {
     let listed = listed.replace('\\', "/");
     let mut rest = listed.as_str();
     loop {
-        if photos.find(rest).is_some() {
-            return rest.to_owned();
+        let stem_is = |photo: &&PhotoFile| {
+            let stem = photo.name.rsplit_once('.').map_or("", |(stem, _)| stem);
+            stem == rest
+        };
+        if let Some(photo) = photos
+            .find(rest)
+            .or_else(|| photos.photos.iter().find(stem_is))
+        {
+            return photo.name.clone();
         }
         match rest.split_once('/') {
             Some((_, shorter)) => rest = shorter,

@@ -10,6 +10,9 @@ pub enum SceneError {
     /// An OpenCV calibration cannot be read.
     #[error(transparent)]
     OpenCv(#[from] calibrate::opencv::OpenCvError),
+    /// Another program's calibration cannot be read.
+    #[error(transparent)]
+    Format(#[from] calibrate::formats::FormatError),
     /// An OpenCV calibration has a lens that cannot be drawn with.
     #[error("{}: {source}", path.display())]
     Lens {

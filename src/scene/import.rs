@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// How photos are imported.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV;
+    /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV
+    /// or another program that [`calibrate::formats`] knows;
     /// `None`: in the capture's folder.
     pub calibration: Option<PathBuf>,
     /// Which of an OpenCV file's matrices to use.
@@ -54,6 +55,7 @@ impl Scene {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
             Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
+            Source::Other(format, file) => calibration::read_other(*format, file, &found)?,
         };
         let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
         names.sort();

@@ -4,6 +4,7 @@ mod bad_input;
 mod captures;
 mod evaluate;
 mod field;
+mod formats;
 mod gpu;
 mod help;
 mod opencv;

@@ -30,3 +30,28 @@ pub use meshroom::read_meshroom;
 pub use nvm::read_nvm;
 pub use openmvg::read_openmvg;
 pub use transforms::read_transforms;
+
+use crate::Reconstruction;
+use std::path::Path;
+
+/// Reads a calibration of a known format. `size_of` gives the size in pixels of the photo
+/// that a name in the file stands for, where the format leaves it to the photos;
+/// `photo_names` are the photos in their order, for a format that names none.
+///
+/// # Errors
+/// As the format's own reader.
+pub fn read(
+    format: Format,
+    path: &Path,
+    size_of: SizeOf<'_>,
+    photo_names: &[String],
+) -> Result<Reconstruction, FormatError> {
+    match format {
+        Format::Transforms => read_transforms(path, size_of),
+        Format::Bundler => read_bundler(path, size_of),
+        Format::Nvm => read_nvm(path, size_of),
+        Format::Llff => read_llff(path, photo_names, size_of),
+        Format::Meshroom => read_meshroom(path),
+        Format::OpenMvg => read_openmvg(path),
+    }
+}
