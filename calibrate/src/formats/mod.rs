@@ -1,6 +1,6 @@
 //! Calibrations that are neither COLMAP's nor OpenCV's.
 //!
-//! Each file here reads one format into a [`Reconstruction`](crate::Reconstruction) in our
+//! Each file here reads one format into a [`Reconstruction`] in our
 //! conventions (camera x right, y down, z forward; the first pixel's centre at
 //! (0.5, 0.5)), and its first lines say which conventions the format has. What a format
 //! says and we cannot represent is an error, never an approximation.
