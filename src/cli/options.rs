@@ -296,7 +296,7 @@ pub(super) struct DrawArgs {
     /// Size of the pictures in pixels [default: each view's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<(u32, u32)>,
-    /// Do all the work that could be skipped: the same bytes, later
+    /// Decode every photo, needed or not: the same bytes, later
     #[arg(long)]
     pub(super) no_skip: bool,
 }

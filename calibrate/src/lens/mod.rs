@@ -13,6 +13,7 @@ mod plane;
 
 pub use distortion::Distortion;
 pub use pixel::Pixel;
+pub(crate) use plane::rational;
 
 use glam::{DMat2, DVec2, DVec3};
 

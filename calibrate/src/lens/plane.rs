@@ -5,7 +5,7 @@ use glam::{DMat2, DVec2};
 
 /// The distorted point and the Jacobian of the mapping.
 #[inline]
-pub(super) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
+pub(crate) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
     let r2 = point.length_squared();
     let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
     let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));

@@ -4,6 +4,7 @@
 //! The formulas are those of OpenCV's documentation of `calib3d`; pixels have our
 //! convention, the first pixel's centre at (0.5, 0.5), half a pixel more than OpenCV's.
 
+use crate::lens::rational;
 use crate::{Camera, Distortion, Lens, ModelKind, Pixel};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
@@ -212,31 +213,13 @@ fn tilted(point: DVec2, homography: DMat3) -> DVec2 {
 
 /// The rational model with thin prisms: the distorted point and the Jacobian.
 fn thin_prism(point: DVec2, k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> (DVec2, DMat2) {
-    let DVec2 { x, y } = point;
+    let (without, d_without) = rational(point, k, p);
     let r2 = point.length_squared();
-    let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
-    let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
-    let radial = above / below;
-    let d_above = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
-    let d_below = k[3] + r2 * (2.0 * k[4] + r2 * 3.0 * k[5]);
-    let slope = (d_above - radial * d_below) / below;
     let prism = DVec2::new(r2 * (s[0] + r2 * s[1]), r2 * (s[2] + r2 * s[3]));
-    let distorted = point * radial
-        + DVec2::new(
-            2.0 * p[0] * x * y + p[1] * (r2 + 2.0 * x * x),
-            2.0 * p[1] * x * y + p[0] * (r2 + 2.0 * y * y),
-        )
-        + prism;
-    // d r² / d(x, y) = 2(x, y) in the radial and the prism terms.
-    let dxx = radial + 2.0 * x * x * slope + 2.0 * p[0] * y + 6.0 * p[1] * x;
-    let dyy = radial + 2.0 * y * y * slope + 2.0 * p[1] * x + 6.0 * p[0] * y;
-    let dxy = 2.0 * x * y * slope + 2.0 * p[0] * x + 2.0 * p[1] * y;
+    // d r² / d(x, y) = 2(x, y).
     let d_prism = DVec2::new(s[0] + 2.0 * r2 * s[1], s[2] + 2.0 * r2 * s[3]);
-    let jacobian = DMat2::from_cols(
-        DVec2::new(dxx, dxy) + 2.0 * x * d_prism,
-        DVec2::new(dxy, dyy) + 2.0 * y * d_prism,
-    );
-    (distorted, jacobian)
+    let d_prism = DMat2::from_cols(2.0 * point.x * d_prism, 2.0 * point.y * d_prism);
+    (without + prism, d_without + d_prism)
 }
 
 /// Solves the rational model with thin prisms for the undistorted point.

@@ -24,6 +24,12 @@ struct Params {
     gains_differ: u32,
 }
 
+// MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
+const CONTRIBUTORS = 16u;
+const SAME_RAY: f32 = 1e-12;
+const SMALLEST_THRESHOLD: f32 = 1e-30;
+const INFINITY: f32 = 3e38;
+
 const BLEND_CONSISTENT = 0u;
 const BLEND_PAPER = 1u;
 const RESOLUTION_RATIO = 0u;

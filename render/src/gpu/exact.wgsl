@@ -3,10 +3,6 @@
 
 // MAX_CONTRIBUTORS, and one more whose difference caps the threshold.
 const LISTED = 17u;
-const CONTRIBUTORS = 16u;
-const SAME_RAY: f32 = 1e-12;
-const SMALLEST_THRESHOLD: f32 = 1e-30;
-const INFINITY: f32 = 3e38;
 
 // The candidates with the smallest differences, nearest first, lower index first.
 struct Nearest {

@@ -3,10 +3,6 @@
 
 // MAX_LISTED of field.rs.
 const LISTED = 32u;
-const CONTRIBUTORS = 16u;
-const SAME_RAY: f32 = 1e-12;
-const SMALLEST_THRESHOLD: f32 = 1e-30;
-const INFINITY: f32 = 3e38;
 
 @group(1) @binding(0) var photos: texture_2d_array<f32>;
 @group(1) @binding(1) var photo_sampler: sampler;
