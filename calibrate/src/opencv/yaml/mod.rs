@@ -5,18 +5,17 @@
 //! both. Read is the first document: maps, sequences, scalars, in block and in flow
 //! style, tags; not aliases.
 
-use super::error::{Problem, excerpt};
+mod cursor;
+mod flow;
+
+use super::error::Problem;
 use super::matrix;
-use super::storage::{Entries, MAX_DEPTH, Node, Value};
+use super::storage::{Entries, Node, Value};
+use cursor::Reader;
 
 /// Reads a whole file, which must be a map.
 pub(super) fn parse(text: &str) -> Result<Entries, Problem> {
-    let mut reader = Reader {
-        text,
-        at: 0,
-        line: 1,
-        line_start: 0,
-    };
+    let mut reader = Reader::new(text);
     // 1. The header.
     reader.skip_blanks();
     while reader.peek() == Some('%') {
@@ -42,109 +41,8 @@ pub(super) fn parse(text: &str) -> Result<Entries, Problem> {
     }
 }
 
-#[derive(Clone, Copy)]
-struct Reader<'a> {
-    text: &'a str,
-    at: usize,
-    line: usize,
-    line_start: usize,
-}
-
-impl<'a> Reader<'a> {
-    fn rest(&self) -> &'a str {
-        &self.text[self.at..]
-    }
-
-    fn peek(&self) -> Option<char> {
-        self.rest().chars().next()
-    }
-
-    fn column(&self) -> usize {
-        self.at - self.line_start
-    }
-
-    /// What is left of this line, without its end and a comment.
-    fn rest_of_line(&self) -> &'a str {
-        let rest = self.rest();
-        let line = &rest[..rest.find('\n').unwrap_or(rest.len())];
-        let comment = line
-            .match_indices('#')
-            .map(|(at, _)| at)
-            .find(|&at| at == 0 || line[..at].ends_with([' ', '\t']));
-        line[..comment.unwrap_or(line.len())].trim_end()
-    }
-
-    fn bump(&mut self) -> Option<char> {
-        let c = self.peek()?;
-        self.at += c.len_utf8();
-        if c == '\n' {
-            self.line += 1;
-            self.line_start = self.at;
-        }
-        Some(c)
-    }
-
-    /// Skips to the next line.
-    fn skip_line(&mut self) {
-        while self.bump().is_some_and(|c| c != '\n') {}
-    }
-
-    /// Skips blanks within the line.
-    fn skip_spaces(&mut self) {
-        while self.rest().starts_with([' ', '\t']) {
-            self.at += 1;
-        }
-    }
-
-    /// Skips blanks, line ends and comments.
-    fn skip_blanks(&mut self) {
-        while let Some(c) = self.peek() {
-            if c == '#' {
-                self.skip_line();
-            } else if c.is_whitespace() {
-                self.bump();
-            } else {
-                return;
-            }
-        }
-    }
-
-    /// At `---` or `...` at the start of a line.
-    fn at_document_mark(&self) -> bool {
-        let mark = self.rest().get(..3);
-        self.column() == 0
-            && matches!(mark, Some("---" | "..."))
-            && self.rest()[3..]
-                .chars()
-                .next()
-                .is_none_or(char::is_whitespace)
-    }
-
-    /// At the end of the document.
-    fn at_end(&self) -> bool {
-        self.peek().is_none() || self.at_document_mark()
-    }
-
-    fn at_dash(&self) -> bool {
-        let mut chars = self.rest().chars();
-        chars.next() == Some('-') && chars.next().is_none_or(char::is_whitespace)
-    }
-
-    fn unexpected(&self, expected: &str) -> Problem {
-        let found = match self.rest().trim() {
-            "" => "the file ends".to_owned(),
-            rest => format!("found {}", excerpt(rest)),
-        };
-        Problem::new(self.line, format!("{found}, expected {expected}"))
-    }
-
-    fn check_depth(&self, depth: usize) -> Result<(), Problem> {
-        if depth > MAX_DEPTH {
-            return Err(self.unexpected(&format!("at most {MAX_DEPTH} levels")));
-        }
-        Ok(())
-    }
-
+/// Block style.
+impl Reader<'_> {
     /// A value that begins on a line of its own at `least` columns or more; nothing where
     /// the next line is less indented.
     fn block(&mut self, least: usize, depth: usize) -> Result<Node, Problem> {
@@ -319,131 +217,5 @@ impl<'a> Reader<'a> {
             self.skip_line();
         }
         Value::Text(text.trim_end().to_owned())
-    }
-
-    /// `[ … ]`, `{ … }`, quoted text, or a word within the former.
-    fn flow(&mut self, marked: bool, depth: usize) -> Result<Node, Problem> {
-        self.check_depth(depth)?;
-        let line = self.line;
-        let value = match self.peek() {
-            Some('[') => {
-                let mut nodes = Vec::new();
-                self.items(']', |reader| {
-                    nodes.push(reader.flow(false, depth + 1)?);
-                    Ok(())
-                })?;
-                Value::Sequence(nodes)
-            }
-            Some('{') => {
-                let mut entries = Entries::new();
-                self.items('}', |reader| {
-                    let key = reader.flow_key()?;
-                    reader.skip_blanks();
-                    entries.push((key, reader.flow(false, depth + 1)?));
-                    Ok(())
-                })?;
-                matrix::map(line, marked, entries)?
-            }
-            Some('"') => Value::Text(self.double_quoted()?),
-            Some('\'') => Value::Text(self.single_quoted()?),
-            _ => {
-                // Not `rest_of_line`: a matrix may stand on one long line.
-                let word = self.rest();
-                let word = &word[..word.find([',', ']', '}', '\n']).unwrap_or(word.len())];
-                let word = word.split(" #").next().unwrap_or_default();
-                self.at += word.len();
-                match word.trim_end() {
-                    "" => return Err(self.unexpected("a value")),
-                    "~" | "null" => Value::Null,
-                    word => matrix::plain(word),
-                }
-            }
-        };
-        Ok(Node::new(line, value))
-    }
-
-    fn flow_key(&mut self) -> Result<String, Problem> {
-        let key = match self.peek() {
-            Some('"') => self.double_quoted()?,
-            Some('\'') => self.single_quoted()?,
-            _ => {
-                let line = self.rest_of_line();
-                let word = &line[..line.find([':', ',', ']', '}']).unwrap_or(line.len())];
-                self.at += word.len();
-                word.trim_end().to_owned()
-            }
-        };
-        self.skip_spaces();
-        if self.peek() != Some(':') {
-            return Err(self.unexpected(&format!("a colon after the name {key:?}")));
-        }
-        self.at += 1;
-        Ok(key)
-    }
-
-    /// Steps over the bracket, items with commas between them, and the closing bracket.
-    fn items(
-        &mut self,
-        close: char,
-        mut item: impl FnMut(&mut Self) -> Result<(), Problem>,
-    ) -> Result<(), Problem> {
-        self.bump();
-        loop {
-            self.skip_blanks();
-            if self.peek() == Some(close) {
-                self.bump();
-                return Ok(());
-            }
-            item(self)?;
-            self.skip_blanks();
-            match self.peek() {
-                Some(',') => self.bump(),
-                Some(c) if c == close => None,
-                _ => return Err(self.unexpected(&format!("a comma or {close}"))),
-            };
-        }
-    }
-
-    fn double_quoted(&mut self) -> Result<String, Problem> {
-        let line = self.line;
-        let unfinished = || Problem::new(line, "a quotation mark is never closed");
-        self.bump();
-        let mut text = String::new();
-        loop {
-            match self.bump().ok_or_else(unfinished)? {
-                '"' => return Ok(text),
-                '\\' => match self.bump().ok_or_else(unfinished)? {
-                    'n' => text.push('\n'),
-                    'r' => text.push('\r'),
-                    't' => text.push('\t'),
-                    'x' => {
-                        let code = self.rest().get(..2);
-                        let code = code.and_then(|hex| u8::from_str_radix(hex, 16).ok());
-                        let code = code.ok_or_else(|| self.unexpected("two digits after \\x"))?;
-                        self.at += 2;
-                        text.push(char::from(code));
-                    }
-                    other => text.push(other),
-                },
-                c => text.push(c),
-            }
-        }
-    }
-
-    fn single_quoted(&mut self) -> Result<String, Problem> {
-        let line = self.line;
-        self.bump();
-        let mut text = String::new();
-        loop {
-            match self.bump() {
-                Some('\'') if self.peek() == Some('\'') => {
-                    self.bump();
-                    text.push('\'');
-                }
-                Some('\'') => return Ok(text),
-                Some(c) => text.push(c),
-                None => return Err(Problem::new(line, "a quotation mark is never closed")),
-            }
-        }
     }
 }
