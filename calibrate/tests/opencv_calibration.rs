@@ -1,9 +1,9 @@
 //! Cameras and poses out of OpenCV's files, as they are met in the wild.
 
 use calibrate::opencv::{
-    Keys, OpenCvCalibration, OpenCvDistortion, OpenCvError, find_calibrations, read_calibration,
+    Keys, OpenCvCalibration, OpenCvError, find_calibrations, read_calibration,
 };
-use calibrate::{ModelKind, Rigid3, colmap};
+use calibrate::{Camera, Distortion, ModelKind, Rigid3, colmap};
 use glam::{DVec2, DVec3};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -73,7 +73,7 @@ fn wild_files_give_cameras() {
                     let size = camera
                         .size
                         .map_or("?".to_owned(), |(w, h)| format!("{w}x{h}"));
-                    let made = camera.lens.camera(1, 1).unwrap().model.name();
+                    let made = Camera::of(&camera.lens, 1, 1).model.name();
                     line += &format!(" {} {made} {size},", camera.name);
                 }
                 let board = calibration.board.map_or(0, |board| board.corners.len());
@@ -129,7 +129,7 @@ fn the_chessboard_is_what_colmap_says() {
     );
     let names = &calibration.image_names;
     assert_eq!((names.len(), names[9].as_str()), (13, "left11.jpg"));
-    let found = calibration.reconstruction(names, (1, 1)).unwrap();
+    let found = calibration.reconstruction(names, (1, 1));
 
     let expected = colmap::read_model(&capture.join("sparse/0")).unwrap();
     let (ours, theirs) = (
@@ -183,11 +183,20 @@ fn coefficients_come_in_opencvs_order() {
     let text = matrix("M1", 3, 3, K) + &matrix("D1", 1, 8, "1, 2, 3, 4, 5, 6, 7, 8");
     assert_eq!(
         read(&text).unwrap().cameras[0].lens.distortion(),
-        OpenCvDistortion::Standard {
+        Distortion::Rational {
             k: [1.0, 2.0, 5.0, 6.0, 7.0, 8.0],
             p: [3.0, 4.0],
-            s: [0.0; 4],
-            tau: [0.0; 2],
+        }
+    );
+    let all = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0.13, 0.14";
+    let text = matrix("M1", 3, 3, K) + &matrix("D1", 1, 14, all);
+    assert_eq!(
+        read(&text).unwrap().cameras[0].lens.distortion(),
+        Distortion::Tilted {
+            k: [1.0, 2.0, 5.0, 6.0, 7.0, 8.0],
+            p: [3.0, 4.0],
+            s: [9.0, 10.0, 11.0, 12.0],
+            tau: [0.13, 0.14],
         }
     );
 }
@@ -195,7 +204,7 @@ fn coefficients_come_in_opencvs_order() {
 #[test]
 fn a_fisheye_is_known_by_what_the_file_says() {
     let skewed = "500, 5, 319.5, 0, 510, 239.5, 0, 0, 1";
-    let fisheye = OpenCvDistortion::Fisheye {
+    let fisheye = Distortion::SkewedFisheye {
         k: [1.0, 2.0, 3.0, 4.0],
         alpha: 0.01,
     };
@@ -259,7 +268,7 @@ fn unknown_names_are_listed_and_can_be_chosen() {
     assert!(read_with(&text, &keys).is_ok());
     keys.distortion = Some("Verzeichnung".to_owned());
     let chosen = read_with(&text, &keys).unwrap().cameras[0].clone();
-    assert_eq!(chosen.lens.camera(640, 480).unwrap().params[4], 0.1);
+    assert_eq!(Camera::of(&chosen.lens, 640, 480).params[4], 0.1);
     keys.camera_matrix = Some("Camera".to_owned());
     let said = read_with(&text, &keys).unwrap_err().to_string();
     assert!(
@@ -322,9 +331,7 @@ fn poses_are_read_in_each_form() {
     let found = read(&rig).unwrap();
     let right = found.photo_poses()[1];
     assert!((right * DVec3::X - DVec3::new(-0.1, 1.0, 0.0)).length() < 1e-12);
-    let whole = found
-        .reconstruction(&["l".to_owned(), "r".to_owned()], (640, 480))
-        .unwrap();
+    let whole = found.reconstruction(&["l".to_owned(), "r".to_owned()], (640, 480));
     assert_eq!((whole.cameras.len(), whole.images.len()), (2, 2));
 }
 

@@ -1,7 +1,6 @@
 //! OpenCV's lenses against a table that OpenCV computed.
 
-use calibrate::Pixel;
-use calibrate::opencv::{OpenCvDistortion, OpenCvLens};
+use calibrate::{Camera, Distortion, Lens, Pixel};
 use glam::{DMat3, DVec2, DVec3};
 use serde_json::Value;
 use std::path::Path;
@@ -29,14 +28,14 @@ fn opencv_projects_to_the_same_pixels() {
         let k = numbers(&case["camera_matrix"]);
         let coefficients = numbers(&case["dist_coeffs"]);
         let distortion = if case["function"] == "cv2.fisheye.projectPoints" {
-            OpenCvDistortion::Fisheye {
+            Distortion::SkewedFisheye {
                 k: coefficients.try_into().unwrap(),
                 alpha: case["alpha"].as_f64().unwrap(),
             }
         } else {
-            OpenCvDistortion::standard(&coefficients).unwrap()
+            Distortion::of_opencv(&coefficients).unwrap()
         };
-        let lens = OpenCvLens::new(
+        let lens = Lens::new(
             DVec2::new(k[0], k[4]),
             DVec2::new(k[2], k[5]) + 0.5,
             distortion,
@@ -69,22 +68,22 @@ fn opencv_projects_to_the_same_pixels() {
     }
 }
 
-fn with(distortion: OpenCvDistortion) -> OpenCvLens {
+fn with(distortion: Distortion) -> Lens {
     let focal = DVec2::new(812.4, 809.9);
-    OpenCvLens::new(focal, DVec2::new(322.2, 243.7), distortion)
+    Lens::new(focal, DVec2::new(322.2, 243.7), distortion)
 }
 
-fn tilted_prism() -> OpenCvLens {
+fn tilted_prism() -> Lens {
     let c = [
         0.2143, -0.0912, 0.0009, -0.0014, 0.0121, 0.3017, -0.0286, 0.0081, 0.0017, -0.0005,
         -0.0011, 0.0003, 0.0213, -0.0147,
     ];
-    with(OpenCvDistortion::standard(&c).unwrap())
+    with(Distortion::of_opencv(&c).unwrap())
 }
 
 #[test]
 fn every_pixel_of_an_image_has_its_ray() {
-    let skewed = with(OpenCvDistortion::Fisheye {
+    let skewed = with(Distortion::SkewedFisheye {
         k: [-0.0213, 0.0092, -0.0047, 0.0011],
         alpha: 0.0031,
     });
@@ -108,27 +107,29 @@ fn nothing_is_seen_behind() {
     assert_eq!(tilted_prism().unproject(Pixel::new(f64::NAN, 0.0)), None);
 }
 
+/// The simplest of COLMAP's models that holds the coefficients, else ours.
 #[test]
-fn what_the_renderer_lacks_is_said() {
-    let said = |c: &[f64]| {
-        let distortion = OpenCvDistortion::standard(c).unwrap();
-        let lens = with(distortion);
-        lens.camera(640, 480).map_err(|e| e.to_string())
-    };
-    assert_eq!(said(&[]).unwrap().model.name(), "PINHOLE");
-    assert_eq!(said(&[0.1, 0.0, 0.0, 0.0]).unwrap().model.name(), "OPENCV");
+fn coefficients_that_are_zero_make_a_simpler_model() {
+    let made = |c: &[f64]| Camera::of(&with(Distortion::of_opencv(c).unwrap()), 640, 480);
+    assert_eq!(made(&[]).model.name(), "PINHOLE");
+    assert_eq!(made(&[0.0; 14]).model.name(), "PINHOLE");
+    assert_eq!(made(&[0.1, 0.0, 0.0, 0.0]).model.name(), "OPENCV");
     let mut c = [0.0; 14];
     c[7] = 0.1;
-    let camera = said(&c).unwrap();
+    let camera = made(&c);
     assert_eq!(camera.model.name(), "FULL_OPENCV");
     assert_eq!(camera.params[11], 0.1);
     c[13] = 0.01;
+    let camera = made(&c);
+    assert_eq!(camera.model.name(), "OPENCV_TILTED");
+    assert_eq!(camera.params[4..], c);
+    let skewed = |alpha| with(Distortion::SkewedFisheye { k: [0.1; 4], alpha });
+    let name = |alpha| Camera::of(&skewed(alpha), 640, 480).model.name();
     assert_eq!(
-        said(&c).unwrap_err(),
-        "the sensor's tilt (τx, τy = [0.0, 0.01]) of this calibration is not supported by the \
-         renderer yet; calibrate without CALIB_TILTED_MODEL, or undistort the photos with \
-         OpenCV and import them as a pinhole camera"
+        (name(0.0), name(0.1)),
+        ("OPENCV_FISHEYE", "OPENCV_SKEWED_FISHEYE")
     );
-    c[9] = 0.01;
-    assert!(said(&c).unwrap_err().contains("thin prism"));
+    for count in [1, 2, 3, 6, 7, 9, 13, 15] {
+        assert_eq!(Distortion::of_opencv(&vec![0.1; count]), None);
+    }
 }

@@ -20,6 +20,7 @@ mod raster;
 mod rays;
 pub mod reference;
 pub mod score;
+mod sensor;
 pub mod trajectory;
 pub mod triangulation;
 

@@ -1,7 +1,8 @@
 //! `lumigraph info` of a calibration's file without photos.
 
 use super::output::{print, print_json, say};
-use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera, OpenCvDistortion};
+use calibrate::Camera;
+use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,26 +27,17 @@ fn gather(calibration: &OpenCvCalibration) -> Value {
     })
 }
 
-/// In our pixels. `model` is null where the renderer has no lens like it.
+/// In our pixels.
 fn camera(camera: &OpenCvCamera) -> Value {
-    let lens = &camera.lens;
     // Only the names matter, not the size.
     let (width, height) = camera.size.unwrap_or((1, 1));
-    let known = lens.camera(width, height);
-    let distortion = match lens.distortion() {
-        OpenCvDistortion::Standard { k, p, s, tau } => json!({"k": k, "p": p, "s": s, "tau": tau}),
-        OpenCvDistortion::Fisheye { k, alpha } => json!({"fisheye_k": k, "alpha": alpha}),
-    };
+    let Camera { model, params, .. } = Camera::of(&camera.lens, width, height);
     json!({
         "name": camera.name,
-        "model": known.as_ref().ok().map(|camera| camera.model.name()),
+        "model": model.name(),
         "width": camera.size.map(|(width, _)| width),
         "height": camera.size.map(|(_, height)| height),
-        "params": known.as_ref().ok().map(|camera| &camera.params),
-        "focal": lens.focal.to_array(),
-        "principal": lens.principal.to_array(),
-        "distortion": distortion,
-        "unsupported": known.err().map(|error| error.to_string()),
+        "params": params,
     })
 }
 
@@ -57,16 +49,8 @@ fn text(info: &Value) -> String {
             (Some(width), Some(height)) => format!("{width}×{height}"),
             _ => "of unstated size".to_owned(),
         };
-        text += &match camera["model"].as_str() {
-            Some(model) => format!("camera   {name}: {model} {size} {}\n", camera["params"]),
-            None => format!(
-                "camera   {name}: {size}, focal {}, principal {}, {}: {}\n",
-                camera["focal"],
-                camera["principal"],
-                camera["distortion"],
-                camera["unsupported"].as_str().unwrap_or_default()
-            ),
-        };
+        let model = camera["model"].as_str().unwrap_or_default();
+        text += &format!("camera   {name}: {model} {size} {}\n", camera["params"]);
     }
     let photos = info["photos"].as_array().map_or(0, Vec::len);
     text += &format!("poses    {}, {photos} photos named\n", info["poses"]);

@@ -173,10 +173,6 @@ pub(super) fn read_opencv(
         _ => (1, 1),
     };
     let whole = calibration.reconstruction(&names, size);
-    let whole = whole.map_err(|source| SceneError::Lens {
-        path: path.to_owned(),
-        source,
-    })?;
     for (id, camera) in &whole.cameras {
         camera.lens().map_err(|source| SceneError::Camera {
             name: format!("{}, camera {}", path.display(), id.0),

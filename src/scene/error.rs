@@ -13,14 +13,6 @@ pub enum SceneError {
     /// Another program's calibration cannot be read.
     #[error(transparent)]
     Format(#[from] calibrate::formats::FormatError),
-    /// An OpenCV calibration has a lens that cannot be drawn with.
-    #[error("{}: {source}", path.display())]
-    Lens {
-        /// The file.
-        path: PathBuf,
-        /// What is not supported.
-        source: calibrate::opencv::UnsupportedLens,
-    },
     /// An OpenCV calibration's poses cannot be given to the photos.
     #[error("{}: the file holds {problem}", path.display())]
     Poses {

@@ -266,7 +266,11 @@ pub(super) fn write_cameras(model: &Reconstruction, out: &mut dyn Write) -> io::
     write_u64(out, model.cameras.len() as u64)?;
     for (id, camera) in &model.cameras {
         write_u32(out, id.0)?;
-        out.write_all(&camera.model.colmap_id().to_le_bytes())?;
+        let model = camera
+            .model
+            .colmap_id()
+            .ok_or(io::ErrorKind::InvalidInput)?;
+        out.write_all(&model.to_le_bytes())?;
         write_u64(out, u64::from(camera.width))?;
         write_u64(out, u64::from(camera.height))?;
         write_f64s(out, &camera.params)?;

@@ -131,6 +131,21 @@ pub enum ColmapError {
         /// Its name.
         name: String,
     },
+    /// A camera was to be written for COLMAP that COLMAP has no model for.
+    #[error(
+        "{}: camera {camera_id} has the model {}, which COLMAP does not have; undistort the \
+         photos and write the pinhole cameras of the result, or write a text model, which is \
+         read here",
+        folder.display(), model.name()
+    )]
+    NotColmaps {
+        /// The folder that was to be written.
+        folder: PathBuf,
+        /// The camera.
+        camera_id: u32,
+        /// Its model.
+        model: ModelKind,
+    },
     /// A text model was to be written where a binary one would be read in its stead.
     #[error(
         "{}: the folder already holds a binary model, which would be read instead of the text \

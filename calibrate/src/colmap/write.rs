@@ -5,7 +5,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes `cameras.txt`, `images.txt` and `points3D.txt` into `folder`, which is made
-/// where it is missing. Every number reads back to the last bit, every id is kept.
+/// where it is missing. Every number reads back to the last bit, every id is kept. Cameras
+/// that no model of COLMAP's describes have names of our own ([`ModelKind::colmap_id`] is
+/// none): we read them again, COLMAP does not.
+///
+/// [`ModelKind::colmap_id`]: crate::ModelKind::colmap_id
 ///
 /// The files are written under temporary names and renamed once all three are complete.
 ///
@@ -36,8 +40,17 @@ pub fn write_text(reconstruction: &Reconstruction, folder: &Path) -> Result<(), 
 ///
 /// # Errors
 /// What [`read_model`](super::read_model) would refuse is refused here, before anything
-/// is written; so is a name with a zero byte. Files that cannot be written.
+/// is written; so is a name with a zero byte, and a camera of a model that COLMAP lacks.
+/// Files that cannot be written.
 pub fn write_binary(reconstruction: &Reconstruction, folder: &Path) -> Result<(), ColmapError> {
+    let mut cameras = reconstruction.cameras.iter();
+    if let Some((id, camera)) = cameras.find(|(_, camera)| camera.model.colmap_id().is_none()) {
+        return Err(ColmapError::NotColmaps {
+            folder: folder.to_owned(),
+            camera_id: id.0,
+            model: camera.model,
+        });
+    }
     write(
         reconstruction,
         folder,

@@ -66,6 +66,38 @@ pub(super) fn invert_division(radius: f64, k: f64) -> Option<(f64, f64)> {
     (k <= 0.0 || z < 2.0).then_some((radius, z))
 }
 
+/// The inverse of a cubic (Wu 2014, "Critical configurations for radial distortion
+/// self-calibration"; VisualSFM and PBA distort so): r with ρ/z = r(1 + k·r²), for z > 0.
+///
+/// With r = 2 sinh φ/√(3k) the cubic is sinh 3φ = 3√(3k)·ρ/2z; sines where k < 0.
+pub(super) fn inverse_radial(rho: f64, z: f64, k: f64) -> Option<Profile> {
+    let root = (3.0 * k.abs()).sqrt();
+    let sine = 1.5 * root * (rho / z);
+    let r = if k >= 0.0 {
+        (sine.asinh() / 3.0).sinh() * 2.0 / root
+    } else {
+        (sine.asin() / 3.0).sin() * 2.0 / root
+    };
+    let slope = (1.0 + (rho / z) * (rho / z)) / (1.0 + 3.0 * k * r * r);
+    // Where the sine is 1 the image folds.
+    (z > 0.0 && (k >= 0.0 || sine < 1.0)).then_some((r, slope))
+}
+
+/// The largest angle that [`inverse_radial`] sees.
+pub(super) fn inverse_radial_limit(k: f64) -> f64 {
+    if k >= 0.0 {
+        FRAC_PI_2
+    } else {
+        2.0_f64.atan2(3.0 * (-3.0 * k).sqrt())
+    }
+}
+
+/// (ρ, z) from the radius of [`inverse_radial`].
+pub(super) fn invert_inverse_radial(radius: f64, k: f64) -> Option<(f64, f64)> {
+    let term = k * radius * radius;
+    (1.0 + 3.0 * term > 0.0).then_some((radius * (1.0 + term), 1.0))
+}
+
 /// The enhanced unified camera model (Khomutenko, Garcia and Martinet 2016):
 /// ρ/(α√(βρ² + z²) + (1 − α)z), as far as it grows with the angle.
 ///
@@ -169,6 +201,16 @@ mod tests {
                 |r| invert_division(r, k),
             );
         }
+        for k in [-2.0, -0.2, -1e-9, 1e-9, 0.2, 2.0] {
+            let name = format!("inverse radial {k}");
+            let limit = inverse_radial_limit(k);
+            check(
+                &name,
+                limit,
+                |r, z| inverse_radial(r, z, k),
+                |r| invert_inverse_radial(r, k),
+            );
+        }
         for alpha in [0.0, 0.1, 0.499, 0.5, 0.501, 0.59, 0.9, 1.0] {
             for beta in [0.5, 1.0, 1.7] {
                 let limit = eucm_limit(alpha, beta);
@@ -182,6 +224,7 @@ mod tests {
         }
         assert_eq!(invert_fov(FRAC_PI_2, 1.0), None);
         assert_eq!(invert_division(1.01, 1.0), None);
+        assert_eq!(invert_inverse_radial(1.01, -1.0 / 3.0), None);
         assert_eq!(invert_eucm(1.01, 1.0, 1.0), None);
     }
 }

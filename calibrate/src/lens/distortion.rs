@@ -1,4 +1,5 @@
-use super::{closed, fisheye, plane};
+use super::{closed, fisheye, plane, sensor};
+use glam::DMat3;
 use std::f64::consts::{FRAC_PI_4, PI};
 
 /// How a lens bends rays away from the pinhole's.
@@ -20,11 +21,32 @@ pub enum Distortion {
         /// Tangential terms.
         p: [f64; 2],
     },
+    /// [`Distortion::Rational`] plus thin prisms, (s₁r² + s₂r⁴, s₃r² + s₄r⁴), seen on a sensor
+    /// that is turned by τx around x and then by τy around y (OpenCV's 12 and 14
+    /// coefficients). Tilts are less than a right angle.
+    Tilted {
+        /// Radial terms: k₁, k₂, k₃ above the bar, k₄, k₅, k₆ below it.
+        k: [f64; 6],
+        /// Tangential terms.
+        p: [f64; 2],
+        /// Thin prism terms.
+        s: [f64; 4],
+        /// The sensor's tilt in radians, (τx, τy).
+        tau: [f64; 2],
+    },
     /// r' = θ(1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸) (Kannala and Brandt 2006; OpenCV). All zero:
     /// equidistant.
     Fisheye {
         /// The polynomial.
         k: [f64; 4],
+    },
+    /// [`Distortion::Fisheye`] on a sensor whose axes are not at right angles: with its
+    /// (x, y), x' = x + αy and y' = y (OpenCV's fisheye with skew).
+    SkewedFisheye {
+        /// The polynomial.
+        k: [f64; 4],
+        /// Skew, α.
+        alpha: f64,
     },
     /// With (x, y) of length θ and r = θ:
     /// x' = x(1 + k₁r² + … + k₄r⁸) + 2p₁xy + p₂(r² + 2x²) + s₁r², and y' likewise with p₁
@@ -59,6 +81,12 @@ pub enum Distortion {
         /// k.
         k: f64,
     },
+    /// r' with ρ/z = r'(1 + k·r'²): what straightens is the polynomial, not what distorts (Wu
+    /// 2014; VisualSFM). With k < 0 as far as r' = 1/√(−3k).
+    InverseRadial {
+        /// k.
+        k: f64,
+    },
     /// r' = ρ/(α√(βρ² + z²) + (1 − α)z) (Khomutenko, Garcia and Martinet 2016), 0 ≤ α ≤ 1,
     /// β > 0. With α > 0 it sees behind itself.
     Eucm {
@@ -73,18 +101,65 @@ pub enum Distortion {
 }
 
 impl Distortion {
+    /// The distortion of OpenCV's pinhole cameras with these coefficients,
+    /// k₁ k₂ p₁ p₂ k₃ k₄ k₅ k₆ s₁ s₂ s₃ s₄ τx τy or the first 0, 4, 5, 8 or 12 of them; `None`
+    /// for another number.
+    pub fn of_opencv(coefficients: &[f64]) -> Option<Self> {
+        if ![0, 4, 5, 8, 12, 14].contains(&coefficients.len()) {
+            return None;
+        }
+        let at = |i: usize| coefficients.get(i).copied().unwrap_or(0.0);
+        let all = Self::Tilted {
+            k: [at(0), at(1), at(4), at(5), at(6), at(7)],
+            p: [at(2), at(3)],
+            s: [at(8), at(9), at(10), at(11)],
+            tau: [at(12), at(13)],
+        };
+        Some(all.simplest())
+    }
+
+    /// The simplest formula that is the same mapping within the precision of f64.
+    pub(super) fn simplest(self) -> Self {
+        match self {
+            Self::Tilted { k, p, s, tau } if s == [0.0; 4] && tau == [0.0; 2] => {
+                Self::Rational { k, p }.simplest()
+            }
+            Self::SkewedFisheye { k, alpha: 0.0 } => Self::Fisheye { k },
+            Self::Rational { k, p } if k == [0.0; 6] && p == [0.0; 2] => Self::None,
+            Self::Fov { omega } if omega.abs() < 1e-9 => Self::None,
+            Self::Division { k: 0.0 } | Self::InverseRadial { k: 0.0 } => Self::None,
+            Self::Eucm { alpha: 0.0, .. } => Self::None,
+            other => other,
+        }
+    }
+
+    /// The homography from distorted coordinates to the sensor's, (x', y', w) from (x, y, 1),
+    /// where the sensor is tilted or skewed. It keeps the origin, and its last entry is 1.
+    /// Nothing is seen where w ≤ 0.
+    pub fn sensor(&self) -> Option<DMat3> {
+        match *self {
+            Self::Tilted { tau, .. } => Some(sensor::tilt(tau)),
+            Self::SkewedFisheye { alpha, .. } => Some(sensor::skew(alpha)),
+            _ => None,
+        }
+    }
+
     /// See [`super::Lens::limit`].
     pub(super) fn limit(&self) -> f64 {
         match self {
             Distortion::None => f64::INFINITY,
-            Distortion::Rational { k, p } => plane::rational_limit(k, p),
-            Distortion::Fisheye { k } => fisheye::polynomial_limit(k),
+            Distortion::Rational { k, p } => plane::limit(k, p, &[0.0; 4]),
+            Distortion::Tilted { k, p, s, .. } => plane::limit(k, p, s),
+            Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
+                fisheye::polynomial_limit(k)
+            }
             Distortion::ThinPrismFisheye { k, p, s } => fisheye::thin_prism_limit(k, p, s),
             Distortion::RadTanThinPrismFisheye { k, p, s } => {
                 fisheye::rad_tan_thin_prism_limit(k, p, s)
             }
             Distortion::Fov { .. } => 0.5 * PI,
             Distortion::Division { k } => closed::division_limit(*k),
+            Distortion::InverseRadial { k } => closed::inverse_radial_limit(*k),
             Distortion::Eucm { alpha, beta } => closed::eucm_limit(*alpha, *beta),
             Distortion::Equirectangular => PI,
         }
@@ -98,8 +173,11 @@ impl Distortion {
     pub(super) fn is_wide(&self) -> bool {
         let (sin, cos) = FRAC_PI_4.sin_cos();
         let (at_45, central) = match *self {
-            Distortion::None | Distortion::Rational { .. } => return false,
+            Distortion::None | Distortion::Rational { .. } | Distortion::Tilted { .. } => {
+                return false;
+            }
             Distortion::Fisheye { .. }
+            | Distortion::SkewedFisheye { .. }
             | Distortion::ThinPrismFisheye { .. }
             | Distortion::RadTanThinPrismFisheye { .. }
             | Distortion::Equirectangular => return true,
@@ -108,6 +186,7 @@ impl Distortion {
                 (closed::fov(sin, cos, omega), central)
             }
             Distortion::Division { k } => (closed::division(sin, cos, k), 1.0),
+            Distortion::InverseRadial { k } => (closed::inverse_radial(sin, cos, k), 1.0),
             Distortion::Eucm { alpha, beta } => (closed::eucm(sin, cos, alpha, beta), 1.0),
         };
         let pinhole = 1.0 / (cos * cos * cos);

@@ -5,7 +5,7 @@
 //! point θ·(x, y)/|(x, y)|, whose distance from the origin is the angle θ.
 
 use super::invert::{invert_monotone, invert_on_disc, scan};
-use super::plane::{radial_jacobian, tangential};
+use super::plane::{prism, radial_jacobian, sideways_bound, tangential};
 use glam::{DMat2, DVec2};
 use std::f64::consts::PI;
 
@@ -48,22 +48,26 @@ pub(super) fn thin_prism(point: DVec2, k: &[f64; 4], p: &[f64; 2], s: &[f64; 2])
     let t2 = point.length_squared();
     let (factor, d_factor) = even(t2, k);
     let (shift, d_shift) = tangential(point, p);
-    let s = DVec2::from_array(*s);
+    let (slant, d_slant) = prism(point, &squares(s));
     (
-        point * factor + shift + s * t2,
-        radial_jacobian(point, factor, d_factor) + d_shift + outer(s, 2.0 * point),
+        point * factor + shift + slant,
+        radial_jacobian(point, factor, d_factor) + d_shift + d_slant,
     )
 }
 
 /// The angle up to which [`thin_prism`] is one to one: where the eigenvalues of the radial
-/// Jacobian outweigh those of the tangential one (see [`tangential`]) and of the prism's,
-/// the symmetric part of 2s·xᵀ, at least −2|s|r.
+/// Jacobian outweigh those of the others.
 pub(super) fn thin_prism_limit(k: &[f64; 4], p: &[f64; 2], s: &[f64; 2]) -> f64 {
-    let sideways = 6.0 * p[0].hypot(p[1]) + 2.0 * s[0].hypot(s[1]);
+    let sideways = sideways_bound(0.0, p, &squares(s));
     scan(PI, 4_000, PI, |theta| {
         let (value, slope) = polynomial(theta, k);
         slope.min(value / theta) > sideways * theta
     })
+}
+
+/// Prism terms by r² alone.
+fn squares([x, y]: &[f64; 2]) -> [f64; 4] {
+    [*x, 0.0, *y, 0.0]
 }
 
 /// The point that [`thin_prism`] maps to a distorted one.
@@ -93,26 +97,19 @@ pub(super) fn rad_tan_thin_prism(
     (value, jacobian * radial_jacobian(point, factor, d_factor))
 }
 
-/// The second half of [`rad_tan_thin_prism`]. COLMAP's p₀ and p₁ are OpenCV's p₂ and p₁;
-/// the prism adds (s₀r² + s₁r⁴, s₂r² + s₃r⁴).
+/// The second half of [`rad_tan_thin_prism`]. COLMAP's p₀ and p₁ are OpenCV's p₂ and p₁.
 fn sideways(point: DVec2, p: &[f64; 2], s: &[f64; 4]) -> (DVec2, DMat2) {
-    let r2 = point.length_squared();
     let (shift, d_shift) = tangential(point, &[p[1], p[0]]);
-    let (once, twice) = (DVec2::new(s[0], s[2]), DVec2::new(s[1], s[3]));
-    let prism = r2 * (once + r2 * twice);
-    let d_prism = outer(once + 2.0 * r2 * twice, 2.0 * point);
-    (point + shift + prism, DMat2::IDENTITY + d_shift + d_prism)
+    let (slant, d_slant) = prism(point, s);
+    (point + shift + slant, DMat2::IDENTITY + d_shift + d_slant)
 }
 
 /// The angle up to which [`rad_tan_thin_prism`] is one to one: the polynomial grows there,
-/// and on the disc that it fills the second half's Jacobian is positive definite, by the
-/// bounds of [`thin_prism_limit`].
+/// and on the disc that it fills the second half's Jacobian is positive definite.
 pub(super) fn rad_tan_thin_prism_limit(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> f64 {
-    let (once, twice) = (s[0].hypot(s[2]), s[1].hypot(s[3]));
     scan(PI, 4_000, PI, |theta| {
         let (r, slope) = polynomial(theta, k);
-        let bound = 6.0 * p[0].hypot(p[1]) + 2.0 * (once + 2.0 * r * r * twice);
-        slope > 0.0 && bound * r < 1.0
+        slope > 0.0 && sideways_bound(r, p, s) * r < 1.0
     })
 }
 
@@ -128,11 +125,6 @@ pub(super) fn invert_rad_tan_thin_prism(
     let start = distorted.clamp_length_max(reach);
     let radially = invert_on_disc(distorted, start, reach, |x| sideways(x, p, s))?;
     straighten(radially, k, limit)
-}
-
-/// a·bᵀ.
-fn outer(a: DVec2, b: DVec2) -> DMat2 {
-    DMat2::from_cols(a * b.x, a * b.y)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Projection through a lens and back.
 //!
-//! Every model that COLMAP calls by a name of its own is one of [`Distortion`]'s, some with
-//! coefficients zero; pixel centres are COLMAP's too.
+//! Every model of COLMAP, OpenCV and the other programs read here is one of [`Distortion`]'s,
+//! some with coefficients zero; pixel centres are COLMAP's.
 
 mod closed;
 mod distortion;
@@ -10,10 +10,10 @@ mod fisheye;
 mod invert;
 mod pixel;
 mod plane;
+mod sensor;
 
 pub use distortion::Distortion;
 pub use pixel::Pixel;
-pub(crate) use plane::rational;
 
 use glam::{DMat2, DVec2, DVec3};
 
@@ -51,21 +51,10 @@ pub struct Projection {
 }
 
 impl Lens {
-    /// A lens; the range in which its distortion can be inverted is found here.
+    /// A lens; the range in which its distortion can be inverted is found here. Where
+    /// coefficients are zero, [`Lens::distortion`] is the simplest variant without them.
     pub fn new(focal: DVec2, principal: DVec2, distortion: Distortion) -> Self {
-        // What does not bend rays within the precision of f64 is a pinhole.
-        let is_pinhole = match distortion {
-            Distortion::Rational { k, p } => k == [0.0; 6] && p == [0.0; 2],
-            Distortion::Fov { omega } => omega.abs() < 1e-9,
-            Distortion::Division { k } => k == 0.0,
-            Distortion::Eucm { alpha, .. } => alpha == 0.0,
-            _ => false,
-        };
-        let distortion = if is_pinhole {
-            Distortion::None
-        } else {
-            distortion
-        };
+        let distortion = distortion.simplest();
         Self {
             focal,
             principal,
@@ -85,8 +74,8 @@ impl Lens {
         self.distortion
     }
 
-    /// How far from the axis the lens maps rays one to one: for [`Distortion::None`] and
-    /// [`Distortion::Rational`] a radius on the plane z = 1, infinite for a pinhole; for
+    /// How far from the axis the lens maps rays one to one: for [`Distortion::None`],
+    /// [`Distortion::Rational`] and [`Distortion::Tilted`] a radius on the plane z = 1, infinite for a pinhole; for
     /// all others an angle in radians, π/2 or less for those that see only what is in front.
     pub fn limit(&self) -> f64 {
         self.limit
@@ -112,6 +101,7 @@ impl Lens {
     pub fn mean_focal(&self) -> f64 {
         let central = match self.distortion {
             Distortion::Fov { omega } => 2.0 * (0.5 * omega).tan() / omega,
+            Distortion::Tilted { tau, .. } => (tau[0].cos() * tau[1].cos()).sqrt().recip(),
             _ => 1.0,
         };
         central * (self.focal.x * self.focal.y).sqrt()
@@ -131,6 +121,9 @@ impl Lens {
             Distortion::Rational { k, p } => {
                 plane::rational(self.on_plane(point_in_camera)?, &k, &p).0
             }
+            Distortion::Tilted { k, p, s, .. } => {
+                plane::rational_prism(self.on_plane(point_in_camera)?, &k, &p, &s).0
+            }
             Distortion::ThinPrismFisheye { k, p, s } => {
                 fisheye::thin_prism(self.by_angle(point_in_camera)?, &k, &p, &s).0
             }
@@ -139,8 +132,10 @@ impl Lens {
             }
             Distortion::Equirectangular => equirectangular::angles(point_in_camera)?.0,
             Distortion::Fisheye { .. }
+            | Distortion::SkewedFisheye { .. }
             | Distortion::Fov { .. }
             | Distortion::Division { .. }
+            | Distortion::InverseRadial { .. }
             | Distortion::Eucm { .. } => {
                 let rho = x.hypot(y);
                 let (r, slope) = self.profile(rho, z)?;
@@ -149,7 +144,10 @@ impl Lens {
                 DVec2::new(x, y) * scale
             }
         };
-        self.pixel(distorted)
+        self.pixel(match self.distortion.sensor() {
+            None => distorted,
+            Some(homography) => sensor::apply(homography, distorted)?.0,
+        })
     }
 
     /// [`Self::project`] with its derivatives, for optimisation.
@@ -157,7 +155,7 @@ impl Lens {
         let DVec3 { x, y, z } = point_in_camera;
         // 1. The point's own coordinates, undistorted, or distorted where that is symmetric.
         let (before, gradients) = match self.distortion {
-            Distortion::None | Distortion::Rational { .. } => {
+            Distortion::None | Distortion::Rational { .. } | Distortion::Tilted { .. } => {
                 let before = if let Distortion::None = self.distortion {
                     (z > 0.0).then(|| DVec2::new(x / z, y / z))?
                 } else {
@@ -181,14 +179,20 @@ impl Lens {
             }
         };
         // 2. What distorts them further.
-        let (distorted, jacobian) = match self.distortion {
+        let (mut distorted, mut jacobian) = match self.distortion {
             Distortion::Rational { k, p } => plane::rational(before, &k, &p),
+            Distortion::Tilted { k, p, s, .. } => plane::rational_prism(before, &k, &p, &s),
             Distortion::ThinPrismFisheye { k, p, s } => fisheye::thin_prism(before, &k, &p, &s),
             Distortion::RadTanThinPrismFisheye { k, p, s } => {
                 fisheye::rad_tan_thin_prism(before, &k, &p, &s)
             }
             _ => (before, DMat2::IDENTITY),
         };
+        // 3. The sensor.
+        if let Some(homography) = self.distortion.sensor() {
+            let (mapped, by_distorted) = sensor::apply(homography, distorted)?;
+            (distorted, jacobian) = (mapped, by_distorted * jacobian);
+        }
         let row = |r: usize| {
             let row = jacobian.row(r) * self.focal[r];
             row.x * gradients[0] + row.y * gradients[1]
@@ -203,7 +207,10 @@ impl Lens {
     ///
     /// `None` where no ray within the lens' one-to-one range falls on that pixel.
     pub fn unproject(&self, pixel: Pixel) -> Option<DVec3> {
-        let distorted = (DVec2::new(pixel.x, pixel.y) - self.principal) / self.focal;
+        let mut distorted = (DVec2::new(pixel.x, pixel.y) - self.principal) / self.focal;
+        if let Some(homography) = self.distortion.sensor() {
+            distorted = sensor::apply(homography.inverse(), distorted)?.0;
+        }
         if !distorted.is_finite() {
             return None;
         }
@@ -225,10 +232,14 @@ impl Lens {
         match self.distortion {
             Distortion::None => Some(distorted.extend(1.0).normalize()),
             Distortion::Rational { k, p } => {
-                let undistorted = plane::invert_rational(distorted, &k, &p, self.limit)?;
+                let undistorted = plane::invert(distorted, &k, &p, &[0.0; 4], self.limit)?;
                 Some(undistorted.extend(1.0).normalize())
             }
-            Distortion::Fisheye { k } => {
+            Distortion::Tilted { k, p, s, .. } => {
+                let undistorted = plane::invert(distorted, &k, &p, &s, self.limit)?;
+                Some(undistorted.extend(1.0).normalize())
+            }
+            Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
                 let theta = invert::invert_monotone(radius, self.limit, |theta| {
                     fisheye::polynomial(theta, &k)
                 })?;
@@ -242,6 +253,9 @@ impl Lens {
             }
             Distortion::Fov { omega } => closed::invert_fov(radius, omega).map(sideways),
             Distortion::Division { k } => closed::invert_division(radius, k).map(sideways),
+            Distortion::InverseRadial { k } => {
+                closed::invert_inverse_radial(radius, k).map(sideways)
+            }
             Distortion::Eucm { alpha, beta } => {
                 closed::invert_eucm(radius, alpha, beta).map(sideways)
             }
@@ -276,13 +290,14 @@ impl Lens {
     /// The distorted radius of a symmetric lens, and its derivative by the angle.
     fn profile(&self, rho: f64, z: f64) -> Option<closed::Profile> {
         match self.distortion {
-            Distortion::Fisheye { k } => {
+            Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
                 let theta = rho.atan2(z);
                 (theta <= self.limit && (rho > 0.0 || z > 0.0))
                     .then(|| fisheye::polynomial(theta, &k))
             }
             Distortion::Fov { omega } => closed::fov(rho, z, omega),
             Distortion::Division { k } => closed::division(rho, z, k),
+            Distortion::InverseRadial { k } => closed::inverse_radial(rho, z, k),
             Distortion::Eucm { alpha, beta } => closed::eucm(rho, z, alpha, beta),
             _ => None,
         }

@@ -1,11 +1,12 @@
-//! Brown–Conrady with a rational radial term, on the plane z = 1: OpenCV's formula.
+//! Brown–Conrady with a rational radial term and thin prisms, on the plane z = 1: OpenCV's
+//! formula.
 
 use super::invert::{invert_monotone, invert_on_disc, scan};
 use glam::{DMat2, DVec2};
 
 /// The distorted point and the Jacobian of the mapping.
 #[inline]
-pub(crate) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
+pub(super) fn rational(point: DVec2, k: &[f64; 6], p: &[f64; 2]) -> (DVec2, DMat2) {
     let r2 = point.length_squared();
     let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
     let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
@@ -53,46 +54,79 @@ pub(super) fn tangential(point: DVec2, p: &[f64; 2]) -> (DVec2, DMat2) {
     )
 }
 
+/// Thin prisms, (s₁r² + s₂r⁴, s₃r² + s₄r⁴), and their Jacobian: 2a·xᵀ with
+/// a = (s₁ + 2s₂r², s₃ + 2s₄r²), of whose symmetric part the eigenvalues are at least
+/// −2|a|r.
+#[inline]
+pub(super) fn prism(point: DVec2, s: &[f64; 4]) -> (DVec2, DMat2) {
+    let r2 = point.length_squared();
+    let (once, twice) = (DVec2::new(s[0], s[2]), DVec2::new(s[1], s[3]));
+    let a = once + 2.0 * r2 * twice;
+    let jacobian = DMat2::from_cols(a * (2.0 * point.x), a * (2.0 * point.y));
+    (r2 * (once + r2 * twice), jacobian)
+}
+
+/// What the least eigenvalue of the tangential and the prism terms' Jacobians together is
+/// above, negated, where r is at most that long; divided by r.
+pub(super) fn sideways_bound(r: f64, p: &[f64; 2], s: &[f64; 4]) -> f64 {
+    let (once, twice) = (s[0].hypot(s[2]), s[1].hypot(s[3]));
+    6.0 * p[0].hypot(p[1]) + 2.0 * (once + 2.0 * r * r * twice)
+}
+
+/// [`rational`] with thin prisms.
+#[inline]
+pub(super) fn rational_prism(
+    point: DVec2,
+    k: &[f64; 6],
+    p: &[f64; 2],
+    s: &[f64; 4],
+) -> (DVec2, DMat2) {
+    let (without, d_without) = rational(point, k, p);
+    let (shift, d_shift) = prism(point, s);
+    (without + shift, d_without + d_shift)
+}
+
 /// r·radial(r²) and its derivative: the model along a radius.
 fn rational_radius(r: f64, k: &[f64; 6]) -> (f64, f64) {
     let (point, jacobian) = rational(DVec2::new(r, 0.0), k, &[0.0; 2]);
     (point.x, jacobian.x_axis.x)
 }
 
-/// The radius up to which the model is one to one.
+/// The radius up to which [`rational_prism`] is one to one.
 ///
-/// The radial terms' Jacobian is symmetric, with the eigenvalues f/r and f'; the tangential
-/// terms' is bounded by [`tangential`]. Where the sum is positive definite on a disc, which
-/// is convex, the mapping is one to one there.
-pub(super) fn rational_limit(k: &[f64; 6], p: &[f64; 2]) -> f64 {
-    let tangential = 6.0 * p[0].hypot(p[1]);
+/// The radial terms' Jacobian is symmetric, with the eigenvalues f/r and f'; the others are
+/// bounded by [`sideways_bound`]. Where the sum is positive definite on a disc, which is
+/// convex, the mapping is one to one there.
+pub(super) fn limit(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> f64 {
     // Radius 50 is 88.9° off the axis.
     scan(50.0, 20_000, f64::INFINITY, |r| {
         let (value, slope) = rational_radius(r, k);
-        slope.min(value / r) > tangential * r
+        slope.min(value / r) > sideways_bound(r, p, s) * r
     })
 }
 
-/// The undistorted point.
-pub(super) fn invert_rational(
+/// The point that [`rational_prism`] maps to a distorted one.
+pub(super) fn invert(
     distorted: DVec2,
     k: &[f64; 6],
     p: &[f64; 2],
+    s: &[f64; 4],
     limit: f64,
 ) -> Option<DVec2> {
-    // Without the tangential terms the problem has one dimension and a sure answer.
+    // The radial terms alone are a problem of one dimension and have a sure answer.
+    let only_radial = *p == [0.0; 2] && *s == [0.0; 4];
     let radius = distorted.length();
     let start = match invert_monotone(radius, limit, |r| rational_radius(r, k)) {
         Some(undistorted) if radius > 0.0 => distorted * (undistorted / radius),
         Some(_) => distorted,
-        // Tangential terms may still bring the point within reach.
-        None if *p != [0.0; 2] && limit.is_finite() => distorted * (limit / radius),
+        // The others may still bring the point within reach.
+        None if !only_radial && limit.is_finite() => distorted * (limit / radius),
         None => return None,
     };
-    if *p == [0.0; 2] {
+    if only_radial {
         return Some(start);
     }
-    invert_on_disc(distorted, start, limit, |x| rational(x, k, p))
+    invert_on_disc(distorted, start, limit, |x| rational_prism(x, k, p, s))
 }
 
 #[cfg(test)]
@@ -104,11 +138,12 @@ mod tests {
     fn derivatives_meet_finite_differences() {
         let k = [-0.3, 0.1, -0.02, 0.2, 0.05, -0.01];
         let p = [0.01, -0.02];
+        let s = [0.02, -0.01, -0.03, 0.005];
         for x in [-0.9, -0.2, 0.0, 0.35, 0.7] {
             for y in [-0.6, 0.0, 0.15, 0.8] {
                 let at = DVec2::new(x, y);
-                let expected = difference(|point| rational(point, &k, &p).0, at);
-                let found = rational(at, &k, &p).1;
+                let expected = difference(|point| rational_prism(point, &k, &p, &s).0, at);
+                let found = rational_prism(at, &k, &p, &s).1;
                 let close = (found - expected).to_cols_array();
                 assert!(
                     close.iter().all(|e| e.abs() < 1e-8),

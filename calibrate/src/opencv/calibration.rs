@@ -1,12 +1,14 @@
 //! From storage files to cameras, poses and a reconstruction.
 
+use super::OpenCvError;
 use super::board::{self, Board};
 use super::cameras::{self, Keys, OpenCvCamera};
 use super::poses;
 use super::storage::{FileStorage, Value};
 use super::values::{Values, plain};
-use super::{OpenCvError, UnsupportedLens};
-use crate::{CameraId, Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction, Rigid3};
+use crate::{
+    Camera, CameraId, Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction, Rigid3,
+};
 use std::path::{Path, PathBuf};
 
 /// What OpenCV's calibration left in files.
@@ -190,22 +192,15 @@ impl OpenCvCalibration {
     /// `names` are the photos' in the order of [`OpenCvCalibration::photo_poses`];
     /// `photo_size` is used for cameras whose size the file does not say.
     ///
-    /// # Errors
-    /// A lens that the renderer lacks.
-    ///
     /// # Panics
     /// The numbers of names and poses differ.
-    pub fn reconstruction(
-        &self,
-        names: &[String],
-        photo_size: (u32, u32),
-    ) -> Result<Reconstruction, UnsupportedLens> {
+    pub fn reconstruction(&self, names: &[String], photo_size: (u32, u32)) -> Reconstruction {
         let poses = self.photo_poses();
         assert_eq!(names.len(), poses.len(), "a name for each pose");
         let mut whole = Reconstruction::default();
         for (i, camera) in self.cameras.iter().enumerate() {
             let (width, height) = camera.size.unwrap_or(photo_size);
-            let camera = camera.lens.camera(width, height)?;
+            let camera = Camera::of(&camera.lens, width, height);
             whole.cameras.insert(CameraId(i as u32 + 1), camera);
         }
         let is_rig = self.poses.is_empty();
@@ -225,7 +220,7 @@ impl OpenCvCalibration {
             whole.images.insert(ImageId(i as u32 + 1), image);
         }
         self.add_corners(&mut whole);
-        Ok(whole)
+        whole
     }
 
     /// The board's corners as points that every image sees.

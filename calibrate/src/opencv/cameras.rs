@@ -3,9 +3,9 @@
 use super::OpenCvError;
 use super::coefficients::{coefficients_for, is_fisheye};
 use super::flat::{of_scalars, size};
-use super::lens::{OpenCvDistortion, OpenCvLens};
 use super::storage::{Matrix, Value};
 use super::values::{Named, Role, Values, plain, role};
+use crate::{Distortion, Lens};
 use glam::DVec2;
 
 /// Which of a file's matrices to use, where its names leave that open.
@@ -25,7 +25,7 @@ pub struct OpenCvCamera {
     /// What the file calls its matrix.
     pub name: String,
     /// Intrinsics.
-    pub lens: OpenCvLens,
+    pub lens: Lens,
     /// Width and height in pixels, where the file says.
     pub size: Option<(u32, u32)>,
 }
@@ -156,7 +156,7 @@ fn of_matrix(
     let k = intrinsics(values, named)?;
     let coefficients = coefficients_for(values, named, keys, notes)?;
     let distortion = match &coefficients {
-        None => OpenCvDistortion::standard(&[]),
+        None => Some(Distortion::None),
         Some((of, c)) if is_fisheye(values, keys, [named, of], c.len(), notes) => {
             let refuse = || {
                 let problem = format!(
@@ -165,12 +165,12 @@ fn of_matrix(
                 );
                 values.refuse(of, problem)
             };
-            Some(OpenCvDistortion::Fisheye {
+            Some(Distortion::SkewedFisheye {
                 k: c.as_slice().try_into().map_err(|_| refuse())?,
                 alpha: k.skew / k.focal.x,
             })
         }
-        Some((_, c)) => OpenCvDistortion::standard(c),
+        Some((_, c)) => Distortion::of_opencv(c),
     };
     let Some(distortion) = distortion else {
         let (of, c) = coefficients.unwrap_or((named.clone(), Vec::new()));
@@ -182,7 +182,7 @@ fn of_matrix(
         return Err(values.refuse(&of, problem));
     };
     // OpenCV's own functions ignore skew but for the fisheye.
-    if k.skew != 0.0 && !matches!(distortion, OpenCvDistortion::Fisheye { .. }) {
+    if k.skew != 0.0 && !matches!(distortion, Distortion::SkewedFisheye { .. }) {
         let problem = format!(
             "the camera matrix has skew {}, which OpenCV's pinhole model does not have; set it \
              to 0, or say --fisheye if cv::fisheye computed it",
@@ -192,7 +192,7 @@ fn of_matrix(
     }
     Ok(OpenCvCamera {
         name: named.path.clone(),
-        lens: OpenCvLens::new(k.focal, k.principal + 0.5, distortion),
+        lens: Lens::new(k.focal, k.principal + 0.5, distortion),
         size: size(values, named.prefix())?,
     })
 }

@@ -2,8 +2,8 @@
 
 use super::OpenCvError;
 use super::cameras::{Keys, OpenCvCamera, model_name};
-use super::lens::{OpenCvDistortion, OpenCvLens};
 use super::values::{Named, Values, plain};
+use crate::{Distortion, Lens};
 use glam::DVec2;
 
 /// Cameras written as numbers: ORB-SLAM's `Camera.fx`, camodocal's
@@ -53,23 +53,20 @@ pub(super) fn of_scalars(
                 ["k1", "k2", "k3", "k4"]
             };
             let k = terms(&names);
-            OpenCvDistortion::Fisheye {
+            Distortion::Fisheye {
                 k: [k[0], k[1], k[2], k[3]],
-                alpha: 0.0,
             }
         } else {
             let k = terms(&["k1", "k2", "k3", "k4", "k5", "k6"]);
             let p = terms(&["p1", "p2"]);
-            OpenCvDistortion::Standard {
+            Distortion::Rational {
                 k: [k[0], k[1], k[2], k[3], k[4], k[5]],
                 p: [p[0], p[1]],
-                s: [0.0; 4],
-                tau: [0.0; 2],
             }
         };
         cameras.push(OpenCvCamera {
             name: prefix.trim_end_matches('.').to_owned(),
-            lens: OpenCvLens::new(DVec2::new(fx, fy), DVec2::new(cx, cy) + 0.5, distortion),
+            lens: Lens::new(DVec2::new(fx, fy), DVec2::new(cx, cy) + 0.5, distortion),
             size: size(values, prefix)?,
         });
     }

@@ -178,7 +178,8 @@ fn an_unknown_camera_model_is_named() {
          among those read here: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, \
          OPENCV_FISHEYE, FULL_OPENCV, FOV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, \
          THIN_PRISM_FISHEYE, RAD_TAN_THIN_PRISM_FISHEYE, SIMPLE_DIVISION, DIVISION, \
-         SIMPLE_FISHEYE, FISHEYE, EUCM, EQUIRECTANGULAR; undistort the photos with \
+         SIMPLE_FISHEYE, FISHEYE, EUCM, EQUIRECTANGULAR, OPENCV_TILTED, \
+         OPENCV_SKEWED_FISHEYE, INVERSE_RADIAL; undistort the photos with \
          `colmap image_undistorter` and use the model it writes"
     );
     let error = text_error("cameras.txt", "SIMPLE_RADIAL", "MY_LENS");

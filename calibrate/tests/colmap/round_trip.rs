@@ -1,5 +1,5 @@
 use crate::synthetic::small;
-use calibrate::colmap::{read_model, write_binary, write_text};
+use calibrate::colmap::{ColmapError, read_model, write_binary, write_text};
 use calibrate::{
     Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Reconstruction,
     Rigid3,
@@ -24,13 +24,13 @@ fn camera() -> impl Strategy<Value = Camera> {
         prop::sample::select(ModelKind::ALL),
         1_u32..5000,
         1_u32..5000,
-        vec(0.001..2000.0, 16),
+        vec(0.001..2000.0, 18),
     )
         .prop_map(|(model, width, height, mut params)| {
             params.truncate(model.parameter_names().len());
             for (value, name) in params.iter_mut().zip(model.parameter_names()) {
                 // These have bounds.
-                if ["omega", "alpha"].contains(name) {
+                if ["omega", "alpha", "tauX", "tauY"].contains(name) {
                     *value /= 2000.0;
                 }
             }
@@ -111,11 +111,50 @@ proptest! {
     fn what_is_written_reads_back_bit_for_bit(model in reconstruction()) {
         let folder = tempfile::tempdir().unwrap();
         let (binary, text) = (folder.path().join("binary"), folder.path().join("text"));
-        write_binary(&model, &binary).unwrap();
         write_text(&model, &text).unwrap();
-        prop_assert_eq!(&read_model(&binary).unwrap(), &model);
         prop_assert_eq!(&read_model(&text).unwrap(), &model);
+        // COLMAP reads binary models, and not all of ours.
+        let is_colmaps = |camera: &Camera| camera.model.colmap_id().is_some();
+        let written = write_binary(&model, &binary);
+        if model.cameras.values().all(is_colmaps) {
+            written.unwrap();
+            prop_assert_eq!(&read_model(&binary).unwrap(), &model);
+        } else {
+            prop_assert!(matches!(written, Err(ColmapError::NotColmaps { .. })));
+            prop_assert!(!binary.exists());
+        }
     }
+}
+
+#[test]
+fn a_binary_model_holds_only_colmaps_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = small();
+    let (id, camera) = model.cameras.iter_mut().next().unwrap();
+    let id = id.0;
+    camera.model = ModelKind::OpenCvTilted;
+    camera.params = [500.0, 500.0, 320.0, 240.0]
+        .into_iter()
+        .chain((1..15).map(|i| 0.01 * f64::from(i)))
+        .collect();
+    let error = write_binary(&model, folder.path()).unwrap_err().to_string();
+    let expected = format!(
+        "{}: camera {id} has the model OPENCV_TILTED, which COLMAP does not have; undistort the \
+         photos and write the pinhole cameras of the result, or write a text model, which is \
+         read here",
+        folder.path().display()
+    );
+    assert_eq!(error, expected);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    write_text(&model, folder.path()).unwrap();
+    let text = fs::read_to_string(folder.path().join("cameras.txt")).unwrap();
+    let line = format!(
+        "{id} OPENCV_TILTED {} {} 500 500 320 240 0.01 0.02 0.03",
+        model.cameras[&CameraId(id)].width,
+        model.cameras[&CameraId(id)].height
+    );
+    assert!(text.contains(&line), "{text}");
+    assert_eq!(read_model(folder.path()).unwrap(), model);
 }
 
 #[test]

@@ -37,7 +37,7 @@ const RESOLUTION_LENGTH = 1u;
 
 // A source view is SOURCE_TEXELS texels of a texture (`Source` of layout.rs): software
 // drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
-const SOURCE_TEXELS = 11u;
+const SOURCE_TEXELS = 12u;
 const SOURCES_PER_ROW = 128u;
 // Rows of the rotation from the desired camera's frame; w: the translation. All are scaled
 // so that a patch of the proxy at equal depth in both cameras covers equally many pixels.
@@ -46,8 +46,8 @@ const Y_AXIS = 1u;
 const Z_AXIS = 2u;
 // Focal lengths, principal point.
 const PINHOLE = 3u;
-// k1, k2, p1, p2; of a fisheye k1, k2. FOV: 2 tan(omega / 2), 1 / omega. Division: k.
-// EUCM: alpha, beta, and z over the radius at its limit.
+// k1, k2, p1, p2; of a fisheye k1, k2. FOV: 2 tan(omega / 2), 1 / omega. Division and
+// inverse radial: k. EUCM: alpha, beta, and z over the radius at its limit.
 const LENS = 4u;
 // k3, k4, k5, k6; of a fisheye k3, k4.
 const LENS_REST = 5u;
@@ -62,6 +62,8 @@ const CENTER = 8u;
 const GAIN = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
+// Shear and horizon of a sensor that is tilted or skewed (`Sensor` of sensor.rs).
+const SENSOR = 11u;
 
 // The one kind of lens that all source views have; negative where they differ. Set when a
 // pipeline is made, so that no pixel pays for lenses that are not there.
@@ -79,6 +81,10 @@ const LENS_FOV: f32 = 6.0;
 const LENS_DIVISION: f32 = 7.0;
 const LENS_EUCM: f32 = 8.0;
 const LENS_EQUIRECTANGULAR: f32 = 9.0;
+const LENS_INVERSE_RADIAL: f32 = 10.0;
+// Those whose sensor is not upright.
+const LENS_TILTED: f32 = 11.0;
+const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
@@ -120,6 +126,19 @@ fn ray_through(pixel: vec2u) -> vec3f {
         return textureLoad(rays, pixel, 0).xyz;
     }
     return vec3f((vec2f(pixel) + 0.5 - params.ray_offset) * params.ray_scale, 1.0);
+}
+
+// Brown's distortion of a point on the plane z = 1, with its full radial term or without k3
+// to k6.
+fn rational(source_idx: u32, n: vec2f, r2: f32, full: bool) -> vec2f {
+    let k = source_data(source_idx, LENS);
+    var radial = 1.0 + r2 * (k.x + r2 * k.y);
+    if full {
+        let rest = source_data(source_idx, LENS_REST);
+        let below = 1.0 + r2 * (rest.y + r2 * (rest.z + r2 * rest.w));
+        radial = (radial + r2 * r2 * r2 * rest.x) / below;
+    }
+    return n * radial + 2.0 * k.zw * n.x * n.y + k.wz * (r2 + 2.0 * n * n);
 }
 
 // What a rarer lens makes of a point of its camera's frame.
@@ -176,6 +195,44 @@ fn bend_division(p: vec3f, k: f32) -> Bent {
     return Bent(p.xy * (2.0 / below), true, 0.0);
 }
 
+// Newton's steps for the cubic of `at = n * g`, g + t * g^3 = 1, approach its root from one
+// side; beyond the largest t they stop outside every image.
+const CUBIC_STEPS = 8;
+const LARGEST_CUBIC_TERM: f32 = 1e6;
+
+fn bend_inverse_radial(p: vec3f, k: f32) -> Bent {
+    let n = p.xy / p.z;
+    let t = k * dot(n, n);
+    // Where t is -4/27 the image folds.
+    if p.z <= 0.0 || t <= -4.0 / 27.0 || t >= LARGEST_CUBIC_TERM {
+        return UNSEEN;
+    }
+    var g = 1.0;
+    for (var step = 0; step < CUBIC_STEPS; step++) {
+        let term = t * g * g;
+        g = (1.0 + 2.0 * term * g) / (1.0 + 3.0 * term);
+    }
+    return Bent(n * g, true, 0.0);
+}
+
+// Rational with thin prisms.
+fn bend_rational_prism(source_idx: u32, p: vec3f) -> Bent {
+    if p.z <= 0.0 {
+        return UNSEEN;
+    }
+    let n = p.xy / p.z;
+    let r2 = dot(n, n);
+    let prism = source_data(source_idx, PRISM);
+    let at = rational(source_idx, n, r2, true) + r2 * (prism.xy + r2 * prism.zw);
+    return Bent(at, true, r2);
+}
+
+fn onto_sensor(source_idx: u32, bent: Bent) -> Bent {
+    let sensor = source_data(source_idx, SENSOR);
+    let w = 1.0 + dot(sensor.zw, bent.at);
+    return Bent((bent.at + sensor.xy * bent.at.yx) / w, bent.seen && w > 0.0, bent.reach);
+}
+
 fn bend_eucm(p: vec3f, alpha: f32, beta: f32, cotangent: f32) -> Bent {
     let r2 = dot(p.xy, p.xy);
     let distance = sqrt(beta * r2 + p.z * p.z);
@@ -207,12 +264,21 @@ fn bend_rare(source_idx: u32, lens: f32, p: vec3f) -> Bent {
     if lens == LENS_EQUIRECTANGULAR {
         return bend_equirectangular(p);
     }
+    if lens == LENS_TILTED {
+        return onto_sensor(source_idx, bend_rational_prism(source_idx, p));
+    }
+    if lens == LENS_SKEWED_FISHEYE {
+        return onto_sensor(source_idx, bend_prism(source_idx, p, false));
+    }
     let own = source_data(source_idx, LENS);
     if lens == LENS_FOV {
         return bend_fov(p, own.x, own.y);
     }
     if lens == LENS_DIVISION {
         return bend_division(p, own.x);
+    }
+    if lens == LENS_INVERSE_RADIAL {
+        return bend_inverse_radial(p, own.x);
     }
     return bend_eucm(p, own.x, own.y, own.z);
 }
@@ -260,16 +326,8 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
         let n = p.xy / p.z;
         bent = n;
         if lens != LENS_PINHOLE {
-            let k = source_data(source_idx, LENS);
-            let r2 = dot(n, n);
-            var radial = 1.0 + r2 * (k.x + r2 * k.y);
-            if lens == LENS_RATIONAL {
-                let rest = source_data(source_idx, LENS_REST);
-                let below = 1.0 + r2 * (rest.y + r2 * (rest.z + r2 * rest.w));
-                radial = (radial + r2 * r2 * r2 * rest.x) / below;
-            }
-            bent = n * radial + 2.0 * k.zw * n.x * n.y + k.wz * (r2 + 2.0 * n * n);
-            sight.reach = r2;
+            sight.reach = dot(n, n);
+            bent = rational(source_idx, n, sight.reach, lens == LENS_RATIONAL);
         }
         sight.depth = p.z;
     }

@@ -3,6 +3,7 @@
 
 use crate::frame::{Frame, FrameSource};
 use crate::options::{Blend, Resolution};
+use crate::sensor::focal_and_sensor;
 use bytemuck::{Pod, Zeroable};
 use calibrate::Distortion;
 use glam::{DVec3, Vec3};
@@ -50,6 +51,8 @@ pub(crate) struct Source {
     pub center: [f32; 4],
     pub gain: [f32; 4],
     pub prism: [f32; 4],
+    pub shear: [f32; 2],
+    pub horizon: [f32; 2],
 }
 
 /// `Corner`'s inputs of triangulated.wgsl.
@@ -83,6 +86,9 @@ pub(super) const LENS_FOV: f32 = 6.0;
 pub(super) const LENS_DIVISION: f32 = 7.0;
 pub(super) const LENS_EUCM: f32 = 8.0;
 pub(super) const LENS_EQUIRECTANGULAR: f32 = 9.0;
+pub(super) const LENS_INVERSE_RADIAL: f32 = 10.0;
+pub(super) const LENS_TILTED: f32 = 11.0;
+pub(super) const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
 impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
@@ -137,7 +143,13 @@ impl Source {
                 none,
                 limit * limit,
             ),
-            Distortion::Fisheye { k } => {
+            Distortion::Tilted { k, p, s, .. } => (
+                [k[0], k[1], p[0], p[1]],
+                [k[2], k[3], k[4], k[5]],
+                [s[0], s[2], s[1], s[3]],
+                limit * limit,
+            ),
+            Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
                 ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], none, limit)
             }
             Distortion::ThinPrismFisheye { k, p, s } => (
@@ -158,17 +170,20 @@ impl Source {
                 let lens = [2.0 * (0.5 * omega).tan(), 1.0 / omega, 0.0, 0.0];
                 (lens, none, none, limit)
             }
-            Distortion::Division { k } => ([k, 0.0, 0.0, 0.0], none, none, limit),
+            Distortion::Division { k } | Distortion::InverseRadial { k } => {
+                ([k, 0.0, 0.0, 0.0], none, none, limit)
+            }
             Distortion::Eucm { alpha, beta } => {
                 let cotangent = limit.cos() / limit.sin();
                 ([alpha, beta, cotangent, 0.0], none, none, limit)
             }
             Distortion::Equirectangular => (none, none, none, limit),
         };
+        let (focal, sensor) = focal_and_sensor(&source.lens);
         let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
         Self {
             axes: [axis(0), axis(1), axis(2)],
-            focal: source.lens.focal.as_vec2().to_array(),
+            focal: focal.to_array(),
             principal: source.lens.principal.as_vec2().to_array(),
             lens: lens.map(f),
             lens_rest: lens_rest.map(f),
@@ -182,6 +197,8 @@ impl Source {
             center: source.center.as_vec3().extend(f(g)).to_array(),
             gain: gain.extend(0.0).to_array(),
             prism: prism.map(f),
+            shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
+            horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),
         }
     }
 }
@@ -198,11 +215,14 @@ fn lens_kind(distortion: Distortion) -> f32 {
         Distortion::None => LENS_PINHOLE,
         Distortion::Rational { k, .. } if k[2..] == [0.0; 4] => LENS_BROWN,
         Distortion::Rational { .. } => LENS_RATIONAL,
+        Distortion::Tilted { .. } => LENS_TILTED,
         Distortion::Fisheye { .. } => LENS_FISHEYE,
+        Distortion::SkewedFisheye { .. } => LENS_SKEWED_FISHEYE,
         Distortion::ThinPrismFisheye { .. } => LENS_THIN_PRISM,
         Distortion::RadTanThinPrismFisheye { .. } => LENS_BENT_PRISM,
         Distortion::Fov { .. } => LENS_FOV,
         Distortion::Division { .. } => LENS_DIVISION,
+        Distortion::InverseRadial { .. } => LENS_INVERSE_RADIAL,
         Distortion::Eucm { .. } => LENS_EUCM,
         Distortion::Equirectangular => LENS_EQUIRECTANGULAR,
     }

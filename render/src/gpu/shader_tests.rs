@@ -125,6 +125,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("KIND", offset_of!(Source, kind)),
             ("GAIN", offset_of!(Source, gain)),
             ("PRISM", offset_of!(Source, prism)),
+            ("SENSOR", offset_of!(Source, shear)),
         ] {
             assert_eq!(constants[name] as usize * TEXEL, offset, "{name}");
         }
@@ -140,6 +141,8 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     assert_eq!(within(offset_of!(Source, wide), kind), 3);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
+    let sensor = offset_of!(Source, shear);
+    assert_eq!(within(offset_of!(Source, horizon), sensor), 2);
 }
 
 #[test]
@@ -205,6 +208,15 @@ fn shared_numbers_are_the_same() {
             (
                 "LENS_EQUIRECTANGULAR",
                 f64::from(layout::LENS_EQUIRECTANGULAR),
+            ),
+            (
+                "LENS_INVERSE_RADIAL",
+                f64::from(layout::LENS_INVERSE_RADIAL),
+            ),
+            ("LENS_TILTED", f64::from(layout::LENS_TILTED)),
+            (
+                "LENS_SKEWED_FISHEYE",
+                f64::from(layout::LENS_SKEWED_FISHEYE),
             ),
         ] {
             // Only a typed constant is left in the module.

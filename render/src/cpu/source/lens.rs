@@ -2,6 +2,7 @@
 //! what they mean.
 
 use super::super::lanes::{LANES, Lane, angle, each};
+use crate::sensor::{Sensor, focal_and_sensor};
 use calibrate::{Distortion, Lens};
 
 /// Keeps a sphere's seam and poles in the image: no rounding error takes them across its
@@ -13,7 +14,15 @@ pub(super) struct Lens32 {
     focal: [f32; 2],
     principal: [f32; 2],
     distortion: Distortion32,
+    sensor: Option<Sensor>,
 }
+
+/// What a lens does not see is put here, far outside the image.
+const OUTSIDE: f32 = -1e9;
+/// Newton's steps for a cubic from 1, which approach its root from one side; beyond this
+/// term they stop outside every image.
+const CUBIC_STEPS: usize = 8;
+const LARGEST_CUBIC_TERM: f32 = 1e6;
 
 enum Distortion32 {
     None,
@@ -24,6 +33,14 @@ enum Distortion32 {
     Rational {
         k: [f32; 6],
         p: [f32; 2],
+        limit_squared: f32,
+    },
+    /// Rational with thin prisms.
+    RationalPrism {
+        k: [f32; 6],
+        p: [f32; 2],
+        /// By r² and by r⁴.
+        s: [[f32; 2]; 2],
         limit_squared: f32,
     },
     Fisheye {
@@ -46,6 +63,9 @@ enum Distortion32 {
         inverse_omega: f32,
     },
     Division {
+        k: f32,
+    },
+    InverseRadial {
         k: f32,
     },
     Eucm {
@@ -74,10 +94,18 @@ impl Lens32 {
                 p: p.map(f),
                 limit_squared: f(limit * limit),
             },
-            Distortion::Fisheye { k } => Distortion32::Fisheye {
+            Distortion::Tilted { k, p, s, .. } => Distortion32::RationalPrism {
                 k: k.map(f),
-                limit: f(limit),
+                p: p.map(f),
+                s: [[f(s[0]), f(s[2])], [f(s[1]), f(s[3])]],
+                limit_squared: f(limit * limit),
             },
+            Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
+                Distortion32::Fisheye {
+                    k: k.map(f),
+                    limit: f(limit),
+                }
+            }
             Distortion::ThinPrismFisheye { k, p, s } => Distortion32::Prism {
                 k: [f(k[0]), f(k[1]), f(k[2]), f(k[3]), 0.0, 0.0],
                 p: p.map(f),
@@ -97,6 +125,7 @@ impl Lens32 {
                 inverse_omega: f(1.0 / omega.abs()),
             },
             Distortion::Division { k } => Distortion32::Division { k: f(k) },
+            Distortion::InverseRadial { k } => Distortion32::InverseRadial { k: f(k) },
             Distortion::Eucm { alpha, beta } => Distortion32::Eucm {
                 alpha: f(alpha),
                 beta: f(beta),
@@ -104,10 +133,12 @@ impl Lens32 {
             },
             Distortion::Equirectangular => Distortion32::Equirectangular,
         };
+        let (focal, sensor) = focal_and_sensor(lens);
         Self {
-            focal: lens.focal.as_vec2().to_array(),
+            focal: focal.to_array(),
             principal: lens.principal.as_vec2().to_array(),
             distortion,
+            sensor,
         }
     }
 
@@ -115,7 +146,6 @@ impl Lens32 {
     /// outside the image.
     #[inline(always)]
     pub(super) fn project(&self, x: &Lane, y: &Lane, z: &Lane) -> (Lane, Lane) {
-        const OUTSIDE: f32 = -1e9;
         let mut u = [OUTSIDE; LANES];
         let mut v = [OUTSIDE; LANES];
         match &self.distortion {
@@ -156,14 +186,27 @@ impl Lens32 {
                 for k in 0..LANES {
                     let inverse_z = 1.0 / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
-                    let r2 = a * a + b * b;
-                    let radial = (1.0 + r2 * (c[0] + r2 * (c[1] + r2 * c[2])))
-                        / (1.0 + r2 * (c[3] + r2 * (c[4] + r2 * c[5])));
-                    let du = 2.0 * p[0] * a * b + p[1] * (r2 + 2.0 * a * a);
-                    let dv = 2.0 * p[1] * a * b + p[0] * (r2 + 2.0 * b * b);
+                    let (r2, [bent_a, bent_b]) = rational(a, b, c, p);
                     let seen = (z[k] > 0.0) & (r2 <= *limit_squared);
-                    u[k] = if seen { a * radial + du } else { OUTSIDE };
-                    v[k] = if seen { b * radial + dv } else { OUTSIDE };
+                    u[k] = if seen { bent_a } else { OUTSIDE };
+                    v[k] = if seen { bent_b } else { OUTSIDE };
+                }
+            }
+            Distortion32::RationalPrism {
+                k: c,
+                p,
+                s: [once, twice],
+                limit_squared,
+            } => {
+                for k in 0..LANES {
+                    let inverse_z = 1.0 / z[k];
+                    let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
+                    let (r2, [bent_a, bent_b]) = rational(a, b, c, p);
+                    let du = r2 * (once[0] + r2 * twice[0]);
+                    let dv = r2 * (once[1] + r2 * twice[1]);
+                    let seen = (z[k] > 0.0) & (r2 <= *limit_squared);
+                    u[k] = if seen { bent_a + du } else { OUTSIDE };
+                    v[k] = if seen { bent_b + dv } else { OUTSIDE };
                 }
             }
             Distortion32::Fisheye { k: c, limit } => {
@@ -245,6 +288,23 @@ impl Lens32 {
                     v[k] = if seen { y[k] * (2.0 / below) } else { OUTSIDE };
                 }
             }
+            Distortion32::InverseRadial { k: c } => {
+                for k in 0..LANES {
+                    let inverse_z = 1.0 / z[k];
+                    let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
+                    // r = ρg/z, of which the cubic is g + t·g³ = 1.
+                    let t = c * (a * a + b * b);
+                    let mut g = 1.0;
+                    for _ in 0..CUBIC_STEPS {
+                        let term = t * g * g;
+                        g = (1.0 + 2.0 * term * g) / (1.0 + 3.0 * term);
+                    }
+                    // Where t is −4/27 the image folds.
+                    let seen = (z[k] > 0.0) & (t > -4.0 / 27.0) & (t < LARGEST_CUBIC_TERM);
+                    u[k] = if seen { a * g } else { OUTSIDE };
+                    v[k] = if seen { b * g } else { OUTSIDE };
+                }
+            }
             Distortion32::Eucm {
                 alpha,
                 beta,
@@ -273,9 +333,29 @@ impl Lens32 {
                 }
             }
         }
+        if let Some(Sensor { shear, horizon }) = &self.sensor {
+            for k in 0..LANES {
+                let (a, b) = (u[k], v[k]);
+                let w = 1.0 + horizon.x * a + horizon.y * b;
+                let seen = (a != OUTSIDE) & (w > 0.0);
+                u[k] = if seen { (a + shear.x * b) / w } else { OUTSIDE };
+                v[k] = if seen { (b + shear.y * a) / w } else { OUTSIDE };
+            }
+        }
         (
             each(|k| u[k] * self.focal[0] + self.principal[0]),
             each(|k| v[k] * self.focal[1] + self.principal[1]),
         )
     }
+}
+
+/// r² and the distorted point of the rational model.
+#[inline(always)]
+fn rational(a: f32, b: f32, k: &[f32; 6], p: &[f32; 2]) -> (f32, [f32; 2]) {
+    let r2 = a * a + b * b;
+    let radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2])))
+        / (1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5])));
+    let du = 2.0 * p[0] * a * b + p[1] * (r2 + 2.0 * a * a);
+    let dv = 2.0 * p[1] * a * b + p[0] * (r2 + 2.0 * b * b);
+    (r2, [a * radial + du, b * radial + dv])
 }
