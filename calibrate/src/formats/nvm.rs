@@ -6,8 +6,8 @@
 //!   the first pixel's centre at (0.5, 0.5) as we do. Sizes are not stored.
 //! - Distortion acts on the *measurement* (Wu, "Critical configurations for radial
 //!   distortion self-calibration", and PBA's `SetNormalizedMeasurementDistortion`): with d
-//!   the measured position over f, the undistorted one is u = d·(1 + r·|d|²). See
-//!   [`lens_of_measurement_distortion`] for how that becomes a lens.
+//!   the measured position over f, the undistorted one is u = d·(1 + r·|d|²):
+//!   [`crate::ModelKind::InverseRadial`].
 //! - With `NVM_V3 FixedK fx cx fy cy` all cameras share that calibration.
 //!
 //! A file may hold several models, largest first; the first one is read.
@@ -15,15 +15,12 @@
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
 use super::words::Words;
-use crate::{Camera, ImageId, Lens, ModelKind, Pixel, Point3DId, Reconstruction};
+use crate::{Camera, Distortion, ImageId, Lens, Pixel, Point3DId, Reconstruction};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::path::Path;
 
 /// How far from 1 a quaternion's length may be.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
-/// How far a converted lens may be from the file's model, anywhere in the image; the
-/// measurements themselves are off by ten times as much.
-const MAX_CONVERSION_ERROR_PX: f64 = 0.05;
 
 /// Reads the first model of an `.nvm` file. Images and points are numbered from 0, as in
 /// the file; keypoints are in the order of the points that they observe. `size_of` is
@@ -31,8 +28,7 @@ const MAX_CONVERSION_ERROR_PX: f64 = 0.05;
 ///
 /// # Errors
 /// An unreadable file, another version, a quaternion that is no rotation, a camera
-/// without a lens or with a distortion too strong to be converted to 0.05 px, a photo of
-/// unknown size, two photos of one name.
+/// without a lens, a photo of unknown size, two photos of one name.
 pub fn read_nvm(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
     let text = build::read_text(path)?;
     let mut words = Words::new(path, &text);
@@ -113,16 +109,8 @@ fn read_image(
     let (width, height) = build::size(size_of, &name).map_err(refuse)?;
     let center = DVec2::new(f64::from(width), f64::from(height)) / 2.0;
     let (focal, center) = shared.unwrap_or((DVec2::splat(f), center));
-    let camera = if r == 0.0 {
-        Camera {
-            model: ModelKind::Pinhole,
-            width,
-            height,
-            params: vec![focal.x, focal.y, center.x, center.y],
-        }
-    } else {
-        lens_of_measurement_distortion(focal, center, (width, height), r).map_err(refuse)?
-    };
+    let lens = Lens::new(focal, center, Distortion::InverseRadial { k: r });
+    let camera = Camera::of(&lens, width, height);
     let place = words.place(&of);
     let camera_id = builder.camera(&place, camera)?;
     builder.image(&place, ImageId(index), &name, camera_id, pose)
@@ -155,87 +143,6 @@ fn split(line: &str) -> Result<(String, [f64; 9]), Problem> {
             .ok_or_else(|| Problem::broken(format!("found {word:?}, expected a finite number")))?;
     }
     Ok((name, numbers))
-}
-
-/// The lens whose projection undoes u = d·(1 + r·|d|²).
-///
-/// With t = r·|u|² the inverse is d = u·g, where g + t·g³ = 1, a function of t alone:
-/// g = Σ (−1)ⁿ binom(3n, n)/(2n + 1) tⁿ = 1 − t + 3t² − 12t³ + … Its [3/3] Padé
-/// approximant is a quotient of cubics in |u|², which is exactly OpenCV's rational model.
-/// It is off by less than 1e-7 for |t| ≤ 0.05 and 6e-5 at t = −0.1; what that makes in
-/// this image's pixels is checked against the definition from the centre to the corner.
-fn lens_of_measurement_distortion(
-    focal: DVec2,
-    center: DVec2,
-    (width, height): (u32, u32),
-    r: f64,
-) -> Result<Camera, Problem> {
-    let above = [113.0, 243.0, 85.0].map(|c| c / 13.0);
-    let below = [126.0, 330.0, 193.0].map(|c| c / 13.0);
-    let k = |c: [f64; 3], n: usize| c[n - 1] * r.powi(n as i32);
-    let camera = Camera {
-        model: ModelKind::FullOpenCv,
-        width,
-        height,
-        params: vec![
-            focal.x,
-            focal.y,
-            center.x,
-            center.y,
-            k(above, 1),
-            k(above, 2),
-            0.0,
-            0.0,
-            k(above, 3),
-            k(below, 1),
-            k(below, 2),
-            k(below, 3),
-        ],
-    };
-    let too_strong = |found: String| {
-        Problem::new(
-            format!(
-                "the radial distortion is {r}: {found}, expected at most \
-                 {MAX_CONVERSION_ERROR_PX} px"
-            ),
-            "undistort the photos with VisualSFM (\"export to PMVS\") and use the model it writes",
-        )
-    };
-    // A focal length that is none is refused with the camera.
-    let Ok(lens) = camera.lens() else {
-        return Ok(camera);
-    };
-    let error_px = conversion_error_px(&lens, DVec2::new(width.into(), height.into()), r);
-    match error_px {
-        Some(error_px) if error_px <= MAX_CONVERSION_ERROR_PX => Ok(camera),
-        Some(error_px) => Err(too_strong(format!(
-            "as OpenCV's model it is off by {error_px:.3} px"
-        ))),
-        None => Err(too_strong(
-            "it folds the image over itself before the corners".to_owned(),
-        )),
-    }
-}
-
-/// The greatest distance between measured positions on the diagonals and where the lens
-/// projects the rays they stand for; `None` where the definition is not one to one.
-fn conversion_error_px(lens: &Lens, size: DVec2, r: f64) -> Option<f64> {
-    const STEPS: u32 = 64;
-    let mut worst = 0.0_f64;
-    for corner in [DVec2::ZERO, size, size * DVec2::X, size * DVec2::Y] {
-        for step in 1..=STEPS {
-            let fraction = f64::from(step) / f64::from(STEPS);
-            let d = (corner - lens.principal) / lens.focal * fraction;
-            if 1.0 + 3.0 * r * d.length_squared() <= 0.0 {
-                return None;
-            }
-            let u = d * (1.0 + r * d.length_squared());
-            let measured = lens.principal + lens.focal * d;
-            let projected = lens.project(u.extend(1.0))?;
-            worst = worst.max(projected.distance(Pixel::new(measured.x, measured.y)));
-        }
-    }
-    Some(worst)
 }
 
 fn read_point(
