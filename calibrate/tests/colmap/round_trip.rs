@@ -120,7 +120,8 @@ proptest! {
             written.unwrap();
             prop_assert_eq!(&read_model(&binary).unwrap(), &model);
         } else {
-            prop_assert!(matches!(written, Err(ColmapError::NotColmaps { .. })));
+            let refused = matches!(written, Err(ColmapError::NotColmaps { .. }));
+            prop_assert!(refused);
             prop_assert!(!binary.exists());
         }
     }
