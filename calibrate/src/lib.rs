@@ -17,6 +17,7 @@ pub mod opencv;
 mod reconstruction;
 mod rigid;
 mod ties;
+pub mod undistort;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};

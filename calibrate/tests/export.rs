@@ -58,7 +58,7 @@ fn reconstruction(cameras: &[Camera], poses: &[Rigid3]) -> Reconstruction {
     }
     for (i, &camera_from_world) in poses.iter().enumerate() {
         let image = Image {
-            name: format!("left \\ \"{i}\"/photo {i}.jpg").replace('\\', "-"),
+            name: format!("left \"{i}\"/photo {i}.jpg"),
             camera_id: CameraId((i % cameras.len()) as u32 + 3),
             camera_from_world,
             keypoints: vec![],
