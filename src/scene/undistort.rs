@@ -17,8 +17,8 @@ pub(super) const IMAGES_FOLDER: &str = "images";
 pub(super) const MASKS_FOLDER: &str = "masks";
 /// Silhouettes, in a scene that was undistorted.
 pub(super) const MATTES_FOLDER: &str = "mattes";
-/// Measured against views rendered without distortion: 0.9 to 2 dB above bilinear, and
-/// computed without a transcendental function, so that every machine writes the same bytes.
+/// Sharper than a tent, and computed without a transcendental function, so that every machine
+/// writes the same bytes.
 const KERNEL: Kernel = Kernel::CatmullRom;
 
 impl Scene {
