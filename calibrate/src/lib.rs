@@ -10,12 +10,14 @@
 
 mod camera;
 pub mod colmap;
+pub mod export;
 pub mod formats;
 mod lens;
 pub mod opencv;
 mod reconstruction;
 mod rigid;
 mod ties;
+pub mod undistort;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};

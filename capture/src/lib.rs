@@ -10,10 +10,12 @@ mod error;
 mod jpeg;
 mod photo_set;
 mod resize;
+mod warp;
 mod write;
 
 pub use decode::{decode, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
 pub use resize::{reduced_size, resize};
-pub use write::write_png;
+pub use warp::{Footprint, Kernel, warp};
+pub use write::{copy_photo, write_mask, write_png};

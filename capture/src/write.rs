@@ -1,6 +1,6 @@
 use crate::CaptureError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, RgbaImage};
+use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbaImage};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -12,6 +12,36 @@ use std::path::Path;
 /// # Errors
 /// A file or folder that cannot be written.
 pub fn write_png(path: &Path, image: &RgbaImage) -> Result<(), CaptureError> {
+    write(path, |temporary| {
+        encode(
+            temporary,
+            image,
+            image.dimensions(),
+            ExtendedColorType::Rgba8,
+        )
+    })
+}
+
+/// [`write_png`] for a mask, which has one channel.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_mask(path: &Path, mask: &GrayImage) -> Result<(), CaptureError> {
+    write(path, |temporary| {
+        encode(temporary, mask, mask.dimensions(), ExtendedColorType::L8)
+    })
+}
+
+/// Copies a file as it is, in the way of [`write_png`].
+///
+/// # Errors
+/// A file that cannot be read or written.
+pub fn copy_photo(from: &Path, to: &Path) -> Result<(), CaptureError> {
+    write(to, |temporary| fs::copy(from, temporary).map(|_| ()))
+}
+
+/// Fills a file under a temporary name and renames it.
+fn write(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), CaptureError> {
     let failed = |source| CaptureError::Write {
         path: path.to_owned(),
         source,
@@ -31,7 +61,7 @@ pub fn write_png(path: &Path, image: &RgbaImage) -> Result<(), CaptureError> {
         name.to_string_lossy(),
         std::process::id()
     ));
-    let written = encode(&temporary, image).and_then(|()| fs::rename(&temporary, path));
+    let written = fill(&temporary).and_then(|()| fs::rename(&temporary, path));
     written.map_err(|source| {
         // The error at hand is the one to report.
         let _ = fs::remove_file(&temporary);
@@ -39,11 +69,15 @@ pub fn write_png(path: &Path, image: &RgbaImage) -> Result<(), CaptureError> {
     })
 }
 
-fn encode(path: &Path, image: &RgbaImage) -> io::Result<()> {
+fn encode(
+    path: &Path,
+    bytes: &[u8],
+    (width, height): (u32, u32),
+    color: ExtendedColorType,
+) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
-    let (width, height) = image.dimensions();
     PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(image.as_raw(), width, height, ExtendedColorType::Rgba8)
+        .write_image(bytes, width, height, color)
         .map_err(|error| match error {
             image::ImageError::IoError(error) => error,
             other => io::Error::other(other),

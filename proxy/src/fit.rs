@@ -6,6 +6,7 @@ use crate::{Plane, PlaneError};
 use calibrate::Reconstruction;
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
+use std::fmt;
 
 /// A fitted plane and what it rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,11 +15,55 @@ pub struct PlaneFit {
     pub plane: Plane,
     /// The harmonic mean distance from the cameras to it, in world units.
     pub distance: f64,
-    /// Observations of sparse points that decided the distance.
-    pub observations: usize,
-    /// Observations left out: of isolated points, behind their camera, or far from the
-    /// typical inverse depth.
-    pub outliers: usize,
+    /// What it rests on.
+    pub basis: FitBasis,
+}
+
+/// What decided a plane's distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FitBasis {
+    /// Observations of sparse points.
+    Points {
+        /// Those that decided.
+        observations: usize,
+        /// Those left out: of isolated points, behind their camera, or far from the typical
+        /// inverse depth.
+        outliers: usize,
+    },
+    /// Where the optical axes come closest to each other.
+    Axes {
+        /// How many.
+        cameras: usize,
+    },
+    /// The nearest and farthest depths that the calibration gives.
+    DepthBounds {
+        /// For how many.
+        cameras: usize,
+    },
+}
+
+impl fmt::Display for FitBasis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Points {
+                observations,
+                outliers,
+            } => write!(
+                f,
+                "{observations} observations of points, {outliers} outliers left out"
+            ),
+            Self::Axes { cameras } => write!(
+                f,
+                "where the optical axes of {cameras} photos come closest, as there are no sparse \
+                 points"
+            ),
+            Self::DepthBounds { cameras } => write!(
+                f,
+                "the nearest and farthest depths of {cameras} photos, as there are no sparse \
+                 points"
+            ),
+        }
+    }
 }
 
 /// Why no plane could be fitted.
@@ -26,8 +71,8 @@ pub struct PlaneFit {
 pub enum FitError {
     /// There is nothing to fit to.
     #[error(
-        "the reconstruction has no sparse points in front of its cameras to fit a plane to; \
-         give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
+        "the reconstruction has no sparse points in front of its cameras to fit a plane to, and \
+         their optical axes do not meet there; give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
     )]
     NoPoints,
     /// The points make no plane.
@@ -53,23 +98,15 @@ const OUTLIER_SIGMAS: f64 = 3.0;
 /// No observation of a point in front of its camera.
 pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> {
     // 1. Orientation: the mean of the forward axes.
-    let forward_sum: DVec3 = reconstruction
-        .images
-        .values()
-        .map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z)
-        .sum();
-    let mean_forward = forward_sum / reconstruction.images.len().max(1) as f64;
     let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
     let isolated = isolated_points(&positions);
-    let normal = if mean_forward.length() >= COMMON_DIRECTION {
-        mean_forward.normalize()
-    } else {
+    let normal = mean_forward(reconstruction).unwrap_or_else(|| {
         let kept = positions
             .iter()
             .zip(&isolated)
             .filter(|(_, alone)| !**alone);
         direction_of_least_spread(kept.map(|(p, _)| *p)).unwrap_or(DVec3::Z)
-    };
+    });
 
     // 2. Inverse depths along it, one an observation; and the observing cameras' mean.
     let mut observed: Vec<(f64, DVec3)> = Vec::new();
@@ -105,13 +142,26 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
     Ok(PlaneFit {
         plane,
         distance,
-        observations: observed.len(),
-        outliers: total - observed.len(),
+        basis: FitBasis::Points {
+            observations: observed.len(),
+            outliers: total - observed.len(),
+        },
     })
 }
 
+/// The unit vector that the cameras look along on the whole; `None` where they look every
+/// way.
+pub(crate) fn mean_forward(reconstruction: &Reconstruction) -> Option<DVec3> {
+    let images = reconstruction.images.values();
+    let forward = images.map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z);
+    let mean = forward.sum::<DVec3>() / reconstruction.images.len().max(1) as f64;
+    (mean.length() >= COMMON_DIRECTION).then(|| mean.normalize())
+}
+
 /// The direction in which a cloud is thinnest; `None` without a point.
-fn direction_of_least_spread(points: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
+pub(crate) fn direction_of_least_spread(
+    points: impl Iterator<Item = DVec3> + Clone,
+) -> Option<DVec3> {
     let first = points.clone().next()?;
     let count = points.clone().count() as f64;
     let mean = first + points.clone().map(|p| p - first).sum::<DVec3>() / count;
@@ -183,7 +233,11 @@ mod tests {
                 assert!(distance.abs() < 1e-7, "{distance}");
             }
             assert!((fit.distance - 5.0).abs() < 1e-7);
-            assert_eq!((fit.observations, fit.outliers), (400, 0));
+            let basis = FitBasis::Points {
+                observations: 400,
+                outliers: 0,
+            };
+            assert_eq!(fit.basis, basis);
         }
     }
 
@@ -197,7 +251,10 @@ mod tests {
         add_point(&mut r, 2001, DVec3::new(0.3, 0.3, 0.01));
         let fit = fit_plane(&r).unwrap();
         assert!((fit.distance - 5.0).abs() < 1e-9, "{fit:?}");
-        assert_eq!(fit.outliers, 20);
+        let FitBasis::Points { outliers, .. } = fit.basis else {
+            panic!("{fit:?}");
+        };
+        assert_eq!(outliers, 20);
     }
 
     #[test]
@@ -220,8 +277,8 @@ mod tests {
         r.points.clear();
         assert_eq!(
             fit_plane(&r).unwrap_err().to_string(),
-            "the reconstruction has no sparse points in front of its cameras to fit a plane to; \
-             give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
+            "the reconstruction has no sparse points in front of its cameras to fit a plane to, \
+             and their optical axes do not meet there; give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
         );
     }
 }

@@ -4,15 +4,17 @@
 //! Today's surface is the [`Plane`] of Buehler et al. 2001 (§5, Pond); others join the
 //! [`Proxy`] enum.
 
+mod axes;
 mod cloud;
 mod file;
 mod fit;
 mod glb;
 mod plane;
 
+pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
 pub use file::{FileError, read, write};
-pub use fit::{FitError, PlaneFit, fit_plane};
+pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use plane::{Plane, PlaneError};
 
 /// The approximate surface.

@@ -2,13 +2,13 @@
 
 use super::options::{DrawArgs, FieldArgs, ProxyArgs, SceneArgs, resized};
 use super::output::say;
-use super::output::{frame_files, print, print_json};
+use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
 use image::RgbaImage;
-use lumigraph::scene::Scene;
+use lumigraph::scene::{Scene, picture_files};
 use render::score::{PSNR_CAP_DB, Score, mean, score};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -111,7 +111,7 @@ fn score_photos(
     output: Option<&std::path::Path>,
 ) -> anyhow::Result<Vec<Line>> {
     let folder = output.unwrap_or(std::path::Path::new(""));
-    let files = frame_files(names.iter().map(String::as_str), folder)?;
+    let files = picture_files("view", names.iter().map(|n| (n.as_str(), true)), folder)?;
     session.prepare()?;
     let bar = progress(names.len(), "evaluating");
     let mut lines = Vec::new();

@@ -2,6 +2,7 @@
 
 use super::options::{KeyArgs, print_warnings};
 use super::output::print;
+use super::session::progress;
 use lumigraph::scene::{ImportOptions, Scene};
 use std::path::PathBuf;
 
@@ -9,7 +10,7 @@ use std::path::PathBuf;
 ///
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
 /// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
-/// alone, with --calibration. Photos are not copied.
+/// alone, with --calibration. Photos are not copied, except with --undistort.
 ///
 /// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
 /// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in
@@ -17,6 +18,7 @@ use std::path::PathBuf;
 ///
 ///     lumigraph import my-capture -o my-scene
 ///     lumigraph import photos --calibration out_camera_data.yml -o my-scene
+///     lumigraph import my-capture --undistort -o my-scene
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -28,6 +30,12 @@ pub(super) struct Args {
     calibration: Option<PathBuf>,
     #[command(flatten)]
     keys: KeyArgs,
+    /// Write undistorted photos into the scene's folder, and pinhole cameras for them
+    ///
+    /// As large as the photos fill them, as PNG; photos without distortion are copied. What a
+    /// wide lens sees more than 60° aside is left out, and masked where its photos end before.
+    #[arg(long)]
+    undistort: bool,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -47,7 +55,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
     print_warnings(&warnings);
-    scene.save(&args.output, args.force)?;
+    if args.undistort {
+        let bar = progress(scene.photos.len(), "undistorting photos");
+        let step = || bar.inc(1);
+        let warnings = scene.save_undistorted(&args.output, args.force, args.strict, &step);
+        bar.finish_and_clear();
+        print_warnings(&warnings?);
+    } else {
+        scene.save(&args.output, args.force)?;
+    }
     print(&format!(
         "{}: {} photos, {} points\n",
         args.output.display(),

@@ -4,14 +4,16 @@ use super::info_of_file;
 use super::options::{KeyArgs, SceneArgs, proxy_json, proxy_text, tie_text};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
-use calibrate::TRUSTED_TIE;
+use calibrate::{TRUSTED_TIE, colmap};
+use capture::find_photos_folder;
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError};
 use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 
 /// Photos, cameras, points, reprojection error per camera, proxy, memory
 ///
-/// Of an OpenCV calibration's file alone: its cameras and poses.
+/// Of a calibration alone, a file of any format or a COLMAP model: its cameras and poses.
 ///
 ///     lumigraph info my-capture
 ///     lumigraph info out_camera_data.yml
@@ -34,6 +36,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.scene.scene.is_file() {
         return info_of_file::run(&args.scene.scene, &args.keys.keys(), args.json);
     }
+    if let Some(model) = bare_model(&args.scene.scene) {
+        return info_of_file::of_model(&model, args.json);
+    }
     let scene = args.scene.open()?;
     let info = gather(&scene)?;
     if args.json {
@@ -44,6 +49,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         say!("warning: {}; --drop-weak leaves out", tie_text(&group));
     }
     Ok(())
+}
+
+/// The COLMAP model in a folder that holds neither photos nor a scene.
+fn bare_model(folder: &Path) -> Option<PathBuf> {
+    let model = colmap::find_model(folder).ok()?;
+    let has_photos = find_photos_folder(folder).is_some() || Scene::is_scene(folder);
+    (!has_photos).then_some(model)
 }
 
 fn gather(scene: &Scene) -> anyhow::Result<Value> {

@@ -1,21 +1,79 @@
 //! `lumigraph info` of a calibration's file without photos.
 
 use super::output::{print, print_json, say};
-use calibrate::Camera;
+use calibrate::colmap::{self, ColmapError};
 use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera};
+use calibrate::{Camera, Reconstruction, formats};
+use lumigraph::scene::{self, Sizes};
 use serde_json::{Value, json};
 use std::path::Path;
 
 pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()> {
-    let calibration = opencv::read_calibration(path, keys)?;
-    for note in &calibration.notes {
-        say!("note: {note}");
-    }
-    let info = gather(&calibration);
+    let info = match formats::detect(path) {
+        Some(format) => {
+            let (whole, sizes) = scene::read_bare(format, path)?;
+            if sizes == Sizes::Unknown {
+                say!(
+                    "note: neither the file nor photos beside it tell the photos' size; principal \
+                     points, and focal lengths given as angles, are in parts of it"
+                );
+            }
+            of_reconstruction(&whole, sizes)
+        }
+        None if colmap::is_part(path) => {
+            // One of a model's files stands for all, if the others are there.
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let whole = match colmap::read_model(folder) {
+                Err(ColmapError::NoModel { .. }) => Reconstruction {
+                    cameras: colmap::read_cameras(path)?,
+                    ..Reconstruction::default()
+                },
+                model => model?,
+            };
+            of_reconstruction(&whole, Sizes::Known)
+        }
+        None => {
+            let calibration = opencv::read_calibration(path, keys)?;
+            for note in &calibration.notes {
+                say!("note: {note}");
+            }
+            gather(&calibration)
+        }
+    };
+    print_info(&info, as_json)
+}
+
+/// The same of the folder of a COLMAP model.
+pub(super) fn of_model(folder: &Path, as_json: bool) -> anyhow::Result<()> {
+    let whole = colmap::read_model(folder)?;
+    print_info(&of_reconstruction(&whole, Sizes::Known), as_json)
+}
+
+fn print_info(info: &Value, as_json: bool) -> anyhow::Result<()> {
     if as_json {
-        return print_json(&info);
+        return print_json(info);
     }
-    print(&text(&info))
+    print(&text(info))
+}
+
+fn of_reconstruction(whole: &Reconstruction, sizes: Sizes) -> Value {
+    let known = sizes == Sizes::Known;
+    let cameras = whole.cameras.iter().map(|(id, camera)| {
+        json!({
+            "name": id.0.to_string(),
+            "model": camera.model.name(),
+            "width": known.then_some(camera.width),
+            "height": known.then_some(camera.height),
+            "params": camera.params,
+        })
+    });
+    let names = whole.images.values().map(|image| &image.name);
+    json!({
+        "cameras": cameras.collect::<Vec<_>>(),
+        "poses": whole.images.len(),
+        "photos": names.collect::<Vec<_>>(),
+        "points": whole.points.len(),
+    })
 }
 
 fn gather(calibration: &OpenCvCalibration) -> Value {

@@ -3,6 +3,7 @@
 
 mod demo;
 mod evaluate;
+mod export;
 mod field;
 mod frames;
 mod generate;
@@ -44,6 +45,7 @@ enum Command {
     Render(render::Args),
     Field(field::Args),
     Evaluate(evaluate::Args),
+    Export(export::Args),
     Generate(generate::Args),
 }
 
@@ -86,6 +88,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => render::run(&args),
         Command::Field(args) => field::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Generate(args) => generate::run(&args),
     }
 }

@@ -10,7 +10,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{Scene, Warning};
-use proxy::Proxy;
+use proxy::{FitBasis, Proxy};
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -131,12 +131,19 @@ impl ProxyArgs {
         without: &BTreeSet<String>,
     ) -> anyhow::Result<ChosenProxy> {
         let fitted = || {
-            let proxy = scene
-                .fit_proxy(without)
+            let fit = scene
+                .fit_plane(without)
                 .context("no proxy can be fitted to this scene")?;
+            let origin = match fit.basis {
+                FitBasis::Points { .. } => "fitted".to_owned(),
+                basis => {
+                    say!("note: the proxy is a plane fitted to {basis}; see `lumigraph proxy`");
+                    format!("fitted to {basis}")
+                }
+            };
             Ok(ChosenProxy {
-                proxy,
-                origin: "fitted".to_owned(),
+                proxy: Proxy::Plane(fit.plane),
+                origin,
             })
         };
         match self.proxy.as_deref() {

@@ -75,10 +75,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let fit = scene
                 .fit_plane(&without)
                 .context("no plane can be fitted to this scene")?;
-            let how = format!(
-                "fitted at distance {:.4} to {} observations of points, {} outliers left out",
-                fit.distance, fit.observations, fit.outliers
-            );
+            let how = format!("fitted at distance {:.4} to {}", fit.distance, fit.basis);
             (Proxy::Plane(fit.plane), how, Some(&without))
         }
     };

@@ -3,9 +3,10 @@
 use super::frames::{ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::say;
-use super::output::{frame_files, print, print_json};
+use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use lumigraph::scene::picture_files;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -52,7 +53,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     let points = || session.points();
     let frames = frames(&args.views, args.frames, session.lumigraph(), points)?;
-    let files = frame_files(frames.iter().map(|f| f.name.as_str()), &args.output)?;
+    let names = frames.iter().map(|f| (f.name.as_str(), true));
+    let files = picture_files("view", names, &args.output)?;
     session.prepare()?;
 
     let bar = progress(frames.len(), "rendering");

@@ -4,8 +4,9 @@ use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration};
 use calibrate::{Reconstruction, colmap};
-use capture::{PhotoFile, PhotoSet, photo_size};
-use std::collections::BTreeSet;
+use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Where a calibration is, and whose.
@@ -111,6 +112,50 @@ pub(super) fn read_other(
         }
     }
     Ok(whole)
+}
+
+/// Whether the cameras' image sizes are those of the photos.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sizes {
+    /// As the file or the photos say.
+    Known,
+    /// Nobody says: they are 1 × 1, and lengths that depend on them in parts of it.
+    Unknown,
+}
+
+/// Reads another program's calibration without a capture around it. Photos are looked for
+/// beside it, only for their sizes and names.
+///
+/// # Errors
+/// As [`calibrate::formats::read`].
+pub fn read_bare(format: Format, path: &Path) -> Result<(Reconstruction, Sizes), SceneError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let photos = find_photos_folder(folder).and_then(|photos| PhotoSet::open(&photos).ok());
+    let sizes = Cell::new(Sizes::Known);
+    let size_of = |listed: &str| {
+        let size = photos.as_ref().and_then(|photos| {
+            let photo = photos.find(&photo_of(listed, photos))?;
+            photo_size(&photo.path).ok()
+        });
+        // LLFF's file has a size of its own.
+        if size.is_none() && format != Format::Llff {
+            sizes.set(Sizes::Unknown);
+            return Some((1, 1));
+        }
+        size
+    };
+    let whole = formats::read(format, path, &size_of, &[])?;
+    Ok((whole, sizes.get()))
+}
+
+/// The nearest and farthest depth that LLFF's file says of each photo.
+pub(super) fn depth_bounds(
+    path: &Path,
+    photos: &PhotoSet,
+) -> Result<BTreeMap<String, [f64; 2]>, SceneError> {
+    // A row a photo, in the order of their names.
+    let names = photos.photos.iter().map(|photo| photo.name.clone());
+    Ok(names.zip(formats::read_llff_bounds(path)?).collect())
 }
 
 /// Reads an OpenCV calibration and finds which of the photos each pose is of.

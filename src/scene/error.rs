@@ -29,6 +29,18 @@ pub enum SceneError {
         /// What is wrong with its camera.
         source: calibrate::CameraError,
     },
+    /// The photos cannot be undistorted.
+    #[error(transparent)]
+    Undistort(#[from] calibrate::undistort::UndistortError),
+    /// Photos cannot be written under their names.
+    #[error(transparent)]
+    Name(#[from] super::NameError),
+    /// A photo with a depth map is to be undistorted.
+    #[error(
+        "photo {0} has a depth map, and depth maps are not undistorted; import without them, or \
+         without --undistort"
+    )]
+    DepthMap(String),
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),

@@ -45,6 +45,9 @@ pub struct PhotoEntry {
     pub name: String,
     /// The photo's file.
     pub path: String,
+    /// What the capture calls it, where undistorting gave it another name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub original: Option<String>,
     /// The file of a mask of what to ignore.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ignore_mask: Option<String>,
@@ -63,6 +66,9 @@ pub struct PhotoEntry {
     /// Exposure of red, green and blue, relative to the other photos.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<[f64; 3]>,
+    /// The nearest and farthest depth along z that it shows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_bounds: Option<[f64; 2]>,
     /// Everything else.
     #[serde(flatten)]
     pub other: Extra,
@@ -92,6 +98,18 @@ pub struct Settings {
     /// The calibration that was given beside it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<String>,
+    /// Of an OpenCV calibration, what the camera matrix was said to be called.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_matrix: Option<String>,
+    /// The same of its distortion coefficients.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<String>,
+    /// Whether its coefficients were said to be a fisheye's.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub fisheye: bool,
+    /// Whether the photos were undistorted: the scene's folder holds them.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub undistorted: bool,
     /// Whether a missing or corrupt photo was an error.
     #[serde(default)]
     pub strict: bool,
@@ -101,4 +119,9 @@ pub struct Settings {
     /// Everything else.
     #[serde(flatten)]
     pub other: Extra,
+}
+
+/// Settings that were not chosen are not written.
+fn is_false(value: &bool) -> bool {
+    !value
 }

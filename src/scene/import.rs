@@ -4,9 +4,10 @@ use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
 use super::{Photo, Scene, SceneError, Warning};
 use calibrate::colmap;
+use calibrate::formats::Format;
 use calibrate::opencv::Keys;
 use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// How photos are imported.
@@ -57,17 +58,23 @@ impl Scene {
             Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
             Source::Other(format, file) => calibration::read_other(*format, file, &found)?,
         };
+        let bounds = match &source {
+            Source::Other(Format::Llff, file) => calibration::depth_bounds(file, &found)?,
+            _ => BTreeMap::new(),
+        };
         let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
         names.sort();
         let photos = names.iter().map(|name| Photo {
             name: (*name).clone(),
             path: folder.join(name),
+            original: None,
             ignore_mask: None,
             object_matte: None,
             depth_map: None,
             depth_scale: None,
             time_s: None,
             gain: None,
+            depth_bounds: bounds.get(name.as_str()).copied(),
             other: Extra::new(),
         });
         let unused = |photo: &&capture::PhotoFile| names.binary_search(&&photo.name).is_err();
@@ -84,6 +91,9 @@ impl Scene {
             reconstruction,
             proxy: None,
             settings: Settings {
+                camera_matrix: options.keys.camera_matrix.clone(),
+                distortion: options.keys.distortion.clone(),
+                fisheye: options.keys.fisheye,
                 strict: options.strict,
                 program: Some(concat!("lumigraph ", env!("CARGO_PKG_VERSION")).to_owned()),
                 ..Settings::default()
@@ -118,6 +128,15 @@ impl Scene {
                 Err(error) => unusable.push((photo.name.clone(), error)),
             }
         }
+        self.leave_out(unusable, strict)
+    }
+
+    /// Leaves out photos for what is wrong with them, as long as enough others remain.
+    pub(super) fn leave_out(
+        &mut self,
+        unusable: Vec<(String, CaptureError)>,
+        strict: bool,
+    ) -> Result<Vec<Warning>, SceneError> {
         let Some((name, reason)) = unusable.first() else {
             return Ok(Vec::new());
         };
@@ -136,7 +155,7 @@ impl Scene {
         let names: BTreeSet<String> = unusable.iter().map(|(name, _)| name.clone()).collect();
         self.photos.retain(|photo| !names.contains(&photo.name));
         self.reconstruction = self.reconstruction.without_images(&names);
-        self.left_out = names.into_iter().collect();
+        self.left_out.extend(names);
         let warning = |(name, error): (String, CaptureError)| Warning::LeftOut {
             name,
             reason: error.to_string(),

@@ -2,7 +2,7 @@
 
 use super::{Scene, SceneError};
 use calibrate::{Image, View};
-use proxy::{PlaneFit, Proxy};
+use proxy::{FitError, PlaneFit, Proxy};
 use render::{Lumigraph, PhotoStore, SourceView};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,21 +41,29 @@ impl Scene {
     }
 
     /// The plane that fits the sparse points when the photos of the given names were never
-    /// taken.
+    /// taken; without points, that through what the cameras look at.
     ///
     /// # Errors
-    /// No points to fit to.
+    /// Nothing to fit to.
     pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
-        Ok(proxy::fit_plane(
-            &self.reconstruction.without_images(without),
-        )?)
+        let rest = self.reconstruction.without_images(without);
+        match proxy::fit_plane(&rest) {
+            Err(FitError::NoPoints) => {
+                let bounds = self.photos.iter().filter_map(|photo| {
+                    let bounds = photo.depth_bounds?;
+                    Some((photo.name.clone(), bounds))
+                });
+                Ok(proxy::plane_across_axes(&rest, &bounds.collect())?)
+            }
+            fit => Ok(fit?),
+        }
     }
 
     /// The best surface that can be fitted without the photos of the given names; today
     /// the plane.
     ///
     /// # Errors
-    /// No points to fit to.
+    /// Nothing to fit to.
     pub fn fit_proxy(&self, without: &BTreeSet<String>) -> Result<Proxy, SceneError> {
         Ok(Proxy::Plane(self.fit_plane(without)?.plane))
     }

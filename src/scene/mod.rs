@@ -9,12 +9,17 @@ mod error;
 pub mod file;
 mod import;
 mod lumigraph;
+mod names;
 mod relative;
 mod split;
 mod store;
+mod undistort;
 
+pub use calibration::{Sizes, read_bare};
 pub use error::{SceneError, Warning};
 pub use import::ImportOptions;
+pub use names::{NameError, picture_files};
+pub use relative::relative;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{Extra, Settings};
@@ -53,6 +58,8 @@ pub struct Photo {
     pub name: String,
     /// Where the file is.
     pub path: PathBuf,
+    /// What the capture calls it, where undistorting gave it another name.
+    pub original: Option<String>,
     /// A mask of what to ignore (people, cars), if any.
     pub ignore_mask: Option<PathBuf>,
     /// The silhouette of the object that the photo is about, if any.
@@ -65,6 +72,8 @@ pub struct Photo {
     pub time_s: Option<f64>,
     /// Exposure per colour channel, relative to the other photos.
     pub gain: Option<[f64; 3]>,
+    /// The nearest and farthest depth along z that it shows, where the calibration says.
+    pub depth_bounds: Option<[f64; 2]>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
 }

@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// The way from a folder to a file, `/` between its parts; the whole path where there is
 /// none (another drive). Both are made absolute first, so that neither need exist.
-pub(super) fn relative(folder: &Path, file: &Path) -> String {
+pub fn relative(folder: &Path, file: &Path) -> String {
     let (folder, file) = (resolved(folder), resolved(file));
     let from: Vec<Component<'_>> = folder.components().collect();
     let to: Vec<Component<'_>> = file.components().collect();

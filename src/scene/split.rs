@@ -1,8 +1,8 @@
 //! Held-out photos: `split.json`, `{"test": ["a.jpg", …]}`.
 
-use super::{Scene, SceneError};
+use super::{Photo, Scene, SceneError};
 use serde::Deserialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 #[derive(Deserialize)]
@@ -30,10 +30,14 @@ impl Scene {
         if read.test.is_empty() {
             return Err(SceneError::EmptySplit(split.to_owned()));
         }
+        // Splits speak of the photos as the capture calls them.
+        let called = |photo: &Photo| photo.original.clone().map(|was| (was, photo.name.clone()));
+        let renamed: BTreeMap<String, String> = self.photos.iter().filter_map(called).collect();
         let known: BTreeSet<&str> = self.photos.iter().map(|p| p.name.as_str()).collect();
         let (here, not_here): (BTreeSet<String>, BTreeSet<String>) = read
             .test
             .into_iter()
+            .map(|name| renamed.get(&name).cloned().unwrap_or(name))
             .partition(|name| known.contains(name.as_str()));
         let unknown: Vec<String> = not_here
             .into_iter()

@@ -2,6 +2,7 @@
 
 use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
 use super::relative::relative;
+use super::undistort::{IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use proxy::Proxy;
@@ -22,7 +23,7 @@ impl Scene {
     /// As for [`Scene::import`]; a damaged `scene.json`.
     pub fn open(folder: &Path, strict: bool) -> Result<(Self, Vec<Warning>), SceneError> {
         let path = folder.join(SCENE_FILE);
-        if !path.is_file() {
+        if !Self::is_scene(folder) {
             let options = ImportOptions {
                 strict,
                 ..ImportOptions::default()
@@ -50,6 +51,11 @@ impl Scene {
         Ok((scene, warnings))
     }
 
+    /// Whether a folder is a scene's.
+    pub fn is_scene(folder: &Path) -> bool {
+        folder.join(SCENE_FILE).is_file()
+    }
+
     fn from_file(file: SceneFile, folder: &Path, path: &Path) -> Result<Self, SceneError> {
         let inconsistent = |problem: String| SceneError::Inconsistent {
             path: path.to_owned(),
@@ -75,12 +81,14 @@ impl Scene {
             }
             photos.push(Photo {
                 path: folder.join(&entry.path),
+                original: entry.original,
                 ignore_mask: at(&entry.ignore_mask),
                 object_matte: at(&entry.object_matte),
                 depth_map: at(&entry.depth_map),
                 depth_scale: entry.depth_scale,
                 time_s: entry.time_s,
                 gain: entry.gain,
+                depth_bounds: entry.depth_bounds,
                 other: entry.other,
                 name: entry.name,
             });
@@ -134,6 +142,17 @@ impl Scene {
     /// The folder holds something: an earlier scene, unless `replace`; anything that is no
     /// part of a scene, always. Files that cannot be written.
     pub fn save(&mut self, folder: &Path, replace: bool) -> Result<(), SceneError> {
+        self.write_folder(folder, replace, |_, _| Ok(()))
+    }
+
+    /// [`Scene::save`]; `fill` first puts further files into the folder in the making and
+    /// has the scene name them.
+    pub(super) fn write_folder(
+        &mut self,
+        folder: &Path,
+        replace: bool,
+        fill: impl FnOnce(&mut Self, &Path) -> Result<(), SceneError>,
+    ) -> Result<(), SceneError> {
         check_free(folder, replace)?;
         let parent = match folder.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -148,6 +167,7 @@ impl Scene {
             .map_err(|e| io(parent, "make a folder within", e))?;
         let new = made.path().join("scene");
         std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
+        fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
             own.file = PROXY_FILE.to_owned();
@@ -208,12 +228,14 @@ impl Scene {
         let entry = |photo: &Photo| PhotoEntry {
             name: photo.name.clone(),
             path: relative(folder, &photo.path),
+            original: photo.original.clone(),
             ignore_mask: from_here(&photo.ignore_mask),
             object_matte: from_here(&photo.object_matte),
             depth_map: from_here(&photo.depth_map),
             depth_scale: photo.depth_scale,
             time_s: photo.time_s,
             gain: photo.gain,
+            depth_bounds: photo.depth_bounds,
             other: photo.other.clone(),
         };
         let mut settings = self.settings.clone();
@@ -253,7 +275,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneErr
 }
 
 /// Whether a scene may be written to a folder.
-fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
+pub(super) fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
     if !folder.exists() {
         return Ok(());
     }
@@ -262,12 +284,16 @@ fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
         problem,
     };
     let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
-    let mut is_scene = false;
+    let is_scene = Scene::is_scene(folder);
+    let mut parts = vec![SCENE_FILE, MODEL_FOLDER, PROXY_FILE];
+    // Photos are part of a scene only where it says that they are its own.
+    if is_scene && holds_photos(folder) {
+        parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER]);
+    }
     for entry in entries {
         let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        is_scene |= name == SCENE_FILE;
-        if ![SCENE_FILE, MODEL_FOLDER, PROXY_FILE].contains(&name.as_str()) {
+        if !parts.contains(&name.as_str()) {
             return Err(occupied(format!(
                 "holds {name}, which is no part of a scene; choose another folder"
             )));
@@ -279,6 +305,12 @@ fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
         ));
     }
     Ok(())
+}
+
+/// Whether the scene in a folder was undistorted into it.
+fn holds_photos(folder: &Path) -> bool {
+    let bytes = std::fs::read(folder.join(SCENE_FILE)).unwrap_or_default();
+    serde_json::from_slice::<SceneFile>(&bytes).is_ok_and(|file| file.settings.undistorted)
 }
 
 fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {

@@ -1,7 +1,7 @@
 //! What both formats ask of a record, and of the three files together.
 
 use super::ColmapError;
-use crate::{Image, ImageId, Keypoint, Point3DId, Reconstruction, Rigid3};
+use crate::{Camera, CameraId, Image, ImageId, Keypoint, Point3DId, Reconstruction, Rigid3};
 use glam::{DQuat, DVec3};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -95,6 +95,18 @@ pub(super) fn insert<Id: Ord, Record>(
     }
 }
 
+/// Checks that every camera has a lens.
+pub(super) fn lenses(cameras: &BTreeMap<CameraId, Camera>, path: &Path) -> Result<(), ColmapError> {
+    for (&id, camera) in cameras {
+        camera.lens().map_err(|source| ColmapError::Camera {
+            path: path.to_owned(),
+            camera_id: id.0,
+            source,
+        })?;
+    }
+    Ok(())
+}
+
 /// Checks what only the three `files` together can show.
 pub(super) fn references(
     reconstruction: &Reconstruction,
@@ -107,13 +119,7 @@ pub(super) fn references(
     } = reconstruction;
     let [cameras_path, images_path, points_path] = files;
 
-    for (&id, camera) in cameras {
-        camera.lens().map_err(|source| ColmapError::Camera {
-            path: cameras_path.clone(),
-            camera_id: id.0,
-            source,
-        })?;
-    }
+    lenses(cameras, cameras_path)?;
     if images.is_empty() {
         return Err(ColmapError::NoImages {
             path: images_path.clone(),

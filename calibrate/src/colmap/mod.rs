@@ -27,7 +27,8 @@ pub use error::{ColmapError, Incomplete, Place};
 pub use find::find_model;
 pub use write::{write_binary, write_text};
 
-use crate::Reconstruction;
+use crate::{Camera, CameraId, Reconstruction};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -84,6 +85,31 @@ pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
     };
     check::references(&reconstruction, &files)?;
     Ok(reconstruction)
+}
+
+/// Reads `cameras.bin` or `cameras.txt` alone: a binary file by its extension, else text.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn read_cameras(path: &Path) -> Result<BTreeMap<CameraId, Camera>, ColmapError> {
+    let bytes = read(path)?;
+    let cameras = if path.extension() == Some("bin".as_ref()) {
+        binary::read_cameras(path, &bytes)?
+    } else {
+        text::read_cameras(path, &bytes)?
+    };
+    check::lenses(&cameras, path)?;
+    Ok(cameras)
+}
+
+/// Whether a file is called like one of a COLMAP model.
+pub fn is_part(path: &Path) -> bool {
+    [Format::Binary, Format::Text].iter().any(|format| {
+        format
+            .files(Path::new(""))
+            .iter()
+            .any(|name| path.ends_with(name))
+    })
 }
 
 /// A file's bytes; having none is an error, except that COLMAP's own instructions for

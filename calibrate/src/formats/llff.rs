@@ -1,7 +1,7 @@
 //! LLFF's `poses_bounds.npy` (Mildenhall's `LLFF/README.md`, "Using your own poses").
 //!
 //! - One row of 17 numbers a photo: a 3×5 matrix by rows, then the nearest and farthest
-//!   depth, which are not kept. The matrix is camera to world, its columns the camera's
+//!   depth. The matrix is camera to world, its columns the camera's
 //!   down, right and back axes, its centre, and (height, width, focal length in pixels).
 //! - The principal point is the image's centre, which in our pixels is (w/2, h/2).
 //! - The rows are the photos in the order of their sorted names, which are not stored.
@@ -17,7 +17,8 @@ use std::path::Path;
 const COLUMNS: usize = 17;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Reads a `poses_bounds.npy` for the photos of these names, which are sorted here.
+/// Reads a `poses_bounds.npy` for the photos of these names, which are sorted here; without
+/// any, images are called by their rows.
 /// `size_of` is asked for every photo; where it knows one, the camera gets that size,
 /// which must have the file's shape to within a pixel. Images are numbered from 0.
 ///
@@ -31,6 +32,10 @@ pub fn read_llff(
 ) -> Result<Reconstruction, FormatError> {
     let bytes = build::read(path)?;
     let rows = rows(&bytes).map_err(|problem| problem.at(path, "header"))?;
+    let mut names = match names {
+        [] => (0..rows.len()).map(|row| format!("{row:04}")).collect(),
+        names => names.to_vec(),
+    };
     if rows.len() != names.len() {
         return Err(Problem::new(
             format!("found {} poses for {} photos", rows.len(), names.len()),
@@ -38,7 +43,6 @@ pub fn read_llff(
         )
         .at(path, "header"));
     }
-    let mut names = names.to_vec();
     names.sort();
 
     let mut builder = Builder::new(path);
@@ -58,6 +62,23 @@ pub fn read_llff(
         builder.image(&record, ImageId(index as u32), &name, camera_id, pose)?;
     }
     builder.finish("rows")
+}
+
+/// The nearest and farthest depth along z that each row of a `poses_bounds.npy` gives.
+///
+/// # Errors
+/// An unreadable file, an array of another type or shape, bounds that are not 0 < near ≤ far.
+pub fn read_llff_bounds(path: &Path) -> Result<Vec<[f64; 2]>, FormatError> {
+    let rows = rows(&build::read(path)?).map_err(|problem| problem.at(path, "header"))?;
+    let bounds = |(index, row): (usize, &[f64; COLUMNS])| {
+        let [near, far] = [row[15], row[16]];
+        if near > 0.0 && near <= far && far.is_finite() {
+            return Ok([near, far]);
+        }
+        let problem = format!("the depths are {near} and {far}, expected 0 < nearest ≤ farthest");
+        Err(Problem::broken(problem).at(path, format!("row {index}")))
+    };
+    rows.iter().enumerate().map(bounds).collect()
 }
 
 /// The camera of (height, width, focal), brought to the photo's size.

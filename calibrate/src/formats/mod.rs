@@ -25,7 +25,7 @@ pub use build::SizeOf;
 pub use bundler::read_bundler;
 pub use detect::{Format, detect};
 pub use error::FormatError;
-pub use llff::read_llff;
+pub use llff::{read_llff, read_llff_bounds};
 pub use meshroom::read_meshroom;
 pub use nvm::read_nvm;
 pub use openmvg::read_openmvg;

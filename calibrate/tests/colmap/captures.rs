@@ -1,6 +1,6 @@
 //! Real models.
 
-use calibrate::colmap::{find_model, read_model};
+use calibrate::colmap::{find_model, read_model, write_binary, write_text};
 use calibrate::{Pixel, Point3D, Reconstruction};
 use std::collections::BTreeMap;
 use std::fs;
@@ -84,6 +84,53 @@ fn every_capture_reads_and_reprojects_as_its_readme_states() {
         read += 1;
     }
     assert!(read >= 11, "only {read} captures");
+}
+
+#[test]
+fn every_capture_is_written_byte_for_byte_as_it_was_read() {
+    let Some(folder) = captures() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let mut compared = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let capture = entry.unwrap().path();
+        let Ok(source) = find_model(&capture) else {
+            continue;
+        };
+        let name = capture.file_name().unwrap().to_owned();
+        let model = read_model(&source).unwrap();
+
+        // Binary: the very bytes.
+        let binary = here.path().join("binary").join(&name);
+        write_binary(&model, &binary).unwrap();
+        for file in ["cameras.bin", "images.bin", "points3D.bin"] {
+            let (ours, theirs) = (binary.join(file), source.join(file));
+            let same = fs::read(ours).unwrap() == fs::read(theirs).unwrap();
+            assert!(same, "{file} of {capture:?}");
+        }
+
+        // Text: every bit of every number, twice.
+        let (text, again) = (here.path().join("text"), here.path().join("again"));
+        let (text, again) = (text.join(&name), again.join(&name));
+        write_text(&model, &text).unwrap();
+        let read = read_model(&text).unwrap();
+        assert_eq!(bits(&read), bits(&model), "{capture:?}");
+        write_text(&read, &again).unwrap();
+        for file in ["cameras.txt", "images.txt", "points3D.txt"] {
+            let same = fs::read(text.join(file)).unwrap() == fs::read(again.join(file)).unwrap();
+            assert!(same, "{file} of {capture:?}");
+        }
+        compared += 1;
+    }
+    assert!(compared >= 11, "only {compared} captures");
+}
+
+/// A model as COLMAP's bytes, which tell 0 from −0.
+fn bits(model: &Reconstruction) -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    write_binary(model, folder.path()).unwrap();
+    ["cameras.bin", "images.bin", "points3D.bin"]
+        .map(|file| fs::read(folder.path().join(file)).unwrap())
+        .to_vec()
 }
 
 #[test]

@@ -1,0 +1,299 @@
+//! What is exported reads back the same.
+
+use calibrate::export::{ExportError, FrameFiles, opencv_yaml, transforms_json};
+use calibrate::formats::read_transforms;
+use calibrate::opencv::{Keys, read_calibration};
+use calibrate::{
+    Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Reconstruction, Rigid3, colmap,
+};
+use glam::{DQuat, DVec3};
+use proptest::prelude::*;
+use std::fs;
+use std::path::Path;
+
+fn camera(model: ModelKind, distortion: &[f64]) -> Camera {
+    let one_focal = model.parameter_names()[0] == "f";
+    let mut params = vec![517.300_000_000_1, 318.6 + 0.1, 1.0 / 3.0 + 255.0];
+    if !one_focal {
+        params.insert(1, 516.5);
+    }
+    params.extend(distortion);
+    Camera {
+        model,
+        width: 640,
+        height: 480,
+        params,
+    }
+}
+
+/// What both formats can express.
+fn expressible() -> Vec<Camera> {
+    use ModelKind::*;
+    vec![
+        camera(SimplePinhole, &[]),
+        camera(Pinhole, &[]),
+        camera(SimpleRadial, &[-0.1]),
+        camera(Radial, &[-0.1, 0.01]),
+        camera(OpenCv, &[0.1, -0.2, 1e-3, -2e-4]),
+        camera(FullOpenCv, &[0.1, -0.2, 1e-3, -2e-4, 0.03, 0.0, 0.0, 0.0]),
+    ]
+}
+
+fn fisheyes() -> Vec<Camera> {
+    use ModelKind::*;
+    vec![
+        camera(SimpleFisheye, &[]),
+        camera(Fisheye, &[]),
+        camera(SimpleRadialFisheye, &[0.02]),
+        camera(RadialFisheye, &[0.02, -0.003]),
+        camera(OpenCvFisheye, &[0.02, -0.003, 1e-4, -1e-5]),
+    ]
+}
+
+/// An image for each camera and pose.
+fn reconstruction(cameras: &[Camera], poses: &[Rigid3]) -> Reconstruction {
+    let mut whole = Reconstruction::default();
+    for (i, camera) in cameras.iter().enumerate() {
+        whole.cameras.insert(CameraId(i as u32 + 3), camera.clone());
+    }
+    for (i, &camera_from_world) in poses.iter().enumerate() {
+        let image = Image {
+            name: format!("left \"{i}\"/photo {i}.jpg"),
+            camera_id: CameraId((i % cameras.len()) as u32 + 3),
+            camera_from_world,
+            keypoints: vec![],
+        };
+        whole.images.insert(ImageId(10 + i as u32), image);
+    }
+    whole
+}
+
+fn through_transforms(whole: &Reconstruction) -> Reconstruction {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("transforms.json");
+    let files = |image: &Image| FrameFiles {
+        photo: image.name.clone(),
+        mask: None,
+    };
+    fs::write(&path, transforms_json(whole, &files).unwrap()).unwrap();
+    read_transforms(&path, &|name| panic!("{name}: the size is in the file")).unwrap()
+}
+
+fn through_opencv(whole: &Reconstruction) -> Reconstruction {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camera.yml");
+    let text = opencv_yaml(whole, &|image| image.name.clone()).unwrap();
+    fs::write(&path, text).unwrap();
+    let read = read_calibration(&path, &Keys::default()).unwrap();
+    assert!(read.notes.is_empty(), "{:?}", read.notes);
+    read.reconstruction(&read.image_names, (0, 0)).unwrap()
+}
+
+/// The same photos through the same lenses from the same places: sizes and coefficients to
+/// the last bit, the rest to 1e-12 of its size.
+#[track_caller]
+fn assert_same(found: &Reconstruction, expected: &Reconstruction) {
+    assert_eq!(found.images.len(), expected.images.len());
+    for (a, b) in found.images.values().zip(expected.images.values()) {
+        assert_eq!(a.name, b.name);
+        let (p, q) = (a.camera_from_world, b.camera_from_world);
+        let turned = (p.rotation * q.rotation.conjugate()).xyz().length();
+        assert!(2.0 * turned < 1e-12, "{}: {turned} radians", a.name);
+        let scale = q.translation.length().max(1.0);
+        let moved = p.translation.distance(q.translation);
+        assert!(moved < 1e-12 * scale, "{}: {moved} of {scale}", a.name);
+
+        let (c, d) = (
+            &found.cameras[&a.camera_id],
+            &expected.cameras[&b.camera_id],
+        );
+        assert_eq!((c.width, c.height), (d.width, d.height));
+        let (c, d) = (c.lens().unwrap(), d.lens().unwrap());
+        assert_eq!(c.focal, d.focal);
+        assert_eq!(c.distortion(), d.distortion());
+        assert!((c.principal - d.principal).length() < 1e-12 * d.principal.length());
+    }
+}
+
+fn pose() -> impl Strategy<Value = Rigid3> {
+    let axis = [-1.0..1.0, -1.0..1.0, -1.0..1.0];
+    // Next to nothing, and next to half a turn, are where rotation vectors are delicate.
+    let angle = prop_oneof![
+        -10.0..10.0,
+        (0.0..16.0).prop_map(|e: f64| 10.0_f64.powf(-e)),
+        (0.0..16.0).prop_map(|e: f64| std::f64::consts::PI - 10.0_f64.powf(-e)),
+        Just(0.0),
+    ];
+    let translation = prop_oneof![Just(1.0), Just(1e7)];
+    (axis, angle, axis_of_translation(), translation).prop_map(|(axis, angle, t, scale)| {
+        let axis = DVec3::from_array(axis).normalize_or(DVec3::Z);
+        Rigid3::new(DQuat::from_axis_angle(axis, angle), t * scale)
+    })
+}
+
+fn axis_of_translation() -> impl Strategy<Value = DVec3> {
+    [-1.0..1.0, -1.0..1.0, -1.0..1.0].prop_map(DVec3::from_array)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    #[test]
+    fn poses_and_intrinsics_read_back(
+        poses in prop::collection::vec(pose(), 2..5),
+        model in 0..expressible().len() + fisheyes().len(),
+    ) {
+        let cameras = [expressible(), fisheyes()].concat();
+        let whole = reconstruction(&cameras[model..=model], &poses);
+        assert_same(&through_transforms(&whole), &whole);
+        assert_same(&through_opencv(&whole), &whole);
+    }
+}
+
+#[test]
+fn a_transforms_file_holds_many_cameras() {
+    let poses: Vec<Rigid3> = (0..7)
+        .map(|i| Rigid3::new(DQuat::from_rotation_y(0.1 * f64::from(i)), DVec3::X))
+        .collect();
+    for cameras in [expressible(), fisheyes()] {
+        let whole = reconstruction(&cameras, &poses);
+        assert_same(&through_transforms(&whole), &whole);
+    }
+}
+
+#[test]
+fn the_keys_are_those_that_nerfstudio_reads() {
+    let files = |image: &Image| FrameFiles {
+        photo: image.name.clone(),
+        mask: (image.name.contains('1')).then(|| "m.png".to_owned()),
+    };
+    let json = |cameras: &[Camera]| -> serde_json::Value {
+        let whole = reconstruction(cameras, &[Rigid3::IDENTITY; 2]);
+        serde_json::from_str(&transforms_json(&whole, &files).unwrap()).unwrap()
+    };
+    let shared = json(&expressible()[4..5]);
+    let keys: Vec<&String> = shared.as_object().unwrap().keys().collect();
+    assert_eq!(
+        keys.iter()
+            .map(|k| k.as_str())
+            .collect::<Vec<_>>()
+            .join(" "),
+        "camera_model w h fl_x fl_y cx cy k1 k2 p1 p2 applied_transform frames"
+    );
+    assert_eq!(shared["camera_model"], "OPENCV");
+    assert_eq!(
+        shared["applied_transform"].to_string(),
+        "[[1.0,0.0,0.0,0.0],[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0]]"
+    );
+    // y up, z back.
+    assert_eq!(shared["frames"][0]["transform_matrix"][1][1], -1.0);
+    assert_eq!(shared["frames"][0]["transform_matrix"][2][2], -1.0);
+    assert!(shared["frames"][0].get("mask_path").is_none());
+    assert_eq!(shared["frames"][1]["mask_path"], "m.png");
+
+    let own = json(&expressible()[1..3]);
+    assert_eq!(own["camera_model"], "OPENCV");
+    assert!(own.get("fl_x").is_none());
+    assert_eq!(own["frames"][1]["k1"], -0.1);
+    assert_eq!(json(&expressible()[..1])["camera_model"], "PINHOLE");
+    assert_eq!(json(&fisheyes()[..1])["camera_model"], "OPENCV_FISHEYE");
+}
+
+#[test]
+fn what_cannot_be_expressed_is_named() {
+    let one = |cameras: &[Camera]| reconstruction(cameras, &[Rigid3::IDENTITY; 2]);
+    let transforms = |cameras: &[Camera]| {
+        let files = |image: &Image| FrameFiles {
+            photo: image.name.clone(),
+            mask: None,
+        };
+        transforms_json(&one(cameras), &files)
+            .unwrap_err()
+            .to_string()
+    };
+    let opencv = |cameras: &[Camera]| {
+        let text = opencv_yaml(&one(cameras), &|image| image.name.clone());
+        text.unwrap_err().to_string()
+    };
+    let remedy = "import the photos with --undistort and export that scene, or export as colmap";
+    let fov = camera(ModelKind::Fov, &[0.9]);
+    assert_eq!(
+        transforms(std::slice::from_ref(&fov)),
+        format!("camera 3 is FOV, which transforms.json cannot express; {remedy}")
+    );
+    assert_eq!(
+        opencv(std::slice::from_ref(&fov)),
+        format!("camera 3 is FOV, which OpenCV's calibration file cannot express; {remedy}")
+    );
+    let rational = camera(
+        ModelKind::FullOpenCv,
+        &[0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0],
+    );
+    assert_eq!(
+        transforms(std::slice::from_ref(&rational)),
+        format!(
+            "camera 3 is FULL_OPENCV with a denominator (k4, k5, k6), which transforms.json \
+             cannot express; {remedy}"
+        )
+    );
+    let whole = one(std::slice::from_ref(&rational));
+    assert_same(&through_opencv(&whole), &whole);
+
+    let mixed = [fisheyes()[1].clone(), expressible()[1].clone()];
+    assert_eq!(
+        transforms(&mixed),
+        "camera 3 (FISHEYE) is a fisheye and camera 4 (PINHOLE) is not, and transforms.json has \
+         one camera_model for all; import the photos with --undistort and export that scene, or \
+         export as colmap"
+    );
+    assert_eq!(
+        opencv(&expressible()[..2]),
+        "the photos were taken with 2 cameras, but the poses in an OpenCV file are those of one; \
+         export as colmap or transforms"
+    );
+    let none = opencv_yaml(&Reconstruction::default(), &|_| String::new());
+    assert_eq!(none, Err(ExportError::NoImages));
+}
+
+#[test]
+fn captures_read_back() {
+    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/captures");
+    if !captures.is_dir() {
+        eprintln!("SKIPPED: {} is absent", captures.display());
+        return;
+    }
+    let (mut transforms, mut opencv) = (0, 0);
+    for entry in fs::read_dir(captures).unwrap() {
+        let Ok(model) = colmap::find_model(&entry.unwrap().path()) else {
+            continue;
+        };
+        let whole = colmap::read_model(&model).unwrap();
+        let camera = whole.cameras.values().next().unwrap();
+        if camera.model != ModelKind::FullOpenCv {
+            assert_same(&through_transforms(&whole), &whole);
+            transforms += 1;
+        }
+        if whole.cameras.len() == 1 {
+            let read = through_opencv(&whole);
+            assert_same(&read, &whole);
+            opencv += 1;
+            // A board that every photo sees keeps its corners.
+            if model.ends_with("opencv-chessboard/sparse/0") {
+                assert_eq!(read.points.len(), 54);
+                let positions = |r: &Reconstruction| -> Vec<DVec3> {
+                    r.points.values().map(|p| p.position).collect()
+                };
+                assert_eq!(positions(&read), positions(&whole));
+                let keypoints = |r: &Reconstruction| -> Vec<Keypoint> {
+                    let image = r.images.values().nth(5).unwrap();
+                    let seen = image.keypoints.iter().filter(|k| k.point.is_some());
+                    seen.copied().collect()
+                };
+                for (a, b) in keypoints(&read).iter().zip(keypoints(&whole)) {
+                    assert!((a.x - b.x).hypot(a.y - b.y) < 1e-12);
+                }
+            }
+        }
+    }
+    assert!(transforms >= 10 && opencv >= 10, "{transforms}, {opencv}");
+}

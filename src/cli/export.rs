@@ -1,0 +1,111 @@
+//! `lumigraph export`
+
+use super::Usage;
+use super::options::SceneArgs;
+use super::output::{print, write_file};
+use calibrate::export::{FrameFiles, opencv_yaml, transforms_json};
+use calibrate::{Image, colmap};
+use clap::ValueEnum;
+use lumigraph::scene::{Photo, Scene, relative};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Write a scene's cameras, poses and points for other programs
+///
+/// A COLMAP model is a folder; transforms.json (nerfstudio) and OpenCV's calibration are a
+/// file, which names the photos by their paths from where it lies. Photos are not copied.
+/// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
+/// all of them can.
+///
+///     lumigraph export my-scene --format colmap -o model
+///     lumigraph export my-scene --format transforms -o my-scene/transforms.json
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Whose format
+    #[arg(long, value_enum)]
+    format: Format,
+    /// The model's folder, or the file
+    #[arg(short, long, value_name = "PATH")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// COLMAP's binary model: everything
+    Colmap,
+    /// COLMAP's text model: everything
+    ColmapText,
+    /// nerfstudio's transforms.json: cameras and poses
+    Transforms,
+    /// OpenCV's YAML: one camera and its poses; the corners of a board
+    #[value(name = "opencv")]
+    OpenCv,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let output = &args.output;
+    let is_file = matches!(args.format, Format::Transforms | Format::OpenCv);
+    if is_file && output.is_dir() {
+        let message = "is a folder, but this format is a file; give its name with -o";
+        return Err(Usage(format!("{} {message}", output.display())).into());
+    }
+    let scene = args.scene.open()?;
+    let whole = &scene.reconstruction;
+    match args.format {
+        Format::Colmap => colmap::write_binary(whole, output)?,
+        Format::ColmapText => colmap::write_text(whole, output)?,
+        Format::Transforms => {
+            let files = Files::new(&scene, output);
+            let text = transforms_json(whole, &|image| files.of(image))?;
+            write_file(output, text.as_bytes())?;
+        }
+        Format::OpenCv => {
+            let files = Files::new(&scene, output);
+            let text = opencv_yaml(whole, &|image| files.of(image).photo)?;
+            write_file(output, text.as_bytes())?;
+        }
+    }
+    print(&format!(
+        "{}: {} photos, {}\n",
+        output.display(),
+        whole.images.len(),
+        match args.format {
+            Format::Transforms => "no points: the format has none".to_owned(),
+            _ => format!("{} points", whole.points.len()),
+        }
+    ))
+}
+
+/// Where a scene's photos and masks lie, as seen from a file's folder.
+struct Files<'a> {
+    photos: BTreeMap<&'a str, &'a Photo>,
+    folder: PathBuf,
+}
+
+impl<'a> Files<'a> {
+    fn new(scene: &'a Scene, file: &Path) -> Self {
+        let folder = match file.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        Self {
+            photos: scene.photos.iter().map(|p| (p.name.as_str(), p)).collect(),
+            folder: folder.to_owned(),
+        }
+    }
+
+    fn of(&self, image: &Image) -> FrameFiles {
+        let photo = self.photos.get(image.name.as_str());
+        let mask = photo.and_then(|photo| photo.ignore_mask.as_deref());
+        FrameFiles {
+            photo: photo.map_or_else(
+                || image.name.clone(),
+                |photo| relative(&self.folder, &photo.path),
+            ),
+            mask: mask.map(|mask| relative(&self.folder, mask)),
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! A scene whose photos are a pinhole's: its folder holds them, in `images/`, and in
+//! `masks/` what to ignore where a photo does not fill its picture.
+
+use super::store::check_free;
+use super::{Photo, Scene, SceneError, Warning, picture_files};
+use calibrate::Pixel;
+use calibrate::undistort::{Undistortion, undistort};
+use capture::{CaptureError, Footprint, Kernel, copy_photo, warp, write_mask, write_png};
+use image::{GrayImage, Luma, RgbaImage};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Photos, in a scene that was undistorted.
+pub(super) const IMAGES_FOLDER: &str = "images";
+/// Ignore masks, in a scene that was undistorted.
+pub(super) const MASKS_FOLDER: &str = "masks";
+/// Silhouettes, in a scene that was undistorted.
+pub(super) const MATTES_FOLDER: &str = "mattes";
+/// Sharper than a tent, and computed without a transcendental function, so that every machine
+/// writes the same bytes.
+const KERNEL: Kernel = Kernel::CatmullRom;
+
+impl Scene {
+    /// Undistorts the photos and writes the scene with them as a new folder, complete or not
+    /// at all, as [`Scene::save`] does.
+    ///
+    /// A pinhole's photos are copied as they are. All others become PNG files of the size that
+    /// [`calibrate::undistort`] chooses, their names' extension replaced; [`Photo::original`]
+    /// is what they were called. Masks and mattes are undistorted likewise, as
+    /// `masks/NAME.png` and `mattes/NAME.png`. `progress` is called after each photo.
+    ///
+    /// # Errors
+    /// As [`Scene::save`]; a camera that has no undistorted picture; two photos that would
+    /// have one name; a depth map. A photo that cannot be decoded is left out, or with
+    /// `strict` an error, as at the import.
+    pub fn save_undistorted(
+        &mut self,
+        folder: &Path,
+        replace: bool,
+        strict: bool,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Warning>, SceneError> {
+        check_free(folder, replace)?;
+        let (reconstruction, undistortions) = undistort(&self.reconstruction)?;
+        if let Some(photo) = self.photos.iter().find(|p| p.depth_map.is_some()) {
+            return Err(SceneError::DepthMap(photo.name.clone()));
+        }
+        let cameras: BTreeMap<&str, &Undistortion> = self
+            .images_by_name()
+            .into_iter()
+            .map(|(name, image)| (name, &undistortions[&image.camera_id]))
+            .collect();
+        let names = self.photos.iter().map(|photo| {
+            let name = photo.name.as_str();
+            (name, !cameras[name].is_identity())
+        });
+        let new_names = picture_files("photo", names, Path::new(""))?;
+
+        let mut warnings = Vec::new();
+        let mut undistorted = self.clone();
+        undistorted.reconstruction = reconstruction;
+        undistorted.settings.undistorted = true;
+        undistorted.write_folder(folder, replace, |scene, new| {
+            // 1. The photos, each by itself.
+            let jobs: Vec<(&Photo, &PathBuf)> = self.photos.iter().zip(&new_names).collect();
+            let written: Vec<Result<Photo, CaptureError>> = jobs
+                .into_par_iter()
+                .map(|(photo, new_name)| {
+                    let done = write_photo(photo, cameras[photo.name.as_str()], new_name, new);
+                    progress();
+                    done
+                })
+                .collect();
+
+            // 2. The scene names them, where they will be.
+            let mut unusable = Vec::new();
+            for (photo, written) in scene.photos.iter_mut().zip(written) {
+                match written {
+                    Ok(Photo {
+                        name,
+                        path,
+                        ignore_mask,
+                        object_matte,
+                        ..
+                    }) => {
+                        let there = |file: PathBuf| folder.join(file);
+                        photo.original.get_or_insert_with(|| photo.name.clone());
+                        if photo.original.as_ref() == Some(&name) {
+                            photo.original = None;
+                        }
+                        photo.path = there(path);
+                        photo.ignore_mask = ignore_mask.map(there);
+                        photo.object_matte = object_matte.map(there);
+                        photo.name = name;
+                    }
+                    Err(error @ CaptureError::Write { .. }) => return Err(error.into()),
+                    Err(error) => unusable.push((photo.name.clone(), error)),
+                }
+            }
+            let renamed: BTreeMap<&str, String> = self
+                .photos
+                .iter()
+                .zip(&new_names)
+                .map(|(photo, new_name)| (photo.name.as_str(), slashed(new_name)))
+                .collect();
+            warnings = scene.leave_out(unusable, strict)?;
+            for image in scene.reconstruction.images.values_mut() {
+                if let Some(name) = renamed.get(image.name.as_str()) {
+                    image.name.clone_from(name);
+                }
+            }
+            scene.photos.sort_by(|a, b| a.name.cmp(&b.name));
+            Ok(())
+        })?;
+        *self = undistorted;
+        Ok(warnings)
+    }
+}
+
+/// Writes a photo without distortion, and its masks, into the scene's folder. What comes back
+/// has the new name, and paths from that folder.
+fn write_photo(
+    photo: &Photo,
+    undistortion: &Undistortion,
+    new_name: &Path,
+    folder: &Path,
+) -> Result<Photo, CaptureError> {
+    let file = Path::new(IMAGES_FOLDER).join(new_name);
+    let size = {
+        let camera = undistortion.camera();
+        (camera.width, camera.height)
+    };
+    let footprint_of = |column, row| footprint(undistortion, column, row);
+    if undistortion.is_identity() {
+        // Decoded, so that a damaged one is found now.
+        capture::decode(&photo.path, Some(size))?;
+        copy_photo(&photo.path, &folder.join(&file))?;
+    } else {
+        let picture = capture::decode(&photo.path, None)?;
+        let picture = warp(&picture, size, KERNEL, footprint_of);
+        write_png(&folder.join(&file), &picture)?;
+    }
+
+    // What to ignore: what was, and what the photo does not fill.
+    let mut name = new_name.as_os_str().to_owned();
+    name.push(".png");
+    let warped = |mask: &Path| -> Result<GrayImage, CaptureError> {
+        let mask: RgbaImage = capture::decode(mask, None)?;
+        let mask = warp(&mask, size, KERNEL, footprint_of);
+        Ok(image::DynamicImage::from(mask).into_luma8())
+    };
+    let ignored = match &photo.ignore_mask {
+        Some(mask) => Some(warped(mask)?),
+        None if undistortion.is_filled() => None,
+        None => Some(GrayImage::from_fn(size.0, size.1, |column, row| {
+            Luma([if footprint_of(column, row).is_some() {
+                255
+            } else {
+                0
+            }])
+        })),
+    };
+    let written = |folder_name: &str, mask: Option<GrayImage>| {
+        let Some(mask) = mask else { return Ok(None) };
+        let file = Path::new(folder_name).join(&name);
+        write_mask(&folder.join(&file), &mask)?;
+        Ok(Some(file))
+    };
+    let matte = photo.object_matte.as_deref().map(warped).transpose()?;
+    Ok(Photo {
+        name: slashed(new_name),
+        path: file,
+        ignore_mask: written(MASKS_FOLDER, ignored)?,
+        object_matte: written(MATTES_FOLDER, matte)?,
+        ..photo.clone()
+    })
+}
+
+fn footprint(undistortion: &Undistortion, column: u32, row: u32) -> Option<Footprint> {
+    let place = undistortion.in_photo(Pixel::center_of(column, row))?;
+    let row = |i: usize| place.jacobian.row(i).to_array();
+    Some(Footprint {
+        center: [place.pixel.x, place.pixel.y],
+        jacobian: [row(0), row(1)],
+    })
+}
+
+/// A path as photos' names have it.
+fn slashed(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
+}

@@ -1,0 +1,281 @@
+//! Out to other programs' formats and back in.
+
+use crate::run::{lumigraph, with_wall};
+use calibrate::{ModelKind, Reconstruction, colmap};
+use serde_json::json;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn model(folder: &TempDir, path: &str) -> Reconstruction {
+    colmap::read_model(&folder.path().join(path)).unwrap()
+}
+
+/// The same cameras to 1e-12.
+#[track_caller]
+fn assert_same_cameras(a: &Reconstruction, b: &Reconstruction) {
+    assert_eq!(a.images.len(), b.images.len());
+    for (a_image, b_image) in a.images.values().zip(b.images.values()) {
+        assert_eq!(a_image.name, b_image.name);
+        let (p, q) = (a_image.camera_from_world, b_image.camera_from_world);
+        assert!((p.rotation * q.rotation.conjugate()).xyz().length() < 1e-12);
+        assert!(p.translation.distance(q.translation) < 1e-12 * q.translation.length().max(1.0));
+        let (p, q) = (
+            &a.cameras[&a_image.camera_id],
+            &b.cameras[&b_image.camera_id],
+        );
+        assert_eq!((p.width, p.height), (q.width, q.height));
+        let (p, q) = (p.lens().unwrap(), q.lens().unwrap());
+        assert!((p.focal - q.focal).length() < 1e-12 * q.focal.length());
+        assert!((p.principal - q.principal).length() < 1e-12 * q.principal.length());
+        assert_eq!(p.distortion(), q.distortion());
+    }
+}
+
+fn png(path: &Path) -> image::RgbaImage {
+    image::open(path).unwrap().into_rgba8()
+}
+
+#[test]
+fn every_format_brings_back_the_cameras_and_the_pictures() {
+    let folder = with_wall();
+    let run = |line: &str| lumigraph(folder.path(), line).ok();
+    run("import wall -o scene");
+    run("proxy scene plane -o plane.json");
+    let render = |scene: &str, out: &str| {
+        let path = "--path sweep --frames 2 --proxy plane.json";
+        run(&format!("render {scene} {path} -o {out}"));
+    };
+    render("scene", "frames");
+    let original = model(&folder, "scene/model");
+    for (format, file, has_points) in [
+        ("colmap", "model-bin", true),
+        ("colmap-text", "model-txt", true),
+        ("transforms", "out/transforms.json", false),
+        ("opencv", "out/camera.yml", false),
+    ] {
+        run(&format!("export scene --format {format} -o {file}"));
+        let back = format!("back-{format}");
+        run(&format!(
+            "import wall/images --calibration {file} -o {back}"
+        ));
+        let read = model(&folder, &format!("{back}/model"));
+        assert_same_cameras(&read, &original);
+        if has_points {
+            assert_eq!(read, original, "{format}");
+        }
+        render(&back, &format!("frames-{format}"));
+        for frame in fs::read_dir(folder.path().join("frames")).unwrap() {
+            let name = frame.unwrap().file_name();
+            let a = png(&folder.path().join("frames").join(&name));
+            let b = png(&folder.path().join(format!("frames-{format}")).join(&name));
+            let off = a
+                .as_raw()
+                .iter()
+                .zip(b.as_raw())
+                .map(|(a, b)| a.abs_diff(*b));
+            // Poses that went through a matrix differ in their last bits.
+            assert!(off.max().unwrap() <= 1, "{format}: {name:?}");
+        }
+    }
+    // Photos are named as seen from the file, so that it serves where it lies.
+    let text = fs::read_to_string(folder.path().join("out/transforms.json")).unwrap();
+    assert!(text.contains("\"../wall/images/0000.png\""), "{text}");
+}
+
+#[test]
+fn what_a_format_lacks_is_said_and_undistorting_helps() {
+    let folder = with_wall();
+    let sparse = folder.path().join("wall/sparse/0");
+    let mut whole = colmap::read_model(&sparse).unwrap();
+    for camera in whole.cameras.values_mut() {
+        camera.model = ModelKind::Fov;
+        camera.params.push(0.5);
+    }
+    colmap::write_binary(&whole, &sparse).unwrap();
+    let line = "export wall --format transforms -o t.json";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert_eq!(
+        error,
+        "camera 1 is FOV, which transforms.json cannot express; import the photos with \
+         --undistort and export that scene, or export as colmap"
+    );
+    assert!(!folder.path().join("t.json").exists());
+    lumigraph(folder.path(), "import wall --undistort -o flat").ok();
+    lumigraph(folder.path(), "export flat --format transforms -o t.json").ok();
+    let usage = lumigraph(folder.path(), "export flat --format opencv -o flat");
+    assert_eq!(usage.code, 2);
+}
+
+#[test]
+fn an_undistorted_scene_holds_its_photos() {
+    let folder = with_wall();
+    let sparse = folder.path().join("wall/sparse/0");
+    let mut whole = colmap::read_model(&sparse).unwrap();
+    for camera in whole.cameras.values_mut() {
+        camera.model = ModelKind::OpenCv;
+        camera.params.extend([-0.1, 0.01, 1e-3, 0.0]);
+    }
+    colmap::write_binary(&whole, &sparse).unwrap();
+    // A JPEG photo gets another name; the split still knows it by its own.
+    let images = folder.path().join("wall/images");
+    let photo = image::open(images.join("0008.png")).unwrap().into_rgb8();
+    photo.save(images.join("0008.jpg")).unwrap();
+    fs::remove_file(images.join("0008.png")).unwrap();
+    for image in whole.images.values_mut().filter(|i| i.name == "0008.png") {
+        image.name = "0008.jpg".to_owned();
+    }
+    colmap::write_binary(&whole, &sparse).unwrap();
+    let split = json!({"test": ["0000.png", "0008.jpg"]});
+    fs::write(folder.path().join("wall/split.json"), split.to_string()).unwrap();
+
+    let run = |line: &str| lumigraph(folder.path(), line).ok();
+    run("import wall --undistort -o flat");
+    let scene: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.path().join("flat/scene.json")).unwrap()).unwrap();
+    assert_eq!(scene["photos"][8]["name"], "0008.png");
+    assert_eq!(scene["photos"][8]["path"], "images/0008.png");
+    assert_eq!(scene["photos"][8]["original"], "0008.jpg");
+    assert!(scene["photos"][0].get("original").is_none());
+    assert_eq!(scene["settings"]["undistorted"], true);
+    let flat = model(&folder, "flat/model");
+    let camera = flat.cameras.values().next().unwrap();
+    assert_eq!(camera.model, ModelKind::Pinhole);
+    assert_eq!(
+        png(&folder.path().join("flat/images/0003.png")).dimensions(),
+        (camera.width, camera.height)
+    );
+    let result = run("evaluate flat --json").json();
+    assert_eq!(result["photos"].as_array().unwrap().len(), 2);
+
+    // Its own photos may be replaced, those of others never.
+    run("import wall --undistort -o flat --force");
+    run("import wall -o thin");
+    fs::create_dir(folder.path().join("thin/images")).unwrap();
+    let error = lumigraph(folder.path(), "import wall -o thin --force").error(1);
+    assert!(error.contains("holds images, which is no part"), "{error}");
+
+    // Two photos of one name.
+    fs::copy(images.join("0007.png"), images.join("0008.png")).unwrap();
+    for image in whole.images.values_mut().filter(|i| i.name == "0007.png") {
+        image.name = "0008.png".to_owned();
+    }
+    colmap::write_binary(&whole, &sparse).unwrap();
+    let error = lumigraph(folder.path(), "import wall --undistort -o clash").error(1);
+    assert_eq!(
+        error,
+        "photos 0008.jpg and 0008.png would both be written to 0008.png; rename one of them"
+    );
+    assert!(!folder.path().join("clash").exists());
+}
+
+#[test]
+fn the_keys_that_were_chosen_are_recorded() {
+    let folder = with_wall();
+    let run = |line: &str| lumigraph(folder.path(), line).ok();
+    run("export wall --format opencv -o camera.yml");
+    let file = folder.path().join("camera.yml");
+    let text = fs::read_to_string(&file).unwrap();
+    let text = text
+        .replace("camera_matrix:", "Kamera:")
+        .replace("distortion_coefficients:", "Poly:");
+    fs::write(&file, text).unwrap();
+    run(
+        "import wall/images --calibration camera.yml --camera-matrix Kamera --distortion Poly -o s",
+    );
+    let scene: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.path().join("s/scene.json")).unwrap()).unwrap();
+    assert_eq!(scene["settings"]["camera_matrix"], "Kamera");
+    assert_eq!(scene["settings"]["distortion"], "Poly");
+    assert!(scene["settings"].get("fisheye").is_none());
+}
+
+fn captures() -> Option<std::path::PathBuf> {
+    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/captures");
+    if !captures.is_dir() {
+        eprintln!("SKIPPED: {} is absent", captures.display());
+        return None;
+    }
+    Some(captures.canonicalize().unwrap())
+}
+
+#[test]
+fn info_describes_any_bare_calibration() {
+    let Some(captures) = captures() else { return };
+    let here = tempfile::tempdir().unwrap();
+    for (file, cameras, poses) in [
+        ("fern/sparse/0/cameras.bin", 1, 20),
+        ("sceaux-castle/sparse-txt/0/images.txt", 1, 11),
+        ("sceaux-castle/sparse-txt", 1, 11),
+        ("lego/transforms_train.json", 1, 40),
+        ("other-formats/instant-ngp-fox/transforms.json", 1, 25),
+        ("other-formats/bundler-platypus/bundle.out", 6, 6),
+        ("other-formats/visualsfm-nvm/model.nvm", 22, 22),
+        ("other-formats/meshroom-sfm/cameras.sfm", 1, 34),
+        ("other-formats/llff-fern/poses_bounds.npy", 1, 20),
+        ("opencv-chessboard/out_camera_data.yml", 1, 13),
+    ] {
+        let line = format!("info {} --json", captures.join(file).display());
+        let info = lumigraph(here.path(), &line).ok().json();
+        assert_eq!(info["cameras"].as_array().unwrap().len(), cameras, "{file}");
+        assert_eq!(info["poses"], poses, "{file}");
+    }
+    // Alone, without the rest of its model.
+    fs::copy(
+        captures.join("fern/sparse/0/cameras.bin"),
+        here.path().join("cameras.bin"),
+    )
+    .unwrap();
+    let text = lumigraph(here.path(), "info cameras.bin").ok().stdout;
+    assert!(
+        text.starts_with("camera   1: SIMPLE_RADIAL 1000×750 ["),
+        "{text}"
+    );
+}
+
+#[test]
+fn without_points_the_plane_is_where_the_cameras_look() {
+    let Some(captures) = captures() else { return };
+    let here = tempfile::tempdir().unwrap();
+    for (photos, file, said) in [
+        (
+            "lego/images",
+            "lego/transforms_train.json",
+            "optical axes of 40",
+        ),
+        (
+            "other-formats/instant-ngp-fox/images",
+            "other-formats/instant-ngp-fox/transforms.json",
+            "optical axes of 25",
+        ),
+        (
+            "fern/images",
+            "other-formats/llff-fern/poses_bounds.npy",
+            "of 20 photos",
+        ),
+    ] {
+        let (photos, file) = (captures.join(photos), captures.join(file));
+        let line = format!(
+            "import {} --calibration {} -o scene --force",
+            photos.display(),
+            file.display()
+        );
+        lumigraph(here.path(), &line).ok();
+        let ran = lumigraph(here.path(), "proxy scene plane").ok();
+        println!("{}", ran.stdout);
+        assert!(ran.stdout.contains(said), "{}", ran.stdout);
+        let ran = lumigraph(
+            here.path(),
+            "evaluate scene --proxy plane --every 8 --size 200x150 --json",
+        )
+        .ok();
+        assert!(
+            ran.stderr.contains("note: the proxy is a plane fitted to"),
+            "{}",
+            ran.stderr
+        );
+        let mean = &ran.json()["mean"];
+        println!("{mean}");
+        assert!(mean["coverage"].as_f64().unwrap() > 0.5);
+    }
+}
