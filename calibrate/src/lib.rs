@@ -10,6 +10,7 @@
 
 mod camera;
 pub mod colmap;
+pub mod exposure;
 pub mod formats;
 mod lens;
 pub mod opencv;

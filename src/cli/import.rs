@@ -1,8 +1,10 @@
 //! `lumigraph import`
 
+use super::exposure::ExposureArgs;
 use super::options::{KeyArgs, print_warnings};
-use super::output::print;
+use super::output::{print, say};
 use lumigraph::scene::{ImportOptions, Scene};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Make a scene of photos and their calibration
@@ -28,6 +30,8 @@ pub(super) struct Args {
     calibration: Option<PathBuf>,
     #[command(flatten)]
     keys: KeyArgs,
+    #[command(flatten)]
+    exposure: ExposureArgs,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -47,6 +51,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
     print_warnings(&warnings);
+    let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
+    say!("exposure: {}", exposure.text());
     scene.save(&args.output, args.force)?;
     print(&format!(
         "{}: {} photos, {} points\n",

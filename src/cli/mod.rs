@@ -3,6 +3,7 @@
 
 mod demo;
 mod evaluate;
+mod exposure;
 mod field;
 mod frames;
 mod generate;

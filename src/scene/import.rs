@@ -83,6 +83,7 @@ impl Scene {
             photos: photos.collect(),
             reconstruction,
             proxy: None,
+            exposure: None,
             settings: Settings {
                 strict: options.strict,
                 program: Some(concat!("lumigraph ", env!("CARGO_PKG_VERSION")).to_owned()),

@@ -6,6 +6,7 @@
 
 mod calibration;
 mod error;
+mod exposure;
 pub mod file;
 mod import;
 mod lumigraph;
@@ -14,10 +15,11 @@ mod split;
 mod store;
 
 pub use error::{SceneError, Warning};
+pub use exposure::Matched;
 pub use import::ImportOptions;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
-use file::{Extra, Settings};
+use file::{ExposureEntry, Extra, Settings};
 use proxy::Proxy;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -31,6 +33,8 @@ pub struct Scene {
     pub reconstruction: Reconstruction,
     /// The surface that was made for this scene, if any.
     pub proxy: Option<SceneProxy>,
+    /// How the photos' gains were found; `None` where they were not, or given by hand.
+    pub exposure: Option<ExposureEntry>,
     /// How the scene was made.
     pub settings: Settings,
     /// The folder it was read from or saved to; `None` for a capture that was imported in

@@ -3,6 +3,7 @@
 mod bad_input;
 mod captures;
 mod evaluate;
+mod exposure;
 mod field;
 mod formats;
 mod gpu;

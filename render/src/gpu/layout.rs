@@ -25,7 +25,7 @@ pub(crate) struct Params {
     pub blend: u32,
     pub resolution: u32,
     pub plane_seen: u32,
-    pub gains_differ: u32,
+    pub exposures_differ: u32,
     pub padding: [u32; 3],
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct Source {
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub gain: [f32; 4],
+    pub exposure: [f32; 4],
     pub prism: [f32; 4],
 }
 
@@ -108,7 +108,7 @@ impl Params {
                 Resolution::Length => 1,
             },
             plane_seen: u32::from(frame.plane.is_some()),
-            gains_differ: u32::from(frame.gains_differ()),
+            exposures_differ: u32::from(frame.exposures_differ()),
             padding: [0; 3],
         }
     }
@@ -165,7 +165,7 @@ impl Source {
             }
             Distortion::Equirectangular => (none, none, none, limit),
         };
-        let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
+        let exposure = Vec3::from_array(source.exposure.map(f));
         Self {
             axes: [axis(0), axis(1), axis(2)],
             focal: source.lens.focal.as_vec2().to_array(),
@@ -180,7 +180,7 @@ impl Source {
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            gain: gain.extend(0.0).to_array(),
+            exposure: exposure.extend(1.0).to_array(),
             prism: prism.map(f),
         }
     }
