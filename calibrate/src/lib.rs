@@ -11,6 +11,7 @@
 mod camera;
 pub mod colmap;
 pub mod export;
+pub mod exposure;
 pub mod formats;
 mod lens;
 pub mod opencv;

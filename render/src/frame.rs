@@ -5,6 +5,7 @@ pub(crate) mod every_lens;
 
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
+use crate::reference::blend_at;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
 use proxy::Proxy;
@@ -27,6 +28,10 @@ pub struct ProxyPoint {
 /// the cost; no capture's held-out score changed by more than 0.02 dB, even with 0.5.
 pub const LEVEL_BIAS: f64 = 0.25;
 
+/// Cells across the image's longer side of the grid that a frame's exposure is averaged
+/// over.
+const EXPOSURE_GRID: f64 = 16.0;
+
 /// A source view, relative to the desired one.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameSource {
@@ -44,6 +49,8 @@ pub struct FrameSource {
     pub footprint_ratio: f64,
     /// Pixels from the border over which it fades in.
     pub feather_px: f64,
+    /// What red, green and blue are multiplied by to bring it to the frame's exposure.
+    pub exposure: [f64; 3],
 }
 
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
@@ -106,6 +113,7 @@ impl<'a> Frame<'a> {
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
+                    exposure: [1.0; 3],
                 }
             })
             .collect();
@@ -113,18 +121,62 @@ impl<'a> Frame<'a> {
         let plane = plane
             .inverse_distance_from(desired_center)
             .map(|q| desired_from_world * q);
-        Self {
+        let mut frame = Self {
             lumigraph,
             desired,
             options,
             sources,
             plane,
+        };
+        if lumigraph.sources.iter().any(|s| s.gain != [1.0; 3]) {
+            let gain = frame.gain();
+            for (source, of) in frame.sources.iter_mut().zip(&lumigraph.sources) {
+                source.exposure = std::array::from_fn(|c| gain[c] / of.gain[c]);
+            }
         }
+        frame
     }
 
-    /// Whether any source view's exposure differs from one.
-    pub fn gains_differ(&self) -> bool {
-        self.lumigraph.sources.iter().any(|s| s.gain != [1.0; 3])
+    /// Whether any source view is brought to another exposure.
+    pub fn exposures_differ(&self) -> bool {
+        self.sources.iter().any(|s| s.exposure != [1.0; 3])
+    }
+
+    /// The exposure of the whole frame: the mean of Σ wⱼ·gainⱼ over a grid of its pixels.
+    ///
+    /// It is one for the frame, as for a photo taken there. With the mean of each pixel in
+    /// its place nothing would change: where photos agree but for their gains,
+    /// Σ wᵢ·(Σ wⱼ·gainⱼ)/gainᵢ·colourᵢ is Σ wᵢ·colourᵢ again, and all steps stay.
+    fn gain(&self) -> [f64; 3] {
+        let size = [self.desired.width, self.desired.height].map(f64::from);
+        let longer = size[0].max(size[1]);
+        // Cells as square as fit, so that their middles lie well within the image.
+        let [columns, rows] = size.map(|side| (EXPOSURE_GRID * side / longer).round().max(1.0));
+        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        for row in 0..rows as u32 {
+            for column in 0..columns as u32 {
+                let middle = |i: u32| f64::from(i) + 0.5;
+                let pixel = Pixel::new(
+                    size[0] / columns * middle(column),
+                    size[1] / rows * middle(row),
+                );
+                let Some(point) = self.proxy_point(pixel) else {
+                    continue;
+                };
+                for contributor in blend_at(self, &point) {
+                    let gain = self.lumigraph.sources[contributor.source_idx].gain;
+                    weights += contributor.weight;
+                    for c in 0..3 {
+                        sum[c] += contributor.weight * gain[c];
+                    }
+                }
+            }
+        }
+        if weights > 0.0 {
+            sum.map(|s| s / weights)
+        } else {
+            [1.0; 3]
+        }
     }
 
     /// The proxy point seen at a pixel of the desired image, if there is one.

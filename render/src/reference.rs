@@ -27,8 +27,7 @@ pub fn blend_at(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<Contributor> {
 
 /// The colour of a proxy point: premultiplied sRGB and coverage, 0…1.
 ///
-/// Each contributor is brought to the blended exposure of its neighbours,
-/// Σ wⱼ·gainⱼ / gainᵢ.
+/// Each contributor is brought to the frame's exposure first.
 ///
 /// # Errors
 /// A contributor's photo cannot be decoded.
@@ -38,22 +37,17 @@ pub fn color_at(
     contributors: &[Contributor],
 ) -> Result<[f64; 4], PhotoError> {
     let mut color = [0.0; 4];
-    let mut gain = [0.0; 3];
     for &Contributor { source_idx, weight } in contributors {
         let Some(pixel) = frame.project(source_idx, point) else {
             continue;
         };
         let photo = frame.lumigraph.photos.get(source_idx)?;
         let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
-        let source_gain = frame.lumigraph.sources[source_idx].gain;
+        let exposure = frame.sources[source_idx].exposure;
         for c in 0..3 {
-            color[c] += weight * sample[c] / source_gain[c];
-            gain[c] += weight * source_gain[c];
+            color[c] += weight * exposure[c] * sample[c];
         }
         color[3] += weight * sample[3];
-    }
-    for c in 0..3 {
-        color[c] *= gain[c];
     }
     Ok(color)
 }

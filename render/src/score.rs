@@ -14,6 +14,10 @@ pub struct Score {
     /// identical.
     #[serde(serialize_with = "capped")]
     pub psnr: f64,
+    /// PSNR in dB over the whole picture when it is first given the photo's exposure: red,
+    /// green and blue are each multiplied by the factor that fits the covered pixels best.
+    #[serde(serialize_with = "capped")]
+    pub psnr_exposed: f64,
     /// Structural similarity over the whole picture; 1 where it is identical.
     pub ssim: f64,
     /// PSNR in dB over the covered pixels, those with half coverage or more; `None` where
@@ -94,8 +98,24 @@ pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreErro
     let covered_count = covered().count();
     let covered_total: u64 = covered().map(|(i, _)| squared_error(i)).sum();
     let alpha_sum: u64 = alphas().map(u64::from).sum();
+    let gain: [f64; 3] = std::array::from_fn(|c| {
+        let pairs = covered().map(|(i, _)| (ours[i][c], theirs[i][c]));
+        best_gain(pairs)
+    });
+    let exposed_error = |i: usize| -> u64 {
+        (0..3)
+            .map(|c| {
+                squared(
+                    (f64::from(ours[i][c]) * gain[c]).round() as u8,
+                    theirs[i][c],
+                )
+            })
+            .sum()
+    };
+    let exposed_total: u64 = (0..count).map(exposed_error).sum();
     Ok(Score {
         psnr: psnr(total, count),
+        psnr_exposed: psnr(exposed_total, count),
         ssim: ssim(&ours, &theirs, width as usize),
         psnr_covered: (covered_count > 0).then(|| psnr(covered_total, covered_count)),
         coverage: alpha_sum as f64 / (255.0 * count as f64),
@@ -115,10 +135,23 @@ pub fn mean(scores: &[Score]) -> Option<Score> {
         .collect();
     Some(Score {
         psnr: all(|s| s.psnr.min(PSNR_CAP_DB))?,
+        psnr_exposed: all(|s| s.psnr_exposed.min(PSNR_CAP_DB))?,
         ssim: all(|s| s.ssim)?,
         psnr_covered: mean_of(&covered),
         coverage: all(|s| s.coverage)?,
     })
+}
+
+/// The factor by which the first values of all pairs come closest to the second, in least
+/// squares; one where all are zero.
+fn best_gain(pairs: impl Iterator<Item = (u8, u8)>) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for (a, b) in pairs {
+        let (a, b) = (f64::from(a), f64::from(b));
+        product += a * b;
+        square += a * a;
+    }
+    if square > 0.0 { product / square } else { 1.0 }
 }
 
 fn capped<S: Serializer>(psnr: &f64, serializer: S) -> Result<S::Ok, S::Error> {
@@ -240,7 +273,7 @@ mod tests {
         let json = serde_json::to_string(&s).unwrap();
         assert_eq!(
             json,
-            r#"{"psnr":99.0,"ssim":1.0,"psnr_covered":99.0,"coverage":1.0}"#
+            r#"{"psnr":99.0,"psnr_exposed":99.0,"ssim":1.0,"psnr_covered":99.0,"coverage":1.0}"#
         );
     }
 
@@ -276,6 +309,40 @@ mod tests {
         let s = score(&rendered, &photo).unwrap();
         assert!((s.psnr - 20.0 * (255.0_f64 / 3.0).log10()).abs() < 1e-12);
         assert!(s.ssim < 1.0 && s.ssim > 0.8, "{}", s.ssim);
+    }
+
+    #[test]
+    fn a_picture_can_be_given_the_photos_exposure() {
+        let photo = picture(40, 23);
+        let mut darker = photo.clone();
+        for p in darker.pixels_mut() {
+            // Even values halve exactly.
+            p.0 = [p.0[0] / 2, p.0[1], p.0[2] / 2, 255];
+        }
+        let mut even = photo.clone();
+        for p in even.pixels_mut() {
+            p.0 = [p.0[0] & 0xFE, p.0[1], p.0[2] & 0xFE, 255];
+        }
+        let s = score(&darker, &even).unwrap();
+        assert!(s.psnr < 15.0, "{}", s.psnr);
+        assert_eq!(s.psnr_exposed, f64::INFINITY);
+        // What is not covered has no say.
+        let mut half = darker.clone();
+        for (x, _, p) in half.enumerate_pixels_mut() {
+            if x < 20 {
+                p.0 = [250, 0, 250, 0];
+            }
+        }
+        let mut seen = even.clone();
+        for (x, _, p) in seen.enumerate_pixels_mut() {
+            if x < 20 {
+                p.0 = [0; 4];
+            }
+        }
+        assert_eq!(score(&half, &seen).unwrap().psnr_exposed, f64::INFINITY);
+        let black = RgbaImage::from_pixel(40, 23, Rgba([0, 0, 0, 255]));
+        let s = score(&black, &photo).unwrap();
+        assert_eq!(s.psnr, s.psnr_exposed);
     }
 
     #[test]
@@ -376,6 +443,7 @@ mod tests {
     fn means_are_of_decibels() {
         let one = |psnr, psnr_covered| Score {
             psnr,
+            psnr_exposed: psnr,
             ssim: 0.5,
             psnr_covered,
             coverage: 0.25,

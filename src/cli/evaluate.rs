@@ -1,5 +1,6 @@
 //! `lumigraph evaluate`
 
+use super::exposure::ExposureArgs;
 use super::options::{DrawArgs, FieldArgs, ProxyArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};
@@ -17,9 +18,11 @@ use std::path::PathBuf;
 
 /// Score held-out photos: render each at its own pose and compare
 ///
-/// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR over
-/// the covered pixels, coverage, and processor time without decoding. Held out are the
-/// photos that the capture's split.json names, else every 8th.
+/// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR once the
+/// picture is given the photo's own exposure (psnr_exposed), PSNR over the covered pixels,
+/// coverage, how far the photos that share a pixel are apart in steps of 255, details aside
+/// (seams), and processor time without decoding. Held out are the photos that the capture's
+/// split.json names, else every 8th.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -36,6 +39,8 @@ pub(super) struct Args {
     every: Option<usize>,
     #[command(flatten)]
     proxy: ProxyArgs,
+    #[command(flatten)]
+    exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
     #[command(flatten)]
@@ -54,6 +59,8 @@ struct Line {
     name: String,
     #[serde(flatten)]
     score: Score,
+    /// See [`render::seams`].
+    seams: Option<f64>,
     cpu_ms: f64,
 }
 
@@ -69,6 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         held_out.clone(),
         args.scene.strict,
         &args.proxy,
+        &args.exposure,
         &args.field,
         &args.draw,
     )?;
@@ -80,6 +88,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return print_json(&result);
     }
     say!("proxy: {}", session.proxy.text());
+    say!("exposure: {}", session.exposure.text());
     say!("{}", Report::new(&session, &start).text());
     print(&table(&lines))
 }
@@ -129,6 +138,7 @@ fn score_photos(
         lines.push(Line {
             name: name.clone(),
             score: score(&drawn.picture, &photo)?,
+            seams: session.seams(&desired)?,
             cpu_ms: drawn.cpu.as_secs_f64() * 1e3,
         });
         bar.inc(1);
@@ -149,10 +159,12 @@ fn at_size(photo: RgbaImage, (width, height): (u32, u32)) -> RgbaImage {
 
 fn mean_line(lines: &[Line]) -> Option<Line> {
     let scores: Vec<Score> = lines.iter().map(|line| line.score).collect();
+    let seams: Vec<f64> = lines.iter().filter_map(|line| line.seams).collect();
     let cpu_ms: f64 = lines.iter().map(|line| line.cpu_ms).sum();
     Some(Line {
         name: "mean".to_owned(),
         score: mean(&scores)?,
+        seams: (!seams.is_empty()).then(|| seams.iter().sum::<f64>() / seams.len() as f64),
         cpu_ms: cpu_ms / lines.len() as f64,
     })
 }
@@ -162,7 +174,7 @@ fn json(session: &Session, lines: &[Line]) -> Value {
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
-    json!({"photos": lines, "mean": mean, "proxy": session.proxy.json()})
+    json!({"photos": lines, "mean": mean, "proxy": session.proxy.json(), "exposure": session.exposure.json()})
 }
 
 /// For people.
@@ -171,18 +183,20 @@ fn table(lines: &[Line]) -> String {
     let widest = lines.iter().map(|line| line.name.chars().count()).max();
     let width = widest.unwrap_or_default().max("photo".len());
     let mut text = format!(
-        "{:width$}  {:>7}  {:>6}  {:>12}  {:>8}  {:>8}\n",
-        "photo", "psnr", "ssim", "psnr_covered", "coverage", "cpu ms"
+        "{:width$}  {:>7}  {:>12}  {:>6}  {:>12}  {:>8}  {:>6}  {:>8}\n",
+        "photo", "psnr", "psnr_exposed", "ssim", "psnr_covered", "coverage", "seams", "cpu ms"
     );
     for line in lines.iter().chain(&mean) {
         let covered = line.score.psnr_covered;
         text += &format!(
-            "{:width$}  {:>7.2}  {:>6.4}  {:>12}  {:>8.4}  {:>8.1}\n",
+            "{:width$}  {:>7.2}  {:>12.2}  {:>6.4}  {:>12}  {:>8.4}  {:>6}  {:>8.1}\n",
             line.name,
             line.score.psnr.min(PSNR_CAP_DB),
+            line.score.psnr_exposed.min(PSNR_CAP_DB),
             line.score.ssim,
             covered.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB))),
             line.score.coverage,
+            line.seams.map_or("-".to_owned(), |v| format!("{v:.2}")),
             line.cpu_ms
         );
     }

@@ -1,5 +1,6 @@
 //! `lumigraph field`
 
+use super::exposure::ExposureArgs;
 use super::frames::{NamedView, of_path};
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
@@ -47,6 +48,9 @@ pub(super) struct Args {
     hold_out: HoldOutArgs,
     #[command(flatten)]
     proxy: ProxyArgs,
+    // Taken as by the commands that draw; weights do not depend on it.
+    #[command(flatten)]
+    _exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
     /// Size of the picture in pixels [default: the photo's]

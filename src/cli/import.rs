@@ -1,9 +1,11 @@
 //! `lumigraph import`
 
+use super::exposure::ExposureArgs;
 use super::options::{KeyArgs, print_warnings};
-use super::output::print;
+use super::output::{print, say};
 use super::session::progress;
 use lumigraph::scene::{ImportOptions, Scene};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Make a scene of photos and their calibration
@@ -36,6 +38,8 @@ pub(super) struct Args {
     /// wide lens sees more than 60° aside is left out, and masked where its photos end before.
     #[arg(long)]
     undistort: bool,
+    #[command(flatten)]
+    exposure: ExposureArgs,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -55,6 +59,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
     print_warnings(&warnings);
+    let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
+    say!("exposure: {}", exposure.text());
     if args.undistort {
         let bar = progress(scene.photos.len(), "undistorting photos");
         let step = || bar.inc(1);

@@ -4,6 +4,7 @@
 mod demo;
 mod evaluate;
 mod export;
+mod exposure;
 mod field;
 mod frames;
 mod generate;

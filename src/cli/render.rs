@@ -1,5 +1,6 @@
 //! `lumigraph render`
 
+use super::exposure::ExposureArgs;
 use super::frames::{ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::say;
@@ -31,6 +32,8 @@ pub(super) struct Args {
     #[command(flatten)]
     proxy: ProxyArgs,
     #[command(flatten)]
+    exposure: ExposureArgs,
+    #[command(flatten)]
     field: FieldArgs,
     #[command(flatten)]
     draw: DrawArgs,
@@ -48,6 +51,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.scene,
         &args.hold_out,
         &args.proxy,
+        &args.exposure,
         &args.field,
         &args.draw,
     )?;
@@ -74,10 +78,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return print_json(&json!({
             "frames": listed.collect::<Vec<_>>(),
             "proxy": session.proxy.json(),
+            "exposure": session.exposure.json(),
             "report": report,
         }));
     }
     say!("proxy: {}", session.proxy.text());
+    say!("exposure: {}", session.exposure.text());
     say!("{}", report.text());
     print(&format!(
         "{}: {} frames\n",

@@ -1,5 +1,6 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
+use super::exposure::{ExposureArgs, ExposureUsed};
 use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::say;
 use anyhow::bail;
@@ -19,6 +20,7 @@ use std::time::Duration;
 pub(super) struct Session {
     pub(super) scene: Scene,
     pub(super) proxy: ChosenProxy,
+    pub(super) exposure: ExposureUsed,
     pub(super) options: FieldOptions,
     pub(super) method: Method,
     /// Held-out photos, and those found corrupt.
@@ -39,12 +41,13 @@ pub(super) struct Timed {
 
 impl Session {
     /// A session without the photos of the given names; they play no part in fitting the
-    /// proxy either.
+    /// proxy and matching exposures either.
     pub(super) fn new(
-        scene: Scene,
+        mut scene: Scene,
         without: BTreeSet<String>,
         strict: bool,
         proxy: &ProxyArgs,
+        exposure: &ExposureArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
     ) -> anyhow::Result<Self> {
@@ -52,10 +55,12 @@ impl Session {
             return Err(SceneError::NothingLeft(scene.photos.len()).into());
         }
         let proxy = proxy.choose(&scene, &without)?;
+        let exposure = exposure.choose(&mut scene, &without);
         let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
         Ok(Self {
             scene,
             proxy,
+            exposure,
             options: field.options(),
             method: field.method(),
             without,
@@ -72,12 +77,13 @@ impl Session {
         scene: &SceneArgs,
         hold_out: &HoldOutArgs,
         proxy: &ProxyArgs,
+        exposure: &ExposureArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
     ) -> anyhow::Result<Self> {
         let opened = scene.open()?;
         let without = hold_out.names(&opened)?;
-        Self::new(opened, without, scene.strict, proxy, field, draw)
+        Self::new(opened, without, scene.strict, proxy, exposure, field, draw)
     }
 
     pub(super) fn lumigraph(&self) -> &Lumigraph {
@@ -132,6 +138,17 @@ impl Session {
                 Ok(picture) => return Ok(picture),
                 Err(RenderError::Photo(error)) => self.leave_out(&error)?,
                 Err(error) => return Err(error.into()),
+            }
+        }
+    }
+
+    /// How visible seams are in a view: see [`render::seams`].
+    pub(super) fn seams(&mut self, desired: &View) -> anyhow::Result<Option<f64>> {
+        loop {
+            let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            match render::seams(&frame) {
+                Ok(seams) => return Ok(seams),
+                Err(error) => self.leave_out(&error)?,
             }
         }
     }

@@ -30,6 +30,9 @@ pub struct SceneFile {
     /// The scene's own proxy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proxy: Option<ProxyEntry>,
+    /// How the photos' gains were found; absent where they were not, or given by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<ExposureEntry>,
     /// How the scene was made.
     #[serde(default)]
     pub settings: Settings,
@@ -84,6 +87,18 @@ pub struct ProxyEntry {
     /// For a fitted one, the photos that were held out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted_without: Option<Vec<String>>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Extra,
+}
+
+/// How the photos' gains were found. A matched scene without gains is one whose photos
+/// do not differ.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ExposureEntry {
+    /// The photos that were held out.
+    #[serde(default)]
+    pub matched_without: Vec<String>,
     /// Everything else.
     #[serde(flatten)]
     pub other: Extra,

@@ -90,6 +90,7 @@ impl Scene {
             photos: photos.collect(),
             reconstruction,
             proxy: None,
+            exposure: None,
             settings: Settings {
                 camera_matrix: options.keys.camera_matrix.clone(),
                 distortion: options.keys.distortion.clone(),

@@ -6,6 +6,7 @@
 
 mod calibration;
 mod error;
+mod exposure;
 pub mod file;
 mod import;
 mod lumigraph;
@@ -17,12 +18,13 @@ mod undistort;
 
 pub use calibration::{Sizes, read_bare};
 pub use error::{SceneError, Warning};
+pub use exposure::Matched;
 pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
 pub use relative::relative;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
-use file::{Extra, Settings};
+use file::{ExposureEntry, Extra, Settings};
 use proxy::Proxy;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -36,6 +38,8 @@ pub struct Scene {
     pub reconstruction: Reconstruction,
     /// The surface that was made for this scene, if any.
     pub proxy: Option<SceneProxy>,
+    /// How the photos' gains were found; `None` where they were not, or given by hand.
+    pub exposure: Option<ExposureEntry>,
     /// How the scene was made.
     pub settings: Settings,
     /// The folder it was read from or saved to; `None` for a capture that was imported in

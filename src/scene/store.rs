@@ -127,6 +127,7 @@ impl Scene {
             photos,
             reconstruction,
             proxy,
+            exposure: file.exposure,
             capture: at(&file.settings.capture),
             calibration: at(&file.settings.calibration),
             settings: file.settings,
@@ -246,6 +247,7 @@ impl Scene {
             photos: self.photos.iter().map(entry).collect(),
             model: MODEL_FOLDER.to_owned(),
             proxy: self.proxy.as_ref().map(proxy_entry),
+            exposure: self.exposure.clone(),
             settings,
             other: self.other.clone(),
         };

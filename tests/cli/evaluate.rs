@@ -23,7 +23,15 @@ fn the_json_is_as_documented() {
             .cloned()
             .collect::<Vec<_>>()
     };
-    let scores = ["psnr", "ssim", "psnr_covered", "coverage", "cpu_ms"];
+    let scores = [
+        "psnr",
+        "psnr_exposed",
+        "ssim",
+        "psnr_covered",
+        "coverage",
+        "seams",
+        "cpu_ms",
+    ];
     for photo in result["photos"].as_array().unwrap() {
         assert_eq!(keys(photo)[1..], scores);
         assert!(scores.iter().all(|&score| photo[score].is_f64()), "{photo}");

@@ -4,6 +4,7 @@ mod bad_input;
 mod captures;
 mod evaluate;
 mod export;
+mod exposure;
 mod field;
 mod formats;
 mod gpu;

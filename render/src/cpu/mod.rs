@@ -205,7 +205,6 @@ struct Engine<'a> {
     rays: &'a RayMap,
     plane: [f32; 3],
     no_plane: bool,
-    gains: bool,
 }
 
 impl<'a> Engine<'a> {
@@ -217,7 +216,6 @@ impl<'a> Engine<'a> {
             rays,
             plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
             no_plane: frame.plane.is_none(),
-            gains: frame.gains_differ(),
         }
     }
 
@@ -250,34 +248,25 @@ impl<'a> Engine<'a> {
     ) -> Result<(), PhotoError> {
         let count = out.len() / 4;
         let mut color = [glam::Vec4::ZERO; LANES];
-        let mut gain = [glam::Vec4::ZERO; LANES];
         let mut sum = [0.0_f32; LANES];
         for (i, sight, weight) in seen {
             if weight[..count].iter().all(|w| *w == 0.0) {
                 continue;
             }
             let photo = self.frame.lumigraph.photos.get(i)?;
-            let [r, g, b] = self.sources[i].gain;
-            let source_gain = glam::Vec4::new(r, g, b, 1.0);
+            let exposure = self.sources[i].exposure;
             for k in 0..count {
                 let w = weight[k];
                 if w > 0.0 {
-                    let mut sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
-                    if self.gains {
-                        sample /= source_gain;
-                        gain[k] += source_gain * w;
-                    }
-                    color[k] += sample * w;
+                    let sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
+                    color[k] += sample * (exposure * w);
                     sum[k] += w;
                 }
             }
         }
         for (k, out) in out.chunks_exact_mut(4).enumerate() {
             if sum[k] > 0.0 {
-                let mut rgba = color[k] / (sum[k] * 255.0);
-                if self.gains {
-                    rgba *= gain[k] / sum[k];
-                }
+                let rgba = color[k] / (sum[k] * 255.0);
                 out.copy_from_slice(&straight_rgba8(rgba.to_array().map(f64::from)));
             }
         }

@@ -31,7 +31,8 @@ pub(crate) struct Source {
     area_scale: f32,
     by_distance: bool,
     desired_by_distance: bool,
-    pub gain: [f32; 3],
+    /// What colours are multiplied by; alpha by one.
+    pub exposure: glam::Vec4,
     beta: f32,
     by_length: bool,
 }
@@ -68,7 +69,7 @@ impl Source {
             area_scale: frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO)) as f32,
             by_distance: source.lens.is_wide(),
             desired_by_distance: frame.desired.lens.is_wide(),
-            gain: frame.lumigraph.sources[source_idx].gain.map(|v| v as f32),
+            exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0),
             beta: frame.options.beta as f32,
             by_length: frame.options.resolution == Resolution::Length,
         }

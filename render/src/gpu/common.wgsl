@@ -21,7 +21,7 @@ struct Params {
     blend: u32,
     resolution: u32,
     plane_seen: u32,
-    gains_differ: u32,
+    exposures_differ: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -59,7 +59,7 @@ const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
 // rgb.
-const GAIN = 9u;
+const EXPOSURE = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
 // Shear and horizon of a sensor that is tilted or skewed (`Sensor` of sensor.rs).
@@ -381,15 +381,12 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
 // The blend of photos so far.
 struct Mix {
     color: vec4f,
-    gain: vec3f,
     sum: f32,
 }
 
 fn add(mix: ptr<function, Mix>, weight: f32, color: vec4f, source_idx: u32) {
-    if params.gains_differ == 1u {
-        let gain = source_data(source_idx, GAIN).rgb;
-        (*mix).color += weight * vec4f(color.rgb / gain, color.a);
-        (*mix).gain += weight * gain;
+    if params.exposures_differ == 1u {
+        (*mix).color += weight * source_data(source_idx, EXPOSURE) * color;
     } else {
         (*mix).color += weight * color;
     }
@@ -401,8 +398,7 @@ fn resolve(mix: Mix) -> vec4f {
     if mix.sum <= 0.0 || mix.color.a <= 0.0 {
         return vec4f(0.0);
     }
-    let gain = select(vec3f(1.0), mix.gain / mix.sum, params.gains_differ == 1u);
-    let rgb = mix.color.rgb * gain / mix.color.a;
+    let rgb = mix.color.rgb / mix.color.a;
     let alpha = mix.color.a / mix.sum;
     // What rounds to no coverage has no colour.
     return select(vec4f(rgb, alpha), vec4f(0.0), alpha * 255.0 < 0.5);

@@ -19,7 +19,7 @@ fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
     }
     var nearest = nearest_sources(ray, s);
     let count = weigh(&nearest);
-    var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
+    var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
         if nearest.a[n] <= 0.0 {
             continue;

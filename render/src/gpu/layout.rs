@@ -26,7 +26,7 @@ pub(crate) struct Params {
     pub blend: u32,
     pub resolution: u32,
     pub plane_seen: u32,
-    pub gains_differ: u32,
+    pub exposures_differ: u32,
     pub padding: [u32; 3],
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Source {
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub gain: [f32; 4],
+    pub exposure: [f32; 4],
     pub prism: [f32; 4],
     pub shear: [f32; 2],
     pub horizon: [f32; 2],
@@ -114,7 +114,7 @@ impl Params {
                 Resolution::Length => 1,
             },
             plane_seen: u32::from(frame.plane.is_some()),
-            gains_differ: u32::from(frame.gains_differ()),
+            exposures_differ: u32::from(frame.exposures_differ()),
             padding: [0; 3],
         }
     }
@@ -180,7 +180,7 @@ impl Source {
             Distortion::Equirectangular => (none, none, none, limit),
         };
         let (focal, sensor) = focal_and_sensor(&source.lens);
-        let gain = Vec3::from_array(frame.lumigraph.sources[source_idx].gain.map(f));
+        let exposure = Vec3::from_array(source.exposure.map(f));
         Self {
             axes: [axis(0), axis(1), axis(2)],
             focal: focal.to_array(),
@@ -195,7 +195,7 @@ impl Source {
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            gain: gain.extend(0.0).to_array(),
+            exposure: exposure.extend(1.0).to_array(),
             prism: prism.map(f),
             shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),

@@ -93,7 +93,7 @@ fn params_lie_where_the_shaders_read_them() {
     }
     let expected = offsets!(
         plane rays_in_table ray_scale ray_offset array_size size source_count
-        desired_by_distance beta full_weight k blend resolution plane_seen gains_differ
+        desired_by_distance beta full_weight k blend resolution plane_seen exposures_differ
     );
     for shader in SHADERS {
         let (found, size) = members(&parse(shader), "Params");
@@ -123,7 +123,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("LENS", offset_of!(Source, lens)),
             ("LENS_REST", offset_of!(Source, lens_rest)),
             ("KIND", offset_of!(Source, kind)),
-            ("GAIN", offset_of!(Source, gain)),
+            ("EXPOSURE", offset_of!(Source, exposure)),
             ("PRISM", offset_of!(Source, prism)),
             ("SENSOR", offset_of!(Source, shear)),
         ] {

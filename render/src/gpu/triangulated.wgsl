@@ -48,7 +48,7 @@ fn triangle(in: Corner) -> @location(0) vec4f {
     if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
-    var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
+    var mix = Mix(vec4f(0.0), 0.0);
     for (var i = in.list.x; i < in.list.x + in.list.y; i++) {
         let listed = entry(i);
         let weight = dot(in.shares, listed.yzw);
@@ -110,7 +110,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     }
     // 2. Their weights and colours.
     let t = max(threshold(&terms, count), SMALLEST_THRESHOLD);
-    var mix = Mix(vec4f(0.0), vec3f(0.0), 0.0);
+    var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
         let diff = terms.diff[n];
         var weight = terms.a[n] * max(1.0 - diff / t, 0.0);

@@ -1,0 +1,241 @@
+//! One channel's gains: robust least squares in the logarithms.
+
+use super::Observation;
+
+/// One channel of the observations, ordered by point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Channel {
+    photo_count: usize,
+    /// Of each observation: its photo, the logarithm of its value, what it counts for.
+    photo: Vec<usize>,
+    log: Vec<f64>,
+    evidence: Vec<f64>,
+    /// Of each point: where its observations begin; and the end of the last.
+    start: Vec<usize>,
+}
+
+/// Sensor noise and blur weigh more where it is dark: a value counts for v²/(v² + v₀²).
+const HALF_TRUSTED: f64 = 32.0;
+/// Tukey's constant for 95 % efficiency on Gaussian noise (Holland and Welsch 1977).
+const TUKEY: f64 = 4.685;
+/// Huber's constant for the same; its steps bring Tukey's near the answer.
+const HUBER: f64 = 1.345;
+const HUBER_STEPS: usize = 5;
+const TUKEY_STEPS: usize = 10;
+/// No noise is assumed smaller than half a step of the stored values at white.
+const MIN_NOISE: f64 = 0.5 / 255.0;
+
+impl Channel {
+    /// The observations that have a value in channel `c` and whose point `counts`; points
+    /// with a single such observation say nothing and are left out.
+    pub(super) fn new(
+        photo_count: usize,
+        by_point: &[&Observation],
+        c: usize,
+        counts: impl Fn(usize) -> bool,
+    ) -> Self {
+        let mut channel = Self {
+            photo_count,
+            ..Self::default()
+        };
+        for same_point in by_point.chunk_by(|a, b| a.point_idx == b.point_idx) {
+            let values = || {
+                same_point
+                    .iter()
+                    .filter_map(|o| Some((o.photo_idx, o.rgb[c]?)))
+            };
+            let count = values().count();
+            if count < 2 || !counts(same_point[0].point_idx) {
+                continue;
+            }
+            // All of a point's observations count alike, or the brighter would win.
+            let mean = values().map(|(_, v)| v).sum::<f64>() / count as f64;
+            let evidence = mean * mean / (mean * mean + HALF_TRUSTED * HALF_TRUSTED);
+            channel.start.push(channel.photo.len());
+            for (photo_idx, value) in values() {
+                channel.photo.push(photo_idx);
+                channel.log.push(value.ln());
+                channel.evidence.push(evidence);
+            }
+        }
+        channel.start.push(channel.photo.len());
+        channel
+    }
+
+    /// Which photos have an observation here.
+    pub(super) fn linked(&self) -> Vec<bool> {
+        let mut linked = vec![false; self.photo_count];
+        self.photo.iter().for_each(|&photo| linked[photo] = true);
+        linked
+    }
+
+    /// For each photo the lowest photo that shared points link it to; itself if none.
+    fn groups(&self) -> Vec<usize> {
+        let mut group: Vec<usize> = (0..self.photo_count).collect();
+        fn root(group: &[usize], mut i: usize) -> usize {
+            while group[i] != i {
+                i = group[i];
+            }
+            i
+        }
+        for range in self.start.windows(2) {
+            let first = self.photo[range[0]];
+            for &photo in &self.photo[range[0]..range[1]] {
+                let (a, b) = (root(&group, first), root(&group, photo));
+                group[a.max(b)] = a.min(b);
+            }
+        }
+        for i in 0..group.len() {
+            group[i] = root(&group, i);
+        }
+        group
+    }
+
+    /// Robust least squares over log gainᵢ and log albedoₚ: iteratively reweighted, by
+    /// Huber's function and then by Tukey's. Returns log gains by photo, which have the
+    /// mean zero over each linked group.
+    ///
+    /// Beside the observations, whose noise is estimated, stands the prior that a log gain
+    /// has the mean zero and the variance 1 / `precision`.
+    pub(super) fn fit(&self, precision: f64) -> Vec<f64> {
+        let groups = self.groups();
+        let mut log_gains = vec![0.0; self.photo_count];
+        let mut weights = self.evidence.clone();
+        let mut prior = 0.0;
+        for step in 0..HUBER_STEPS + TUKEY_STEPS {
+            self.solve(&weights, prior, &mut log_gains);
+            center(&groups, &mut log_gains);
+            let residuals = self.residuals(&weights, &log_gains);
+            let noise = self.noise(&residuals);
+            prior = precision * noise * noise;
+            for i in 0..residuals.len() {
+                let u = residuals[i].abs() * self.evidence[i].sqrt() / noise;
+                let robust = if step < HUBER_STEPS {
+                    (HUBER / u).min(1.0)
+                } else {
+                    (1.0 - (u / TUKEY).powi(2)).max(0.0).powi(2)
+                };
+                weights[i] = self.evidence[i] * robust;
+            }
+        }
+        log_gains
+    }
+
+    /// What is left of each observation's logarithm without its photo's gain and its
+    /// point's albedo.
+    fn residuals(&self, weights: &[f64], log_gains: &[f64]) -> Vec<f64> {
+        let mut residuals: Vec<f64> = (0..self.log.len())
+            .map(|i| self.log[i] - log_gains[self.photo[i]])
+            .collect();
+        self.less_point_means(weights, &mut residuals);
+        residuals
+    }
+
+    /// Subtracts from the values of each point's observations their weighted mean, or
+    /// where all weights are zero their plain mean.
+    fn less_point_means(&self, weights: &[f64], values: &mut [f64]) {
+        for range in self.start.windows(2) {
+            let range = range[0]..range[1];
+            let (mut sum, mut total) = (0.0, 0.0);
+            for i in range.clone() {
+                sum += weights[i] * values[i];
+                total += weights[i];
+            }
+            let mean = if total > 0.0 {
+                sum / total
+            } else {
+                values[range.clone()].iter().sum::<f64>() / range.len() as f64
+            };
+            values[range].iter_mut().for_each(|v| *v -= mean);
+        }
+    }
+
+    /// The median absolute residual as a Gaussian's standard deviation; a mean of n
+    /// observations takes up 1/n of each one's variance.
+    fn noise(&self, residuals: &[f64]) -> f64 {
+        let mut sizes = Vec::with_capacity(residuals.len());
+        for range in self.start.windows(2) {
+            let n = (range[1] - range[0]) as f64;
+            let whole = (n / (n - 1.0)).sqrt();
+            let size = |i: usize| whole * residuals[i].abs() * self.evidence[i].sqrt();
+            sizes.extend((range[0]..range[1]).map(size));
+        }
+        if sizes.is_empty() {
+            return MIN_NOISE;
+        }
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        (1.4826 * *median).max(MIN_NOISE)
+    }
+
+    /// The weighted least-squares gains, points eliminated (Schur's complement), by
+    /// conjugate gradients with Jacobi's preconditioner from the gains given.
+    fn solve(&self, weights: &[f64], prior: f64, x: &mut [f64]) {
+        let count = self.photo_count;
+        // S·x: each observation's x less its point's mean, weighted, summed by photo.
+        let mut scratch = vec![0.0; self.log.len()];
+        let mut summed = |value: &dyn Fn(usize) -> f64, out: &mut [f64]| {
+            for i in 0..scratch.len() {
+                scratch[i] = value(i);
+            }
+            self.less_point_means(weights, &mut scratch);
+            out.fill(0.0);
+            for i in 0..scratch.len() {
+                out[self.photo[i]] += weights[i] * scratch[i];
+            }
+        };
+        let mut b = vec![0.0; count];
+        summed(&|i| self.log[i], &mut b);
+        let mut diagonal = vec![prior; count];
+        for (&photo, weight) in self.photo.iter().zip(weights) {
+            diagonal[photo] += weight;
+        }
+        let precondition = |r: &[f64]| -> Vec<f64> {
+            let one = |(r, d): (&f64, &f64)| if *d > 0.0 { r / d } else { 0.0 };
+            r.iter().zip(&diagonal).map(one).collect()
+        };
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+
+        let mut product = vec![0.0; count];
+        summed(&|i| x[self.photo[i]], &mut product);
+        let mut r: Vec<f64> = (0..count)
+            .map(|i| b[i] - product[i] - prior * x[i])
+            .collect();
+        let mut z = precondition(&r);
+        let mut p = z.clone();
+        let mut rz = dot(&r, &z);
+        let enough = 1e-24 * dot(&b, &precondition(&b)).max(f64::MIN_POSITIVE);
+        for _ in 0..20 * count.max(10) {
+            if !(rz > enough) {
+                break;
+            }
+            summed(&|i| p[self.photo[i]], &mut product);
+            for i in 0..count {
+                product[i] += prior * p[i];
+            }
+            let step = rz / dot(&p, &product);
+            for i in 0..count {
+                x[i] += step * p[i];
+                r[i] -= step * product[i];
+            }
+            z = precondition(&r);
+            let next = dot(&r, &z);
+            for i in 0..count {
+                p[i] = z[i] + next / rz * p[i];
+            }
+            rz = next;
+        }
+    }
+}
+
+/// Only ratios of gains are seen: the geometric mean of each linked group is one.
+fn center(groups: &[usize], log_gains: &mut [f64]) {
+    let mut sums = vec![(0.0, 0.0); log_gains.len()];
+    for (value, &group) in log_gains.iter().zip(groups) {
+        sums[group].0 += value;
+        sums[group].1 += 1.0;
+    }
+    for (value, &group) in log_gains.iter_mut().zip(groups) {
+        *value -= sums[group].0 / sums[group].1;
+    }
+}

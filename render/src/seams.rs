@@ -1,0 +1,64 @@
+//! How visible it is in a frame where one photo's part ends and another's begins.
+
+use crate::frame::Frame;
+use crate::photos::PhotoError;
+use crate::reference::{blend_at, sample};
+use calibrate::Pixel;
+use rayon::prelude::*;
+
+/// Every how many pixels, across and down, the frame is looked at.
+const STEP: u32 = 8;
+/// Photos are sampled this many mip levels coarser than for the picture: what a coarse
+/// proxy puts in the wrong place is mostly finer than that, a step of exposure is not.
+const COARSER: f64 = 3.0;
+
+/// The root mean square, in steps of 255, of how far the contributors to a pixel are from
+/// their blend: Σ wᵢ·(cᵢ − Σ wⱼ·cⱼ)², colours at the frame's exposure, averaged over red,
+/// green and blue and over every eighth pixel across and down. `None` where no photo sees
+/// anything.
+///
+/// # Errors
+/// A photo that is needed cannot be decoded.
+pub fn seams(frame: &Frame<'_>) -> Result<Option<f64>, PhotoError> {
+    let rows: Vec<u32> = (STEP / 2..frame.desired.height)
+        .step_by(STEP as usize)
+        .collect();
+    let of_row = |y: u32| -> Result<(f64, u32), PhotoError> {
+        let (mut sum, mut count) = (0.0, 0);
+        for x in (STEP / 2..frame.desired.width).step_by(STEP as usize) {
+            if let Some(variance) = variance(frame, Pixel::center_of(x, y))? {
+                sum += variance;
+                count += 1;
+            }
+        }
+        Ok((sum, count))
+    };
+    let by_row: Vec<(f64, u32)> = rows.into_par_iter().map(of_row).collect::<Result<_, _>>()?;
+    let count: u32 = by_row.iter().map(|(_, count)| count).sum();
+    let sum: f64 = by_row.iter().map(|(sum, _)| sum).sum();
+    Ok((count > 0).then(|| 255.0 * (sum / f64::from(count)).sqrt()))
+}
+
+/// The weighted variance of the contributors' colours, 0…1, averaged over the channels.
+fn variance(frame: &Frame<'_>, pixel: Pixel) -> Result<Option<f64>, PhotoError> {
+    let Some(point) = frame.proxy_point(pixel) else {
+        return Ok(None);
+    };
+    let (mut first, mut second) = ([0.0; 3], [0.0; 3]);
+    let contributors = blend_at(frame, &point);
+    for contributor in &contributors {
+        let (i, weight) = (contributor.source_idx, contributor.weight);
+        let Some(at) = frame.project(i, &point) else {
+            continue;
+        };
+        let level = frame.level_of_detail(i, &point) + COARSER;
+        let color = sample(frame.lumigraph.photos.get(i)?, at, level);
+        for c in 0..3 {
+            let value = color[c] * frame.sources[i].exposure[c];
+            first[c] += weight * value;
+            second[c] += weight * value * value;
+        }
+    }
+    let of_channel = |c: usize| (second[c] - first[c] * first[c]).max(0.0);
+    Ok((!contributors.is_empty()).then(|| (0..3).map(of_channel).sum::<f64>() / 3.0))
+}

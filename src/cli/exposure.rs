@@ -1,0 +1,112 @@
+//! Whether and how photos are brought to one exposure.
+
+use super::output::say;
+use super::session::spinner;
+use calibrate::exposure::{Evidence, Verdict};
+use clap::Args;
+use lumigraph::scene::Scene;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+/// Whether photos are brought to one exposure.
+#[derive(Args)]
+pub(super) struct ExposureArgs {
+    /// Blend photos as they were exposed, without matching them
+    #[arg(long)]
+    no_exposure: bool,
+}
+
+/// What became of the photos' exposures.
+pub(super) struct ExposureUsed {
+    /// Smallest and largest gain of all photos and channels; `None` where none is used.
+    range: Option<(f64, f64)>,
+    how: How,
+    seconds: f64,
+}
+
+enum How {
+    Off,
+    Stored,
+    Matched(Verdict),
+}
+
+impl ExposureArgs {
+    /// Gives the scene's photos the gains to draw with: its own if it has been written
+    /// with some that rest on none of the photos in `without`, else new ones.
+    pub(super) fn choose(&self, scene: &mut Scene, without: &BTreeSet<String>) -> ExposureUsed {
+        let start = Instant::now();
+        let how = if self.no_exposure {
+            scene.forget_exposure();
+            How::Off
+        } else if scene.folder.is_some() && scene.exposure_is_without(without) {
+            How::Stored
+        } else {
+            let bar = spinner("matching exposures");
+            let matched = scene.match_exposure(without);
+            bar.finish_and_clear();
+            for warning in &matched.warnings {
+                say!("note: for matching exposures, {warning}");
+            }
+            How::Matched(matched.verdict)
+        };
+        let gains = scene.photos.iter().filter_map(|p| p.gain).flatten();
+        let range = gains.fold(None, |range: Option<(f64, f64)>, gain| {
+            let (low, high) = range.unwrap_or((gain, gain));
+            Some((low.min(gain), high.max(gain)))
+        });
+        ExposureUsed {
+            range,
+            how,
+            seconds: start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+impl ExposureUsed {
+    /// For people.
+    pub(super) fn text(&self) -> String {
+        let range = self.range.map_or_else(String::new, |(low, high)| {
+            format!("gains {low:.3} to {high:.3}")
+        });
+        let percent = |v: f64| 100.0 * v;
+        match (&self.how, self.range) {
+            (How::Off, _) => "as it is (--no-exposure)".to_owned(),
+            (How::Stored, Some(_)) => format!("{range} (the scene's own)"),
+            (How::Stored, None) => "as it is (the scene has no gains)".to_owned(),
+            (How::Matched(Verdict::Matched(e)), _) => {
+                let error = percent(e.error);
+                format!("{range}, ±{error:.1} % (matched in {:.1} s)", self.seconds)
+            }
+            (How::Matched(Verdict::NotMeasurable(e)), _) => format!(
+                "as it is (gains differ by {:.1} %, too little or too unsure, ±{:.1} %; found in \
+                 {:.1} s)",
+                percent(e.spread),
+                percent(e.error),
+                self.seconds
+            ),
+            (How::Matched(Verdict::NoLinks), _) => {
+                "as it is (no sparse points to match photos by)".to_owned()
+            }
+        }
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let (how, evidence): (&str, Option<Evidence>) = match self.how {
+            How::Off => ("off", None),
+            How::Stored if self.range.is_some() => ("the scene's own", None),
+            How::Stored => ("the scene has none", None),
+            How::Matched(Verdict::Matched(e)) => ("matched", Some(e)),
+            How::Matched(Verdict::NotMeasurable(e)) => ("not measurable", Some(e)),
+            How::Matched(Verdict::NoLinks) => ("no links", None),
+        };
+        json!({
+            "used": self.range.is_some(),
+            "how": how,
+            "range": self.range.map(|(low, high)| [low, high]),
+            "spread": evidence.map(|e| e.spread),
+            "error": evidence.map(|e| e.error),
+            "seconds": self.seconds,
+        })
+    }
+}

@@ -1,0 +1,70 @@
+//! The photos' gains.
+
+use super::file::{ExposureEntry, Extra};
+use super::{Scene, Warning};
+use calibrate::exposure::{self, Verdict};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// What matching the exposures of a scene's photos has found.
+#[derive(Clone, Debug)]
+pub struct Matched {
+    /// Whether they differ.
+    pub verdict: Verdict,
+    /// The photos that could not be decoded, and had no say.
+    pub warnings: Vec<Warning>,
+}
+
+impl Scene {
+    /// Estimates every photo's gain, and sets it, from those of their colours at the sparse
+    /// points, as if the photos of the given names had never been taken; these have none
+    /// then. Where gains do not differ measurably no photo has one.
+    ///
+    /// Decodes each photo that sees a point, and keeps none. See
+    /// [`calibrate::exposure`].
+    pub fn match_exposure(&mut self, without: &BTreeSet<String>) -> Matched {
+        let rest = self.reconstruction.without_images(without);
+        let used = || self.photos.iter().filter(|p| !without.contains(&p.name));
+        let names: Vec<&str> = used().map(|p| p.name.as_str()).collect();
+        let files: Vec<&Path> = used().map(|p| p.path.as_path()).collect();
+        let patches = exposure::patches(&rest, &names);
+        let (observations, failed) = exposure::sample_files(&files, &patches);
+        let matched = exposure::estimate(names.len(), &patches.points_in_world, &observations);
+
+        let warnings = failed.into_iter().map(|(idx, error)| Warning::LeftOut {
+            name: names[idx].to_owned(),
+            reason: error.to_string(),
+        });
+        let warnings = warnings.collect();
+        let differ = matches!(matched.verdict, Verdict::Matched(_));
+        let mut gains = matched.gains.into_iter();
+        for photo in &mut self.photos {
+            photo.gain = None;
+            if !without.contains(&photo.name) {
+                photo.gain = gains.next().filter(|_| differ);
+            }
+        }
+        self.exposure = Some(ExposureEntry {
+            matched_without: without.iter().cloned().collect(),
+            other: Extra::new(),
+        });
+        Matched {
+            verdict: matched.verdict,
+            warnings,
+        }
+    }
+
+    /// Whether the scene's gains rest on none of the photos of the given names: they were
+    /// matched without them, or given by hand.
+    pub fn exposure_is_without(&self, names: &BTreeSet<String>) -> bool {
+        self.exposure
+            .as_ref()
+            .is_none_or(|own| names.iter().all(|name| own.matched_without.contains(name)))
+    }
+
+    /// Forgets all gains.
+    pub fn forget_exposure(&mut self) {
+        self.exposure = None;
+        self.photos.iter_mut().for_each(|photo| photo.gain = None);
+    }
+}

@@ -1,0 +1,151 @@
+//! Photos of different exposures.
+
+use crate::run::{files, lumigraph, with_wall};
+use serde_json::Value;
+use std::path::Path;
+
+/// A gain of each channel for the photo of an index, within ±30 %.
+fn gain(i: usize) -> [f64; 3] {
+    let at = |salt: usize| 1.0 + 0.3 * (((7 * i + salt) % 9) as f64 / 4.0 - 1.0);
+    [at(0), at(3), at(5)]
+}
+
+/// Gives the photos of `wall` their gains, clipped to bytes.
+fn expose(folder: &Path) {
+    for i in 0..9 {
+        let path = folder.join(format!("wall/images/{i:04}.png"));
+        let mut photo = image::open(&path).unwrap().into_rgb8();
+        for pixel in photo.pixels_mut() {
+            for (v, g) in pixel.0.iter_mut().zip(gain(i)) {
+                *v = (f64::from(*v) * g).round().min(255.0) as u8;
+            }
+        }
+        photo.save(&path).unwrap();
+    }
+}
+
+fn evaluate(folder: &Path, options: &str) -> Value {
+    lumigraph(folder, &format!("evaluate {options} --json"))
+        .ok()
+        .json()
+}
+
+fn gains(folder: &Path) -> Vec<Option<[f64; 3]>> {
+    let text = std::fs::read(folder.join("scene/scene.json")).unwrap();
+    let scene: Value = serde_json::from_slice(&text).unwrap();
+    let of = |photo: &Value| serde_json::from_value(photo["gain"].clone()).unwrap();
+    scene["photos"].as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn known_gains_are_found_and_seams_go() {
+    let folder = with_wall();
+    let equal = evaluate(folder.path(), "wall -o equal");
+    expose(folder.path());
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(ran.stderr.contains("exposure: gains 0."), "{}", ran.stderr);
+
+    // 1. In the scene's file, relative to each other.
+    let found: Vec<[f64; 3]> = gains(folder.path())
+        .into_iter()
+        .map(Option::unwrap)
+        .collect();
+    for c in 0..3 {
+        let error = |i: usize| found[i][c].ln() - gain(i)[c].ln();
+        let mean = (0..9).map(error).sum::<f64>() / 9.0;
+        for i in 0..9 {
+            assert!(
+                (error(i) - mean).abs() < 0.01,
+                "{i}: {:?}, {:?}",
+                found[i],
+                gain(i)
+            );
+        }
+    }
+
+    // 2. In what is drawn: the same from the capture as from the scene.
+    let matched = evaluate(folder.path(), "wall -o matched");
+    evaluate(folder.path(), "scene -o again");
+    assert!(files(&folder.path().join("matched")) == files(&folder.path().join("again")));
+    let unmatched = evaluate(folder.path(), "wall --no-exposure -o unmatched");
+    let mean = |result: &Value, score: &str| result["mean"][score].as_f64().unwrap();
+    let seams = [&equal, &matched, &unmatched].map(|r| mean(r, "seams"));
+    assert!(
+        seams[1] < seams[0] + 0.5 && seams[2] > 5.0 * seams[1],
+        "{seams:?}"
+    );
+    let exposed = [&equal, &matched, &unmatched].map(|r| mean(r, "psnr_exposed"));
+    assert!(exposed[1] > exposed[0] - 1.0, "{exposed:?}");
+    assert!(exposed[1] > exposed[2] + 3.0, "{exposed:?}");
+    assert_eq!(matched["exposure"]["how"], "matched");
+    assert_eq!(unmatched["exposure"]["how"], "off");
+    assert_eq!(unmatched["exposure"]["used"], false);
+
+    // 3. A path from photo to photo ends at the photos as they were exposed.
+    let drawn = |options: &str| {
+        let line = format!("render scene --views wall/sparse/0 {options}");
+        lumigraph(folder.path(), &line).ok();
+    };
+    drawn("-o all");
+    drawn("--no-exposure -o all-unmatched");
+    assert!(files(&folder.path().join("all")) == files(&folder.path().join("all-unmatched")));
+}
+
+#[test]
+fn photos_of_one_exposure_are_drawn_as_they_are() {
+    let folder = with_wall();
+    let with = evaluate(folder.path(), "wall -o with");
+    assert_eq!(
+        with["exposure"]["how"], "not measurable",
+        "{}",
+        with["exposure"]
+    );
+    evaluate(folder.path(), "wall --no-exposure -o without");
+    assert!(files(&folder.path().join("with")) == files(&folder.path().join("without")));
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(gains(folder.path()).iter().all(Option::is_none));
+    let text = std::fs::read_to_string(folder.path().join("scene/scene.json")).unwrap();
+    assert!(text.contains("matched_without"), "{text}");
+}
+
+#[test]
+fn held_out_photos_have_no_say() {
+    let folder = with_wall();
+    expose(folder.path());
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    for scene in ["wall", "scene"] {
+        let render = |out: &str| {
+            let line = format!(
+                "render {scene} --hold-out wall/split.json --path orbit --frames 2 -o {out}"
+            );
+            lumigraph(folder.path(), &line).ok();
+            files(&folder.path().join(out))
+        };
+        let honest = render(&format!("{scene}-a"));
+        let saved = folder.path().join("wall/images/0000.png");
+        let before = std::fs::read(&saved).unwrap();
+        image::RgbImage::from_pixel(96, 72, image::Rgb([200, 90, 30]))
+            .save(&saved)
+            .unwrap();
+        assert!(honest == render(&format!("{scene}-b")), "{scene}");
+        std::fs::write(&saved, before).unwrap();
+    }
+}
+
+#[test]
+fn without_exposure_nothing_is_stored_or_used() {
+    let folder = with_wall();
+    expose(folder.path());
+    let ran = lumigraph(folder.path(), "import wall --no-exposure -o scene").ok();
+    assert!(ran.stderr.contains("--no-exposure"), "{}", ran.stderr);
+    assert!(gains(folder.path()).iter().all(Option::is_none));
+    let plain = evaluate(folder.path(), "scene -o plain");
+    assert_eq!(plain["exposure"]["how"], "the scene has none");
+    evaluate(folder.path(), "wall --no-exposure -o none");
+    assert!(files(&folder.path().join("plain")) == files(&folder.path().join("none")));
+    lumigraph(
+        folder.path(),
+        "field wall --no-exposure --view 0004.png -o f.png",
+    )
+    .ok();
+}
