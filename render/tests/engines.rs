@@ -3,7 +3,9 @@
 mod common;
 
 use calibrate::{Distortion, Lens, Rigid3, View, colmap};
-use common::{Shot, assert_close, between, gpu, pinhole, psnr, psnr_covered};
+use common::{
+    METHODS, Shot, assert_close, between, by_all, by_reference, gpu, pinhole, psnr, psnr_covered,
+};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
@@ -11,38 +13,11 @@ use render::field::FieldEntry;
 use render::picture::contributors_exact;
 use render::{
     Blend, FieldOptions, Frame, Lumigraph, Method, PhotoError, PhotoStore, RenderError, Resolution,
-    SourceView, TriangulatedField, cpu, field, reference,
+    SourceView, TriangulatedField, cpu, reference,
 };
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-
-const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
-
-/// The picture by the plain engine.
-fn by_reference(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
-    Ok(match method {
-        Method::Exact => reference::render_exact(frame)?,
-        Method::Triangulated { cells_across } => {
-            field::render_reference(frame, &TriangulatedField::new(frame, cells_across)?)?
-        }
-    })
-}
-
-/// The picture by every engine there is, each with its name.
-fn by_all(
-    frame: &Frame<'_>,
-    method: Method,
-) -> Vec<(&'static str, Result<RgbaImage, RenderError>)> {
-    let mut pictures = vec![
-        ("reference", by_reference(frame, method)),
-        ("cpu", cpu::render(frame, method)),
-    ];
-    if let Some(mut gpu) = gpu() {
-        pictures.push(("gpu", gpu.render(frame, method)));
-    }
-    pictures
-}
 
 fn options(blend: Blend, resolution: Resolution) -> FieldOptions {
     FieldOptions {

@@ -138,6 +138,8 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
     assert_eq!(within(offset_of!(Source, wide), kind), 3);
+    let gain = offset_of!(Source, gain);
+    assert_eq!(within(offset_of!(Source, mask_layer), gain), 3);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
 }

@@ -7,7 +7,10 @@ use glam::{DQuat, DVec2, DVec3};
 use image::RgbaImage;
 use proxy::{Plane, Proxy};
 use render::gpu::Gpu;
-use render::{Lumigraph, PhotoStore, SourceView};
+use render::{
+    Frame, Lumigraph, Method, PhotoStore, RenderError, SourceView, TriangulatedField, cpu, field,
+    reference,
+};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// The graphics device, one for all tests of a program. `None`, said aloud, where no
@@ -148,6 +151,33 @@ impl Shot {
             proxy: Proxy::Plane(self.plane),
         }
     }
+}
+
+pub(crate) const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
+
+/// The picture by the plain engine.
+pub(crate) fn by_reference(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+    Ok(match method {
+        Method::Exact => reference::render_exact(frame)?,
+        Method::Triangulated { cells_across } => {
+            field::render_reference(frame, &TriangulatedField::new(frame, cells_across)?)?
+        }
+    })
+}
+
+/// The picture by every engine there is, each with its name.
+pub(crate) fn by_all(
+    frame: &Frame<'_>,
+    method: Method,
+) -> Vec<(&'static str, Result<RgbaImage, RenderError>)> {
+    let mut pictures = vec![
+        ("reference", by_reference(frame, method)),
+        ("cpu", cpu::render(frame, method)),
+    ];
+    if let Some(mut gpu) = gpu() {
+        pictures.push(("gpu", gpu.render(frame, method)));
+    }
+    pictures
 }
 
 /// A view between two others: `share` 0 is the first, 1 the second; the first's lens.
