@@ -45,8 +45,7 @@ impl Mask {
     /// repeats the border.
     pub(crate) fn range(&self, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) -> (u8, u8) {
         let (width, height) = self.levels[0].dimensions();
-        let block =
-            |at: f64, side: u32| at.clamp(0.0, f64::from(side - 1)).floor() as u32 / BLOCK;
+        let block = |at: f64, side: u32| at.clamp(0.0, f64::from(side - 1)).floor() as u32 / BLOCK;
         let (mut x0, mut x1) = (block(left, width), block(right, width));
         let (mut y0, mut y1) = (block(top, height), block(bottom, height));
         // As fine as a few blocks allow.
@@ -57,7 +56,8 @@ impl Mask {
             level += 1;
         }
         let blocks = &self.blocks[level];
-        let all = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| blocks.ranges[(y * blocks.columns + x) as usize]));
+        let all = (y0..=y1)
+            .flat_map(|y| (x0..=x1).map(move |x| blocks.ranges[(y * blocks.columns + x) as usize]));
         all.fold((u8::MAX, 0), union)
     }
 

@@ -270,7 +270,10 @@ impl PhotoStore {
             message,
         };
         let load = || (self.load_mask)(source_idx).map(Mask::new).map_err(failed);
-        slot.get_or_init(load).as_ref().map(Some).map_err(Clone::clone)
+        slot.get_or_init(load)
+            .as_ref()
+            .map(Some)
+            .map_err(Clone::clone)
     }
 
     /// Whether every mask that was asked for could be decoded.
@@ -374,7 +377,10 @@ mod tests {
             0 => Ok(GrayImage::new(4, 3)),
             _ => Err("c.png: corrupt".to_owned()),
         });
-        assert_eq!((0..3).map(|i| store.is_masked(i)).collect::<Vec<_>>(), [true, false, true]);
+        assert_eq!(
+            (0..3).map(|i| store.is_masked(i)).collect::<Vec<_>>(),
+            [true, false, true]
+        );
         assert_eq!(store.check_masks(), Ok(()));
         assert!(store.mask(1).is_none() && store.get(1).is_ok());
         assert_eq!(store.mask(2), Some(&Mask::nothing()));

@@ -79,7 +79,10 @@ fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
     };
     vec![
         ("nearer", moved(0.3 * distance * ahead)),
-        ("farther", moved(-0.8 * distance * ahead + 0.1 * distance * right)),
+        (
+            "farther",
+            moved(-0.8 * distance * ahead + 0.1 * distance * right),
+        ),
         ("small", middle.resized(67, 50)),
         ("at a photo", shot.views[4].clone()),
         ("between", middle),
@@ -277,7 +280,8 @@ fn a_mask_that_hides_nothing_changes_nothing_and_one_that_hides_all_removes_the_
         for method in METHODS {
             let pictures = |lumigraph| {
                 let all = by_all(&frame(lumigraph, &desired), method);
-                all.into_iter().map(|(engine, picture)| (engine, picture.unwrap()))
+                all.into_iter()
+                    .map(|(engine, picture)| (engine, picture.unwrap()))
             };
             for ((engine, a), (_, b)) in pictures(&plain).zip(pictures(&white)) {
                 assert!(a == b, "{name}, {engine}, {method:?}");
@@ -308,7 +312,10 @@ fn the_order_of_masked_photos_changes_nothing() {
     }
     let reordered = Lumigraph {
         photos: store(photos, masks),
-        sources: order.iter().map(|&i| lumigraph.sources[i].clone()).collect(),
+        sources: order
+            .iter()
+            .map(|&i| lumigraph.sources[i].clone())
+            .collect(),
         proxy: lumigraph.proxy,
     };
     for (name, desired) in desired_views(&shot) {
@@ -337,7 +344,10 @@ fn the_weight_fades_steadily_across_a_masks_edge() {
     for step in 0..6000 {
         let point = frame.proxy_point(Pixel::new(20.0 + f64::from(step) / 50.0, 66.0));
         let field = render::reference::blend_at(&frame, &point.unwrap());
-        let share = field.iter().find(|c| c.source_idx == 4).map_or(0.0, |c| c.weight);
+        let share = field
+            .iter()
+            .find(|c| c.source_idx == 4)
+            .map_or(0.0, |c| c.weight);
         if let Some(last) = last {
             assert!((share - last).abs() < 0.1, "{step}: {last}, {share}");
         }
@@ -359,7 +369,9 @@ fn mattes_become_coverage() {
         let world_from_camera = view.camera_from_world.inverse();
         let towards = world_from_camera * ray - view.center();
         let at = shot.plane.intersect(view.center(), towards);
-        at.map_or(0.0, |at| (60.0 * (0.2 - at.distance(middle) / distance)).clamp(0.0, 1.0))
+        at.map_or(0.0, |at| {
+            (60.0 * (0.2 - at.distance(middle) / distance)).clamp(0.0, 1.0)
+        })
     };
     for (view, photo) in shot.views.iter().zip(&mut photos) {
         for (x, y, pixel) in photo.enumerate_pixels_mut() {
@@ -441,7 +453,10 @@ fn masked_out_candidates_are_none_and_feathered_out_ones_are_the_last_resort() {
     };
     let shares = |candidates: &[Candidate]| {
         let field = blend(candidates, &FieldOptions::default());
-        field.iter().map(|c| (c.source_idx, c.weight)).collect::<Vec<_>>()
+        field
+            .iter()
+            .map(|c| (c.source_idx, c.weight))
+            .collect::<Vec<_>>()
     };
     assert_eq!(shares(&[candidate(0, 0.1, 1.0, 0.0)]), []);
     assert_eq!(
@@ -463,7 +478,10 @@ fn soft_mattes_and_masks_meet_in_one_photo() {
     // Half covered by its matte, and half of it ignored: what is left is half covered.
     let shot = Shot::of("wall", 2, None);
     let mut photos = shot.photos.clone();
-    photos.iter_mut().flat_map(RgbaImage::pixels_mut).for_each(|p: &mut Rgba<u8>| p.0[3] = 128);
+    photos
+        .iter_mut()
+        .flat_map(RgbaImage::pixels_mut)
+        .for_each(|p: &mut Rgba<u8>| p.0[3] = 128);
     let left = GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| Luma([u8::from(x < 80) * 255]));
     let lumigraph = Lumigraph {
         photos: store(photos, vec![Some(left.clone()), Some(left)]),

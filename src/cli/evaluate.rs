@@ -7,9 +7,9 @@ use super::report::{Report, Start};
 use super::session::{Session, progress};
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
-use image::RgbaImage;
+use image::{DynamicImage, RgbaImage};
 use lumigraph::scene::Scene;
-use render::score::{PSNR_CAP_DB, Score, mean, score};
+use render::score::{MaskedScore, PSNR_CAP_DB, Score, mean, mean_masked, score, score_masked};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -18,7 +18,8 @@ use std::path::PathBuf;
 /// Score held-out photos: render each at its own pose and compare
 ///
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR over
-/// the covered pixels, coverage, and processor time without decoding. Held out are the
+/// the covered pixels, coverage, and processor time without decoding; where a photo has an
+/// ignore mask or a matte, also PSNR, SSIM and coverage inside. Held out are the
 /// photos that the capture's split.json names, else every 8th.
 ///
 ///     lumigraph evaluate my-capture --every 4
@@ -54,6 +55,9 @@ struct Line {
     name: String,
     #[serde(flatten)]
     score: Score,
+    /// Inside the photo's own mask or matte, if it has one.
+    #[serde(flatten)]
+    masked: Option<MaskedScore>,
     cpu_ms: f64,
 }
 
@@ -121,7 +125,13 @@ fn score_photos(
             continue;
         };
         let desired = resized(view, size);
-        let photo = at_size(photo, (desired.width, desired.height));
+        let inside = photo
+            .inside()
+            .map(DynamicImage::from)
+            .map(|mask| mask.into_rgba8());
+        let size = (desired.width, desired.height);
+        let photo = at_size(photo.pixels, size);
+        let inside = inside.map(|mask| DynamicImage::from(at_size(mask, size)).into_luma8());
         let drawn = session.draw_timed(&desired)?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;
@@ -129,6 +139,10 @@ fn score_photos(
         lines.push(Line {
             name: name.clone(),
             score: score(&drawn.picture, &photo)?,
+            masked: match inside {
+                Some(inside) => score_masked(&drawn.picture, &photo, &inside)?,
+                None => None,
+            },
             cpu_ms: drawn.cpu.as_secs_f64() * 1e3,
         });
         bar.inc(1);
@@ -149,10 +163,12 @@ fn at_size(photo: RgbaImage, (width, height): (u32, u32)) -> RgbaImage {
 
 fn mean_line(lines: &[Line]) -> Option<Line> {
     let scores: Vec<Score> = lines.iter().map(|line| line.score).collect();
+    let masked: Vec<MaskedScore> = lines.iter().filter_map(|line| line.masked).collect();
     let cpu_ms: f64 = lines.iter().map(|line| line.cpu_ms).sum();
     Some(Line {
         name: "mean".to_owned(),
         score: mean(&scores)?,
+        masked: mean_masked(&masked),
         cpu_ms: cpu_ms / lines.len() as f64,
     })
 }
@@ -170,21 +186,33 @@ fn table(lines: &[Line]) -> String {
     let mean = mean_line(lines);
     let widest = lines.iter().map(|line| line.name.chars().count()).max();
     let width = widest.unwrap_or_default().max("photo".len());
+    let any_masked = mean.as_ref().is_some_and(|line| line.masked.is_some());
     let mut text = format!(
-        "{:width$}  {:>7}  {:>6}  {:>12}  {:>8}  {:>8}\n",
-        "photo", "psnr", "ssim", "psnr_covered", "coverage", "cpu ms"
+        "{:width$}  {:>7}  {:>6}  {:>12}  {:>8}",
+        "photo", "psnr", "ssim", "psnr_covered", "coverage"
     );
+    if any_masked {
+        text += &format!("  {:>11}  {:>11}", "psnr_masked", "ssim_masked");
+    }
+    text += &format!("  {:>8}\n", "cpu ms");
+    let db =
+        |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB)));
     for line in lines.iter().chain(&mean) {
-        let covered = line.score.psnr_covered;
         text += &format!(
-            "{:width$}  {:>7.2}  {:>6.4}  {:>12}  {:>8.4}  {:>8.1}\n",
+            "{:width$}  {:>7}  {:>6.4}  {:>12}  {:>8.4}",
             line.name,
-            line.score.psnr.min(PSNR_CAP_DB),
+            db(Some(line.score.psnr)),
             line.score.ssim,
-            covered.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB))),
+            db(line.score.psnr_covered),
             line.score.coverage,
-            line.cpu_ms
         );
+        if any_masked {
+            let ssim = line.masked.and_then(|m| m.ssim_masked);
+            let ssim = ssim.map_or("-".to_owned(), |v| format!("{v:.4}"));
+            let psnr = db(line.masked.map(|m| m.psnr_masked));
+            text += &format!("  {psnr:>11}  {ssim:>11}");
+        }
+        text += &format!("  {:>8.1}\n", line.cpu_ms);
     }
     text
 }

@@ -4,6 +4,7 @@
 //! and, once there is one, the proxy's file. Photos stay where they are and are named by
 //! their path relative to the folder.
 
+mod beside;
 mod calibration;
 mod error;
 pub mod file;
@@ -13,6 +14,7 @@ mod relative;
 mod split;
 mod store;
 
+pub use beside::DEPTH_UNITS_PER_STEP;
 pub use error::{SceneError, Warning};
 pub use import::ImportOptions;
 

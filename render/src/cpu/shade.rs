@@ -9,16 +9,17 @@ use std::ops::{Add, Mul, Sub};
 /// Trilinear; premultiplied, 0…255.
 #[inline]
 pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
-    let texel = |[r, g, b, a]: [u8; 4]| {
-        Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
-    };
+    let texel =
+        |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
     trilinear(&photo.levels, u, v, level, texel)
 }
 
 /// Trilinear; 0…1.
 #[inline]
 pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
-    trilinear(&mask.levels, u, v, level, |[value]: [u8; 1]| f32::from(value)) / 255.0
+    trilinear(&mask.levels, u, v, level, |[value]: [u8; 1]| {
+        f32::from(value)
+    }) / 255.0
 }
 
 /// `texel` makes a number or several of a texel's bytes.

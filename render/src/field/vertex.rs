@@ -66,7 +66,10 @@ pub(super) fn candidates<'f>(
     point: &'f ProxyPoint,
     sources: &'f [VertexSource],
 ) -> impl Iterator<Item = Candidate> + 'f {
-    sources.iter().enumerate().filter_map(|(source_idx, source)| {
-        candidate(frame, source_idx, point, source.pixel?, || source.diff)
-    })
+    sources
+        .iter()
+        .enumerate()
+        .filter_map(|(source_idx, source)| {
+            candidate(frame, source_idx, point, source.pixel?, || source.diff)
+        })
 }

@@ -216,7 +216,10 @@ impl Special {
     /// The shaders' constants.
     pub(super) fn constants(self) -> [(&'static str, f64); 2] {
         let lens = f64::from(self.common_lens.unwrap_or(-1.0));
-        [("COMMON_LENS", lens), ("MASKED", f64::from(u8::from(self.masked)))]
+        [
+            ("COMMON_LENS", lens),
+            ("MASKED", f64::from(u8::from(self.masked))),
+        ]
     }
 
     /// Different for each.

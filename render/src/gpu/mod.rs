@@ -183,7 +183,8 @@ impl Gpu {
             self.pipelines
                 .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
         let special = Special::of(frame);
-        self.pipelines.ensure(&self.device, Pass::Triangles, special);
+        self.pipelines
+            .ensure(&self.device, Pass::Triangles, special);
         self.pipelines
             .ensure(&self.device, Pass::BorderedTriangles, special);
         self.draw(frame, |pass, pipelines| {
@@ -257,7 +258,14 @@ impl Gpu {
         order: Order,
     ) -> Result<wgpu::BindGroup, RenderError> {
         let (device, queue) = (&self.device, &self.queue);
-        Layers::ensure(&mut self.photos, Content::Photos, device, queue, frame, wanted)?;
+        Layers::ensure(
+            &mut self.photos,
+            Content::Photos,
+            device,
+            queue,
+            frame,
+            wanted,
+        )?;
         // The exact field weighs all views, and asks all masks.
         let store = &frame.lumigraph.photos;
         let mut masked: Vec<usize> = match order {
@@ -266,7 +274,14 @@ impl Gpu {
         };
         masked.retain(|&i| store.is_masked(i));
         if store.any_masked() {
-            Layers::ensure(&mut self.masks, Content::Masks, device, queue, frame, &masked)?;
+            Layers::ensure(
+                &mut self.masks,
+                Content::Masks,
+                device,
+                queue,
+                frame,
+                &masked,
+            )?;
         } else {
             self.masks = None;
         }
