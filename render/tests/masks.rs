@@ -284,7 +284,13 @@ fn a_mask_that_hides_nothing_changes_nothing_and_one_that_hides_all_removes_the_
                     .map(|(engine, picture)| (engine, picture.unwrap()))
             };
             for ((engine, a), (_, b)) in pictures(&plain).zip(pictures(&white)) {
-                assert!(a == b, "{name}, {engine}, {method:?}");
+                let what = format!("{name}, {engine}, {method:?}");
+                if engine == "gpu" {
+                    // Another shader, and drivers round as they like.
+                    assert_close(&a, &b, &what);
+                } else {
+                    assert!(a == b, "{what}");
+                }
             }
             for ((engine, a), (_, b)) in pictures(&fewer).zip(pictures(&black)) {
                 let what = format!("{name}, {engine}, {method:?}");
@@ -334,22 +340,22 @@ fn the_order_of_masked_photos_changes_nothing() {
 
 #[test]
 fn the_weight_fades_steadily_across_a_masks_edge() {
-    // Along a line on the wall, in steps of a fiftieth of a pixel.
+    // Along a line on the wall, in small steps.
     let shot = Shot::of("wall", 9, None);
     let lumigraph = scene_with(&shot, |i| i == 4);
     let desired = between(&shot.views[4], &shot.views[0], 0.3);
     let frame = frame(&lumigraph, &desired);
     let mut last: Option<f64> = None;
     let mut seen = (f64::INFINITY, 0.0_f64);
-    for step in 0..6000 {
-        let point = frame.proxy_point(Pixel::new(20.0 + f64::from(step) / 50.0, 66.0));
+    for step in 0..48_000 {
+        let point = frame.proxy_point(Pixel::new(20.0 + f64::from(step) / 400.0, 66.0));
         let field = render::reference::blend_at(&frame, &point.unwrap());
         let share = field
             .iter()
             .find(|c| c.source_idx == 4)
             .map_or(0.0, |c| c.weight);
         if let Some(last) = last {
-            assert!((share - last).abs() < 0.1, "{step}: {last}, {share}");
+            assert!((share - last).abs() < 0.05, "{step}: {last}, {share}");
         }
         seen = (seen.0.min(share), seen.1.max(share));
         last = Some(share);
