@@ -15,6 +15,11 @@ pub struct Mask {
     blocks: Vec<Blocks>,
 }
 
+/// A filtered value of this (of 255) or less ignores. At a photo's own place it has all the
+/// weight that its mask leaves, however little, and rounding would decide beside a mask's
+/// edge: from here on the mask rises, to one.
+pub(crate) const IGNORED: u8 = 1;
+
 /// Sides of the smallest blocks, in pixels.
 const BLOCK: u32 = 8;
 

@@ -5,6 +5,7 @@
 use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::image_out::straight_rgba8;
+use crate::mask::IGNORED;
 use crate::photos::{PhotoError, Pyramid};
 use calibrate::Pixel;
 use image::{ImageBuffer, RgbaImage};
@@ -39,7 +40,8 @@ pub(crate) fn candidate(
     let mask = frame.lumigraph.photos.mask(source_idx).map_or(1.0, |mask| {
         let level = frame.level_of_detail(source_idx, point);
         let [value] = trilinear(&mask.levels, pixel, level);
-        value
+        let ignored = f64::from(IGNORED);
+        ((value * 255.0 - ignored) / (255.0 - ignored)).max(0.0)
     });
     (mask > 0.0).then(|| Candidate {
         source_idx,

@@ -1,6 +1,6 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
-use crate::mask::Mask;
+use crate::mask::{IGNORED, Mask};
 use crate::photos::Pyramid;
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
@@ -14,7 +14,7 @@ pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
     trilinear(&photo.levels, u, v, level, texel)
 }
 
-/// Trilinear; 0…1.
+/// What a mask leaves of its photo, 0…1; trilinear.
 #[inline]
 pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
     trilinear(&mask.levels, u, v, level, |[value]: [u8; 1]| {

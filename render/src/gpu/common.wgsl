@@ -306,6 +306,9 @@ fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
+// See IGNORED of mask.rs.
+const IGNORED: f32 = 1.0;
+
 // fovBlend and what the ignore mask leaves of it.
 fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
     let fov = fov_blend(source_idx, sight);
@@ -318,7 +321,8 @@ fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
     }
     let uv = sight.pixel / params.array_size;
     let level = level_of_detail(sight, ray);
-    return fov * textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
+    let value = textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
+    return fov * max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
 }
 
 // angDiff + beta * resDiff.
