@@ -1,5 +1,5 @@
 use crate::{CaptureError, jpeg, reduced_size, resize};
-use image::{ImageError, ImageFormat, ImageReader, RgbaImage};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, RgbaImage};
 use std::fs::{self, File};
 use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
@@ -53,6 +53,22 @@ pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
 /// A file that cannot be read, is no JPEG or PNG picture, is damaged or cut short, needs
 /// more than 512 MiB, or has another size than `expected_size`.
 pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImage, CaptureError> {
+    let check = |found| match expected_size {
+        Some(expected) if found != expected => Err(CaptureError::Size {
+            path: path.to_owned(),
+            found,
+            expected,
+        }),
+        _ => Ok(()),
+    };
+    Ok(decode_any(path, check)?.into_rgba8())
+}
+
+/// Decodes a picture as stored, once `check` accepts its size. See [`decode`].
+pub(crate) fn decode_any(
+    path: &Path,
+    check: impl Fn((u32, u32)) -> Result<(), CaptureError>,
+) -> Result<DynamicImage, CaptureError> {
     let bytes = fs::read(path).map_err(read_failed(path))?;
     let format = format_of(path, &bytes)?;
 
@@ -67,15 +83,7 @@ pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImag
             .into_dimensions()
             .map_err(|error| decode_failed(path, &error, None))?,
     };
-    if let Some(expected) = expected_size
-        && size != expected
-    {
-        return Err(CaptureError::Size {
-            path: path.to_owned(),
-            found: size,
-            expected,
-        });
-    }
+    check(size)?;
 
     // 2. The JPEG decoder would paint what is missing grey.
     if format == ImageFormat::Jpeg && !jpeg::is_complete(&bytes) {
@@ -83,10 +91,9 @@ pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImag
     }
 
     // 3. The pixels.
-    let picture = ImageReader::with_format(Cursor::new(&bytes), format)
+    ImageReader::with_format(Cursor::new(&bytes), format)
         .decode()
-        .map_err(|error| decode_failed(path, &error, Some(size)))?;
-    Ok(picture.into_rgba8())
+        .map_err(|error| decode_failed(path, &error, Some(size)))
 }
 
 /// Decodes a photo and reduces it so that its longer side is at most `max_side` pixels;
@@ -108,7 +115,7 @@ pub fn decode_reduced(
 }
 
 /// JPEG or PNG, by a file's first bytes: its extension may be wrong.
-fn format_of(path: &Path, bytes: &[u8]) -> Result<ImageFormat, CaptureError> {
+pub(crate) fn format_of(path: &Path, bytes: &[u8]) -> Result<ImageFormat, CaptureError> {
     if bytes.is_empty() {
         return Err(decode_error(path, "the file is empty (0 bytes)"));
     }
@@ -123,7 +130,7 @@ fn format_of(path: &Path, bytes: &[u8]) -> Result<ImageFormat, CaptureError> {
     })
 }
 
-fn read_failed(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
+pub(crate) fn read_failed(path: &Path) -> impl Fn(std::io::Error) -> CaptureError {
     move |source| CaptureError::Read {
         path: path.to_owned(),
         source,

@@ -1,3 +1,4 @@
+use crate::Beside;
 use std::io;
 use std::path::PathBuf;
 
@@ -30,7 +31,7 @@ pub enum CaptureError {
     },
     /// A file cannot be read.
     #[error(
-        "{}: cannot read the photo: {source}; check that it is there and may be read",
+        "{}: cannot read the picture: {source}; check that it is there and may be read",
         path.display()
     )]
     Read {
@@ -87,6 +88,49 @@ pub enum CaptureError {
         found: (u32, u32),
         /// Width and height in pixels.
         expected: (u32, u32),
+    },
+    /// A mask, matte or depth map of another size than its photo.
+    #[error(
+        "{}: the {kind} has {} × {} pixels and its photo {photo} {} × {}; make it as large as \
+         the photo, or leave it out",
+        path.display(), found.0, found.1, photo_size.0, photo_size.1
+    )]
+    SizeBeside {
+        /// What it is.
+        kind: Beside,
+        /// The file.
+        path: PathBuf,
+        /// Its width and height in pixels.
+        found: (u32, u32),
+        /// The photo's name.
+        photo: String,
+        /// Width and height in pixels.
+        photo_size: (u32, u32),
+    },
+    /// A depth map that does not hold depths.
+    #[error(
+        "{}: found {channels} channels of {bits} bits, expected a depth map of one channel of \
+         16 bits; write depths as 16-bit grey PNG, or leave it out",
+        path.display()
+    )]
+    DepthFormat {
+        /// The file.
+        path: PathBuf,
+        /// A channel's.
+        bits: u16,
+        /// How many.
+        channels: u8,
+    },
+    /// A file that belongs to two photos by its name.
+    #[error(
+        "{}: belongs to {} and {} alike by its name; call it {}.png if it is the former's",
+        path.display(), photos[0], photos[1], photos[0]
+    )]
+    Ambiguous {
+        /// The file.
+        path: PathBuf,
+        /// Two photos' names.
+        photos: [String; 2],
     },
     /// A picture cannot be written.
     #[error("{}: cannot write the picture: {source}", path.display())]

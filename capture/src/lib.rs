@@ -1,10 +1,12 @@
-//! Photo sets: finding, ordering and decoding photos.
+//! Photo sets: finding, ordering and decoding photos, and the masks, mattes and depth maps
+//! beside them.
 //!
 //! A photo is its **stored pixel grid**: EXIF orientation is not applied, because
 //! calibrations speak about the pixels as stored. The first pixel's centre is at
 //! (0.5, 0.5), and reducing a photo keeps its corners where they are, so intrinsics
 //! follow by the ratio of the sizes alone.
 
+mod beside;
 mod decode;
 mod error;
 mod jpeg;
@@ -13,6 +15,9 @@ mod resize;
 mod warp;
 mod write;
 
+pub use beside::{
+    Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_mask, match_by_name,
+};
 pub use decode::{decode, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// What a photo's name may end in.
-const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
+pub(crate) const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
 
 /// The photos in a folder and the folders within.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -359,7 +359,7 @@ fn what_is_no_photo_is_said_to_be_none() {
          again or leave it out"
     );
     let absent = folder.path().join("absent.jpg");
-    assert!(refusal(&absent).starts_with("absent.jpg: cannot read the photo: "));
+    assert!(refusal(&absent).starts_with("absent.jpg: cannot read the picture: "));
     assert!(matches!(
         photo_size(&absent),
         Err(CaptureError::Read { .. })

@@ -12,6 +12,8 @@ pub struct Candidate {
     pub diff: f64,
     /// fovBlend, 0…1.
     pub fov: f64,
+    /// What its ignore mask leaves of it, 0…1; 1 without one.
+    pub mask: f64,
 }
 
 /// A source view and its share of a ray.
@@ -28,12 +30,12 @@ pub const SAME_RAY: f64 = 1e-12;
 
 /// The weights of the candidates for one ray, in the order of their indices.
 ///
-/// Consistent form: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t)/diffᵢ, with aᵢ = fovBlendᵢ and t from
+/// Consistent form: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t)/diffᵢ, with aᵢ = fovBlendᵢ·maskᵢ and t from
 /// [`threshold`]. Paper: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t) with t the k-th smallest diff ("k-th
 /// largest" is a misprint). Where that is undefined:
 ///
-/// - all candidates on the very edge of their images (every fovBlend zero): as if each
-///   were one;
+/// - candidates that their masks ignore: as if they were none;
+/// - all others on the very edge of their images (every fovBlend zero): as if each were one;
 /// - candidates with diff ≤ [`SAME_RAY`] (consistent form): they share all weight in
 ///   proportion to aᵢ;
 /// - all weights zero because the candidates are tied: those with the smallest diff share
@@ -42,16 +44,13 @@ pub const SAME_RAY: f64 = 1e-12;
 ///
 /// Every weight is finite and positive, and they sum to one unless there are none.
 pub fn blend(candidates: &[Candidate], options: &FieldOptions) -> Vec<Contributor> {
-    // 1. Relevance: the feather, unless there is nothing but feather.
-    let feathered_out = candidates.iter().all(|c| c.fov <= 0.0);
+    // 1. Relevance: mask and feather, unless there is nothing but feather.
+    let candidates = candidates.iter().filter(|c| c.mask > 0.0);
+    let feathered_out = candidates.clone().all(|c| c.fov <= 0.0);
     let mut relevant: Vec<(usize, f64, f64)> = candidates
-        .iter()
         .map(|c| {
-            (
-                c.source_idx,
-                c.diff,
-                if feathered_out { 1.0 } else { c.fov },
-            )
+            let fov = if feathered_out { 1.0 } else { c.fov };
+            (c.source_idx, c.diff, fov * c.mask)
         })
         .filter(|(_, _, a)| *a > 0.0)
         .collect();

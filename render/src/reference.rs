@@ -5,24 +5,50 @@
 use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::image_out::straight_rgba8;
+use crate::mask::IGNORED;
 use crate::photos::{PhotoError, Pyramid};
 use calibrate::Pixel;
-use image::RgbaImage;
+use image::{ImageBuffer, RgbaImage};
 use rayon::prelude::*;
 
 /// The exact blending field at a proxy point: who paints it, and how much.
 pub fn blend_at(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<Contributor> {
-    let sees = |source_idx: usize| {
-        let fov = frame.fov_blend(source_idx, frame.project(source_idx, point)?);
-        let diff = frame.difference(source_idx, point);
-        (fov >= 0.0).then_some(Candidate {
-            source_idx,
-            diff,
-            fov,
+    let seen = |source_idx: usize| {
+        let pixel = frame.project(source_idx, point)?;
+        candidate(frame, source_idx, point, pixel, || {
+            frame.difference(source_idx, point)
         })
     };
-    let candidates: Vec<Candidate> = (0..frame.sources.len()).filter_map(sees).collect();
+    let candidates: Vec<Candidate> = (0..frame.sources.len()).filter_map(seen).collect();
     blend(&candidates, &frame.options)
+}
+
+/// A source view as a candidate for a proxy point that falls on a pixel of its image; `None`
+/// outside the image and where its mask ignores it.
+pub(crate) fn candidate(
+    frame: &Frame<'_>,
+    source_idx: usize,
+    point: &ProxyPoint,
+    pixel: Pixel,
+    diff: impl FnOnce() -> f64,
+) -> Option<Candidate> {
+    let fov = frame.fov_blend(source_idx, pixel);
+    if fov < 0.0 {
+        return None;
+    }
+    // The mask is sampled as its photo is, so that neither flickers more than the other.
+    let mask = frame.lumigraph.photos.mask(source_idx).map_or(1.0, |mask| {
+        let level = frame.level_of_detail(source_idx, point);
+        let [value] = trilinear(&mask.levels, pixel, level);
+        let ignored = f64::from(IGNORED);
+        ((value * 255.0 - ignored) / (255.0 - ignored)).max(0.0)
+    });
+    (mask > 0.0).then(|| Candidate {
+        source_idx,
+        diff: diff(),
+        fov,
+        mask,
+    })
 }
 
 /// The colour of a proxy point: premultiplied sRGB and coverage, 0…1.
@@ -55,7 +81,7 @@ pub fn color_at(
 /// The exact picture: straight alpha, alpha = coverage.
 ///
 /// # Errors
-/// A photo that is needed cannot be decoded.
+/// A photo or mask that is needed cannot be decoded.
 pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
     render(frame, |_, point| blend_at(frame, point))
 }
@@ -81,45 +107,56 @@ pub(crate) fn render(
         .into_par_iter()
         .map(row)
         .collect::<Result<_, _>>()?;
+    frame.lumigraph.photos.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, rows.concat()).expect("one row each"))
 }
 
-/// Trilinear: bilinear in the two nearest mip levels. Premultiplied, 0…1.
+/// A photo's colour at a pixel: premultiplied, 0…1.
 pub fn sample(photo: &Pyramid, pixel: Pixel, level_of_detail: f64) -> [f64; 4] {
-    let level = level_of_detail.min((photo.levels.len() - 1) as f64);
+    trilinear(&photo.levels, pixel, level_of_detail)
+}
+
+/// Bilinear in the two nearest mip levels, 0…1.
+fn trilinear<P: image::Pixel<Subpixel = u8>, const CHANNELS: usize>(
+    levels: &[ImageBuffer<P, Vec<u8>>],
+    pixel: Pixel,
+    level_of_detail: f64,
+) -> [f64; CHANNELS] {
+    let level = level_of_detail.min((levels.len() - 1) as f64);
     let lower = level.floor();
     let fraction = level - lower;
-    let mut color = bilinear(photo, pixel, lower as usize);
+    let mut color = bilinear(levels, pixel, lower as usize);
     if fraction > 0.0 {
-        let upper = bilinear(photo, pixel, lower as usize + 1);
-        for c in 0..4 {
+        let upper: [f64; CHANNELS] = bilinear(levels, pixel, lower as usize + 1);
+        for c in 0..CHANNELS {
             color[c] += fraction * (upper[c] - color[c]);
         }
     }
     color.map(|v| v / 255.0)
 }
 
-fn bilinear(photo: &Pyramid, pixel: Pixel, level: usize) -> [f64; 4] {
-    let image = &photo.levels[level];
+fn bilinear<P: image::Pixel<Subpixel = u8>, const CHANNELS: usize>(
+    levels: &[ImageBuffer<P, Vec<u8>>],
+    pixel: Pixel,
+    level: usize,
+) -> [f64; CHANNELS] {
+    let image = &levels[level];
     let scale = 1.0 / f64::from(1_u32 << level);
     let (x, y) = (pixel.x * scale - 0.5, pixel.y * scale - 0.5);
-    let texel = |column: f64, row: f64| {
-        let column = column.clamp(0.0, f64::from(image.width() - 1)) as u32;
-        let row = row.clamp(0.0, f64::from(image.height() - 1)) as u32;
-        image.get_pixel(column, row).0.map(f64::from)
-    };
     let (left, top) = (x.floor(), y.floor());
     let (fx, fy) = (x - left, y - top);
-    let mut color = [0.0; 4];
+    let mut color = [0.0; CHANNELS];
     for (column, row, share) in [
         (left, top, (1.0 - fx) * (1.0 - fy)),
         (left + 1.0, top, fx * (1.0 - fy)),
         (left, top + 1.0, (1.0 - fx) * fy),
         (left + 1.0, top + 1.0, fx * fy),
     ] {
-        let values = texel(column, row);
-        for c in 0..4 {
-            color[c] += share * values[c];
+        let column = column.clamp(0.0, f64::from(image.width() - 1)) as u32;
+        let row = row.clamp(0.0, f64::from(image.height() - 1)) as u32;
+        let texel = image.get_pixel(column, row).channels();
+        for c in 0..CHANNELS {
+            color[c] += share * f64::from(texel[c]);
         }
     }
     color

@@ -1,6 +1,6 @@
 //! How close a rendered picture comes to the photo that was taken there.
 
-use image::RgbaImage;
+use image::{GrayImage, RgbaImage};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
@@ -28,12 +28,26 @@ pub struct Score {
     pub coverage: f64,
 }
 
+/// What a rendered picture scores against a photo where a mask says that it matters: the
+/// object, or what is not ignored.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MaskedScore {
+    /// PSNR in dB over the pixels inside; infinite where they are identical.
+    #[serde(serialize_with = "capped")]
+    pub psnr_masked: f64,
+    /// The mean structural similarity of the windows whose middle lies inside; `None` where
+    /// no window's does.
+    pub ssim_masked: Option<f64>,
+    /// The mean alpha inside, 0…1.
+    pub coverage_masked: f64,
+}
+
 /// No PSNR counts for more than this in [`mean`] and in JSON, so that one photo reproduced
 /// exactly does not outweigh all others.
 pub const PSNR_CAP_DB: f64 = 99.0;
 
-/// A rendered pixel is covered when its alpha is at least this: half.
-const COVERED_ALPHA: u8 = 128;
+/// A rendered pixel is covered when its alpha is at least this, and a mask's value inside.
+const HALF: u8 = 128;
 
 /// Wang et al. 2004, "Image quality assessment: from error visibility to structural
 /// similarity", §III: an 11 × 11 Gaussian window with σ = 1.5, K₁ = 0.01, K₂ = 0.03.
@@ -56,6 +70,17 @@ pub enum ScoreError {
         /// Width and height in pixels.
         photo: (u32, u32),
     },
+    /// The mask differs from the photo in size.
+    #[error(
+        "the mask has {} × {} pixels and the photo {} × {}; make them as large as each other",
+        mask.0, mask.1, photo.0, photo.1
+    )]
+    MaskSize {
+        /// Width and height in pixels.
+        mask: (u32, u32),
+        /// Width and height in pixels.
+        photo: (u32, u32),
+    },
     /// They are smaller than the window of SSIM.
     #[error("the pictures have {0} × {1} pixels; SSIM needs at least {WINDOW} × {WINDOW}")]
     TooSmall(u32, u32),
@@ -73,6 +98,82 @@ pub enum ScoreError {
 /// # Errors
 /// The sizes differ, or are below 11 × 11 pixels.
 pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreError> {
+    check_sizes(rendered, photo)?;
+    let width = rendered.width();
+    let (ours, theirs) = (on_black(rendered), on_black(photo));
+    let squared_error =
+        |i: usize| -> u64 { (0..3).map(|c| squared(ours[i][c], theirs[i][c])).sum() };
+    let alphas = || rendered.pixels().map(|p| p.0[3]);
+    let count = ours.len();
+    let total: u64 = (0..count).map(squared_error).sum();
+    let covered = || (0..count).zip(alphas()).filter(|(_, a)| *a >= HALF);
+    let covered_count = covered().count();
+    let covered_total: u64 = covered().map(|(i, _)| squared_error(i)).sum();
+    let alpha_sum: u64 = alphas().map(u64::from).sum();
+    let gain: [f64; 3] = std::array::from_fn(|c| {
+        let pairs = covered().map(|(i, _)| (ours[i][c], theirs[i][c]));
+        best_gain(pairs)
+    });
+    let exposed = |i: usize, c: usize| (f64::from(ours[i][c]) * gain[c]).round() as u8;
+    let exposed_error =
+        |i: usize| -> u64 { (0..3).map(|c| squared(exposed(i, c), theirs[i][c])).sum() };
+    Ok(Score {
+        psnr: psnr(total, count),
+        psnr_exposed: psnr((0..count).map(exposed_error).sum(), count),
+        ssim: ssim(&ours, &theirs, width as usize, |_| true).unwrap_or(f64::NAN),
+        psnr_covered: (covered_count > 0).then(|| psnr(covered_total, covered_count)),
+        coverage: alpha_sum as f64 / (255.0 * count as f64),
+    })
+}
+
+/// Scores a rendered picture against its photo, as [`score`], inside a mask: where it is half
+/// or more. `None` where it is nowhere.
+///
+/// # Errors
+/// The sizes differ, or are below 11 × 11 pixels.
+pub fn score_masked(
+    rendered: &RgbaImage,
+    photo: &RgbaImage,
+    mask: &GrayImage,
+) -> Result<Option<MaskedScore>, ScoreError> {
+    check_sizes(rendered, photo)?;
+    if mask.dimensions() != photo.dimensions() {
+        return Err(ScoreError::MaskSize {
+            mask: mask.dimensions(),
+            photo: photo.dimensions(),
+        });
+    }
+    let (ours, theirs) = (on_black(rendered), on_black(photo));
+    let inside = |i: usize| mask.as_raw()[i] >= HALF;
+    let indices = || (0..ours.len()).filter(|&i| inside(i));
+    let count = indices().count();
+    if count == 0 {
+        return Ok(None);
+    }
+    let squared_error =
+        |i: usize| -> u64 { (0..3).map(|c| squared(ours[i][c], theirs[i][c])).sum() };
+    let alpha = |i: usize| u64::from(rendered.as_raw()[4 * i + 3]);
+    Ok(Some(MaskedScore {
+        psnr_masked: psnr(indices().map(squared_error).sum(), count),
+        ssim_masked: ssim(&ours, &theirs, rendered.width() as usize, inside),
+        coverage_masked: indices().map(alpha).sum::<u64>() as f64 / (255.0 * count as f64),
+    }))
+}
+
+/// The mean of scores inside masks, as [`mean`]; `None` of nothing.
+pub fn mean_masked(scores: &[MaskedScore]) -> Option<MaskedScore> {
+    let mean = |value: &dyn Fn(&MaskedScore) -> Option<f64>| {
+        let values: Vec<f64> = scores.iter().filter_map(value).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    Some(MaskedScore {
+        psnr_masked: mean(&|s| Some(s.psnr_masked.min(PSNR_CAP_DB)))?,
+        ssim_masked: mean(&|s| s.ssim_masked),
+        coverage_masked: mean(&|s| Some(s.coverage_masked))?,
+    })
+}
+
+fn check_sizes(rendered: &RgbaImage, photo: &RgbaImage) -> Result<(), ScoreError> {
     let (width, height) = rendered.dimensions();
     if photo.dimensions() != (width, height) {
         return Err(ScoreError::Size {
@@ -83,43 +184,7 @@ pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreErro
     if (width.min(height) as usize) < WINDOW {
         return Err(ScoreError::TooSmall(width, height));
     }
-
-    let (ours, theirs) = (on_black(rendered), on_black(photo));
-    let squared_error =
-        |i: usize| -> u64 { (0..3).map(|c| squared(ours[i][c], theirs[i][c])).sum() };
-    let alphas = || rendered.pixels().map(|p| p.0[3]);
-    let count = ours.len();
-    let total: u64 = (0..count).map(squared_error).sum();
-    let covered = || {
-        (0..count)
-            .zip(alphas())
-            .filter(|(_, a)| *a >= COVERED_ALPHA)
-    };
-    let covered_count = covered().count();
-    let covered_total: u64 = covered().map(|(i, _)| squared_error(i)).sum();
-    let alpha_sum: u64 = alphas().map(u64::from).sum();
-    let gain: [f64; 3] = std::array::from_fn(|c| {
-        let pairs = covered().map(|(i, _)| (ours[i][c], theirs[i][c]));
-        best_gain(pairs)
-    });
-    let exposed_error = |i: usize| -> u64 {
-        (0..3)
-            .map(|c| {
-                squared(
-                    (f64::from(ours[i][c]) * gain[c]).round() as u8,
-                    theirs[i][c],
-                )
-            })
-            .sum()
-    };
-    let exposed_total: u64 = (0..count).map(exposed_error).sum();
-    Ok(Score {
-        psnr: psnr(total, count),
-        psnr_exposed: psnr(exposed_total, count),
-        ssim: ssim(&ours, &theirs, width as usize),
-        psnr_covered: (covered_count > 0).then(|| psnr(covered_total, covered_count)),
-        coverage: alpha_sum as f64 / (255.0 * count as f64),
-    })
+    Ok(())
 }
 
 /// The mean of per-photo scores, PSNR as the mean of dB values of at most [`PSNR_CAP_DB`];
@@ -192,13 +257,19 @@ fn window() -> [f64; WINDOW] {
     weights.map(|w| w / sum)
 }
 
-/// Mean SSIM. One row of windows at a time: first down the columns, then along the row.
-/// Rows are summed in order, so the result does not depend on the threads.
-fn ssim(ours: &[[u8; 3]], theirs: &[[u8; 3]], width: usize) -> f64 {
+/// Mean SSIM of the windows whose middle pixel counts, by its index; `None` where none does.
+/// One row of windows at a time: first down the columns, then along the row. Rows are summed
+/// in order, so the result does not depend on the threads.
+fn ssim(
+    ours: &[[u8; 3]],
+    theirs: &[[u8; 3]],
+    width: usize,
+    counts: impl Fn(usize) -> bool + Sync,
+) -> Option<f64> {
     let weights = window();
     let rows = ours.len() / width - WINDOW + 1;
     let columns = width - WINDOW + 1;
-    let row = |y: usize| -> f64 {
+    let row = |y: usize| -> (f64, usize) {
         // x, y, x² + y² and xy of each channel, the window applied down the columns.
         let mut down = vec![[0.0; 12]; width];
         for (k, &weight) in weights.iter().enumerate() {
@@ -215,7 +286,12 @@ fn ssim(ours: &[[u8; 3]], theirs: &[[u8; 3]], width: usize) -> f64 {
             }
         }
         let mut total = 0.0;
+        let mut count = 0;
         for x in 0..columns {
+            if !counts((y + WINDOW / 2) * width + x + WINDOW / 2) {
+                continue;
+            }
+            count += 1;
             let mut moments = [0.0; 12];
             for (weight, sums) in weights.iter().zip(&down[x..]) {
                 for i in 0..12 {
@@ -226,10 +302,12 @@ fn ssim(ours: &[[u8; 3]], theirs: &[[u8; 3]], width: usize) -> f64 {
                 total += similarity(m);
             }
         }
-        total
+        (total, count)
     };
-    let totals: Vec<f64> = (0..rows).into_par_iter().map(row).collect();
-    totals.iter().sum::<f64>() / (3 * rows * columns) as f64
+    let totals: Vec<(f64, usize)> = (0..rows).into_par_iter().map(row).collect();
+    let count: usize = totals.iter().map(|t| t.1).sum();
+    let total: f64 = totals.iter().map(|t| t.0).sum();
+    (count > 0).then(|| total / (3 * count) as f64)
 }
 
 /// Wang et al. 2004, eq. 13, from the windowed means of x, y, x² + y² and xy. Exactly one
@@ -244,7 +322,7 @@ fn similarity(&[x, y, squares, product]: &[f64; 4]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgba;
+    use image::{Luma, Rgba};
 
     /// Repeatable noise in 0..256.
     fn noise(x: u32, y: u32, salt: u32) -> u8 {
@@ -437,6 +515,52 @@ mod tests {
             error.to_string(),
             "the pictures have 20 × 10 pixels; SSIM needs at least 11 × 11"
         );
+    }
+
+    #[test]
+    fn inside_a_mask_only_what_lies_there_counts() {
+        let photo = RgbaImage::from_pixel(40, 20, Rgba([100, 100, 100, 255]));
+        let rendered = RgbaImage::from_fn(40, 20, |x, _| match x {
+            0..20 => Rgba([110, 110, 110, 255]),
+            20..30 => Rgba([0; 4]),
+            _ => Rgba([255; 4]),
+        });
+        let mask_of = |inside: fn(u32) -> bool| {
+            GrayImage::from_fn(40, 20, |x, _| Luma([if inside(x) { 200 } else { 100 }]))
+        };
+        let whole = score(&rendered, &photo).unwrap();
+        let all = score_masked(&rendered, &photo, &mask_of(|_| true))
+            .unwrap()
+            .unwrap();
+        assert_eq!(all.psnr_masked, whole.psnr);
+        assert_eq!(all.ssim_masked, Some(whole.ssim));
+        assert_eq!(all.coverage_masked, whole.coverage);
+
+        let left = score_masked(&rendered, &photo, &mask_of(|x| x < 10))
+            .unwrap()
+            .unwrap();
+        assert!((left.psnr_masked - 20.0 * 25.5_f64.log10()).abs() < 1e-12);
+        let ssim = (2.0 * 100.0 * 110.0 + C1) / (100.0 * 100.0 + 110.0 * 110.0 + C1);
+        assert!((left.ssim_masked.unwrap() - ssim).abs() < 1e-9);
+        assert_eq!(left.coverage_masked, 1.0);
+        let margin = score_masked(&rendered, &photo, &mask_of(|x| x < 5))
+            .unwrap()
+            .unwrap();
+        assert_eq!(margin.ssim_masked, None);
+
+        assert_eq!(
+            score_masked(&rendered, &photo, &mask_of(|_| false)),
+            Ok(None)
+        );
+        let error = score_masked(&rendered, &photo, &GrayImage::new(40, 21)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the mask has 40 × 21 pixels and the photo 40 × 20; make them as large as each other"
+        );
+        assert_eq!(mean_masked(&[]), None);
+        let mean = mean_masked(&[left, margin]).unwrap();
+        assert_eq!(mean.ssim_masked, left.ssim_masked);
+        assert!((mean.psnr_masked - left.psnr_masked).abs() < 1e-12);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 mod common;
 
 use calibrate::{Distortion, Lens, Rigid3, View, colmap};
-use common::{Shot, assert_close, between, by_all, by_reference, gpu, pinhole, psnr, psnr_covered};
+use common::{
+    METHODS, Shot, assert_close, between, by_all, by_reference, gpu, pinhole, psnr, psnr_covered,
+};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
@@ -11,13 +13,11 @@ use render::field::FieldEntry;
 use render::picture::contributors_exact;
 use render::{
     Blend, FieldOptions, Frame, Lumigraph, Method, PhotoError, PhotoStore, RenderError, Resolution,
-    SourceView, TriangulatedField, cpu, field, reference,
+    SourceView, TriangulatedField, cpu, reference,
 };
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-
-const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
 
 fn options(blend: Blend, resolution: Resolution) -> FieldOptions {
     FieldOptions {

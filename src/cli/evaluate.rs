@@ -8,9 +8,9 @@ use super::report::{Report, Start};
 use super::session::{Session, progress};
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
-use image::RgbaImage;
+use image::{DynamicImage, RgbaImage};
 use lumigraph::scene::{Scene, picture_files};
-use render::score::{PSNR_CAP_DB, Score, mean, score};
+use render::score::{MaskedScore, PSNR_CAP_DB, Score, mean, mean_masked, score, score_masked};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -21,8 +21,9 @@ use std::path::PathBuf;
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR once the
 /// picture is given the photo's own exposure (psnr_exposed), PSNR over the covered pixels,
 /// coverage, how far the photos that share a pixel are apart in steps of 255, details aside
-/// (seams), and processor time without decoding. Held out are the photos that the capture's
-/// split.json names, else every 8th.
+/// (seams), and processor time without decoding; where a photo has an ignore mask or a matte,
+/// also PSNR, SSIM and coverage inside. Held out are the photos that the capture's split.json
+/// names, else every 8th.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -61,6 +62,9 @@ struct Line {
     score: Score,
     /// See [`render::seams`].
     seams: Option<f64>,
+    /// Inside the photo's own mask or matte, if it has one.
+    #[serde(flatten)]
+    masked: Option<MaskedScore>,
     cpu_ms: f64,
 }
 
@@ -130,7 +134,13 @@ fn score_photos(
             continue;
         };
         let desired = resized(view, size);
-        let photo = at_size(photo, (desired.width, desired.height));
+        let inside = photo
+            .inside()
+            .map(DynamicImage::from)
+            .map(|mask| mask.into_rgba8());
+        let size = (desired.width, desired.height);
+        let photo = at_size(photo.pixels, size);
+        let inside = inside.map(|mask| DynamicImage::from(at_size(mask, size)).into_luma8());
         let drawn = session.draw_timed(&desired)?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;
@@ -139,6 +149,10 @@ fn score_photos(
             name: name.clone(),
             score: score(&drawn.picture, &photo)?,
             seams: session.seams(&desired)?,
+            masked: match inside {
+                Some(inside) => score_masked(&drawn.picture, &photo, &inside)?,
+                None => None,
+            },
             cpu_ms: drawn.cpu.as_secs_f64() * 1e3,
         });
         bar.inc(1);
@@ -160,11 +174,13 @@ fn at_size(photo: RgbaImage, (width, height): (u32, u32)) -> RgbaImage {
 fn mean_line(lines: &[Line]) -> Option<Line> {
     let scores: Vec<Score> = lines.iter().map(|line| line.score).collect();
     let seams: Vec<f64> = lines.iter().filter_map(|line| line.seams).collect();
+    let masked: Vec<MaskedScore> = lines.iter().filter_map(|line| line.masked).collect();
     let cpu_ms: f64 = lines.iter().map(|line| line.cpu_ms).sum();
     Some(Line {
         name: "mean".to_owned(),
         score: mean(&scores)?,
         seams: (!seams.is_empty()).then(|| seams.iter().sum::<f64>() / seams.len() as f64),
+        masked: mean_masked(&masked),
         cpu_ms: cpu_ms / lines.len() as f64,
     })
 }
@@ -182,23 +198,35 @@ fn table(lines: &[Line]) -> String {
     let mean = mean_line(lines);
     let widest = lines.iter().map(|line| line.name.chars().count()).max();
     let width = widest.unwrap_or_default().max("photo".len());
+    let any_masked = mean.as_ref().is_some_and(|line| line.masked.is_some());
     let mut text = format!(
-        "{:width$}  {:>7}  {:>12}  {:>6}  {:>12}  {:>8}  {:>6}  {:>8}\n",
-        "photo", "psnr", "psnr_exposed", "ssim", "psnr_covered", "coverage", "seams", "cpu ms"
+        "{:width$}  {:>7}  {:>12}  {:>6}  {:>12}  {:>8}  {:>6}",
+        "photo", "psnr", "psnr_exposed", "ssim", "psnr_covered", "coverage", "seams"
     );
+    if any_masked {
+        text += &format!("  {:>11}  {:>11}", "psnr_masked", "ssim_masked");
+    }
+    text += &format!("  {:>8}\n", "cpu ms");
+    let db =
+        |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB)));
     for line in lines.iter().chain(&mean) {
-        let covered = line.score.psnr_covered;
         text += &format!(
-            "{:width$}  {:>7.2}  {:>12.2}  {:>6.4}  {:>12}  {:>8.4}  {:>6}  {:>8.1}\n",
+            "{:width$}  {:>7}  {:>12}  {:>6.4}  {:>12}  {:>8.4}  {:>6}",
             line.name,
-            line.score.psnr.min(PSNR_CAP_DB),
-            line.score.psnr_exposed.min(PSNR_CAP_DB),
+            db(Some(line.score.psnr)),
+            db(Some(line.score.psnr_exposed)),
             line.score.ssim,
-            covered.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB))),
+            db(line.score.psnr_covered),
             line.score.coverage,
             line.seams.map_or("-".to_owned(), |v| format!("{v:.2}")),
-            line.cpu_ms
         );
+        if any_masked {
+            let ssim = line.masked.and_then(|m| m.ssim_masked);
+            let ssim = ssim.map_or("-".to_owned(), |v| format!("{v:.4}"));
+            let psnr = db(line.masked.map(|m| m.psnr_masked));
+            text += &format!("  {psnr:>11}  {ssim:>11}");
+        }
+        text += &format!("  {:>8.1}\n", line.cpu_ms);
     }
     text
 }

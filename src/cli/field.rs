@@ -95,7 +95,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             (field.contributors(&frame), Some(field))
         }
     };
-
+    lumigraph.photos.check_masks()?;
     bar.finish_and_clear();
 
     // 2. Its pictures.

@@ -1,10 +1,10 @@
 //! `lumigraph import`
 
 use super::exposure::ExposureArgs;
-use super::options::{KeyArgs, print_warnings};
+use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
 use super::session::progress;
-use lumigraph::scene::{ImportOptions, Scene};
+use lumigraph::scene::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -17,6 +17,8 @@ use std::path::PathBuf;
 /// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
 /// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in
 /// the order of a list within or beside it (images.yml), else in the order of their names.
+///
+/// Masks and depth maps in PHOTOS/masks and PHOTOS/depth are found by the photos' names.
 ///
 ///     lumigraph import my-capture -o my-scene
 ///     lumigraph import photos --calibration out_camera_data.yml -o my-scene
@@ -40,6 +42,26 @@ pub(super) struct Args {
     undistort: bool,
     #[command(flatten)]
     exposure: ExposureArgs,
+    /// Ignore masks (0 = ignore, 255 = use): a.jpg.png or a.png for a.jpg
+    /// [default: PHOTOS/masks, if there]
+    #[arg(long, value_name = "DIR")]
+    masks: Option<PathBuf>,
+    /// Use no ignore masks
+    #[arg(long, conflicts_with = "masks")]
+    no_masks: bool,
+    /// Object mattes, named likewise: what is cut out keeps its smooth outline, as with
+    /// photos that have an alpha channel. PHOTOS/masks given here is not used as ignore
+    /// masks
+    #[arg(long, value_name = "DIR")]
+    mattes: Option<PathBuf>,
+    /// Depth maps, named likewise: 16-bit grey PNG, depth along z, 0 = none
+    /// [default: PHOTOS/depth, if there]
+    #[arg(long, value_name = "DIR")]
+    depth: Option<PathBuf>,
+    /// World units a step of the depth maps
+    #[arg(long, value_name = "UNITS", default_value_t = DEPTH_UNITS_PER_STEP,
+        value_parser = positive)]
+    depth_scale: f64,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -56,6 +78,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         calibration: args.calibration.clone(),
         keys: args.keys.keys(),
         strict: args.strict,
+        masks: args.masks.clone(),
+        no_masks: args.no_masks,
+        mattes: args.mattes.clone(),
+        depth: args.depth.clone(),
+        depth_scale: args.depth_scale,
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
     print_warnings(&warnings);
@@ -71,9 +98,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         scene.save(&args.output, args.force)?;
     }
     print(&format!(
-        "{}: {} photos, {} points\n",
+        "{}: {} photos, {} points{}\n",
         args.output.display(),
         scene.photos.len(),
-        scene.reconstruction.points.len()
+        scene.reconstruction.points.len(),
+        beside_text(&scene)
     ))
 }

@@ -1,14 +1,17 @@
 //! `lumigraph info`
 
 use super::info_of_file;
-use super::options::{KeyArgs, SceneArgs, proxy_json, proxy_text, tie_text};
+use super::options::{
+    KeyArgs, SceneArgs, beside_counts, beside_text, proxy_json, proxy_text, tie_text,
+};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use calibrate::{TRUSTED_TIE, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
-use lumigraph::scene::{Scene, SceneError};
+use lumigraph::scene::{Photo, Scene, SceneError};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Photos, cameras, points, reprojection error per camera, proxy, memory
@@ -31,6 +34,8 @@ pub(super) struct Args {
 
 /// A photo and its mip levels: 4 bytes a pixel, a third more for the levels.
 const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
+/// An ignore mask likewise.
+const MASK_BYTES_PER_PIXEL: f64 = 4.0 / 3.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.scene.scene.is_file() {
@@ -63,16 +68,21 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
     let mut cameras = Vec::new();
     let mut photo_bytes = 0.0;
     for (id, camera) in &reconstruction.cameras {
-        let photos = reconstruction
+        let names: BTreeSet<&str> = reconstruction
             .images
             .values()
             .filter(|i| i.camera_id == *id)
-            .count();
+            .map(|i| i.name.as_str())
+            .collect();
+        let photos = names.len();
         if photos == 0 {
             continue;
         }
-        photo_bytes +=
-            photos as f64 * f64::from(camera.width) * f64::from(camera.height) * BYTES_PER_PIXEL;
+        let is_masked = |p: &&Photo| p.ignore_mask.is_some() && names.contains(p.name.as_str());
+        let masks = scene.photos.iter().filter(is_masked).count();
+        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        photo_bytes += photos as f64 * pixels * BYTES_PER_PIXEL;
+        photo_bytes += masks as f64 * pixels * MASK_BYTES_PER_PIXEL;
         let errors = reconstruction.reprojection_errors_px(*id);
         let errors = errors.map_err(|source| SceneError::Camera {
             name: format!("id {}", id.0),
@@ -96,8 +106,12 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
         value["fitted_without"] = json!(own.fitted_without);
         value
     });
+    let [ignore_masks, object_mattes, depth_maps] = beside_counts(scene).map(|(_, n)| n);
     Ok(json!({
         "photos": scene.photos.len(),
+        "ignore_masks": ignore_masks,
+        "object_mattes": object_mattes,
+        "depth_maps": depth_maps,
         "left_out": scene.left_out,
         "weakly_tied": reconstruction.weakly_tied(TRUSTED_TIE).iter().map(|group| json!({
             "photos": group.names,
@@ -154,6 +168,9 @@ fn text(scene: &Scene, info: &Value) -> String {
             params.join(", "),
             camera["photos"],
         );
+    }
+    if let Some(beside) = beside_text(scene).strip_prefix(", ") {
+        text += &format!("with     {beside}\n");
     }
     text += &format!("points   {}", info["points"]);
     if let (Some(spacing), Some(isolated)) = (info["spacing"].as_f64(), info["isolated"].as_u64()) {

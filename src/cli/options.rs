@@ -9,7 +9,7 @@ use calibrate::opencv::Keys;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use lumigraph::scene::{Scene, Warning};
+use lumigraph::scene::{Photo, Scene, Warning};
 use proxy::{FitBasis, Proxy};
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 use serde_json::{Value, json};
@@ -41,6 +41,22 @@ impl SceneArgs {
         }
         Ok(scene)
     }
+}
+
+/// How many photos have an ignore mask, an object matte and a depth map.
+pub(super) fn beside_counts(scene: &Scene) -> [(&'static str, usize); 3] {
+    let count = |has: fn(&Photo) -> bool| scene.photos.iter().filter(|p| has(p)).count();
+    [
+        ("ignore masks", count(|p| p.ignore_mask.is_some())),
+        ("object mattes", count(|p| p.object_matte.is_some())),
+        ("depth maps", count(|p| p.depth_map.is_some())),
+    ]
+}
+
+/// `, 12 ignore masks`, and so on for what there is.
+pub(super) fn beside_text(scene: &Scene) -> String {
+    let counts = beside_counts(scene).into_iter().filter(|(_, n)| *n > 0);
+    counts.map(|(what, n)| format!(", {n} {what}")).collect()
 }
 
 /// How little ties a group of photos to the rest.
@@ -368,6 +384,14 @@ pub(super) fn triple(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// A number above zero.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    zero_or_more(text)
+        .ok()
+        .filter(|&value| value > 0.0)
+        .ok_or_else(|| "expected a number above zero".to_owned())
+}
+
 fn zero_or_more(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
@@ -385,6 +409,8 @@ mod tests {
         assert!(size("0x480").is_err() && size("640").is_err() && size("-3x4").is_err());
         assert_eq!(triple("1, -2,3e-1"), Ok(DVec3::new(1.0, -2.0, 0.3)));
         assert!(triple("1,2").is_err() && triple("1,2,NaN").is_err());
+        assert!(positive("0").is_err() && positive("x").is_err());
+        assert_eq!(positive("1e-3"), Ok(1e-3));
         assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());
     }
 }

@@ -59,6 +59,19 @@ pub enum SceneError {
          photos, and their calibration with --calibration", .0.display()
     )]
     NoPhotos(PathBuf),
+    /// A folder of masks, mattes or depth maps has none for any photo.
+    #[error(
+        "{}: no {kind} for any photo here; that of {example} would be called {example}.png, or \
+         so without its own extension", folder.display()
+    )]
+    NothingBeside {
+        /// The folder.
+        folder: PathBuf,
+        /// What was looked for.
+        kind: capture::Beside,
+        /// A photo's name.
+        example: String,
+    },
     /// A photo is missing or corrupt and none may be.
     #[error("photo {name}: {reason}; without --strict it would be left out")]
     Strict {

@@ -1,8 +1,9 @@
 //! From a capture to a scene.
 
+use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
-use super::{Photo, Scene, SceneError, Warning};
+use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::colmap;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
@@ -11,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// How photos are imported.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ImportOptions {
     /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV
     /// or another program that [`calibrate::formats`] knows;
@@ -21,6 +22,34 @@ pub struct ImportOptions {
     pub keys: Keys,
     /// A missing or corrupt photo is an error rather than left out.
     pub strict: bool,
+    /// The folder with ignore masks, `a.jpg.png` or `a.png` for the photo `a.jpg`, as is or
+    /// within the capture; `None`: the capture's `masks`, if it has one.
+    pub masks: Option<PathBuf>,
+    /// Without [`Self::masks`], use none.
+    pub no_masks: bool,
+    /// The folder with object mattes, named likewise; `None`: there are none but the
+    /// photos' alpha channels.
+    pub mattes: Option<PathBuf>,
+    /// The folder with depth maps, named likewise; `None`: the capture's `depth`, if it has
+    /// one.
+    pub depth: Option<PathBuf>,
+    /// World units a step of the depth maps.
+    pub depth_scale: f64,
+}
+
+impl Default for ImportOptions {
+    fn default() -> Self {
+        Self {
+            calibration: None,
+            keys: Keys::default(),
+            strict: false,
+            masks: None,
+            no_masks: false,
+            mattes: None,
+            depth: None,
+            depth_scale: DEPTH_UNITS_PER_STEP,
+        }
+    }
 }
 
 /// Photos that must remain for others to be left out.
@@ -29,13 +58,14 @@ const ENOUGH: usize = 2;
 impl Scene {
     /// Imports a capture, a folder of photos with a calibration in it or beside it.
     ///
-    /// Every photo's size is compared with its camera's, from the file's header; nothing
-    /// is decoded. A calibrated photo that is missing, or whose header cannot be read, is
+    /// Every photo's size is compared with its camera's, and those of masks, mattes and depth
+    /// maps with their photos', from the files' headers. A calibrated photo that is missing, or whose header cannot be read, is
     /// left out with a warning as long as two others remain.
     ///
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of
-    /// another size than calibrated; too few photos left, or with
+    /// another size than calibrated; a mask, matte or depth map of another size than its
+    /// photo, or unreadable; too few photos left, or with
     /// [`ImportOptions::strict`] any missing or corrupt one.
     pub fn import(
         capture: &Path,
@@ -51,7 +81,11 @@ impl Scene {
         // 2. The photos, matched by name.
         let folder =
             find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
-        let found = PhotoSet::open(&folder)?;
+        let mut found = PhotoSet::open(&folder)?;
+        if folder == capture {
+            // Photos that lie in the capture itself have their masks within.
+            found.photos.retain(|photo| !beside::is_beside(&photo.name));
+        }
         let reconstruction = match &source {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
@@ -107,6 +141,11 @@ impl Scene {
         };
         // 3. Are they what was calibrated?
         warnings.extend(scene.leave_out_unusable(options.strict)?);
+
+        // 4. What lies beside them.
+        scene.find_beside(capture, options, &mut warnings)?;
+        scene.check_beside()?;
+        scene.note_masks_that_repeat_alpha(&mut warnings);
         Ok((scene, warnings))
     }
 

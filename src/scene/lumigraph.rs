@@ -5,6 +5,7 @@ use calibrate::{Image, View};
 use proxy::{FitError, PlaneFit, Proxy};
 use render::{Lumigraph, PhotoStore, SourceView};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 impl Scene {
     /// A photo's camera and pose.
@@ -83,7 +84,7 @@ impl Scene {
         let mut files = Vec::new();
         for photo in self.photos.iter().filter(|p| !without.contains(&p.name)) {
             let view = self.view_of(images[photo.name.as_str()])?;
-            files.push((photo.path.clone(), (view.width, view.height)));
+            files.push((photo.clone(), (view.width, view.height)));
             sources.push(SourceView {
                 name: photo.name.clone(),
                 view,
@@ -93,9 +94,18 @@ impl Scene {
         if sources.is_empty() {
             return Err(SceneError::NothingLeft(self.photos.len()));
         }
+        let masked: Vec<bool> = files.iter().map(|(p, _)| p.ignore_mask.is_some()).collect();
+        let files = Arc::new(files);
+        let of_masks = Arc::clone(&files);
         let photos = PhotoStore::new(files.len(), move |source_idx| {
-            let (path, size) = &files[source_idx];
-            capture::decode(path, Some(*size)).map_err(|error| error.to_string())
+            let (photo, size) = &files[source_idx];
+            photo.decode(*size).map_err(|error| error.to_string())
+        });
+        let photos = photos.with_masks(&masked, move |source_idx| {
+            let (photo, size) = &of_masks[source_idx];
+            let mask = photo.decode_ignore_mask(*size);
+            let mask = mask.map_err(|error| error.to_string())?;
+            mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))
         });
         Ok(Lumigraph {
             sources,

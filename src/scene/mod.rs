@@ -4,6 +4,7 @@
 //! and, once there is one, the proxy's file. Photos stay where they are and are named by
 //! their path relative to the folder.
 
+mod beside;
 mod calibration;
 mod error;
 mod exposure;
@@ -16,6 +17,7 @@ mod split;
 mod store;
 mod undistort;
 
+pub use beside::DEPTH_UNITS_PER_STEP;
 pub use calibration::{Sizes, read_bare};
 pub use error::{SceneError, Warning};
 pub use exposure::Matched;

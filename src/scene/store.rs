@@ -48,6 +48,7 @@ impl Scene {
         let file: SceneFile = serde_json::from_slice(&bytes).map_err(json)?;
         let mut scene = Self::from_file(file, folder, &path)?;
         let warnings = scene.leave_out_unusable(strict)?;
+        scene.check_beside()?;
         Ok((scene, warnings))
     }
 
@@ -74,9 +75,13 @@ impl Scene {
                 let problem = format!("photo {} is not in the model", entry.name);
                 return Err(inconsistent(problem));
             }
-            let is_exposure = |g: f64| g > 0.0 && g.is_finite();
-            if !entry.gain.iter().flatten().all(|&g| is_exposure(g)) {
+            let is_positive = |g: f64| g > 0.0 && g.is_finite();
+            if !entry.gain.iter().flatten().all(|&g| is_positive(g)) {
                 let problem = format!("photo {}: a gain must be positive", entry.name);
+                return Err(inconsistent(problem));
+            }
+            if !entry.depth_scale.is_none_or(is_positive) {
+                let problem = format!("photo {}: the depth scale must be positive", entry.name);
                 return Err(inconsistent(problem));
             }
             photos.push(Photo {

@@ -9,6 +9,7 @@ mod field;
 mod formats;
 mod gpu;
 mod help;
+mod masks;
 mod opencv;
 mod render;
 mod repeat;

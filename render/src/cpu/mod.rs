@@ -68,7 +68,8 @@ fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError>
             let (seeing, mut terms): (Vec<_>, Vec<_>) = sources
                 .iter()
                 .filter_map(|&i| {
-                    let sight = engine.sources[i].see(&tile)?;
+                    let mut sight = engine.sources[i].see(&tile)?;
+                    engine.mask(i, &mut sight, |_| true);
                     let diff = engine.sources[i].difference(&tile);
                     let term = Term {
                         diff,
@@ -144,7 +145,7 @@ fn draw_field(
                 }
             }
             // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
-            // triangle a term of the blend.
+            // triangle, with the mask, a term of the blend.
             let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
             active.sort_by_key(|s| s.source_idx);
             let mut seen: Vec<(usize, Sight)> = Vec::with_capacity(active.len());
@@ -154,6 +155,8 @@ fn draw_field(
                     continue;
                 };
                 if any_bordered {
+                    // Elsewhere the masks of all that is listed are one.
+                    engine.mask(source.source_idx, &mut sight, |k| source.blended[k] > 0.0);
                     let a = each(|k| sight.a[k] * source.blended[k]);
                     terms.push(Term {
                         diff: source.diff,
@@ -179,7 +182,7 @@ fn draw_field(
 /// What a field says of one source view over a tile.
 struct Interpolated {
     source_idx: usize,
-    /// In triangles that no photo's border crosses; zero elsewhere.
+    /// In triangles that no photo's or mask's border crosses; zero elsewhere.
     weight: Lane,
     /// In the others.
     diff: Lane,
@@ -240,6 +243,18 @@ impl<'a> Engine<'a> {
         tile
     }
 
+    /// Takes what a photo's mask ignores off its relevance, in the pixels that are `wanted`.
+    fn mask(&self, source_idx: usize, sight: &mut Sight, wanted: impl Fn(usize) -> bool) {
+        let Some(mask) = self.frame.lumigraph.photos.mask(source_idx) else {
+            return;
+        };
+        for k in 0..LANES {
+            if sight.a[k] > 0.0 && wanted(k) {
+                sight.a[k] *= shade::sample_mask(mask, sight.u[k], sight.v[k], sight.level[k]);
+            }
+        }
+    }
+
     /// Blends the photos of a tile and writes its pixels.
     fn shade<'s>(
         &self,
@@ -290,5 +305,6 @@ fn draw<S: Default + Send>(
             rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels))
                 .try_for_each(|done| done)
         })?;
+    frame.lumigraph.photos.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
 }

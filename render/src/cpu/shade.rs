@@ -1,29 +1,68 @@
-//! Sampling photos: the f32 twin of [`crate::reference::sample`].
+//! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
+use crate::mask::{IGNORED, Mask};
 use crate::photos::Pyramid;
 use glam::Vec4;
+use image::{ImageBuffer, Pixel};
+use std::ops::{Add, Mul, Sub};
 
 /// Trilinear; premultiplied, 0…255.
 #[inline]
 pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
+    let texel =
+        |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
+    trilinear(&photo.levels, u, v, level, texel)
+}
+
+/// What a mask leaves of its photo, 0…1; trilinear.
+#[inline]
+pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
+    trilinear(&mask.levels, u, v, level, |[value]: [u8; 1]| {
+        f32::from(value)
+    }) / 255.0
+}
+
+/// `texel` makes a number or several of a texel's bytes.
+#[inline]
+fn trilinear<P, T, const CHANNELS: usize>(
+    levels: &[ImageBuffer<P, Vec<u8>>],
+    u: f32,
+    v: f32,
+    level: f32,
+    texel: impl Fn([u8; CHANNELS]) -> T + Copy,
+) -> T
+where
+    P: Pixel<Subpixel = u8>,
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+{
     if level <= 0.0 {
-        return bilinear(photo, u, v, 0);
+        return bilinear(levels, u, v, 0, texel);
     }
-    let level = level.min((photo.levels.len() - 1) as f32);
+    let level = level.min((levels.len() - 1) as f32);
     let lower = level as usize;
     let fraction = level - lower as f32;
-    let color = bilinear(photo, u, v, lower);
+    let color = bilinear(levels, u, v, lower, texel);
     if fraction > 0.0 {
-        color + (bilinear(photo, u, v, lower + 1) - color) * fraction
+        color + (bilinear(levels, u, v, lower + 1, texel) - color) * fraction
     } else {
         color
     }
 }
 
 #[inline]
-fn bilinear(photo: &Pyramid, u: f32, v: f32, level: usize) -> Vec4 {
-    let image = &photo.levels[level];
-    let texels: &[[u8; 4]] = bytemuck::cast_slice(image.as_raw());
+fn bilinear<P, T, const CHANNELS: usize>(
+    levels: &[ImageBuffer<P, Vec<u8>>],
+    u: f32,
+    v: f32,
+    level: usize,
+    texel: impl Fn([u8; CHANNELS]) -> T,
+) -> T
+where
+    P: Pixel<Subpixel = u8>,
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+{
+    let image = &levels[level];
+    let (texels, _) = image.as_raw().as_chunks::<CHANNELS>();
     let (last_x, last_y) = (image.width() as i32 - 1, image.height() as i32 - 1);
     let scale = 1.0 / (1_u32 << level) as f32;
     // The pixel lies inside the photo, so a shift by one keeps truncation a floor.
@@ -35,11 +74,8 @@ fn bilinear(photo: &Pyramid, u: f32, v: f32, level: usize) -> Vec4 {
     let pitch = image.width() as usize;
     let row0 = (bottom - 1).clamp(0, last_y) as usize * pitch;
     let row1 = bottom.clamp(0, last_y) as usize * pitch;
-    let texel = |i: usize| {
-        let [r, g, b, a] = texels[i];
-        Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
-    };
-    let top = texel(row0 + x0) + (texel(row0 + x1) - texel(row0 + x0)) * fx;
-    let low = texel(row1 + x0) + (texel(row1 + x1) - texel(row1 + x0)) * fx;
+    let at = |i: usize| texel(texels[i]);
+    let top = at(row0 + x0) + (at(row0 + x1) - at(row0 + x0)) * fx;
+    let low = at(row1 + x0) + (at(row1 + x1) - at(row1 + x0)) * fx;
     top + (low - top) * fy
 }

@@ -42,7 +42,8 @@ pub(crate) struct Sight {
     /// Pixels of the photo.
     pub u: Lane,
     pub v: Lane,
-    /// fovBlend; zero where the photo does not see the point.
+    /// Relevance: fovBlend, times the mask where that was asked for; zero where the photo
+    /// does not see the point.
     pub a: Lane,
     /// Mip level, ≥ 0.
     pub level: Lane,

@@ -1,9 +1,8 @@
 //! Which source views a triangle carries, and with what.
 
-use super::vertex::{Vertex, sources_at};
+use super::vertex::{Vertex, candidates, point_at, sources_at};
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::Frame;
-use calibrate::Pixel;
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
@@ -18,7 +17,7 @@ pub(super) struct List {
 /// How a source view sees a triangle.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sees {
-    /// With fovBlend one all over.
+    /// With fovBlend and mask one all over.
     All,
     Nothing,
     Part,
@@ -32,7 +31,7 @@ impl List {
             return Self::of_weights(corners);
         }
         let sees: Vec<Sees> = (0..frame.sources.len())
-            .map(|i| how_it_sees(frame, i, corners.map(|c| c.sources[i].pixel)))
+            .map(|i| how_it_sees(frame, i, corners))
             .collect();
         if !sees.contains(&Sees::Part) {
             return Self::of_weights(corners);
@@ -125,12 +124,12 @@ fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
     let step = |i: u32| f64::from(i) / f64::from(STEPS);
     let mut ranks = vec![usize::MAX; frame.sources.len()];
     for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))) {
-        let sources = sources_at(frame, a + step(i) * (b - a) + step(j) * (c - a));
-        let seeing = sources.iter().enumerate().filter_map(|(i, source)| {
-            let sees = frame.fov_blend(i, source.pixel?) >= 0.0;
-            sees.then_some((source.diff, i))
-        });
-        let mut seeing: Vec<(f64, usize)> = seeing.collect();
+        let Some(point) = point_at(frame, a + step(i) * (b - a) + step(j) * (c - a)) else {
+            continue;
+        };
+        let sources = sources_at(frame, &point);
+        let seeing = candidates(frame, &point, &sources);
+        let mut seeing: Vec<(f64, usize)> = seeing.map(|c| (c.diff, c.source_idx)).collect();
         seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         for (rank, (_, i)) in seeing.into_iter().enumerate() {
             ranks[i] = ranks[i].min(rank);
@@ -139,9 +138,10 @@ fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
     ranks
 }
 
-fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [Option<Pixel>; 3]) -> Sees {
-    let [Some(a), Some(b), Some(c)] = corners else {
-        let none = corners.iter().all(Option::is_none);
+fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [&Vertex; 3]) -> Sees {
+    let [Some(a), Some(b), Some(c)] = corners.map(|c| c.sources[source_idx].pixel) else {
+        let unseen = |c: &Vertex| c.sources[source_idx].pixel.is_none();
+        let none = corners.into_iter().all(unseen);
         return if none { Sees::Nothing } else { Sees::Part };
     };
     let source = &frame.sources[source_idx];
@@ -150,10 +150,23 @@ fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [Option<Pixel>; 3]
     let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
     let beyond = (-right).max(left - width).max(-bottom).max(top - height);
     let inside = left.min(width - right).min(top).min(height - bottom);
+    if beyond > CLEARANCE_PX {
+        return Sees::Nothing;
+    }
+    if let Some(mask) = frame.lumigraph.photos.mask(source_idx) {
+        // Filtering reaches two texels of the coarser of its two levels.
+        let points = corners.iter().filter_map(|c| c.point.as_ref());
+        let levels = points.map(|point| frame.level_of_detail(source_idx, point));
+        let coarsest = levels.fold(0.0, f64::max).ceil();
+        let reach = CLEARANCE_PX + 2.0 * coarsest.min((mask.levels.len() - 1) as f64).exp2();
+        match mask.range([left - reach, top - reach], [right + reach, bottom + reach]) {
+            (_, 0) => return Sees::Nothing,
+            (255, _) => {}
+            _ => return Sees::Part,
+        }
+    }
     if inside >= source.feather_px + CLEARANCE_PX {
         Sees::All
-    } else if beyond > CLEARANCE_PX {
-        Sees::Nothing
     } else {
         Sees::Part
     }

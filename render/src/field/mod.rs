@@ -4,10 +4,10 @@
 //! grid, the epipoles, the projected edges of the proxy) and interpolated.
 //!
 //! Where every source view either sees all of a triangle or nothing of it, the corners'
-//! weights are interpolated, as in the paper. Where the border of a photo crosses the
-//! triangle, weights change faster than any grid can follow: fovBlend rises within a few
+//! weights are interpolated, as in the paper. Where the border of a photo, or of what its
+//! mask ignores, crosses the triangle, weights change faster than any grid can follow: fovBlend rises within a few
 //! pixels, and the threshold t of all the others moves with it. There the *differences*
-//! are interpolated, which are smooth, and each pixel blends by its own fovBlend.
+//! are interpolated, which are smooth, and each pixel blends by its own fovBlend and masks.
 //! (Interpolating feathered weights instead cost 15 to 20 dB against the exact picture;
 //! interpolating weights and feathering each pixel still cost 5 to 20 dB near borders.)
 
@@ -19,7 +19,7 @@ use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
-use crate::reference;
+use crate::reference::{self, candidate};
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
 use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
@@ -51,8 +51,8 @@ pub struct FieldTriangle {
     pub first_entry: u32,
     /// How many entries it has; at most [`MAX_LISTED`].
     pub entry_count: u32,
-    /// Whether the border of a photo crosses it: its entries are differences, and each
-    /// pixel blends by its own fovBlend. Otherwise they are weights.
+    /// Whether the border of a photo or of a mask crosses it: its entries are differences,
+    /// and each pixel blends by its own fovBlend and masks. Otherwise they are weights.
     pub bordered: bool,
 }
 
@@ -160,18 +160,13 @@ impl TriangulatedField {
         let value = |entry: &FieldEntry| -> f64 {
             (0..3).map(|c| shares[c] * f64::from(entry.values[c])).sum()
         };
-        let fov = |source_idx| Some(frame.fov_blend(source_idx, frame.project(source_idx, point)?));
         let entries = self.entries_of(triangle_idx).iter();
         if self.triangles[triangle_idx].bordered {
             let candidates: Vec<Candidate> = entries
                 .filter_map(|entry| {
                     let source_idx = entry.source_idx as usize;
-                    let fov = fov(source_idx).filter(|fov| *fov >= 0.0)?;
-                    Some(Candidate {
-                        source_idx,
-                        diff: value(entry),
-                        fov,
-                    })
+                    let pixel = frame.project(source_idx, point)?;
+                    candidate(frame, source_idx, point, pixel, || value(entry))
                 })
                 .collect();
             return blend(&candidates, &frame.options);
@@ -179,7 +174,8 @@ impl TriangulatedField {
         let mut contributors: Vec<Contributor> = entries
             .filter_map(|entry| {
                 let source_idx = entry.source_idx as usize;
-                let weight = value(entry) * fov(source_idx)?;
+                let pixel = frame.project(source_idx, point)?;
+                let weight = value(entry) * frame.fov_blend(source_idx, pixel);
                 (weight > 0.0).then_some(Contributor { source_idx, weight })
             })
             .collect();

@@ -2,6 +2,7 @@
 
 use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
+use crate::reference::candidate;
 use calibrate::Pixel;
 use glam::DVec2;
 
@@ -9,6 +10,8 @@ use glam::DVec2;
 pub(super) struct Vertex {
     /// In pixels of the desired image.
     pub(super) at: DVec2,
+    /// `None` where the lens has no ray.
+    pub(super) point: Option<ProxyPoint>,
     /// By source view; empty where the lens has no ray.
     pub(super) sources: Vec<VertexSource>,
     /// The exact blend, by source view.
@@ -23,43 +26,50 @@ pub(super) struct VertexSource {
 
 impl Vertex {
     pub(super) fn new(frame: &Frame<'_>, at: DVec2) -> Self {
-        let sources = sources_at(frame, at);
-        let candidates: Vec<Candidate> = sources
-            .iter()
-            .enumerate()
-            .filter_map(|(source_idx, source)| {
-                let fov = frame.fov_blend(source_idx, source.pixel?);
-                (fov >= 0.0).then_some(Candidate {
-                    source_idx,
-                    diff: source.diff,
-                    fov,
-                })
-            })
-            .collect();
+        let point = point_at(frame, at);
+        let sources = point.map_or_else(Vec::new, |point| sources_at(frame, &point));
+        let candidates = point.map_or_else(Vec::new, |point| {
+            candidates(frame, &point, &sources).collect()
+        });
         Self {
             at,
+            point,
             sources,
             weights: blend(&candidates, &frame.options),
         }
     }
 }
 
-/// What every source view makes of the proxy point at a position in the desired image;
-/// empty where the lens has no ray.
-pub(super) fn sources_at(frame: &Frame<'_>, at: DVec2) -> Vec<VertexSource> {
-    let Some(ray) = frame.desired.lens.unproject(Pixel::new(at.x, at.y)) else {
-        return Vec::new();
-    };
-    // Snapping may have put a vertex of the horizon a little beyond it.
-    let inverse_distance = frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0);
-    let point = ProxyPoint {
+/// The proxy point at a position in the desired image; `None` where the lens has no ray.
+pub(super) fn point_at(frame: &Frame<'_>, at: DVec2) -> Option<ProxyPoint> {
+    let ray = frame.desired.lens.unproject(Pixel::new(at.x, at.y))?;
+    Some(ProxyPoint {
         ray,
-        inverse_distance,
-    };
+        // Snapping may have put a vertex of the horizon a little beyond it.
+        inverse_distance: frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0),
+    })
+}
+
+/// What every source view makes of a proxy point.
+pub(super) fn sources_at(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<VertexSource> {
     (0..frame.sources.len())
         .map(|source_idx| VertexSource {
-            diff: frame.difference(source_idx, &point),
-            pixel: frame.project(source_idx, &point),
+            diff: frame.difference(source_idx, point),
+            pixel: frame.project(source_idx, point),
         })
         .collect()
+}
+
+/// The source views that see a proxy point.
+pub(super) fn candidates<'f>(
+    frame: &'f Frame<'_>,
+    point: &'f ProxyPoint,
+    sources: &'f [VertexSource],
+) -> impl Iterator<Item = Candidate> + 'f {
+    sources
+        .iter()
+        .enumerate()
+        .filter_map(|(source_idx, source)| {
+            candidate(frame, source_idx, point, source.pixel?, || source.diff)
+        })
 }

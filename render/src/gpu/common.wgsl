@@ -58,7 +58,7 @@ const IMAGE = 6u;
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
-// rgb.
+// rgb; w: layer of the masks' array, negative without a mask.
 const EXPOSURE = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
@@ -68,6 +68,9 @@ const SENSOR = 11u;
 // The one kind of lens that all source views have; negative where they differ. Set when a
 // pipeline is made, so that no pixel pays for lenses that are not there.
 override COMMON_LENS: f32 = -1.0;
+
+// Whether any source view has an ignore mask. Set likewise.
+override MASKED: bool = false;
 
 const LENS_PINHOLE: f32 = 0.0;
 const LENS_RATIONAL: f32 = 1.0;
@@ -89,6 +92,9 @@ const LENS_SKEWED_FISHEYE: f32 = 12.0;
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
+// As large as the photos' array; a single texel where nothing is masked.
+@group(0) @binding(3) var masks: texture_2d_array<f32>;
+@group(0) @binding(4) var mask_sampler: sampler;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
     let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
@@ -356,6 +362,25 @@ fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
     let ratio = here / sight.depth;
     return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
+}
+
+// See IGNORED of mask.rs.
+const IGNORED: f32 = 1.0;
+
+// fovBlend and what the ignore mask leaves of it.
+fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
+    let fov = fov_blend(source_idx, sight);
+    if !MASKED || fov <= 0.0 {
+        return fov;
+    }
+    let layer = source_data(source_idx, GAIN).w;
+    if layer < 0.0 {
+        return fov;
+    }
+    let uv = sight.pixel / params.array_size;
+    let level = level_of_detail(sight, ray);
+    let value = textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
+    return fov * max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
 }
 
 // angDiff + beta * resDiff.

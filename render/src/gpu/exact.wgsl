@@ -15,7 +15,7 @@ struct Nearest {
 fn nearest_sources(ray: vec3f, s: f32) -> Nearest {
     var nearest: Nearest;
     for (var i = 0u; i < params.source_count; i++) {
-        let a = fov_blend(i, see(i, ray, s));
+        let a = relevance(i, see(i, ray, s), ray);
         if a <= 0.0 {
             continue;
         }

@@ -6,7 +6,7 @@ use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
 use bytemuck::{Pod, Zeroable};
 use calibrate::Distortion;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// `Params` of common.wgsl.
 #[repr(C)]
@@ -49,7 +49,8 @@ pub(crate) struct Source {
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub exposure: [f32; 4],
+    pub exposure: [f32; 3],
+    pub mask_layer: f32,
     pub prism: [f32; 4],
     pub shear: [f32; 2],
     pub horizon: [f32; 2],
@@ -121,7 +122,13 @@ impl Params {
 }
 
 impl Source {
-    pub(crate) fn of(frame: &Frame<'_>, source_idx: usize, layer: u32) -> Self {
+    /// `layers` are those of the photo's and the mask's array; of a photo that is not on the
+    /// device any will do.
+    pub(crate) fn of(
+        frame: &Frame<'_>,
+        source_idx: usize,
+        [photo, mask]: [Option<u32>; 2],
+    ) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
         // Depths scaled by the cube root of the ratio of areas make the ratio's cube the
         // area. In the plane of the proxy that is zero, but nothing is seen from there.
@@ -180,7 +187,6 @@ impl Source {
             Distortion::Equirectangular => (none, none, none, limit),
         };
         let (focal, sensor) = focal_and_sensor(&source.lens);
-        let exposure = Vec3::from_array(source.exposure.map(f));
         Self {
             axes: [axis(0), axis(1), axis(2)],
             focal: focal.to_array(),
@@ -191,11 +197,12 @@ impl Source {
             inverse_feather: f(1.0 / source.feather_px.max(1e-9)),
             limit: f(limit.min(1e30)),
             kind: lens_kind(source.lens.distortion()),
-            layer: layer as f32,
+            layer: photo.unwrap_or(0) as f32,
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            exposure: exposure.extend(1.0).to_array(),
+            exposure: source.exposure.map(f),
+            mask_layer: mask.map_or(-1.0, |layer| layer as f32),
             prism: prism.map(f),
             shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),
@@ -203,11 +210,41 @@ impl Source {
     }
 }
 
-/// The kind of lens that all source views have, if it is one; as the shaders number them.
-pub(crate) fn common_lens(frame: &Frame<'_>) -> Option<f32> {
-    let mut kinds = frame.sources.iter().map(|s| lens_kind(s.lens.distortion()));
-    let first = kinds.next()?;
-    kinds.all(|kind| kind == first).then_some(first)
+/// What shaders are specialised to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Special {
+    /// The kind of lens that all source views have, if it is one; as the shaders number
+    /// them.
+    pub common_lens: Option<f32>,
+    /// Whether any source view has an ignore mask.
+    pub masked: bool,
+}
+
+impl Special {
+    pub(crate) fn of(frame: &Frame<'_>) -> Self {
+        let mut kinds = frame.sources.iter().map(|s| lens_kind(s.lens.distortion()));
+        let first = kinds.next();
+        Self {
+            common_lens: first.filter(|first| kinds.all(|kind| kind == *first)),
+            masked: frame.lumigraph.photos.any_masked(),
+        }
+    }
+
+    /// The shaders' constants.
+    pub(super) fn constants(self) -> [(&'static str, f64); 2] {
+        let lens = f64::from(self.common_lens.unwrap_or(-1.0));
+        [
+            ("COMMON_LENS", lens),
+            ("MASKED", f64::from(u8::from(self.masked))),
+        ]
+    }
+
+    /// Different for each.
+    pub(super) fn key(self) -> (u32, bool) {
+        // Lenses' numbers are small and whole; those of views that differ share one more.
+        let lens = self.common_lens.map_or(u32::MAX, |lens| lens as u32);
+        (lens, self.masked)
+    }
 }
 
 fn lens_kind(distortion: Distortion) -> f32 {

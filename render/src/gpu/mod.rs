@@ -14,8 +14,8 @@ use crate::options::Method;
 use crate::rays::RayMap;
 use calibrate::Lens;
 use image::RgbaImage;
-use layout::{Corner, Entry, Params, Source};
-use photos::Photos;
+use layout::{Corner, Entry, Params, Source, Special};
+use photos::{Content, Layers};
 use pipelines::{Pass, Pipelines};
 use std::fmt;
 use std::sync::{Arc, Mutex};
@@ -31,7 +31,9 @@ pub struct Gpu {
     description: String,
     pipelines: Pipelines,
     sampler: wgpu::Sampler,
-    photos: Option<Photos>,
+    photos: Option<Layers>,
+    masks: Option<Layers>,
+    no_masks: wgpu::TextureView,
     rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
     target: Option<Target>,
     failure: Arc<Mutex<Option<String>>>,
@@ -90,6 +92,7 @@ impl Gpu {
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
             ..Default::default()
         });
+        let no_masks = photos::no_layers(&device);
         let description = format!("{} ({:?})", info.name, info.backend);
         Ok(Self {
             device,
@@ -99,6 +102,8 @@ impl Gpu {
             pipelines,
             sampler,
             photos: None,
+            masks: None,
+            no_masks,
             rays: None,
             target: None,
             failure,
@@ -125,6 +130,7 @@ impl Gpu {
             Method::Exact => self.render_exact(frame),
             Method::Triangulated { cells_across } => {
                 let field = TriangulatedField::new(frame, cells_across)?;
+                frame.lumigraph.photos.check_masks()?;
                 self.render_field(frame, &field)
             }
         }
@@ -165,7 +171,7 @@ impl Gpu {
         let bordered = corners_of(true);
         let photos = self.photos.as_ref().expect("prepared above");
         let entry = |e: &FieldEntry| Entry {
-            source_idx: photos.layer(e.source_idx as usize) as f32,
+            source_idx: photos.layer(e.source_idx as usize).unwrap_or(0) as f32,
             values: e.values,
         };
         let entries: Vec<Entry> = field.entries.iter().map(entry).collect();
@@ -176,17 +182,18 @@ impl Gpu {
         let own =
             self.pipelines
                 .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
-        let lens = layout::common_lens(frame);
-        self.pipelines.ensure(&self.device, Pass::Triangles, lens);
+        let special = Special::of(frame);
         self.pipelines
-            .ensure(&self.device, Pass::BorderedTriangles, lens);
+            .ensure(&self.device, Pass::Triangles, special);
+        self.pipelines
+            .ensure(&self.device, Pass::BorderedTriangles, special);
         self.draw(frame, |pass, pipelines| {
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
-            pass.set_pipeline(pipelines.get(Pass::Triangles, lens));
+            pass.set_pipeline(pipelines.get(Pass::Triangles, special));
             pass.set_vertex_buffer(0, plain_buffer.slice(..));
             pass.draw(0..plain.len() as u32, 0..1);
-            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, lens));
+            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, special));
             pass.set_vertex_buffer(0, bordered_buffer.slice(..));
             pass.draw(0..bordered.len() as u32, 0..1);
         })
@@ -205,10 +212,10 @@ impl Gpu {
         let own = self
             .pipelines
             .exact_group(&self.device, &photos.view, &self.sampler);
-        let lens = layout::common_lens(frame);
-        self.pipelines.ensure(&self.device, Pass::Exact, lens);
+        let special = Special::of(frame);
+        self.pipelines.ensure(&self.device, Pass::Exact, special);
         self.draw(frame, |pass, pipelines| {
-            pass.set_pipeline(pipelines.get(Pass::Exact, lens));
+            pass.set_pipeline(pipelines.get(Pass::Exact, special));
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
             pass.draw(0..3, 0..1);
@@ -226,10 +233,7 @@ impl Gpu {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(
-                self.pipelines
-                    .mark(&self.device, layout::common_lens(frame)),
-            );
+            pass.set_pipeline(self.pipelines.mark(&self.device, Special::of(frame)));
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
             let (width, height) = (frame.desired.width, frame.desired.height);
@@ -245,19 +249,50 @@ impl Gpu {
             .collect())
     }
 
-    /// Brings photos, source views and parameters to the device; returns the bind group
-    /// that all shaders share.
+    /// Brings photos, masks, source views and parameters to the device; returns the bind
+    /// group that all shaders share.
     fn prepare(
         &mut self,
         frame: &Frame<'_>,
         wanted: &[usize],
         order: Order,
     ) -> Result<wgpu::BindGroup, RenderError> {
-        Photos::ensure(&mut self.photos, &self.device, &self.queue, frame, wanted)?;
+        let (device, queue) = (&self.device, &self.queue);
+        Layers::ensure(
+            &mut self.photos,
+            Content::Photos,
+            device,
+            queue,
+            frame,
+            wanted,
+        )?;
+        // The exact field weighs all views, and asks all masks.
+        let store = &frame.lumigraph.photos;
+        let mut masked: Vec<usize> = match order {
+            Order::AsGiven => (0..frame.sources.len()).collect(),
+            Order::ByLayer => wanted.to_vec(),
+        };
+        masked.retain(|&i| store.is_masked(i));
+        if store.any_masked() {
+            Layers::ensure(
+                &mut self.masks,
+                Content::Masks,
+                device,
+                queue,
+                frame,
+                &masked,
+            )?;
+        } else {
+            self.masks = None;
+        }
         let rays = self.rays(frame)?;
         let photos = self.photos.as_ref().expect("ensured above");
+        let masks = self.masks.as_ref();
         let params = Params::of(frame, photos.size);
-        let source = |i| Source::of(frame, i, photos.layer(i));
+        let source = |i| {
+            let mask = masks.and_then(|masks| masks.layer(i));
+            Source::of(frame, i, [photos.layer(i), mask])
+        };
         let listed = match order {
             Order::AsGiven => (0..frame.sources.len()).collect(),
             Order::ByLayer => photos.by_layer(),
@@ -269,9 +304,15 @@ impl Gpu {
             bytemuck::cast_slice(&sources),
             layout::SOURCE_ROW,
         );
-        Ok(self
-            .pipelines
-            .shared_group(&self.device, &params, &sources, &rays))
+        let masks = masks.map_or(&self.no_masks, |masks| &masks.view);
+        Ok(self.pipelines.shared_group(
+            &self.device,
+            &params,
+            &sources,
+            &rays,
+            masks,
+            &self.sampler,
+        ))
     }
 
     /// The table of rays of a lens that is not a pinhole; a single texel otherwise.

@@ -1,17 +1,27 @@
-//! The photos on the device: one texture array, filled as frames ask for photos.
+//! The photos and the masks on the device: a texture array each, filled as frames ask.
 
 use crate::RenderError;
 use crate::frame::Frame;
-use crate::photos::{MAX_LEVELS, Pyramid};
-use image::RgbaImage;
+use crate::photos::MAX_LEVELS;
+use image::{ImageBuffer, Pixel};
 
-/// A texture array with one photo a layer.
+/// What a texture array holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Content {
+    /// Premultiplied RGBA.
+    Photos,
+    /// The ignore masks of the views that have one.
+    Masks,
+}
+
+/// A texture array with the photo, or the mask, of one source view a layer.
 ///
 /// Layers are as large as the largest photo, rounded up so that every mip level halves
-/// exactly; smaller photos repeat their border once, so that filtering never mixes in
+/// exactly; smaller ones repeat their border once, so that filtering never mixes in
 /// anything else.
 #[derive(Debug)]
-pub(crate) struct Photos {
+pub(crate) struct Layers {
+    content: Content,
     texture: wgpu::Texture,
     pub view: wgpu::TextureView,
     pub size: [u32; 2],
@@ -26,11 +36,12 @@ pub(crate) struct Photos {
 /// Both sides of the array are multiples of this, the texel of the coarsest level.
 const ALIGNMENT: u32 = 1 << (MAX_LEVELS - 1);
 
-impl Photos {
-    /// Makes sure that the photos of the given source views are on the device. Those that
-    /// are there already stay.
+impl Layers {
+    /// Makes sure that the photos or masks of the given source views are on the device.
+    /// Those that are there already stay.
     pub(crate) fn ensure(
         current: &mut Option<Self>,
+        content: Content,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         frame: &Frame<'_>,
@@ -53,18 +64,19 @@ impl Photos {
             let needed = (keep.len() as u32).max(1);
             let capacity = needed.next_multiple_of(8).min(total.max(1));
             *current = None;
-            let mut photos = Self::allocate(device, frame, store_id, capacity)?;
-            photos.fill(queue, frame, &keep)?;
-            *current = Some(photos);
+            let mut layers = Self::allocate(content, device, frame, store_id, capacity)?;
+            layers.fill(queue, frame, &keep)?;
+            *current = Some(layers);
             return Ok(());
         }
         match current {
-            Some(photos) => photos.fill(queue, frame, wanted),
+            Some(layers) => layers.fill(queue, frame, wanted),
             None => Ok(()),
         }
     }
 
     fn allocate(
+        content: Content,
         device: &wgpu::Device,
         frame: &Frame<'_>,
         store_id: u64,
@@ -85,8 +97,12 @@ impl Photos {
                 size[0], size[1], limits.max_texture_array_layers
             )));
         }
+        let (label, format) = match content {
+            Content::Photos => ("photos", wgpu::TextureFormat::Rgba8Unorm),
+            Content::Masks => ("masks", wgpu::TextureFormat::R8Unorm),
+        };
         let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("photos"),
+            label: Some(label),
             size: wgpu::Extent3d {
                 width: size[0],
                 height: size[1],
@@ -95,16 +111,14 @@ impl Photos {
             mip_level_count: MAX_LEVELS as u32,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8Unorm,
+            format,
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
-        });
+        let view = array_view(&texture);
         let layers = vec![None; sources.len()];
         Ok(Self {
+            content,
             texture,
             view,
             size,
@@ -123,8 +137,14 @@ impl Photos {
     ) -> Result<(), RenderError> {
         for &source_idx in wanted {
             if self.layers[source_idx].is_none() {
-                let photo = frame.lumigraph.photos.get(source_idx)?;
-                self.upload(queue, photo, self.used_layers);
+                let photos = &frame.lumigraph.photos;
+                match self.content {
+                    Content::Photos => self.upload(queue, &photos.get(source_idx)?.levels),
+                    Content::Masks => match photos.try_mask(source_idx)? {
+                        Some(mask) => self.upload(queue, &mask.levels),
+                        None => continue,
+                    },
+                }
                 self.layers[source_idx] = Some(self.used_layers);
                 self.used_layers += 1;
             }
@@ -132,10 +152,15 @@ impl Photos {
         Ok(())
     }
 
-    fn upload(&self, queue: &wgpu::Queue, photo: &Pyramid, layer: u32) {
+    /// Fills the first layer that is free.
+    fn upload<P: Pixel<Subpixel = u8>>(
+        &self,
+        queue: &wgpu::Queue,
+        levels: &[ImageBuffer<P, Vec<u8>>],
+    ) {
         for level in 0..MAX_LEVELS {
-            // A photo that is one texel sooner stays one.
-            let image = &photo.levels[level.min(photo.levels.len() - 1)];
+            // What is one texel sooner stays one.
+            let image = &levels[level.min(levels.len() - 1)];
             let padded = pad(image, self.size[0] >> level, self.size[1] >> level);
             let (width, height) = padded.dimensions();
             queue.write_texture(
@@ -145,14 +170,14 @@ impl Photos {
                     origin: wgpu::Origin3d {
                         x: 0,
                         y: 0,
-                        z: layer,
+                        z: self.used_layers,
                     },
                     aspect: wgpu::TextureAspect::All,
                 },
                 padded.as_raw(),
                 wgpu::TexelCopyBufferLayout {
                     offset: 0,
-                    bytes_per_row: Some(width * 4),
+                    bytes_per_row: Some(width * u32::from(P::CHANNEL_COUNT)),
                     rows_per_image: Some(height),
                 },
                 wgpu::Extent3d {
@@ -164,9 +189,9 @@ impl Photos {
         }
     }
 
-    /// The layer of a photo; the first where it is not on the device.
-    pub(crate) fn layer(&self, source_idx: usize) -> u32 {
-        self.layers[source_idx].unwrap_or(0)
+    /// The layer of a source view, if it is on the device.
+    pub(crate) fn layer(&self, source_idx: usize) -> Option<u32> {
+        self.layers[source_idx]
     }
 
     /// The source views on the device, by layer.
@@ -180,18 +205,43 @@ impl Photos {
         sources
     }
 
-    /// Whether every photo is on the device.
+    /// Whether every source view is on the device.
     pub(crate) fn complete(&self, store_id: u64) -> bool {
         self.store_id == store_id && self.layers.iter().all(Option::is_some)
     }
 }
 
+/// What stands in for an array that nothing is read from.
+pub(crate) fn no_layers(device: &wgpu::Device) -> wgpu::TextureView {
+    array_view(&device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("no layers"),
+        size: wgpu::Extent3d::default(),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R8Unorm,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    }))
+}
+
+fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
 /// Repeats the last column and row once, where there is room.
-fn pad(image: &RgbaImage, room_width: u32, room_height: u32) -> RgbaImage {
+fn pad<P: Pixel<Subpixel = u8>>(
+    image: &ImageBuffer<P, Vec<u8>>,
+    room_width: u32,
+    room_height: u32,
+) -> ImageBuffer<P, Vec<u8>> {
     let (width, height) = image.dimensions();
     let padded_width = (width + 1).min(room_width);
     let padded_height = (height + 1).min(room_height);
-    RgbaImage::from_fn(padded_width, padded_height, |x, y| {
+    ImageBuffer::from_fn(padded_width, padded_height, |x, y| {
         *image.get_pixel(x.min(width - 1), y.min(height - 1))
     })
 }

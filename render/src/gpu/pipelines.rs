@@ -1,6 +1,6 @@
 //! Shaders, pipelines and bind groups: what exists once per device.
 
-use super::layout::Corner;
+use super::layout::{Corner, Special};
 use std::collections::BTreeMap;
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, Device, ShaderStages};
 
@@ -32,10 +32,10 @@ pub(crate) enum Pass {
 }
 
 /// The pipelines made so far, and all that it takes to make more. Each exists once for
-/// every kind of lens that is met.
+/// everything that shaders are specialised to.
 pub(crate) struct Pipelines {
-    made: BTreeMap<(Pass, u32), wgpu::RenderPipeline>,
-    mark: BTreeMap<u32, wgpu::ComputePipeline>,
+    made: BTreeMap<(Pass, (u32, bool)), wgpu::RenderPipeline>,
+    mark: BTreeMap<(u32, bool), wgpu::ComputePipeline>,
     shaders: [wgpu::ShaderModule; 3],
     shared_layout: BindGroupLayout,
     triangulated_layout: BindGroupLayout,
@@ -85,17 +85,20 @@ impl Pipelines {
             made: BTreeMap::new(),
             mark: BTreeMap::new(),
             shaders: SHADERS.map(shader),
-            shared_layout: layout("shared", all, &[buffer(Uniform), table, table]),
+            shared_layout: layout(
+                "shared",
+                all,
+                &[buffer(Uniform), table, table, photos, sampler],
+            ),
             triangulated_layout: layout("triangulated", fragment, &[photos, sampler, table]),
             exact_layout: layout("exact", fragment, &[photos, sampler]),
             mark_layout: layout("mark", ShaderStages::COMPUTE, &[writable]),
         }
     }
 
-    /// Makes sure that [`Self::get`] has a pipeline for the frame's lenses. `common_lens`
-    /// is what all source views have, if they have one kind.
-    pub(crate) fn ensure(&mut self, device: &Device, pass: Pass, common_lens: Option<f32>) {
-        let key = (pass, lens_key(common_lens));
+    /// Makes sure that [`Self::get`] has a pipeline for a frame.
+    pub(crate) fn ensure(&mut self, device: &Device, pass: Pass, special: Special) {
+        let key = (pass, special.key());
         if self.made.contains_key(&key) {
             return;
         }
@@ -127,7 +130,7 @@ impl Pipelines {
                 &[],
             ),
         };
-        let constants = [("COMMON_LENS", f64::from(common_lens.unwrap_or(-1.0)))];
+        let constants = special.constants();
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,
             ..Default::default()
@@ -157,26 +160,22 @@ impl Pipelines {
     }
 
     /// A pipeline that [`Self::ensure`] made.
-    pub(crate) fn get(&self, pass: Pass, common_lens: Option<f32>) -> &wgpu::RenderPipeline {
-        &self.made[&(pass, lens_key(common_lens))]
+    pub(crate) fn get(&self, pass: Pass, special: Special) -> &wgpu::RenderPipeline {
+        &self.made[&(pass, special.key())]
     }
 
     /// The pass that marks the photos which the exact field samples.
-    pub(crate) fn mark(
-        &mut self,
-        device: &Device,
-        common_lens: Option<f32>,
-    ) -> &wgpu::ComputePipeline {
+    pub(crate) fn mark(&mut self, device: &Device, special: Special) -> &wgpu::ComputePipeline {
         let layout = self.layout(device, &self.mark_layout);
         let module = &self.shaders[2];
-        self.mark.entry(lens_key(common_lens)).or_insert_with(|| {
+        self.mark.entry(special.key()).or_insert_with(|| {
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some("mark"),
                 layout: Some(&layout),
                 module,
                 entry_point: Some("mark"),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &[("COMMON_LENS", f64::from(common_lens.unwrap_or(-1.0)))],
+                    constants: &special.constants(),
                     ..Default::default()
                 },
                 cache: None,
@@ -198,11 +197,15 @@ impl Pipelines {
         params: &wgpu::Buffer,
         sources: &wgpu::TextureView,
         rays: &wgpu::TextureView,
+        masks: &wgpu::TextureView,
+        sampler: &wgpu::Sampler,
     ) -> BindGroup {
         let resources = [
             params.as_entire_binding(),
             BindingResource::TextureView(sources),
             BindingResource::TextureView(rays),
+            BindingResource::TextureView(masks),
+            BindingResource::Sampler(sampler),
         ];
         group(device, &self.shared_layout, resources)
     }
@@ -238,11 +241,6 @@ impl Pipelines {
     pub(crate) fn mark_group(&self, device: &Device, used: &wgpu::Buffer) -> BindGroup {
         group(device, &self.mark_layout, [used.as_entire_binding()])
     }
-}
-
-/// Lenses' numbers are small and whole; those of views that differ share one more.
-fn lens_key(common_lens: Option<f32>) -> u32 {
-    common_lens.map_or(u32::MAX, |lens| lens as u32)
 }
 
 fn group<const N: usize>(

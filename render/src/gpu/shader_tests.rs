@@ -139,6 +139,8 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
     assert_eq!(within(offset_of!(Source, wide), kind), 3);
+    let gain = offset_of!(Source, gain);
+    assert_eq!(within(offset_of!(Source, mask_layer), gain), 3);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
     let sensor = offset_of!(Source, shear);
@@ -196,6 +198,7 @@ fn shared_numbers_are_the_same() {
             ("RESOLUTION_RATIO", 0.0),
             ("RESOLUTION_LENGTH", 1.0),
             ("LEVEL_BIAS", crate::LEVEL_BIAS),
+            ("IGNORED", f64::from(crate::mask::IGNORED)),
             ("LENS_PINHOLE", f64::from(layout::LENS_PINHOLE)),
             ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),
             ("LENS_FISHEYE", f64::from(layout::LENS_FISHEYE)),

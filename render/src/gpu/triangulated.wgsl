@@ -56,7 +56,7 @@ fn triangle(in: Corner) -> @location(0) vec4f {
             continue;
         }
         let source_idx = u32(listed.x);
-        // Every listed view sees all of the triangle: fovBlend is one.
+        // Every listed view sees all of the triangle: fovBlend and mask are one.
         let sight = see(source_idx, ray, s);
         if sight.depth > 0.0 {
             let level = level_of_detail(sight, ray);
@@ -75,8 +75,8 @@ struct Terms {
     source_idx: array<u32, LISTED>,
 }
 
-// Where the border of a photo crosses the triangle: interpolated differences, the pixel's
-// own fovBlend, and the blend of the exact field. A pipeline of its own, because software
+// Where the border of a photo or a mask crosses the triangle: interpolated differences, the
+// pixel's own fovBlend and mask, and the blend of the exact field. A pipeline of its own, because software
 // drivers pay for its arrays in every pixel.
 @fragment
 fn bordered_triangle(in: Corner) -> @location(0) vec4f {
@@ -94,7 +94,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         let listed = entry(i);
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
-        let a = fov_blend(source_idx, sight);
+        let a = relevance(source_idx, sight, ray);
         if a > 0.0 {
             let diff = max(dot(in.shares, listed.yzw), 0.0);
             nearest = min(nearest, diff);

@@ -153,6 +153,33 @@ impl Shot {
     }
 }
 
+pub(crate) const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
+
+/// The picture by the plain engine.
+pub(crate) fn by_reference(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
+    Ok(match method {
+        Method::Exact => reference::render_exact(frame)?,
+        Method::Triangulated { cells_across } => {
+            field::render_reference(frame, &TriangulatedField::new(frame, cells_across)?)?
+        }
+    })
+}
+
+/// The picture by every engine there is, each with its name.
+pub(crate) fn by_all(
+    frame: &Frame<'_>,
+    method: Method,
+) -> Vec<(&'static str, Result<RgbaImage, RenderError>)> {
+    let mut pictures = vec![
+        ("reference", by_reference(frame, method)),
+        ("cpu", cpu::render(frame, method)),
+    ];
+    if let Some(mut gpu) = gpu() {
+        pictures.push(("gpu", gpu.render(frame, method)));
+    }
+    pictures
+}
+
 /// A view between two others: `share` 0 is the first, 1 the second; the first's lens.
 pub(crate) fn between(first: &View, second: &View, share: f64) -> View {
     let center = first.center().lerp(second.center(), share);

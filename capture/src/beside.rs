@@ -1,0 +1,249 @@
+//! Pictures beside the photos: masks, mattes and depth maps, matched to photos by name.
+
+use crate::decode::{format_of, read_failed};
+use crate::{CaptureError, PhotoSet, decode};
+use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, ImageReader, RgbaImage};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// What a picture beside a photo says about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beside {
+    /// What to ignore (people, cars): 0 = ignore, 255 = use.
+    IgnoreMask,
+    /// The object that the photo is about: its coverage, as an alpha channel.
+    ObjectMatte,
+    /// Depth along z, in steps of 16 bits; 0 = none.
+    DepthMap,
+}
+
+impl fmt::Display for Beside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::IgnoreMask => "ignore mask",
+            Self::ObjectMatte => "object matte",
+            Self::DepthMap => "depth map",
+        })
+    }
+}
+
+/// The pictures of a folder that belong to photos.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Matched {
+    /// By the photo's name.
+    pub by_photo: BTreeMap<String, PathBuf>,
+    /// PNG files that belong to no photo, by their name in the folder.
+    pub unmatched: Vec<String>,
+}
+
+/// Finds the PNG files in a folder (and the folders within) that belong to photos: for the
+/// photo `sub/a.jpg` that is `sub/a.jpg.png`, as COLMAP names masks, or else `sub/a.png`.
+/// The case of extensions does not matter.
+///
+/// # Errors
+/// A folder that cannot be listed or holds no pictures; a file that two photos could claim.
+pub fn match_by_name(folder: &Path, photos: &[&str]) -> Result<Matched, CaptureError> {
+    let mut files: BTreeMap<String, (String, PathBuf)> = BTreeMap::new();
+    for file in PhotoSet::open(folder)?.photos {
+        if let (name, Some("png")) = split_extension(&file.name) {
+            let called = with_lower_extension(name);
+            files.entry(called).or_insert((file.name, file.path));
+        }
+    }
+    let mut claimed: BTreeMap<&str, &str> = BTreeMap::new();
+    let mut by_photo = BTreeMap::new();
+    for &photo in photos {
+        let stem = split_extension(photo).0.to_owned();
+        let found = [with_lower_extension(photo), stem]
+            .iter()
+            .find_map(|name| files.get(name));
+        let Some((name, path)) = found else {
+            continue;
+        };
+        if let Some(other) = claimed.insert(name, photo) {
+            return Err(CaptureError::Ambiguous {
+                path: path.clone(),
+                photos: [other.to_owned(), photo.to_owned()],
+            });
+        }
+        by_photo.insert(photo.to_owned(), path.clone());
+    }
+    let names = files.values().map(|(name, _)| name);
+    let unmatched = names.filter(|name| !claimed.contains_key(name.as_str()));
+    let unmatched = unmatched.cloned().collect();
+    Ok(Matched {
+        by_photo,
+        unmatched,
+    })
+}
+
+/// A name and its extension, if that is one of a photo's, in lower case.
+fn split_extension(name: &str) -> (&str, Option<&'static str>) {
+    let known = crate::photo_set::EXTENSIONS.into_iter().find_map(|known| {
+        let at = name.len().checked_sub(known.len() + 1)?;
+        let (stem, extension) = (name.get(..at)?, name.get(at + 1..)?);
+        let is_it = name.as_bytes()[at] == b'.' && extension.eq_ignore_ascii_case(known);
+        is_it.then_some((stem, Some(known)))
+    });
+    known.unwrap_or((name, None))
+}
+
+fn with_lower_extension(name: &str) -> String {
+    match split_extension(name) {
+        (stem, Some(extension)) => format!("{stem}.{extension}"),
+        (stem, None) => stem.to_owned(),
+    }
+}
+
+/// Checks, from its header alone, that a picture beside a photo is what its kind needs and
+/// as large as the photo.
+///
+/// # Errors
+/// A file that cannot be read or is no PNG or JPEG picture; another size than `photo_size`;
+/// a depth map that is not 16-bit grey.
+pub fn check_beside(
+    kind: Beside,
+    path: &Path,
+    photo: &str,
+    photo_size: (u32, u32),
+) -> Result<(), CaptureError> {
+    let failed = read_failed(path);
+    let mut reader = BufReader::new(File::open(path).map_err(&failed)?);
+    let mut head = Vec::new();
+    Read::by_ref(&mut reader)
+        .take(16)
+        .read_to_end(&mut head)
+        .map_err(&failed)?;
+    let format = format_of(path, &head)?;
+    let file = BufReader::new(File::open(path).map_err(&failed)?);
+    let decoder = ImageReader::with_format(file, format)
+        .into_decoder()
+        .map_err(|error| CaptureError::Decode {
+            path: path.to_owned(),
+            problem: error.to_string(),
+        })?;
+    check_size(kind, path, decoder.dimensions(), photo, photo_size)?;
+    if kind == Beside::DepthMap {
+        check_depth_format(path, decoder.color_type())?;
+    }
+    Ok(())
+}
+
+/// Decodes an ignore mask or an object matte, 0…255; colours by their brightness. A
+/// picture of nothing but zeros and ones means 0 and 255.
+///
+/// # Errors
+/// As for [`crate::decode()`], and another size than its photo's.
+pub fn decode_mask(
+    kind: Beside,
+    path: &Path,
+    photo: &str,
+    photo_size: (u32, u32),
+) -> Result<GrayImage, CaptureError> {
+    let mut mask = decode_beside(kind, path, photo, photo_size)?.into_luma8();
+    if mask.iter().all(|&value| value <= 1) {
+        mask.iter_mut().for_each(|value| *value *= 255);
+    }
+    Ok(mask)
+}
+
+/// Cuts a photo out by a matte: its alpha becomes the lesser of the two, so that a matte
+/// which repeats an alpha channel changes nothing.
+///
+/// # Panics
+/// If the sizes differ.
+pub fn apply_matte(photo: &mut RgbaImage, matte: &GrayImage) {
+    assert_eq!(photo.dimensions(), matte.dimensions());
+    for (pixel, matte) in photo.pixels_mut().zip(matte.pixels()) {
+        pixel.0[3] = pixel.0[3].min(matte.0[0]);
+    }
+}
+
+/// Depth at each pixel's centre, along the camera's z axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthMap {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// In world units, row by row; 0 where unknown.
+    pub depths: Vec<f32>,
+}
+
+impl DepthMap {
+    /// The depth at a pixel, if it is known.
+    ///
+    /// # Panics
+    /// If the pixel lies outside.
+    pub fn at(&self, column: u32, row: u32) -> Option<f32> {
+        assert!(column < self.width && row < self.height);
+        let depth = self.depths[row as usize * self.width as usize + column as usize];
+        (depth > 0.0).then_some(depth)
+    }
+}
+
+/// Decodes a depth map: a 16-bit grey picture whose values times `units_per_step` are
+/// world units, 0 where the depth is unknown.
+///
+/// # Errors
+/// As for [`crate::decode()`]; another size than its photo's; not 16-bit grey.
+pub fn decode_depth(
+    path: &Path,
+    photo: &str,
+    photo_size: (u32, u32),
+    units_per_step: f64,
+) -> Result<DepthMap, CaptureError> {
+    let picture = decode_beside(Beside::DepthMap, path, photo, photo_size)?;
+    check_depth_format(path, picture.color())?;
+    let (width, height) = photo_size;
+    let steps = picture.into_luma16().into_raw().into_iter();
+    let depths = steps.map(|steps| (f64::from(steps) * units_per_step) as f32);
+    Ok(DepthMap {
+        width,
+        height,
+        depths: depths.collect(),
+    })
+}
+
+fn decode_beside(
+    kind: Beside,
+    path: &Path,
+    photo: &str,
+    photo_size: (u32, u32),
+) -> Result<DynamicImage, CaptureError> {
+    let check = |found| check_size(kind, path, found, photo, photo_size);
+    decode::decode_any(path, check)
+}
+
+fn check_size(
+    kind: Beside,
+    path: &Path,
+    found: (u32, u32),
+    photo: &str,
+    photo_size: (u32, u32),
+) -> Result<(), CaptureError> {
+    if found == photo_size {
+        return Ok(());
+    }
+    Err(CaptureError::SizeBeside {
+        kind,
+        path: path.to_owned(),
+        found,
+        photo: photo.to_owned(),
+        photo_size,
+    })
+}
+
+fn check_depth_format(path: &Path, found: ColorType) -> Result<(), CaptureError> {
+    if found == ColorType::L16 {
+        return Ok(());
+    }
+    Err(CaptureError::DepthFormat {
+        path: path.to_owned(),
+        bits: found.bits_per_pixel() / u16::from(found.channel_count()),
+        channels: found.channel_count(),
+    })
+}

@@ -1,0 +1,217 @@
+//! What lies beside the photos: masks, mattes and depth maps, found by name and checked.
+
+use super::{ImportOptions, Photo, Scene, SceneError, Warning};
+use capture::{Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside, match_by_name};
+use image::{GrayImage, RgbaImage};
+use std::path::{Path, PathBuf};
+
+/// Where masks and depth maps are looked for in a capture, if nobody says.
+const MASKS_FOLDER: &str = "masks";
+const DEPTH_FOLDER: &str = "depth";
+
+/// Whether a file of a capture is a mask or a depth map by its place.
+pub(super) fn is_beside(name: &str) -> bool {
+    let folder = name.split_once('/').map(|(folder, _)| folder);
+    folder.is_some_and(|folder| [MASKS_FOLDER, DEPTH_FOLDER].contains(&folder))
+}
+
+/// World units a step of depth maps, if nobody says: millimetres where units are metres.
+pub const DEPTH_UNITS_PER_STEP: f64 = 0.001;
+
+/// Alpha and mask agree where both are on the same side of half in this share of pixels.
+const AGREES: f64 = 0.99;
+
+impl Photo {
+    /// Its pixels as stored, cut out by its object matte if it has one.
+    ///
+    /// # Errors
+    /// One of the files cannot be decoded or has another size than `size`.
+    pub fn decode(&self, size: (u32, u32)) -> Result<RgbaImage, CaptureError> {
+        let mut pixels = capture::decode(&self.path, Some(size))?;
+        if let Some(path) = &self.object_matte {
+            let matte = capture::decode_mask(Beside::ObjectMatte, path, &self.name, size)?;
+            apply_matte(&mut pixels, &matte);
+        }
+        Ok(pixels)
+    }
+
+    /// Its ignore mask, if it has one: 0 = ignore, 255 = use.
+    ///
+    /// # Errors
+    /// It cannot be decoded or has another size than `size`, the photo's.
+    pub fn decode_ignore_mask(&self, size: (u32, u32)) -> Result<Option<GrayImage>, CaptureError> {
+        let decode =
+            |path: &PathBuf| capture::decode_mask(Beside::IgnoreMask, path, &self.name, size);
+        self.ignore_mask.as_ref().map(decode).transpose()
+    }
+
+    /// Its depth map, if it has one.
+    ///
+    /// # Errors
+    /// It cannot be decoded, is not 16-bit grey or has another size than `size`, the photo's.
+    pub fn decode_depth(&self, size: (u32, u32)) -> Result<Option<DepthMap>, CaptureError> {
+        let scale = self.depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
+        let decode = |path: &PathBuf| capture::decode_depth(path, &self.name, size, scale);
+        self.depth_map.as_ref().map(decode).transpose()
+    }
+
+    /// What lies beside it, with its kind.
+    fn beside(&self) -> impl Iterator<Item = (Beside, &PathBuf)> {
+        let files = [
+            (Beside::IgnoreMask, &self.ignore_mask),
+            (Beside::ObjectMatte, &self.object_matte),
+            (Beside::DepthMap, &self.depth_map),
+        ];
+        files
+            .into_iter()
+            .filter_map(|(kind, path)| Some((kind, path.as_ref()?)))
+    }
+}
+
+impl Scene {
+    /// Gives the photos the masks, mattes and depth maps asked for, and those that lie in
+    /// the capture's `masks` and `depth`.
+    pub(super) fn find_beside(
+        &mut self,
+        capture: &Path,
+        options: &ImportOptions,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), SceneError> {
+        let within = |name: &str| Some(capture.join(name)).filter(|folder| folder.is_dir());
+        let given = |folder: &Option<PathBuf>| folder.as_ref().map(|f| folder_of(capture, f));
+        let mattes = given(&options.mattes).transpose()?;
+        let masks = match given(&options.masks).transpose()? {
+            Some(folder) => Some(folder),
+            None if options.no_masks => None,
+            // One folder does not serve as both, unless that is what was said.
+            None => within(MASKS_FOLDER).filter(|found| {
+                let real = |folder: &Path| folder.canonicalize().ok();
+                mattes.as_ref().is_none_or(|m| real(m) != real(found))
+            }),
+        };
+        let depth = match given(&options.depth).transpose()? {
+            Some(folder) => Some(folder),
+            None => within(DEPTH_FOLDER),
+        };
+        for (kind, folder, asked) in [
+            (Beside::IgnoreMask, masks, options.masks.is_some()),
+            (Beside::ObjectMatte, mattes, true),
+            (Beside::DepthMap, depth, options.depth.is_some()),
+        ] {
+            if let Some(folder) = folder {
+                self.attach(kind, &folder, asked, options, warnings)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the photos the pictures of a folder that belong to them by name.
+    fn attach(
+        &mut self,
+        kind: Beside,
+        folder: &Path,
+        asked: bool,
+        options: &ImportOptions,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), SceneError> {
+        // What belongs to photos that are left out is not astray.
+        let photos = self.photos.iter().map(|p| &p.name);
+        let names = photos.chain(&self.left_out);
+        let names: Vec<&str> = names.map(String::as_str).collect();
+        let total = self.photos.len();
+        let Matched {
+            mut by_photo,
+            unmatched,
+        } = match match_by_name(folder, &names) {
+            // An empty folder that nobody mentioned is none.
+            Err(CaptureError::NoPhotos { .. }) if !asked => return Ok(()),
+            matched => matched?,
+        };
+        let is_found = |p: &&Photo| by_photo.contains_key(&p.name);
+        let found = self.photos.iter().filter(is_found).count();
+        if let (0, true, Some(example)) = (found, asked, names.first()) {
+            return Err(SceneError::NothingBeside {
+                folder: folder.to_owned(),
+                kind,
+                example: (*example).to_owned(),
+            });
+        }
+        if found < total {
+            warnings.push(Warning::Note(format!(
+                "{}: {found} of {total} photos have their {kind} here",
+                folder.display()
+            )));
+        }
+        if let Some(example) = unmatched.first() {
+            warnings.push(Warning::Note(format!(
+                "{}: {} files belong to no calibrated photo ({example}, for one)",
+                folder.display(),
+                unmatched.len()
+            )));
+        }
+        for photo in &mut self.photos {
+            let path = by_photo.remove(&photo.name);
+            match kind {
+                Beside::IgnoreMask => photo.ignore_mask = path,
+                Beside::ObjectMatte => photo.object_matte = path,
+                Beside::DepthMap => {
+                    photo.depth_scale = path.is_some().then_some(options.depth_scale);
+                    photo.depth_map = path;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares the sizes of masks, mattes and depth maps with their photos'. A mask that
+    /// cannot be read is an error: without it the photo would show what it should not.
+    pub(super) fn check_beside(&self) -> Result<(), SceneError> {
+        let images = self.images_by_name();
+        for photo in &self.photos {
+            let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
+            for (kind, path) in photo.beside() {
+                check_beside(kind, path, &photo.name, (camera.width, camera.height))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Says so where the ignore masks only repeat the photos' alpha channels, judged by the
+    /// first photo that has one.
+    pub(super) fn note_masks_that_repeat_alpha(&self, warnings: &mut Vec<Warning>) {
+        let Some(photo) = self.photos.iter().find(|p| p.ignore_mask.is_some()) else {
+            return;
+        };
+        let decoded = capture::photo_size(&photo.path).and_then(|size| {
+            let pixels = photo.decode(size)?;
+            Ok((pixels, photo.decode_ignore_mask(size)?))
+        });
+        // What is wrong with them is said when they are needed.
+        let Ok((pixels, Some(mask))) = decoded else {
+            return;
+        };
+        if pixels.pixels().all(|p| p.0[3] == 255) {
+            return;
+        }
+        let both = pixels.pixels().zip(mask.pixels());
+        let agreeing = both
+            .filter(|(p, m)| (p.0[3] >= 128) == (m.0[0] >= 128))
+            .count();
+        if agreeing as f64 >= AGREES * pixels.pixels().len() as f64 {
+            warnings.push(Warning::Note(format!(
+                "the ignore masks repeat the photos' alpha ({}, for one), which is an object \
+                 matte already; --no-masks leaves them out",
+                photo.name
+            )));
+        }
+    }
+}
+
+/// A folder as given, or else the capture's own of that name.
+fn folder_of(capture: &Path, given: &Path) -> Result<PathBuf, SceneError> {
+    let own = capture.join(given);
+    [given.to_owned(), own]
+        .into_iter()
+        .find(|folder| folder.is_dir())
+        .ok_or_else(|| SceneError::NoFolder(given.to_owned()))
+}

@@ -1,0 +1,321 @@
+//! Masks, mattes and depth maps beside the photos.
+
+use crate::run::{lumigraph, with_wall};
+use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const SIZE: (u32, u32) = (96, 72);
+
+fn save(path: PathBuf, mask: &GrayImage) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    mask.save(path).unwrap();
+}
+
+/// Whether someone stands in a pixel of photo `i`.
+fn someone(i: u32, x: u32, y: u32) -> bool {
+    let left = 8 + (i * 37) % 60;
+    (left..left + 16).contains(&x) && (20..60).contains(&y)
+}
+
+fn mask_of(i: u32) -> GrayImage {
+    GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+        Luma([if someone(i, x, y) { 0 } else { 255 }])
+    })
+}
+
+/// The wall with someone in front of it in every photo.
+fn with_crowd() -> TempDir {
+    let folder = with_wall();
+    for i in 0..9 {
+        let path = folder.path().join(format!("wall/images/{i:04}.png"));
+        let mut photo = image::open(&path).unwrap().into_rgb8();
+        for (x, y, pixel) in photo.enumerate_pixels_mut() {
+            if someone(i, x, y) {
+                pixel.0 = [255, 0, 255];
+            }
+        }
+        photo.save(path).unwrap();
+    }
+    folder
+}
+
+fn at(folder: &TempDir, path: &str) -> PathBuf {
+    folder.path().join(path)
+}
+
+fn scene_json(folder: &TempDir) -> Value {
+    serde_json::from_slice(&fs::read(at(folder, "scene/scene.json")).unwrap()).unwrap()
+}
+
+fn magenta(folder: &Path) -> usize {
+    let entries = fs::read_dir(folder).unwrap();
+    let frames = entries.map(|e| image::open(e.unwrap().path()).unwrap().into_rgba8());
+    let is_magenta = |p: &Rgba<u8>| p.0[0] > 180 && p.0[1] < 90 && p.0[2] > 180 && p.0[3] > 0;
+    frames
+        .map(|f| f.pixels().filter(|p| is_magenta(p)).count())
+        .sum()
+}
+
+#[test]
+fn what_masks_cover_is_not_seen() {
+    let folder = with_crowd();
+    for i in 0..9 {
+        save(
+            at(&folder, &format!("wall/masks/{i:04}.png.png")),
+            &mask_of(i),
+        );
+    }
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(ran.stdout.contains("9 photos"), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains(", 9 ignore masks, 9 depth maps\n"),
+        "{}",
+        ran.stdout
+    );
+    assert_eq!(
+        scene_json(&folder)["photos"][3]["ignore_mask"],
+        "../wall/masks/0003.png.png"
+    );
+    lumigraph(folder.path(), "import wall --no-masks -o without").ok();
+
+    for device in ["cpu", "reference"] {
+        let evaluate = |scene: &str, out: &str| {
+            let line = format!("evaluate {scene} --json --device {device} -o {out}");
+            lumigraph(folder.path(), &line).ok().json()
+        };
+        let with = evaluate("scene", &format!("with-{device}"));
+        let without = evaluate("without", &format!("without-{device}"));
+        let [first, ..] = &with["photos"].as_array().unwrap()[..] else {
+            panic!("{with}");
+        };
+        let keys: Vec<&str> = first
+            .as_object()
+            .unwrap()
+            .keys()
+            .map(String::as_str)
+            .collect();
+        let scores = ["psnr", "ssim", "psnr_covered", "coverage"];
+        let masked = ["psnr_masked", "ssim_masked", "coverage_masked"];
+        assert_eq!(
+            keys,
+            [&["name"], &scores[..], &masked, &["cpu_ms"]].concat()
+        );
+        let inside = with["mean"]["psnr_masked"].as_f64().unwrap();
+        assert!(inside > 30.0, "{with}");
+        assert!(without["mean"].get("psnr_masked").is_none(), "{without}");
+        assert!(with["mean"]["psnr"].as_f64() > without["mean"]["psnr"].as_f64());
+        assert_eq!(magenta(&at(&folder, &format!("with-{device}"))), 0);
+        assert!(magenta(&at(&folder, &format!("without-{device}"))) > 500);
+    }
+    let table = lumigraph(folder.path(), "evaluate scene").ok().stdout;
+    assert!(
+        table.lines().next().unwrap().contains("psnr_masked"),
+        "{table}"
+    );
+    let info = lumigraph(folder.path(), "info scene --json").ok().json();
+    assert_eq!(info["ignore_masks"], 9);
+    assert_eq!(info["object_mattes"], 0);
+    assert_eq!(info["memory_bytes"], 9 * 96 * 72 * 20 / 3);
+    let text = lumigraph(folder.path(), "info wall").ok().stdout;
+    assert!(
+        text.contains("\nwith     9 ignore masks, 9 depth maps\n"),
+        "{text}"
+    );
+}
+
+#[test]
+fn masks_go_by_several_names_and_may_be_missing() {
+    let folder = with_wall();
+    for (i, name) in [
+        "0000.png.png",
+        "0001.PNG.PNG",
+        "0002.png",
+        "0003.png.PNG",
+        "stray.png",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        save(
+            at(&folder, &format!("elsewhere/{name}")),
+            &mask_of(i as u32),
+        );
+    }
+    let ran = lumigraph(folder.path(), "import wall --masks elsewhere -o scene").ok();
+    for note in [
+        "note: elsewhere: 4 of 9 photos have their ignore mask here\n",
+        "note: elsewhere: 1 files belong to no calibrated photo (stray.png, for one)\n",
+    ] {
+        assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    }
+    let file = scene_json(&folder);
+    let masks = (0..5).map(|i| file["photos"][i]["ignore_mask"].clone());
+    assert_eq!(
+        masks.collect::<Vec<_>>(),
+        [
+            json!("../elsewhere/0000.png.png"),
+            json!("../elsewhere/0001.PNG.PNG"),
+            json!("../elsewhere/0002.png"),
+            json!("../elsewhere/0003.png.PNG"),
+            Value::Null
+        ]
+    );
+    lumigraph(folder.path(), "evaluate scene").ok();
+}
+
+#[test]
+fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
+    let folder = with_wall();
+    let mask = at(&folder, "wall/masks/0003.png.png");
+    save(mask.clone(), &GrayImage::new(72, 96));
+    for line in [
+        "import wall -o out",
+        "info wall",
+        "render wall --path orbit -o out",
+    ] {
+        assert_eq!(
+            lumigraph(folder.path(), line).error(1),
+            "wall/masks/0003.png.png: the ignore mask has 72 × 96 pixels and its photo 0003.png \
+             96 × 72; make it as large as the photo, or leave it out"
+        );
+    }
+    for (bytes, problem) in [
+        (&b"not a picture"[..], "found no picture format known here"),
+        (b"", "the file is empty (0 bytes)"),
+        (
+            b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
+            "cannot decode wall/masks/0003.png.png",
+        ),
+    ] {
+        fs::write(&mask, bytes).unwrap();
+        let error = lumigraph(folder.path(), "import wall -o out").error(1);
+        assert!(error.contains("wall/masks/0003.png.png"), "{error}");
+        assert!(error.contains(problem), "{error}");
+        assert!(!at(&folder, "out").exists());
+    }
+    lumigraph(folder.path(), "import wall --no-masks -o scene").ok();
+
+    // Damage that only decoding shows: the photo cannot be used.
+    save(mask.clone(), &mask_of(3));
+    let whole = fs::read(&mask).unwrap();
+    fs::write(&mask, &whole[..whole.len() / 2]).unwrap();
+    let ran = lumigraph(folder.path(), "evaluate wall").ok();
+    let warning = "warning: photo 0003.png is left out: cannot decode wall/masks/0003.png.png";
+    assert!(ran.stderr.contains(warning), "{}", ran.stderr);
+    let error = lumigraph(folder.path(), "evaluate wall --strict").error(1);
+    assert!(error.contains("wall/masks/0003.png.png"), "{error}");
+    let line = "field wall --view 0004.png --without-view -o f.png";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert!(error.contains("wall/masks/0003.png.png"), "{error}");
+}
+
+#[test]
+fn mattes_cut_the_photos_out() {
+    let folder = with_wall();
+    // Everything but the left third is the object.
+    for i in 0..9 {
+        let matte = GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| Luma([if x < 32 { 0 } else { 255 }]));
+        save(at(&folder, &format!("wall/masks/{i:04}.png")), &matte);
+    }
+    lumigraph(folder.path(), "import wall --mattes masks -o scene").ok();
+    let photo = scene_json(&folder)["photos"][2].clone();
+    assert_eq!(photo["object_matte"], "../wall/masks/0002.png");
+    assert!(photo.get("ignore_mask").is_none(), "{photo}");
+    let result = lumigraph(folder.path(), "evaluate scene --json -o frames")
+        .ok()
+        .json();
+    // Outside the matte the held-out photo is black, and so is most of what is drawn there.
+    let coverage = result["mean"]["coverage"].as_f64().unwrap();
+    assert!((0.4..0.9).contains(&coverage), "{result}");
+    assert!(
+        result["mean"]["coverage_masked"].as_f64().unwrap() > 0.8,
+        "{result}"
+    );
+    let frame = image::open(at(&folder, "frames/0008.png"))
+        .unwrap()
+        .into_rgba8();
+    assert!(frame.pixels().any(|p| p.0[3] == 0) && frame.pixels().any(|p| p.0[3] == 255));
+
+    // Both kinds, each from its own folder.
+    for i in 0..9 {
+        save(at(&folder, &format!("people/{i:04}.png")), &mask_of(i));
+    }
+    let line = "import wall --mattes masks --masks people -o both";
+    let ran = lumigraph(folder.path(), line).ok();
+    let counts = ", 9 ignore masks, 9 object mattes, 9 depth maps\n";
+    assert!(ran.stdout.ends_with(counts), "{}", ran.stdout);
+    lumigraph(folder.path(), "evaluate both").ok();
+}
+
+#[test]
+fn masks_that_repeat_the_alpha_are_pointed_out() {
+    let folder = with_wall();
+    for i in 0..9 {
+        let path = at(&folder, &format!("wall/images/{i:04}.png"));
+        let mut photo: RgbaImage = image::open(&path).unwrap().into_rgba8();
+        let mask = mask_of(i);
+        for (pixel, mask) in photo.pixels_mut().zip(mask.pixels()) {
+            pixel.0[3] = mask.0[0];
+        }
+        photo.save(path).unwrap();
+        save(at(&folder, &format!("wall/masks/{i:04}.png.png")), &mask);
+    }
+    let note = "the ignore masks repeat the photos' alpha (0000.png, for one)";
+    let ran = lumigraph(folder.path(), "import wall -o a").ok();
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    let ran = lumigraph(folder.path(), "import wall --mattes masks -o b").ok();
+    assert!(!ran.stderr.contains(note), "{}", ran.stderr);
+    // A matte that repeats the alpha changes nothing.
+    lumigraph(folder.path(), "import wall --no-masks -o c").ok();
+    let evaluated = |scene: &str| {
+        let line = format!("evaluate {scene} --json");
+        lumigraph(folder.path(), &line).ok().json()["mean"]["psnr"].clone()
+    };
+    assert_eq!(evaluated("b"), evaluated("c"));
+}
+
+#[test]
+fn depth_maps_are_recorded_with_their_scale() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let photo = scene_json(&folder)["photos"][1].clone();
+    assert_eq!(photo["depth_map"], "../wall/depth/0001.png");
+    assert_eq!(photo["depth_scale"], 0.001);
+    let line = "import wall --depth wall/depth --depth-scale 0.25 -o scene --force";
+    lumigraph(folder.path(), line).ok();
+    assert_eq!(scene_json(&folder)["photos"][1]["depth_scale"], 0.25);
+
+    // Bytes are no depths.
+    save(at(&folder, "wall/depth/0001.png"), &mask_of(1));
+    assert_eq!(
+        lumigraph(folder.path(), "info wall").error(1),
+        "wall/depth/0001.png: found 1 channels of 8 bits, expected a depth map of one channel of \
+         16 bits; write depths as 16-bit grey PNG, or leave it out"
+    );
+    let small: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::new(48, 36);
+    small.save(at(&folder, "wall/depth/0001.png")).unwrap();
+    let error = lumigraph(folder.path(), "info wall").error(1);
+    assert!(
+        error.contains("the depth map has 48 × 36 pixels and its photo 0001.png"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_asked_for_must_make_sense() {
+    let folder = with_wall();
+    let code = |line: &str| lumigraph(folder.path(), line).code;
+    assert_eq!(code("import wall --masks wall/depth --no-masks -o s"), 2);
+    assert_eq!(code("import wall --depth-scale 0 -o s"), 2);
+    let error = lumigraph(folder.path(), "import wall --mattes nowhere -o s").error(1);
+    assert_eq!(error, "nowhere: there is no such folder; check the path");
+    save(at(&folder, "stray/other.png"), &mask_of(0));
+    assert_eq!(
+        lumigraph(folder.path(), "import wall --masks stray -o s").error(1),
+        "stray: no ignore mask for any photo here; that of 0000.png would be called \
+         0000.png.png, or so without its own extension"
+    );
+}
