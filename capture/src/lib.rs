@@ -1,4 +1,4 @@
-//! Photo sets: finding, ordering and decoding photos.
+//! Photo sets: finding, ordering, decoding and dating photos.
 //!
 //! A photo is its **stored pixel grid**: EXIF orientation is not applied, because
 //! calibrations speak about the pixels as stored. The first pixel's centre is at
@@ -10,10 +10,15 @@ mod error;
 mod jpeg;
 mod photo_set;
 mod resize;
+mod times;
 mod write;
 
 pub use decode::{decode, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
 pub use resize::{reduced_size, resize};
+pub use times::{
+    NameTime, TimeListError, Times, exif_time_s, from_earliest, number_in_name, read_times,
+    time_in_name, times_of_names,
+};
 pub use write::write_png;
