@@ -5,6 +5,7 @@ pub(crate) mod every_lens;
 
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
+use crate::time::Moment;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
 use proxy::Proxy;
@@ -44,6 +45,8 @@ pub struct FrameSource {
     pub footprint_ratio: f64,
     /// Pixels from the border over which it fades in.
     pub feather_px: f64,
+    /// What its time adds to its difference; infinite where it takes no part.
+    pub time_penalty: f64,
 }
 
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
@@ -106,6 +109,7 @@ impl<'a> Frame<'a> {
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
+                    time_penalty: 0.0,
                 }
             })
             .collect();
@@ -120,6 +124,32 @@ impl<'a> Frame<'a> {
             sources,
             plane,
         }
+    }
+
+    /// The same view at a moment of a scene that moves: photos count by their times, too
+    /// (see [`Moment::penalties`]), and those outside the window not at all.
+    ///
+    /// # Panics
+    /// If the moment fails [`Moment::check`].
+    #[must_use]
+    pub fn at(mut self, moment: &Moment) -> Self {
+        assert_eq!(moment.check(), Ok(()));
+        let sources = &self.lumigraph.sources;
+        let times_s: Vec<Option<f64>> = sources.iter().map(|s| s.time_s).collect();
+        let penalties = moment.penalties(&times_s, self.options.k);
+        for (source, penalty) in self.sources.iter_mut().zip(penalties) {
+            source.time_penalty = penalty;
+        }
+        self
+    }
+
+    /// The source views that take part: all but those outside the time window, in order.
+    pub fn taking_part(&self) -> impl Iterator<Item = usize> {
+        (0..self.sources.len()).filter(|&i| self.takes_part(i))
+    }
+
+    fn takes_part(&self, source_idx: usize) -> bool {
+        self.sources[source_idx].time_penalty < f64::INFINITY
     }
 
     /// Whether any source view's exposure differs from one.
@@ -137,10 +167,11 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1).
+    /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1), and what its
+    /// time adds.
     pub fn difference(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
         let source = &self.sources[source_idx];
-        let angle = angle_difference(source.center, point);
+        let angle = angle_difference(source.center, point) + source.time_penalty;
         if self.options.beta == 0.0 {
             return angle;
         }
@@ -154,8 +185,11 @@ impl<'a> Frame<'a> {
     }
 
     /// Where a proxy point falls in a source image, or outside it; `None` where the source
-    /// camera cannot see in that direction.
+    /// camera cannot see in that direction, or takes no part.
     pub fn project(&self, source_idx: usize, point: &ProxyPoint) -> Option<Pixel> {
+        if !self.takes_part(source_idx) {
+            return None;
+        }
         let source = &self.sources[source_idx];
         source
             .lens

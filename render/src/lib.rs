@@ -20,6 +20,8 @@ mod raster;
 mod rays;
 pub mod reference;
 pub mod score;
+mod snapshot;
+mod time;
 pub mod trajectory;
 pub mod triangulation;
 
@@ -31,6 +33,8 @@ pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
+pub use snapshot::snapshots;
+pub use time::{Moment, TIME_COST, WINDOW_TURNS};
 pub use trajectory::Trajectory;
 
 /// Why a frame could not be drawn.

@@ -165,14 +165,21 @@ impl PhotoStore {
     pub fn get(&self, source_idx: usize) -> Result<&Pyramid, PhotoError> {
         let slot = self.slots[source_idx].get_or_init(|| {
             self.decoded.fetch_add(1, Ordering::Relaxed);
-            (self.load)(source_idx)
-                .map(Pyramid::new)
-                .map_err(|message| PhotoError {
-                    source_idx,
-                    message,
-                })
+            self.decode(source_idx)
         });
         slot.as_ref().map_err(Clone::clone)
+    }
+
+    /// The photo of a source view, decoded anew and not kept.
+    ///
+    /// # Errors
+    /// It cannot be decoded.
+    pub fn decode(&self, source_idx: usize) -> Result<Pyramid, PhotoError> {
+        let photo = (self.load)(source_idx).map_err(|message| PhotoError {
+            source_idx,
+            message,
+        })?;
+        Ok(Pyramid::new(photo))
     }
 }
 

@@ -34,6 +34,7 @@ pub(crate) struct Source {
     pub gain: [f32; 3],
     beta: f32,
     by_length: bool,
+    time_penalty: f32,
 }
 
 /// Where a tile's proxy points fall in one photo, and what they are worth there.
@@ -71,6 +72,7 @@ impl Source {
             gain: frame.lumigraph.sources[source_idx].gain.map(|v| v as f32),
             beta: frame.options.beta as f32,
             by_length: frame.options.resolution == Resolution::Length,
+            time_penalty: source.time_penalty as f32,
         }
     }
 
@@ -121,7 +123,7 @@ impl Source {
         Some(Sight { u, v, a, level })
     }
 
-    /// angDiff + β·resDiff; see [`Frame::difference`].
+    /// angDiff + β·resDiff and what time adds; see [`Frame::difference`].
     pub(crate) fn difference(&self, tile: &Tile) -> Lane {
         let [cx, cy, cz] = self.center;
         let center_squared = cx * cx + cy * cy + cz * cz;
@@ -142,7 +144,7 @@ impl Source {
                 (self.footprint_ratio_squared_less_one + g * g * excess)
                     / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)
             };
-            ang + self.beta * resolution.max(0.0)
+            ang + self.time_penalty + self.beta * resolution.max(0.0)
         })
     }
 }

@@ -22,6 +22,8 @@ struct Params {
     resolution: u32,
     plane_seen: u32,
     gains_differ: u32,
+    // 1 where times add to the differences.
+    timed: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -58,7 +60,7 @@ const IMAGE = 6u;
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
-// rgb.
+// rgb; w: what its time adds to its difference.
 const GAIN = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
@@ -300,7 +302,7 @@ fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
     return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
-// angDiff + beta * resDiff.
+// angDiff + beta * resDiff, and what time adds.
 fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
     let center = source_data(source_idx, CENTER);
     let c = center.xyz;
@@ -317,7 +319,11 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
         resolution = (source_data(source_idx, KIND).z + g * g * excess)
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
-    return angle(across, ray_squared - s * towards) + params.beta * max(resolution, 0.0);
+    var ang = angle(across, ray_squared - s * towards);
+    if params.timed == 1u {
+        ang += source_data(source_idx, GAIN).w;
+    }
+    return ang + params.beta * max(resolution, 0.0);
 }
 
 // The blend of photos so far.

@@ -26,7 +26,8 @@ pub(crate) struct Params {
     pub resolution: u32,
     pub plane_seen: u32,
     pub gains_differ: u32,
-    pub padding: [u32; 3],
+    pub timed: u32,
+    pub padding: [u32; 2],
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -48,7 +49,8 @@ pub(crate) struct Source {
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub gain: [f32; 4],
+    pub gain: [f32; 3],
+    pub time_penalty: f32,
     pub prism: [f32; 4],
 }
 
@@ -94,7 +96,7 @@ impl Params {
             ray_offset: lens.principal.as_vec2().to_array(),
             array_size: array_size.map(|v| v as f32),
             size: [frame.desired.width, frame.desired.height],
-            source_count: frame.sources.len() as u32,
+            source_count: frame.taking_part().count() as u32,
             desired_by_distance: u32::from(lens.is_wide()),
             beta: frame.options.beta as f32,
             full_weight: frame.options.full_weight() as f32,
@@ -109,7 +111,8 @@ impl Params {
             },
             plane_seen: u32::from(frame.plane.is_some()),
             gains_differ: u32::from(frame.gains_differ()),
-            padding: [0; 3],
+            timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
+            padding: [0; 2],
         }
     }
 }
@@ -180,7 +183,8 @@ impl Source {
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            gain: gain.extend(0.0).to_array(),
+            gain: gain.to_array(),
+            time_penalty: f(source.time_penalty),
             prism: prism.map(f),
         }
     }

@@ -180,9 +180,9 @@ impl Photos {
         sources
     }
 
-    /// Whether every photo is on the device.
-    pub(crate) fn complete(&self, store_id: u64) -> bool {
-        self.store_id == store_id && self.layers.iter().all(Option::is_some)
+    /// Whether all of the given source views' photos are on the device.
+    pub(crate) fn holds(&self, store_id: u64, mut wanted: impl Iterator<Item = usize>) -> bool {
+        self.store_id == store_id && wanted.all(|i| self.layers[i].is_some())
     }
 }
 
