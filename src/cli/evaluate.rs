@@ -5,6 +5,7 @@ use super::output::say;
 use super::output::{frame_files, print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::time::TimeArgs;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
 use image::RgbaImage;
@@ -19,7 +20,8 @@ use std::path::PathBuf;
 ///
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR over
 /// the covered pixels, coverage, and processor time without decoding. Held out are the
-/// photos that the capture's split.json names, else every 8th.
+/// photos that the capture's split.json names, else every 8th. With --period or
+/// --time-window each is rendered as of its own time.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -40,6 +42,8 @@ pub(super) struct Args {
     field: FieldArgs,
     #[command(flatten)]
     draw: DrawArgs,
+    #[command(flatten)]
+    time: TimeArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -71,6 +75,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.proxy,
         &args.field,
         &args.draw,
+        &args.time,
+        None,
     )?;
     let output = args.output.as_deref();
     let size = args.draw.size;
@@ -122,7 +128,8 @@ fn score_photos(
         };
         let desired = resized(view, size);
         let photo = at_size(photo, (desired.width, desired.height));
-        let drawn = session.draw_timed(&desired)?;
+        let moment = session.moment(&format!("photo {name}"), session.scene.time_s(name))?;
+        let drawn = session.draw_timed(&desired, moment.as_ref())?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;
         }
@@ -162,7 +169,11 @@ fn json(session: &Session, lines: &[Line]) -> Value {
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
-    json!({"photos": lines, "mean": mean, "proxy": session.proxy.json()})
+    let mut result = json!({"photos": lines, "mean": mean, "proxy": session.proxy.json()});
+    if let Some(time) = session.time_json() {
+        result["time"] = time;
+    }
+    result
 }
 
 /// For people.

@@ -1,8 +1,8 @@
 //! `lumigraph import`
 
-use super::options::{KeyArgs, print_warnings};
+use super::options::{KeyArgs, positive, print_warnings};
 use super::output::print;
-use lumigraph::scene::{ImportOptions, Scene};
+use lumigraph::scene::{ImportOptions, Scene, TimeSource};
 use std::path::PathBuf;
 
 /// Make a scene of photos and their calibration
@@ -28,6 +28,14 @@ pub(super) struct Args {
     calibration: Option<PathBuf>,
     #[command(flatten)]
     keys: KeyArgs,
+    /// When each photo was taken: lines of name,seconds [default: PHOTOS/times.csv, else
+    /// what cameras wrote into the photos or into their names]
+    #[arg(long, value_name = "FILE.csv")]
+    times: Option<PathBuf>,
+    /// The photos are frames of a video, counted in their names, so many a second
+    #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "times",
+        allow_negative_numbers = true)]
+    frame_rate: Option<f64>,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -43,6 +51,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let options = ImportOptions {
         calibration: args.calibration.clone(),
         keys: args.keys.keys(),
+        times: match (&args.times, args.frame_rate) {
+            (Some(file), _) => TimeSource::List(file.clone()),
+            (None, Some(per_second)) => TimeSource::FrameRate(per_second),
+            (None, None) => TimeSource::Found,
+        },
         strict: args.strict,
     };
     let (mut scene, warnings) = Scene::import(&args.photos, &options)?;

@@ -361,6 +361,14 @@ pub(super) fn triple(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// More than zero.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match zero_or_more(text) {
+        Ok(value) if value > 0.0 => Ok(value),
+        _ => Err("expected a number above zero".to_owned()),
+    }
+}
+
 fn zero_or_more(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),

@@ -2,6 +2,7 @@
 
 use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::say;
+use super::time::{AtArgs, Clock, InWindow, TimeArgs};
 use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
@@ -10,8 +11,9 @@ use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError};
 use render::{
-    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, PhotoError, RenderError,
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
 };
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -21,6 +23,9 @@ pub(super) struct Session {
     pub(super) proxy: ChosenProxy,
     pub(super) options: FieldOptions,
     pub(super) method: Method,
+    /// Where time plays a part.
+    pub(super) clock: Option<Clock>,
+    pub(super) in_window: InWindow,
     /// Held-out photos, and those found corrupt.
     without: BTreeSet<String>,
     lumigraph: Lumigraph,
@@ -47,14 +52,19 @@ impl Session {
         proxy: &ProxyArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
+        time: &TimeArgs,
+        time_s: Option<f64>,
     ) -> anyhow::Result<Self> {
         if scene.photos.iter().all(|p| without.contains(&p.name)) {
             return Err(SceneError::NothingLeft(scene.photos.len()).into());
         }
         let proxy = proxy.choose(&scene, &without)?;
         let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+        let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,
+            clock,
+            in_window: InWindow::default(),
             proxy,
             options: field.options(),
             method: field.method(),
@@ -74,10 +84,13 @@ impl Session {
         proxy: &ProxyArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
+        time: &TimeArgs,
+        at: &AtArgs,
     ) -> anyhow::Result<Self> {
         let opened = scene.open()?;
         let without = hold_out.names(&opened)?;
-        Self::new(opened, without, scene.strict, proxy, field, draw)
+        let strict = scene.strict;
+        Self::new(opened, without, strict, proxy, field, draw, time, at.time)
     }
 
     pub(super) fn lumigraph(&self) -> &Lumigraph {
@@ -119,12 +132,32 @@ impl Session {
         Ok(())
     }
 
+    /// What time had to do with it, for `--json`.
+    pub(super) fn time_json(&self) -> Option<Value> {
+        let clock = self.clock.as_ref()?;
+        Some(self.in_window.json(clock))
+    }
+
+    /// The moment of a view of this name and time; `None` where time plays no part.
+    pub(super) fn moment(&self, name: &str, own: Option<f64>) -> anyhow::Result<Option<Moment>> {
+        let clock = self.clock.as_ref();
+        clock.map(|clock| clock.moment(name, own)).transpose()
+    }
+
     /// Draws a view. A photo that turns out corrupt is reported and left out from then on
     /// and the view drawn again, unless `--strict`.
-    pub(super) fn draw(&mut self, desired: &View) -> anyhow::Result<RgbaImage> {
+    pub(super) fn draw(
+        &mut self,
+        desired: &View,
+        moment: Option<&Moment>,
+    ) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            let mut frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            if let Some(moment) = moment {
+                frame = frame.at(moment);
+                self.in_window.note(frame.taking_part().count());
+            }
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
@@ -137,13 +170,17 @@ impl Session {
     }
 
     /// Draws a view and takes the time; twice where the first drawing had photos to decode.
-    pub(super) fn draw_timed(&mut self, desired: &View) -> anyhow::Result<Timed> {
+    pub(super) fn draw_timed(
+        &mut self,
+        desired: &View,
+        moment: Option<&Moment>,
+    ) -> anyhow::Result<Timed> {
         let decoded_before = self.lumigraph.photos.decoded();
         let mut start = ProcessTime::now();
-        let mut picture = self.draw(desired)?;
+        let mut picture = self.draw(desired, moment)?;
         if self.lumigraph.photos.decoded() != decoded_before {
             start = ProcessTime::now();
-            picture = self.draw(desired)?;
+            picture = self.draw(desired, moment)?;
         }
         let cpu = start.elapsed();
         Ok(Timed { picture, cpu })

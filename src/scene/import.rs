@@ -2,6 +2,7 @@
 
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
+use super::times::{TimeSource, set_times};
 use super::{Photo, Scene, SceneError, Warning};
 use calibrate::colmap;
 use calibrate::opencv::Keys;
@@ -10,7 +11,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// How photos are imported.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV
     /// or another program that [`calibrate::formats`] knows;
@@ -18,6 +19,8 @@ pub struct ImportOptions {
     pub calibration: Option<PathBuf>,
     /// Which of an OpenCV file's matrices to use.
     pub keys: Keys,
+    /// Where the photos' times come from.
+    pub times: TimeSource,
     /// A missing or corrupt photo is an error rather than left out.
     pub strict: bool,
 }
@@ -28,13 +31,13 @@ const ENOUGH: usize = 2;
 impl Scene {
     /// Imports a capture, a folder of photos with a calibration in it or beside it.
     ///
-    /// Every photo's size is compared with its camera's, from the file's header; nothing
+    /// Photos get times where some are to be had (see [`TimeSource`]). Every photo's size is compared with its camera's, from the file's header; nothing
     /// is decoded. A calibrated photo that is missing, or whose header cannot be read, is
     /// left out with a warning as long as two others remain.
     ///
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of
-    /// another size than calibrated; too few photos left, or with
+    /// another size than calibrated; a list of times with a mistake; too few photos left, or with
     /// [`ImportOptions::strict`] any missing or corrupt one.
     pub fn import(
         capture: &Path,
@@ -79,8 +82,11 @@ impl Scene {
             });
         }
 
+        let mut photos: Vec<Photo> = photos.collect();
+        set_times(&mut photos, capture, &options.times, &found)?;
+
         let mut scene = Self {
-            photos: photos.collect(),
+            photos,
             reconstruction,
             proxy: None,
             settings: Settings {

@@ -12,9 +12,11 @@ mod lumigraph;
 mod relative;
 mod split;
 mod store;
+mod times;
 
 pub use error::{SceneError, Warning};
 pub use import::ImportOptions;
+pub use times::TimeSource;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{Extra, Settings};
