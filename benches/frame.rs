@@ -76,6 +76,7 @@ fn shelf() -> Lumigraph {
         name: p.name.clone(),
         view: p.view.clone(),
         gain: [1.0; 3],
+        time_s: None,
     };
     Lumigraph {
         sources: dataset.photos.iter().map(source).collect(),

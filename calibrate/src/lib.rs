@@ -15,6 +15,7 @@ pub mod exposure;
 pub mod formats;
 mod lens;
 pub mod opencv;
+mod period;
 mod reconstruction;
 mod rigid;
 mod ties;
@@ -23,6 +24,7 @@ mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};
 pub use lens::{Distortion, Lens, Pixel, Projection};
+pub use period::{MIN_PHOTOS, Period, PeriodError, Snapshot, find_period};
 pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};
 pub use rigid::Rigid3;
 pub use ties::{TRUSTED_TIE, WeakGroup};

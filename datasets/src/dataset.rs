@@ -1,7 +1,8 @@
 use crate::points::sparse_points;
-use crate::{Scene, shelf, wall};
+use crate::{Motion, Scene, helicopter, shelf, wall};
 use calibrate::{Camera, CameraId, Image, ImageId, Lens, ModelKind, Reconstruction, Rigid3, View};
 use glam::DQuat;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// A scene, its photos' cameras, and a reconstruction without error.
@@ -9,8 +10,10 @@ use std::path::PathBuf;
 pub struct Dataset {
     /// What [`by_name`] calls it.
     pub name: &'static str,
-    /// What the photos show.
+    /// What the photos show; where something moves, at time 0.
     pub scene: Scene,
+    /// What moves, if anything.
+    pub motion: Option<Motion>,
     /// In the order of their names.
     pub photos: Vec<Photo>,
     /// Rays for each side of a pixel.
@@ -34,6 +37,22 @@ pub struct Photo {
     pub camera: Camera,
     /// The same, posed.
     pub view: View,
+    /// When it was taken, in seconds, where something moves.
+    pub time_s: Option<f64>,
+}
+
+impl Dataset {
+    /// The scene as it was when a photo was taken.
+    pub fn scene_of(&self, photo: &Photo) -> Cow<'_, Scene> {
+        scene_at(&self.scene, self.motion.as_ref(), photo.time_s)
+    }
+}
+
+fn scene_at<'a>(scene: &'a Scene, motion: Option<&Motion>, time_s: Option<f64>) -> Cow<'a, Scene> {
+    match (motion, time_s) {
+        (Some(motion), Some(time_s)) => Cow::Owned(motion.scene_at(scene, time_s)),
+        _ => Cow::Borrowed(scene),
+    }
 }
 
 /// What can be chosen about a dataset; `None` is the dataset's own choice.
@@ -95,7 +114,7 @@ pub enum DatasetError {
 
 type Build = fn(&Options) -> Result<Dataset, DatasetError>;
 
-const DATASETS: [(&str, Build); 2] = [("shelf", shelf), ("wall", wall)];
+const DATASETS: [(&str, Build); 3] = [("shelf", shelf), ("wall", wall), ("helicopter", helicopter)];
 
 /// The names that [`by_name`] knows.
 pub fn names() -> Vec<&'static str> {
@@ -175,6 +194,9 @@ pub(crate) struct Plan {
     /// In the model's order.
     pub(crate) params: Vec<f64>,
     pub(crate) poses: Vec<Rigid3>,
+    /// When each photo is taken; empty where nothing moves.
+    pub(crate) times_s: Vec<f64>,
+    pub(crate) motion: Option<Motion>,
     pub(crate) points: usize,
     pub(crate) seed: u32,
 }
@@ -201,6 +223,7 @@ impl Plan {
                     height: chosen.height,
                     camera_from_world: settled(camera_from_world),
                 },
+                time_s: self.times_s.get(i).copied(),
             })
             .collect();
         let mut reconstruction = Reconstruction::default();
@@ -215,17 +238,17 @@ impl Plan {
             };
             reconstruction.images.insert(ImageId(i as u32 + 1), image);
         }
-        let views: Vec<View> = photos.iter().map(|photo| photo.view.clone()).collect();
-        sparse_points(
-            &self.scene,
-            &views,
-            self.points,
-            self.seed,
-            &mut reconstruction,
-        );
+        let motion = self.motion.as_ref();
+        let seen: Vec<(&View, Cow<'_, Scene>)> = photos
+            .iter()
+            .map(|photo| (&photo.view, scene_at(&self.scene, motion, photo.time_s)))
+            .collect();
+        let still = |object_idx| motion.is_none_or(|motion| !motion.moves(object_idx));
+        sparse_points(&seen, still, self.points, self.seed, &mut reconstruction);
         Dataset {
             name: self.name,
             scene: self.scene,
+            motion: self.motion,
             samples_per_side: chosen.samples_per_side,
             held_out: photos.iter().step_by(8).map(|p| p.name.clone()).collect(),
             photos,

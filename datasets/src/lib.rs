@@ -7,6 +7,7 @@
 //! | name | scene | cameras | good for |
 //! |---|---|---|---|
 //! | `shelf` | a still life on a sideboard: glazed vase, globe, books, toys, pictures on the wall; soft shadows, highlights and mirror images that move with the viewer | 20 hand-held views in a 5 × 4 grid, neighbours 5 % of the distance apart, 480 × 360, SIMPLE_RADIAL with k = −0.05 | demonstrations: depth within 15 % of its mean, so a plane is a fair proxy |
+//! | `helicopter` | a toy helicopter on a paved yard, its rotor and the rotor's shadow turning once in 1.37 s | 96 hand-held views, five a second, to and fro along an arc of 27°, 480 × 360, SIMPLE_PINHOLE | motion that repeats: photos have times, and few show any one moment |
 //! | `wall` | one brick plane in a general position, no highlights | 9 views from general positions, the last one much closer, 480 × 360, PINHOLE | tests: a plane proxy is the exact truth, every difference is the renderer's |
 //!
 //! ```
@@ -20,6 +21,8 @@
 //! ```
 
 mod dataset;
+mod helicopter;
+mod motion;
 mod noise;
 mod picture;
 mod points;
@@ -33,6 +36,8 @@ mod wall;
 mod write;
 
 pub use dataset::{Dataset, DatasetError, Options, Photo, by_name, names};
+pub use helicopter::helicopter;
+pub use motion::Motion;
 pub use picture::{render_depth, render_view, srgb_from_linear};
 pub use scene::{Finish, Hit, Lighting, Material, Object, Scene};
 pub use shape::{Shape, Surface};

@@ -5,16 +5,18 @@ use crate::picture::srgb_from_linear;
 use crate::{Finish, Scene};
 use calibrate::{ImageId, Keypoint, Pixel, Point3D, Point3DId, Reconstruction, View};
 use glam::DVec3;
+use std::borrow::Cow;
 
 /// A place is seen where the ray towards it ends this near to it, relative to its length.
 const SAME_PLACE: f64 = 1e-9;
 
 /// Adds about `count` surface points to `reconstruction`, whose images must be `views` in
 /// order with ids from 1: each is visible in all images of its track (two at least), and
-/// its keypoints are its exact projections.
+/// its keypoints are its exact projections. Each view comes with the scene it sees; points
+/// lie on the objects that are `still`.
 pub(crate) fn sparse_points(
-    scene: &Scene,
-    views: &[View],
+    views: &[(&View, Cow<'_, Scene>)],
+    still: impl Fn(usize) -> bool,
     count: usize,
     seed: u32,
     reconstruction: &mut Reconstruction,
@@ -22,7 +24,7 @@ pub(crate) fn sparse_points(
     let mut next_id = 1;
     for i in 0..count {
         // 1. A random pixel of each view in turn shows a surface point.
-        let view = &views[i % views.len()];
+        let (view, scene) = &views[i % views.len()];
         let pixel = Pixel::new(
             f64::from(view.width) * unit(seed, i as i32, 0, 9),
             f64::from(view.height) * unit(seed, i as i32, 1, 9),
@@ -39,12 +41,12 @@ pub(crate) fn sparse_points(
             scene.objects()[hit.object_idx].material.finish,
             Finish::Glossy { mirror, .. } if mirror > 0.5
         );
-        if mirrors {
+        if mirrors || !still(hit.object_idx) {
             continue;
         }
         // 2. Which views see it?
         let track: Vec<(usize, Pixel)> = (0..views.len())
-            .filter_map(|v| Some((v, seen_at(scene, &views[v], hit.point)?)))
+            .filter_map(|v| Some((v, seen_at(&views[v].1, views[v].0, hit.point)?)))
             .collect();
         if track.len() < 2 {
             continue;

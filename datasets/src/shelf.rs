@@ -43,6 +43,8 @@ pub fn shelf(options: &Options) -> Result<Dataset, DatasetError> {
         poses: (0..chosen.views)
             .map(|i| hand_held(i, chosen.views))
             .collect(),
+        times_s: Vec::new(),
+        motion: None,
         points: 2500,
         seed: SEED,
     };

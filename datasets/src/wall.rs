@@ -63,6 +63,8 @@ pub fn wall(options: &Options) -> Result<Dataset, DatasetError> {
         model: ModelKind::Pinhole,
         params: vec![focal, focal, 0.5 * width, 0.5 * height],
         poses,
+        times_s: Vec::new(),
+        motion: None,
         points: 1000,
         seed: SEED,
     };

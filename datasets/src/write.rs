@@ -1,7 +1,7 @@
 //! A dataset on disk: the folder a user would have, with the truth beside it.
 
 use crate::picture::{LensRays, depth_through, render_through};
-use crate::{Dataset, DatasetError, Photo};
+use crate::{Dataset, DatasetError, Photo, Scene};
 use calibrate::colmap;
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct Written {
 }
 
 /// Renders and writes a dataset: `images/`, `depth/`, `sparse/0/` (COLMAP, binary),
-/// `split.json` and `README.md`.
+/// `split.json`, `README.md` and, where something moves, `times.csv`.
 ///
 /// Everything is written into a folder beside `folder` that takes its name only when it
 /// is complete.
@@ -77,20 +77,19 @@ fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
             Some((before, lens_rays)) if before.camera == photo.camera => lens_rays,
             _ => LensRays::of(&photo.view),
         };
-        let picture = render_through(
-            &dataset.scene,
-            &photo.view,
-            dataset.samples_per_side,
-            &lens_rays,
-        );
+        let scene = dataset.scene_of(photo);
+        let picture = render_through(&scene, &photo.view, dataset.samples_per_side, &lens_rays);
         save(
             DynamicImage::from(DynamicImage::from(picture).into_rgb8()),
             &images.join(&photo.name),
         )?;
-        let depth = DynamicImage::from(depth_steps(dataset, photo, &lens_rays));
+        let depth = DynamicImage::from(depth_steps(&scene, photo, &lens_rays));
         let name = Path::new(&photo.name).with_extension("png");
         save(depth, &depths.join(name))?;
         last = Some((photo, lens_rays));
+    }
+    if dataset.motion.is_some() {
+        write_text(&folder.join("times.csv"), &times(dataset))?;
     }
     write_text(&folder.join("split.json"), &split(dataset))?;
     write_text(&folder.join("README.md"), &readme(dataset))
@@ -98,11 +97,11 @@ fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
 
 /// Depth along z in steps; 0 where there is no surface or it is too far to say.
 fn depth_steps(
-    dataset: &Dataset,
+    scene: &Scene,
     photo: &Photo,
     lens_rays: &LensRays,
 ) -> ImageBuffer<Luma<u16>, Vec<u16>> {
-    let steps = depth_through(&dataset.scene, &photo.view, lens_rays)
+    let steps = depth_through(scene, &photo.view, lens_rays)
         .into_iter()
         .map(|depth| {
             let steps = (depth * DEPTH_STEPS_PER_UNIT).round();
@@ -114,6 +113,16 @@ fn depth_steps(
         })
         .collect();
     ImageBuffer::from_raw(photo.view.width, photo.view.height, steps).expect("a step a pixel")
+}
+
+/// Seconds of each photo, digits enough to read back the same.
+fn times(dataset: &Dataset) -> String {
+    let timed = dataset
+        .photos
+        .iter()
+        .filter_map(|p| Some((&p.name, p.time_s?)));
+    let lines = timed.map(|(name, time_s)| format!("{name},{time_s}\n"));
+    format!("name,seconds\n{}", lines.collect::<String>())
 }
 
 fn split(dataset: &Dataset) -> String {

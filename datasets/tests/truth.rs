@@ -56,13 +56,14 @@ fn depth_maps_agree_with_rays_and_with_points() {
         let dataset = small(name, 2);
         let photo = &dataset.photos[1];
         let view = &photo.view;
-        let depth = render_depth(&dataset.scene, view);
+        let scene = dataset.scene_of(photo);
+        let depth = render_depth(&scene, view);
         for row in (0..view.height).step_by(7) {
             for column in (0..view.width).step_by(7) {
                 let found = depth[(row * view.width + column) as usize];
                 let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
                 let direction = view.camera_from_world.rotation.conjugate() * ray;
-                let hit = dataset.scene.trace(view.center(), direction).unwrap();
+                let hit = scene.trace(view.center(), direction).unwrap();
                 let expected = (view.camera_from_world * hit.point).z;
                 assert!(
                     (found - expected).abs() < 1e-12,
@@ -99,8 +100,9 @@ fn reconstruction_image<'a>(dataset: &'a Dataset, name: &str) -> &'a calibrate::
 fn every_photo_is_full_and_shows_what_rays_find() {
     for name in names() {
         let dataset = small(name, 3);
-        let view = &dataset.photos[2].view;
-        let picture = render_view(&dataset.scene, view, 1);
+        let photo = &dataset.photos[2];
+        let (view, scene) = (&photo.view, dataset.scene_of(photo));
+        let picture = render_view(&scene, view, 1);
         for (column, row, rgba) in picture.enumerate_pixels() {
             assert_eq!(rgba.0[3], 255, "{name} at {column}, {row}");
             if (column + row) % 5 != 0 {
@@ -108,7 +110,7 @@ fn every_photo_is_full_and_shows_what_rays_find() {
             }
             let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
             let direction = view.camera_from_world.rotation.conjugate() * ray;
-            let hit = dataset.scene.trace(view.center(), direction).unwrap();
+            let hit = scene.trace(view.center(), direction).unwrap();
             let expected = srgb_from_linear(hit.color);
             for (found, expected) in rgba.0.iter().zip(expected) {
                 assert!(found.abs_diff(expected) <= 1, "{name} at {column}, {row}");
@@ -184,13 +186,13 @@ fn what_is_written_reads_back_equal() {
 
         let photo = &dataset.photos[8];
         let picture = image::open(destination.join("images/0008.png")).unwrap();
-        let rendered = render_view(&dataset.scene, &photo.view, 2);
+        let rendered = render_view(&dataset.scene_of(photo), &photo.view, 2);
         assert!(matches!(picture, image::DynamicImage::ImageRgb8(_)));
         assert_eq!(picture.to_rgba8(), rendered);
 
         let steps = image::open(destination.join("depth/0008.png")).unwrap();
         let steps = steps.as_luma16().expect("16 bits").as_raw();
-        let depth = render_depth(&dataset.scene, &photo.view);
+        let depth = render_depth(&dataset.scene_of(photo), &photo.view);
         for (&steps, depth) in steps.iter().zip(depth) {
             let error = f64::from(steps) / DEPTH_STEPS_PER_UNIT - depth;
             assert!(error.abs() <= 0.5001 / DEPTH_STEPS_PER_UNIT);
@@ -236,7 +238,7 @@ fn mistakes_are_told() {
     let error = by_name("shelv", &Options::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "no dataset is called \"shelv\"; there are: shelf, wall"
+        "no dataset is called \"shelv\"; there are: shelf, wall, helicopter"
     );
     let one_view = Options {
         views: Some(1),
@@ -246,6 +248,40 @@ fn mistakes_are_told() {
         by_name("wall", &one_view).unwrap_err().to_string(),
         "the number of photos is 1; expected 2 to 9999"
     );
+}
+
+/// After a whole turn all is as it was, and not before; the sparse points never move.
+#[test]
+fn what_moves_repeats_and_carries_no_points() {
+    let dataset = small("helicopter", 9);
+    let motion = dataset.motion.as_ref().unwrap();
+    let view = &dataset.photos[3].view;
+    let at = |time_s: f64| render_depth(&motion.scene_at(&dataset.scene, time_s), view);
+    let off = |a: &[f64], b: &[f64]| {
+        let apart = a.iter().zip(b).filter(|(a, b)| (**a - **b).abs() > 1e-6);
+        apart.count()
+    };
+    let start = at(0.3);
+    assert!(off(&start, &at(0.3 + 2.0 * motion.period_s)) < 5);
+    assert!(off(&start, &at(0.3 + 0.5 * motion.period_s)) > 300);
+    for point in dataset.reconstruction.points.values() {
+        for (image_id, _) in &point.track {
+            let photo = &dataset.photos[image_id.0 as usize - 1];
+            let center = photo.view.center();
+            let hit = dataset
+                .scene_of(photo)
+                .trace(center, point.position - center);
+            assert!(!motion.moves(hit.unwrap().object_idx));
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(&dataset, &folder.path().join("h")).unwrap();
+    let times = std::fs::read_to_string(folder.path().join("h/times.csv")).unwrap();
+    assert!(
+        times.starts_with("name,seconds\n0000.png,0\n0001.png,0.2\n"),
+        "{times}"
+    );
+    assert_eq!(times.lines().count(), 10);
 }
 
 /// A plane proxy is exact on the wall, and fair on the shelf.

@@ -6,6 +6,7 @@ pub(crate) mod every_lens;
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
 use crate::reference::blend_at;
+use crate::time::Moment;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
 use proxy::Proxy;
@@ -51,6 +52,8 @@ pub struct FrameSource {
     pub feather_px: f64,
     /// What red, green and blue are multiplied by to bring it to the frame's exposure.
     pub exposure: [f64; 3],
+    /// What its time adds to its difference; infinite where it takes no part.
+    pub time_penalty: f64,
 }
 
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
@@ -114,6 +117,7 @@ impl<'a> Frame<'a> {
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
                     exposure: [1.0; 3],
+                    time_penalty: 0.0,
                 }
             })
             .collect();
@@ -128,18 +132,51 @@ impl<'a> Frame<'a> {
             sources,
             plane,
         };
-        if lumigraph.sources.iter().any(|s| s.gain != [1.0; 3]) {
-            let gain = frame.gain();
-            for (source, of) in frame.sources.iter_mut().zip(&lumigraph.sources) {
-                source.exposure = std::array::from_fn(|c| gain[c] / of.gain[c]);
-            }
-        }
+        frame.match_exposures();
         frame
+    }
+
+    /// The same view at a moment of a scene that moves: photos count by their times, too
+    /// (see [`Moment::penalties`]), and those outside the window not at all.
+    ///
+    /// # Panics
+    /// If the moment fails [`Moment::check`].
+    #[must_use]
+    pub fn at(mut self, moment: &Moment) -> Self {
+        assert_eq!(moment.check(), Ok(()));
+        let sources = &self.lumigraph.sources;
+        let times_s: Vec<Option<f64>> = sources.iter().map(|s| s.time_s).collect();
+        let penalties = moment.penalties(&times_s, self.options.k);
+        for (source, penalty) in self.sources.iter_mut().zip(penalties) {
+            source.time_penalty = penalty;
+        }
+        self.match_exposures();
+        self
+    }
+
+    /// The source views that take part: all but those outside the time window, in order.
+    pub fn taking_part(&self) -> impl Iterator<Item = usize> {
+        (0..self.sources.len()).filter(|&i| self.takes_part(i))
+    }
+
+    fn takes_part(&self, source_idx: usize) -> bool {
+        self.sources[source_idx].time_penalty < f64::INFINITY
     }
 
     /// Whether any source view is brought to another exposure.
     pub fn exposures_differ(&self) -> bool {
         self.sources.iter().any(|s| s.exposure != [1.0; 3])
+    }
+
+    /// Brings the source views to the frame's exposure.
+    fn match_exposures(&mut self) {
+        let views = &self.lumigraph.sources;
+        if views.iter().any(|s| s.gain != [1.0; 3]) {
+            let gain = self.gain();
+            for (source, of) in self.sources.iter_mut().zip(views) {
+                source.exposure = std::array::from_fn(|c| gain[c] / of.gain[c]);
+            }
+        }
     }
 
     /// The exposure of the whole frame: the mean of Σ wⱼ·gainⱼ over a grid of its pixels.
@@ -189,10 +226,11 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1).
+    /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1), and what its
+    /// time adds.
     pub fn difference(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
         let source = &self.sources[source_idx];
-        let angle = angle_difference(source.center, point);
+        let angle = angle_difference(source.center, point) + source.time_penalty;
         if self.options.beta == 0.0 {
             return angle;
         }
@@ -206,8 +244,11 @@ impl<'a> Frame<'a> {
     }
 
     /// Where a proxy point falls in a source image, or outside it; `None` where the source
-    /// camera cannot see in that direction.
+    /// camera cannot see in that direction, or takes no part.
     pub fn project(&self, source_idx: usize, point: &ProxyPoint) -> Option<Pixel> {
+        if !self.takes_part(source_idx) {
+            return None;
+        }
         let source = &self.sources[source_idx];
         source
             .lens

@@ -23,6 +23,8 @@ pub mod reference;
 pub mod score;
 mod seams;
 mod sensor;
+mod snapshot;
+mod time;
 pub mod trajectory;
 pub mod triangulation;
 
@@ -36,6 +38,8 @@ pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
 pub use seams::seams;
+pub use snapshot::snapshots;
+pub use time::{Moment, TIME_COST, WINDOW_TURNS};
 pub use trajectory::Trajectory;
 
 /// Why a frame could not be drawn.

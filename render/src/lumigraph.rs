@@ -11,6 +11,8 @@ pub struct SourceView {
     pub view: View,
     /// Exposure per colour channel, relative to the other photos; 1 where unknown.
     pub gain: [f64; 3],
+    /// When it was taken, in seconds from any moment common to all; where known.
+    pub time_s: Option<f64>,
 }
 
 /// An unstructured lumigraph: everything a view is rendered from.

@@ -296,25 +296,33 @@ impl PhotoStore {
     pub fn get(&self, source_idx: usize) -> Result<&Pyramid, PhotoError> {
         let slot = self.slots[source_idx].get_or_init(|| {
             self.decoded.fetch_add(1, Ordering::Relaxed);
-            let failed = |message| PhotoError {
-                source_idx,
-                message,
-            };
-            let photo = (self.load)(source_idx).map_err(failed)?;
-            let Some(mask) = self.try_mask(source_idx)? else {
-                return Ok(Pyramid::new(photo));
-            };
-            let (size, of_mask) = (photo.dimensions(), mask.levels[0].dimensions());
-            if size != of_mask {
-                return Err(failed(format!(
-                    "the photo has {} × {} pixels and its ignore mask {} × {}; make the mask \
-                     as large as the photo",
-                    size.0, size.1, of_mask.0, of_mask.1
-                )));
-            }
-            Ok(Pyramid::masked(photo, mask))
+            self.decode(source_idx)
         });
         slot.as_ref().map_err(Clone::clone)
+    }
+
+    /// The photo of a source view, decoded anew and not kept.
+    ///
+    /// # Errors
+    /// It cannot be decoded.
+    pub fn decode(&self, source_idx: usize) -> Result<Pyramid, PhotoError> {
+        let failed = |message| PhotoError {
+            source_idx,
+            message,
+        };
+        let photo = (self.load)(source_idx).map_err(failed)?;
+        let Some(mask) = self.try_mask(source_idx)? else {
+            return Ok(Pyramid::new(photo));
+        };
+        let (size, of_mask) = (photo.dimensions(), mask.levels[0].dimensions());
+        if size != of_mask {
+            return Err(failed(format!(
+                "the photo has {} × {} pixels and its ignore mask {} × {}; make the mask \
+                 as large as the photo",
+                size.0, size.1, of_mask.0, of_mask.1
+            )));
+        }
+        Ok(Pyramid::masked(photo, mask))
     }
 }
 

@@ -130,6 +130,7 @@ mod tests {
             name: format!("{x}"),
             view: view(DVec3::new(x, 0.0, 0.0), 40, 30),
             gain: [1.0; 3],
+            time_s: None,
         };
         let wall = Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap();
         Lumigraph {

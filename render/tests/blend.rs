@@ -20,6 +20,7 @@ fn lumigraph(views: Vec<View>, plane: Plane) -> Lumigraph {
         name: format!("{i}"),
         view,
         gain: [1.0; 3],
+        time_s: None,
     };
     Lumigraph {
         photos: PhotoStore::new(views.len(), |i| Err(format!("{i} is not needed"))),

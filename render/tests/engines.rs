@@ -291,6 +291,7 @@ fn capture(name: &str) -> Option<Lumigraph> {
                 camera_from_world: image.camera_from_world,
             },
             gain: [1.0; 3],
+            time_s: None,
         }
     });
     let sources: Vec<SourceView> = sources.collect();
@@ -612,6 +613,7 @@ fn crowd() -> (Lumigraph, View) {
         name: format!("{i}"),
         view: view.clone(),
         gain: [1.0; 3],
+        time_s: None,
     };
     let desired = between(&views[0], &views[4], 0.3).resized(101, 75);
     let lumigraph = Lumigraph {

@@ -6,6 +6,7 @@ use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::time::TimeArgs;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
 use image::{DynamicImage, RgbaImage};
@@ -23,7 +24,7 @@ use std::path::PathBuf;
 /// coverage, how far the photos that share a pixel are apart in steps of 255, details aside
 /// (seams), and processor time without decoding; where a photo has an ignore mask or a matte,
 /// also PSNR, SSIM and coverage inside. Held out are the photos that the capture's split.json
-/// names, else every 8th.
+/// names, else every 8th. With --period or --time-window each is rendered as of its own time.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -46,6 +47,8 @@ pub(super) struct Args {
     field: FieldArgs,
     #[command(flatten)]
     draw: DrawArgs,
+    #[command(flatten)]
+    time: TimeArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -83,6 +86,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.exposure,
         &args.field,
         &args.draw,
+        &args.time,
+        None,
     )?;
     let output = args.output.as_deref();
     let size = args.draw.size;
@@ -141,14 +146,15 @@ fn score_photos(
         let size = (desired.width, desired.height);
         let photo = at_size(photo.pixels, size);
         let inside = inside.map(|mask| DynamicImage::from(at_size(mask, size)).into_luma8());
-        let drawn = session.draw_timed(&desired)?;
+        let moment = session.moment(&format!("photo {name}"), session.scene.time_s(name))?;
+        let drawn = session.draw_timed(&desired, moment.as_ref())?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;
         }
         lines.push(Line {
             name: name.clone(),
             score: score(&drawn.picture, &photo)?,
-            seams: session.seams(&desired)?,
+            seams: session.seams(&desired, moment.as_ref())?,
             masked: match inside {
                 Some(inside) => score_masked(&drawn.picture, &photo, &inside)?,
                 None => None,
@@ -190,7 +196,16 @@ fn json(session: &Session, lines: &[Line]) -> Value {
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
-    json!({"photos": lines, "mean": mean, "proxy": session.proxy.json(), "exposure": session.exposure.json()})
+    let mut result = json!({
+        "photos": lines,
+        "mean": mean,
+        "proxy": session.proxy.json(),
+        "exposure": session.exposure.json(),
+    });
+    if let Some(time) = session.time_json() {
+        result["time"] = time;
+    }
+    result
 }
 
 /// For people.

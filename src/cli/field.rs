@@ -6,6 +6,7 @@ use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
+use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::anyhow;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
@@ -53,6 +54,10 @@ pub(super) struct Args {
     _exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
+    #[command(flatten)]
+    time: TimeArgs,
+    #[command(flatten)]
+    at: AtArgs,
     /// Size of the picture in pixels [default: the photo's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
@@ -75,15 +80,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let proxy = args.proxy.choose(&scene, &without)?;
     let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
-    let view = match &args.path {
-        None => scene.view(&args.view)?,
+    let (view, time_s) = match &args.path {
+        None => (scene.view(&args.view)?, scene.time_s(&args.view)),
         Some(path) => {
             let points = || points(&scene, &without);
             frame_of(of_path(path, args.frames, &lumigraph, points)?, &args.view)?
         }
     };
     let view = resized(view, args.size);
-    let frame = Frame::new(&lumigraph, view, args.field.options());
+    let mut frame = Frame::new(&lumigraph, view, args.field.options());
+    if let Some(clock) = Clock::of(&args.time, args.at.time, &lumigraph)? {
+        frame = frame.at(&clock.moment(&args.view, time_s)?);
+    }
 
     // 1. The field, as the renderer asked for has it.
     let triangulated = || TriangulatedField::new(&frame, args.field.grid);
@@ -123,12 +131,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     print(&lines.concat())
 }
 
-/// The view of one frame of a path.
-fn frame_of(frames: Vec<NamedView>, name: &str) -> anyhow::Result<View> {
+/// The view of one frame of a path, and its time.
+fn frame_of(frames: Vec<NamedView>, name: &str) -> anyhow::Result<(View, Option<f64>)> {
     let count = frames.len();
     let names: Vec<String> = frames.iter().take(2).map(|f| f.name.clone()).collect();
     let found = frames.into_iter().find(|f| f.name == name);
-    found.map(|f| f.view).ok_or_else(|| {
+    found.map(|f| (f.view, f.time_s)).ok_or_else(|| {
         let names = names.join(", ");
         anyhow!("--view {name}: the path has {count} frames of other names: {names}, …")
     })

@@ -26,6 +26,8 @@ pub(super) struct ViewArgs {
 pub(super) struct NamedView {
     pub(super) name: String,
     pub(super) view: View,
+    /// Seconds, where its file or path says.
+    pub(super) time_s: Option<f64>,
 }
 
 /// The views asked for. `points_in_world` are the sparse points, for derived paths.
@@ -105,6 +107,7 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
                 height: camera.height,
                 camera_from_world: image.camera_from_world,
             },
+            time_s: None,
         });
     }
     views.sort_by(|a, b| a.name.cmp(&b.name));
@@ -120,6 +123,7 @@ fn named(path: CameraPath) -> Vec<NamedView> {
     let named = |frame: PathFrame| NamedView {
         name: frame.name,
         view: frame.view,
+        time_s: frame.time_s,
     };
     path.frames.into_iter().map(named).collect()
 }

@@ -4,7 +4,7 @@ use super::exposure::ExposureArgs;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
 use super::session::progress;
-use lumigraph::scene::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene};
+use lumigraph::scene::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, TimeSource};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -62,6 +62,14 @@ pub(super) struct Args {
     #[arg(long, value_name = "UNITS", default_value_t = DEPTH_UNITS_PER_STEP,
         value_parser = positive)]
     depth_scale: f64,
+    /// When each photo was taken: lines of name,seconds [default: PHOTOS/times.csv, else
+    /// what cameras wrote into the photos or into their names]
+    #[arg(long, value_name = "FILE.csv")]
+    times: Option<PathBuf>,
+    /// The photos are frames of a video, counted in their names, so many a second
+    #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "times",
+        allow_negative_numbers = true)]
+    frame_rate: Option<f64>,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -77,6 +85,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let options = ImportOptions {
         calibration: args.calibration.clone(),
         keys: args.keys.keys(),
+        times: match (&args.times, args.frame_rate) {
+            (Some(file), _) => TimeSource::List(file.clone()),
+            (None, Some(per_second)) => TimeSource::FrameRate(per_second),
+            (None, None) => TimeSource::Found,
+        },
         strict: args.strict,
         masks: args.masks.clone(),
         no_masks: args.no_masks,

@@ -18,6 +18,7 @@ mod proxy;
 mod render;
 mod report;
 mod session;
+mod time;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};

@@ -7,6 +7,7 @@ use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::time::{AtArgs, TimeArgs};
 use lumigraph::scene::picture_files;
 use serde_json::json;
 use std::path::PathBuf;
@@ -37,6 +38,10 @@ pub(super) struct Args {
     field: FieldArgs,
     #[command(flatten)]
     draw: DrawArgs,
+    #[command(flatten)]
+    time: TimeArgs,
+    #[command(flatten)]
+    at: AtArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -54,6 +59,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.exposure,
         &args.field,
         &args.draw,
+        &args.time,
+        &args.at,
     )?;
     let points = || session.points();
     let frames = frames(&args.views, args.frames, session.lumigraph(), points)?;
@@ -63,7 +70,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     let bar = progress(frames.len(), "rendering");
     for (frame, file) in frames.iter().zip(&files) {
-        let picture = session.draw(&args.draw.resized(frame.view.clone()))?;
+        let view = args.draw.resized(frame.view.clone());
+        let moment = session.moment(&frame.name, frame.time_s)?;
+        let picture = session.draw(&view, moment.as_ref())?;
         capture::write_png(file, &picture)?;
         bar.inc(1);
     }

@@ -1,8 +1,10 @@
 //! What a run has cost.
 
 use super::session::Session;
+use super::time::InWindow;
 use cpu_time::ProcessTime;
 use serde::Serialize;
+use serde_json::Value;
 use std::time::Instant;
 
 /// When a command began.
@@ -31,6 +33,11 @@ pub(super) struct Report {
     cpu_seconds: f64,
     /// `None` where the system does not say.
     peak_memory_bytes: Option<u64>,
+    /// Where time plays a part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<Value>,
+    #[serde(skip)]
+    in_window: InWindow,
 }
 
 impl Report {
@@ -44,6 +51,8 @@ impl Report {
             seconds: start.wall.elapsed().as_secs_f64(),
             cpu_seconds: start.cpu.elapsed().as_secs_f64(),
             peak_memory_bytes: peak_memory_bytes(),
+            time: session.time_json(),
+            in_window: session.in_window,
         }
     }
 
@@ -53,13 +62,14 @@ impl Report {
             format!(", peak memory {}", megabytes(bytes))
         });
         format!(
-            "{} of {} photos decoded ({}), {:.1} s ({:.1} CPU s) on {}{peak}",
+            "{} of {} photos decoded ({}), {:.1} s ({:.1} CPU s) on {}{peak}{}",
             self.photos_decoded,
             self.photos_total,
             megabytes(self.photos_bytes as u64),
             self.seconds,
             self.cpu_seconds,
             self.device,
+            self.in_window.text(),
         )
     }
 }

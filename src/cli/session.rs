@@ -3,6 +3,7 @@
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
 use super::output::say;
+use super::time::{AtArgs, Clock, InWindow, TimeArgs};
 use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
@@ -11,8 +12,9 @@ use image::{GrayImage, Luma, RgbaImage};
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError};
 use render::{
-    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, PhotoError, RenderError,
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
 };
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -23,6 +25,9 @@ pub(super) struct Session {
     pub(super) exposure: ExposureUsed,
     pub(super) options: FieldOptions,
     pub(super) method: Method,
+    /// Where time plays a part.
+    pub(super) clock: Option<Clock>,
+    pub(super) in_window: InWindow,
     /// Held-out photos, and those found corrupt.
     without: BTreeSet<String>,
     lumigraph: Lumigraph,
@@ -74,6 +79,8 @@ impl Session {
         exposure: &ExposureArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
+        time: &TimeArgs,
+        time_s: Option<f64>,
     ) -> anyhow::Result<Self> {
         if scene.photos.iter().all(|p| without.contains(&p.name)) {
             return Err(SceneError::NothingLeft(scene.photos.len()).into());
@@ -81,8 +88,11 @@ impl Session {
         let proxy = proxy.choose(&scene, &without)?;
         let exposure = exposure.choose(&mut scene, &without);
         let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+        let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,
+            clock,
+            in_window: InWindow::default(),
             proxy,
             exposure,
             options: field.options(),
@@ -104,10 +114,15 @@ impl Session {
         exposure: &ExposureArgs,
         field: &FieldArgs,
         draw: &DrawArgs,
+        time: &TimeArgs,
+        at: &AtArgs,
     ) -> anyhow::Result<Self> {
         let opened = scene.open()?;
         let without = hold_out.names(&opened)?;
-        Self::new(opened, without, scene.strict, proxy, exposure, field, draw)
+        let strict = scene.strict;
+        Self::new(
+            opened, without, strict, proxy, exposure, field, draw, time, at.time,
+        )
     }
 
     pub(super) fn lumigraph(&self) -> &Lumigraph {
@@ -149,12 +164,31 @@ impl Session {
         Ok(())
     }
 
+    /// What time had to do with it, for `--json`.
+    pub(super) fn time_json(&self) -> Option<Value> {
+        let clock = self.clock.as_ref()?;
+        Some(self.in_window.json(clock))
+    }
+
+    /// The moment of a view of this name and time; `None` where time plays no part.
+    pub(super) fn moment(&self, name: &str, own: Option<f64>) -> anyhow::Result<Option<Moment>> {
+        let clock = self.clock.as_ref();
+        clock.map(|clock| clock.moment(name, own)).transpose()
+    }
+
     /// Draws a view. A photo that turns out corrupt is reported and left out from then on
     /// and the view drawn again, unless `--strict`.
-    pub(super) fn draw(&mut self, desired: &View) -> anyhow::Result<RgbaImage> {
+    pub(super) fn draw(
+        &mut self,
+        desired: &View,
+        moment: Option<&Moment>,
+    ) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            let frame = frame(&self.lumigraph, desired, self.options, moment);
+            if moment.is_some() {
+                self.in_window.note(frame.taking_part().count());
+            }
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
@@ -167,9 +201,13 @@ impl Session {
     }
 
     /// How visible seams are in a view: see [`render::seams`].
-    pub(super) fn seams(&mut self, desired: &View) -> anyhow::Result<Option<f64>> {
+    pub(super) fn seams(
+        &mut self,
+        desired: &View,
+        moment: Option<&Moment>,
+    ) -> anyhow::Result<Option<f64>> {
         loop {
-            let frame = Frame::new(&self.lumigraph, desired.clone(), self.options);
+            let frame = frame(&self.lumigraph, desired, self.options, moment);
             match render::seams(&frame) {
                 Ok(seams) => return Ok(seams),
                 Err(error) => self.leave_out(&error)?,
@@ -178,13 +216,17 @@ impl Session {
     }
 
     /// Draws a view and takes the time; twice where the first drawing had photos to decode.
-    pub(super) fn draw_timed(&mut self, desired: &View) -> anyhow::Result<Timed> {
+    pub(super) fn draw_timed(
+        &mut self,
+        desired: &View,
+        moment: Option<&Moment>,
+    ) -> anyhow::Result<Timed> {
         let decoded_before = self.lumigraph.photos.decoded();
         let mut start = ProcessTime::now();
-        let mut picture = self.draw(desired)?;
+        let mut picture = self.draw(desired, moment)?;
         if self.lumigraph.photos.decoded() != decoded_before {
             start = ProcessTime::now();
-            picture = self.draw(desired)?;
+            picture = self.draw(desired, moment)?;
         }
         let cpu = start.elapsed();
         Ok(Timed { picture, cpu })
@@ -217,6 +259,20 @@ impl Session {
         self.without.insert(name);
         self.lumigraph = self.scene.lumigraph(&self.without, self.proxy.proxy)?;
         Ok(())
+    }
+}
+
+/// A view of the lumigraph, at a moment where time plays a part.
+fn frame<'a>(
+    lumigraph: &'a Lumigraph,
+    desired: &View,
+    options: FieldOptions,
+    moment: Option<&Moment>,
+) -> Frame<'a> {
+    let frame = Frame::new(lumigraph, desired.clone(), options);
+    match moment {
+        Some(moment) => frame.at(moment),
+        None => frame,
     }
 }
 

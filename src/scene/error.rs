@@ -44,6 +44,15 @@ pub enum SceneError {
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),
+    /// The list of times cannot be read.
+    #[error(transparent)]
+    Times(#[from] capture::TimeListError),
+    /// The photos' names do not count frames.
+    #[error(
+        "no times by frame rate: {0}; expected names such as frame_000123.jpg that differ in \
+         one number, or give the times as a list"
+    )]
+    FrameNumbers(String),
     /// The scene's proxy cannot be read or written.
     #[error(transparent)]
     ProxyFile(#[from] proxy::FileError),

@@ -3,6 +3,7 @@
 use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
+use super::times::{TimeSource, set_times};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::colmap;
 use calibrate::formats::Format;
@@ -20,6 +21,8 @@ pub struct ImportOptions {
     pub calibration: Option<PathBuf>,
     /// Which of an OpenCV file's matrices to use.
     pub keys: Keys,
+    /// Where the photos' times come from.
+    pub times: TimeSource,
     /// A missing or corrupt photo is an error rather than left out.
     pub strict: bool,
     /// The folder with ignore masks, `a.jpg.png` or `a.png` for the photo `a.jpg`, as is or
@@ -48,6 +51,7 @@ impl Default for ImportOptions {
             mattes: None,
             depth: None,
             depth_scale: DEPTH_UNITS_PER_STEP,
+            times: TimeSource::default(),
         }
     }
 }
@@ -59,13 +63,14 @@ impl Scene {
     /// Imports a capture, a folder of photos with a calibration in it or beside it.
     ///
     /// Every photo's size is compared with its camera's, and those of masks, mattes and depth
-    /// maps with their photos', from the files' headers. A calibrated photo that is missing, or whose header cannot be read, is
+    /// maps with their photos', from the files' headers. Photos get times where some are to be
+    /// had (see [`TimeSource`]). A calibrated photo that is missing, or whose header cannot be read, is
     /// left out with a warning as long as two others remain.
     ///
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of
     /// another size than calibrated; a mask, matte or depth map of another size than its
-    /// photo, or unreadable; too few photos left, or with
+    /// photo, or unreadable; a list of times with a mistake; too few photos left, or with
     /// [`ImportOptions::strict`] any missing or corrupt one.
     pub fn import(
         capture: &Path,
@@ -120,8 +125,11 @@ impl Scene {
             });
         }
 
+        let mut photos: Vec<Photo> = photos.collect();
+        set_times(&mut photos, capture, &options.times, &found)?;
+
         let mut scene = Self {
-            photos: photos.collect(),
+            photos,
             reconstruction,
             proxy: None,
             exposure: None,

@@ -21,6 +21,11 @@ impl Scene {
         self.view_of(image)
     }
 
+    /// When a photo was taken, in seconds, where known.
+    pub fn time_s(&self, name: &str) -> Option<f64> {
+        self.photos.iter().find(|p| p.name == name)?.time_s
+    }
+
     fn view_of(&self, image: &Image) -> Result<View, SceneError> {
         let camera = &self.reconstruction.cameras[&image.camera_id];
         let lens = camera.lens().map_err(|source| SceneError::Camera {
@@ -89,6 +94,7 @@ impl Scene {
                 name: photo.name.clone(),
                 view,
                 gain: photo.gain.unwrap_or([1.0; 3]),
+                time_s: photo.time_s,
             });
         }
         if sources.is_empty() {

@@ -15,6 +15,7 @@ mod names;
 mod relative;
 mod split;
 mod store;
+mod times;
 mod undistort;
 
 pub use beside::DEPTH_UNITS_PER_STEP;
@@ -24,6 +25,7 @@ pub use exposure::Matched;
 pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
 pub use relative::relative;
+pub use times::TimeSource;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{ExposureEntry, Extra, Settings};

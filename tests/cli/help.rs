@@ -29,7 +29,7 @@ fn usage_errors_exit_with_2() {
             "the plane's normal is zero",
         ),
         ("proxy wall tunnel", "plane, auto"),
-        ("generate moon -o moon", "shelf, wall"),
+        ("generate moon -o moon", "shelf, wall, helicopter"),
     ] {
         let ran = lumigraph(folder.path(), line);
         assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);

@@ -15,3 +15,4 @@ mod render;
 mod repeat;
 mod run;
 mod scene;
+mod time;

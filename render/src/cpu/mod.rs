@@ -60,7 +60,7 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
-    let sources: Vec<usize> = (0..engine.sources.len()).collect();
+    let sources: Vec<usize> = frame.taking_part().collect();
     draw(frame, |row, _: &mut (), pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let tile = engine.tile(tile_idx * LANES, row, |_| true);

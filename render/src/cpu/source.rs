@@ -35,6 +35,7 @@ pub(crate) struct Source {
     pub exposure: glam::Vec4,
     beta: f32,
     by_length: bool,
+    time_penalty: f32,
 }
 
 /// Where a tile's proxy points fall in one photo, and what they are worth there.
@@ -73,6 +74,7 @@ impl Source {
             exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0),
             beta: frame.options.beta as f32,
             by_length: frame.options.resolution == Resolution::Length,
+            time_penalty: source.time_penalty as f32,
         }
     }
 
@@ -123,7 +125,7 @@ impl Source {
         Some(Sight { u, v, a, level })
     }
 
-    /// angDiff + β·resDiff; see [`Frame::difference`].
+    /// angDiff + β·resDiff and what time adds; see [`Frame::difference`].
     pub(crate) fn difference(&self, tile: &Tile) -> Lane {
         let [cx, cy, cz] = self.center;
         let center_squared = cx * cx + cy * cy + cz * cz;
@@ -144,7 +146,7 @@ impl Source {
                 (self.footprint_ratio_squared_less_one + g * g * excess)
                     / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)
             };
-            ang + self.beta * resolution.max(0.0)
+            ang + self.time_penalty + self.beta * resolution.max(0.0)
         })
     }
 }

@@ -107,6 +107,7 @@ pub(crate) fn lumigraph() -> Lumigraph {
                 name: format!("{} {:?}{size}", model.name(), view.lens.distortion()),
                 view,
                 gain: [1.0; 3],
+                time_s: None,
             }),
         );
     }

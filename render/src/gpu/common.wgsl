@@ -22,6 +22,8 @@ struct Params {
     resolution: u32,
     plane_seen: u32,
     exposures_differ: u32,
+    // 1 where times add to the differences.
+    timed: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -37,7 +39,7 @@ const RESOLUTION_LENGTH = 1u;
 
 // A source view is SOURCE_TEXELS texels of a texture (`Source` of layout.rs): software
 // drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
-const SOURCE_TEXELS = 12u;
+const SOURCE_TEXELS = 13u;
 const SOURCES_PER_ROW = 128u;
 // Rows of the rotation from the desired camera's frame; w: the translation. All are scaled
 // so that a patch of the proxy at equal depth in both cameras covers equally many pixels.
@@ -58,12 +60,14 @@ const IMAGE = 6u;
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
-// rgb; w: layer of the masks' array, negative without a mask.
+// rgb.
 const EXPOSURE = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
 // Shear and horizon of a sensor that is tilted or skewed (`Sensor` of sensor.rs).
 const SENSOR = 11u;
+// Layer of the masks' array, negative without a mask; what its time adds to its difference.
+const REST = 12u;
 
 // The one kind of lens that all source views have; negative where they differ. Set when a
 // pipeline is made, so that no pixel pays for lenses that are not there.
@@ -373,7 +377,7 @@ fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
     if !MASKED || fov <= 0.0 {
         return fov;
     }
-    let layer = source_data(source_idx, GAIN).w;
+    let layer = source_data(source_idx, REST).x;
     if layer < 0.0 {
         return fov;
     }
@@ -383,7 +387,7 @@ fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
     return fov * max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
 }
 
-// angDiff + beta * resDiff.
+// angDiff + beta * resDiff, and what time adds.
 fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
     let center = source_data(source_idx, CENTER);
     let c = center.xyz;
@@ -400,7 +404,11 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
         resolution = (source_data(source_idx, KIND).z + g * g * excess)
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
-    return angle(across, ray_squared - s * towards) + params.beta * max(resolution, 0.0);
+    var ang = angle(across, ray_squared - s * towards);
+    if params.timed == 1u {
+        ang += source_data(source_idx, REST).y;
+    }
+    return ang + params.beta * max(resolution, 0.0);
 }
 
 // The blend of photos so far.

@@ -27,7 +27,8 @@ pub(crate) struct Params {
     pub resolution: u32,
     pub plane_seen: u32,
     pub exposures_differ: u32,
-    pub padding: [u32; 3],
+    pub timed: u32,
+    pub padding: [u32; 2],
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -49,11 +50,13 @@ pub(crate) struct Source {
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub exposure: [f32; 3],
-    pub mask_layer: f32,
+    pub exposure: [f32; 4],
     pub prism: [f32; 4],
     pub shear: [f32; 2],
     pub horizon: [f32; 2],
+    pub mask_layer: f32,
+    pub time_penalty: f32,
+    pub padding: [f32; 2],
 }
 
 /// `Corner`'s inputs of triangulated.wgsl.
@@ -101,7 +104,7 @@ impl Params {
             ray_offset: lens.principal.as_vec2().to_array(),
             array_size: array_size.map(|v| v as f32),
             size: [frame.desired.width, frame.desired.height],
-            source_count: frame.sources.len() as u32,
+            source_count: frame.taking_part().count() as u32,
             desired_by_distance: u32::from(lens.is_wide()),
             beta: frame.options.beta as f32,
             full_weight: frame.options.full_weight() as f32,
@@ -116,7 +119,8 @@ impl Params {
             },
             plane_seen: u32::from(frame.plane.is_some()),
             exposures_differ: u32::from(frame.exposures_differ()),
-            padding: [0; 3],
+            timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
+            padding: [0; 2],
         }
     }
 }
@@ -201,11 +205,13 @@ impl Source {
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            exposure: source.exposure.map(f),
-            mask_layer: mask.map_or(-1.0, |layer| layer as f32),
+            exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0).to_array(),
             prism: prism.map(f),
             shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),
+            mask_layer: mask.map_or(-1.0, |layer| layer as f32),
+            time_penalty: f(source.time_penalty),
+            padding: [0.0; 2],
         }
     }
 }

@@ -42,7 +42,7 @@ pub struct Gpu {
 /// How the shaders number source views.
 #[derive(Clone, Copy)]
 enum Order {
-    /// As the lumigraph does.
+    /// As the lumigraph does, passing over those that take no part in the frame.
     AsGiven,
     /// By their layer of the photos' array, those that have one.
     ByLayer,
@@ -200,10 +200,12 @@ impl Gpu {
     }
 
     /// Draws the exact field. A first pass finds the photos that it samples, unless all
-    /// are on the device already.
+    /// that take part are on the device already.
     fn render_exact(&mut self, frame: &Frame<'_>) -> Result<RgbaImage, RenderError> {
         let store_id = frame.lumigraph.photos.id();
-        if !self.photos.as_ref().is_some_and(|p| p.complete(store_id)) {
+        let taking_part = frame.taking_part();
+        let photos = self.photos.as_ref();
+        if !photos.is_some_and(|p| p.holds(store_id, taking_part)) {
             let used = self.mark(frame)?;
             self.prepare(frame, &used, Order::AsGiven)?;
         }
@@ -244,8 +246,10 @@ impl Gpu {
         let bytes = target::read(&self.device, &readback);
         self.check()?;
         let flags: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes?);
-        Ok((0..frame.sources.len())
-            .filter(|&i| flags[i] != 0)
+        let flagged = frame.taking_part().zip(flags);
+        Ok(flagged
+            .filter(|(_, flag)| *flag != 0)
+            .map(|(source_idx, _)| source_idx)
             .collect())
     }
 
@@ -294,7 +298,7 @@ impl Gpu {
             Source::of(frame, i, [photos.layer(i), mask])
         };
         let listed = match order {
-            Order::AsGiven => (0..frame.sources.len()).collect(),
+            Order::AsGiven => frame.taking_part().collect(),
             Order::ByLayer => photos.by_layer(),
         };
         let sources: Vec<Source> = listed.into_iter().map(source).collect();

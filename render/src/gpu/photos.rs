@@ -205,9 +205,9 @@ impl Layers {
         sources
     }
 
-    /// Whether every source view is on the device.
-    pub(crate) fn complete(&self, store_id: u64) -> bool {
-        self.store_id == store_id && self.layers.iter().all(Option::is_some)
+    /// Whether all of the given source views' photos are on the device.
+    pub(crate) fn holds(&self, store_id: u64, mut wanted: impl Iterator<Item = usize>) -> bool {
+        self.store_id == store_id && wanted.all(|i| self.layers[i].is_some())
     }
 }
 

@@ -21,6 +21,7 @@ fn source(i: usize, camera_from_world: Rigid3) -> SourceView {
             camera_from_world,
         },
         gain: [1.0; 3],
+        time_s: None,
     }
 }
 

@@ -118,7 +118,11 @@ impl Shot {
             .collect();
         let photos = views
             .iter()
-            .map(|view| datasets::render_view(&dataset.scene, view, dataset.samples_per_side))
+            .zip(&dataset.photos)
+            .map(|(view, photo)| {
+                let scene = dataset.scene_of(photo);
+                datasets::render_view(&scene, view, dataset.samples_per_side)
+            })
             .collect();
         let plane = match name {
             "wall" => {
@@ -140,6 +144,7 @@ impl Shot {
             name: self.dataset.photos[i].name.clone(),
             view: view.clone(),
             gain: [1.0; 3],
+            time_s: self.dataset.photos[i].time_s,
         };
         self.views.iter().enumerate().map(source).collect()
     }

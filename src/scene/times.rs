@@ -1,0 +1,81 @@
+//! When the photos were taken: from a list, a frame rate, the cameras or the names.
+
+use super::{Photo, SceneError};
+use capture::{PhotoSet, Times, exif_time_s, from_earliest, number_in_name, read_times};
+use std::path::{Path, PathBuf};
+
+/// Where photos' times come from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum TimeSource {
+    /// The capture's `times.csv`; without one what cameras wrote into the photos, or the
+    /// photos' names if these tell more times.
+    #[default]
+    Found,
+    /// A list, `name,seconds` a line.
+    List(PathBuf),
+    /// Frames a second: the last number in a photo's name counts them.
+    FrameRate(f64),
+}
+
+/// The list that is looked for in a capture's folder.
+const TIMES_FILE: &str = "times.csv";
+
+/// Gives the photos their times. `found` are all there are, calibrated or not: a list may
+/// name those as well.
+pub(super) fn set_times(
+    photos: &mut [Photo],
+    capture: &Path,
+    source: &TimeSource,
+    found: &PhotoSet,
+) -> Result<(), SceneError> {
+    let own = capture.join(TIMES_FILE);
+    let times: Times = match source {
+        TimeSource::List(file) => from_list(photos, file, found)?,
+        TimeSource::Found if own.is_file() => from_list(photos, &own, found)?,
+        TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
+        TimeSource::Found => {
+            let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
+            let by_name = capture::times_of_names(&names);
+            let by_camera = photos.iter().map(|p| exif_time_s(&p.path)).collect();
+            let by_camera = from_earliest(by_camera);
+            let count = |times: &Times| times.iter().flatten().count();
+            if count(&by_name) > count(&by_camera) {
+                by_name
+            } else {
+                by_camera
+            }
+        }
+    };
+    for (photo, time_s) in photos.iter_mut().zip(times) {
+        photo.time_s = time_s;
+    }
+    Ok(())
+}
+
+fn from_list(photos: &[Photo], file: &Path, found: &PhotoSet) -> Result<Times, SceneError> {
+    let is_photo = |name: &str| found.find(name).is_some() || photos.iter().any(|p| p.name == name);
+    let listed = read_times(file, is_photo)?;
+    let times = photos.iter().map(|p| listed.get(&p.name).copied());
+    Ok(times.collect())
+}
+
+/// Frames by the last number in their names, which must be all that differs between them.
+fn from_numbers(photos: &[Photo], per_second: f64) -> Result<Times, SceneError> {
+    let refuse = |problem: String| SceneError::FrameNumbers(problem);
+    let mut around = None;
+    let mut times = Vec::new();
+    for Photo { name, .. } in photos {
+        let Some((number, rest)) = number_in_name(name) else {
+            return Err(refuse(format!("photo {name} has no number in its name")));
+        };
+        let first: &(_, &String) = around.get_or_insert((rest, name));
+        if first.0 != rest {
+            return Err(refuse(format!(
+                "the names {} and {name} differ in more than their last number",
+                first.1
+            )));
+        }
+        times.push(Some(number as f64 / per_second));
+    }
+    Ok(times)
+}

@@ -1,0 +1,150 @@
+//! Scenes that move, through the command line.
+
+use crate::run::{files, lumigraph, with_wall};
+use datasets::Options;
+use std::fs;
+use tempfile::TempDir;
+
+/// A folder with `helicopter`, a capture of sixty 64 × 48 photos with times.
+fn with_helicopter() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options {
+        size: Some((64, 48)),
+        views: Some(60),
+        samples_per_side: Some(2),
+    };
+    let helicopter = datasets::by_name("helicopter", &options).unwrap();
+    datasets::write(&helicopter, &folder.path().join("helicopter")).unwrap();
+    folder
+}
+
+#[test]
+fn held_out_photos_score_better_at_their_own_times() {
+    let folder = with_helicopter();
+    let evaluate = |options: &str| {
+        let line = format!("evaluate helicopter --json{options}");
+        lumigraph(folder.path(), &line).ok()
+    };
+    let psnr = |options: &str| evaluate(options).json()["mean"]["psnr"].as_f64().unwrap();
+    let (plain, given) = (psnr(""), psnr(" --period 1.37"));
+    let ran = evaluate(" --period auto");
+    let found = ran.json();
+    let period = found["time"]["period_s"].as_f64().unwrap();
+    assert!((period / 1.37 - 1.0).abs() < 0.01, "{period}");
+    assert!(ran.stderr.contains("period: 1.3"), "{}", ran.stderr);
+    let automatic = found["mean"]["psnr"].as_f64().unwrap();
+    println!("ignoring time {plain:.2} dB, period given {given:.2}, found {automatic:.2}");
+    assert!(given > plain + 1.5 && automatic > plain + 1.5);
+    let [fewest, most] = [0, 1].map(|i| found["time"]["photos_in_window"][i].as_u64().unwrap());
+    assert!(
+        5 <= fewest && fewest <= most && most < 30,
+        "{fewest} to {most}"
+    );
+}
+
+#[test]
+fn frames_show_their_moment() {
+    let folder = with_helicopter();
+    let render = |options: &str, out: &str| {
+        let line = format!("render helicopter --path orbit --frames 2 -o {out} --json{options}");
+        let ran = lumigraph(folder.path(), &line).ok();
+        (files(&folder.path().join(out)), ran.json())
+    };
+    let (plain, report) = render("", "plain");
+    assert_eq!(report["report"]["time"], serde_json::Value::Null);
+    let (early, report) = render(" --period 1.37 --time 0.25", "early");
+    assert_eq!(report["report"]["time"]["period_s"], 1.37);
+    assert!(plain != early);
+    assert!(
+        render(" --period 1.37 --time 1.62", "turn").0 == early,
+        "a whole turn later"
+    );
+    assert!(render(" --period 1.37 --time 0.9", "late").0 != early);
+    // Without --time, each frame has the path's own.
+    let (own, _) = render(" --period 1.37", "own");
+    let (zero, _) = render(" --period 1.37 --time 0", "zero");
+    let frame = |files: &std::collections::BTreeMap<_, Vec<u8>>, i: usize| {
+        files.values().nth(i).unwrap().clone()
+    };
+    assert!(frame(&own, 0) == frame(&zero, 0) && frame(&own, 1) != frame(&zero, 1));
+    // Without a period: the photos nearest in time.
+    let (_, report) = render(" --time 4", "nearest");
+    assert!(report["report"]["time"]["photos_in_window"][1].as_u64() < Some(9));
+    lumigraph(
+        folder.path(),
+        "field helicopter --view 0008.png --period 1.37 -o field.png",
+    )
+    .ok();
+
+    // What plays no part is not decoded, and decoding it changes nothing.
+    let (eager, _) = render(" --period 1.37 --time 0.25 --no-skip", "eager");
+    assert!(eager == early);
+}
+
+#[test]
+fn times_are_imported_from_lists_names_and_frame_rates() {
+    let folder = with_helicopter();
+    let times = |scene: &str| -> Vec<Option<f64>> {
+        let text = fs::read_to_string(folder.path().join(scene).join("scene.json")).unwrap();
+        let scene: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let photos = scene["photos"].as_array().unwrap();
+        photos.iter().map(|p| p["time_s"].as_f64()).collect()
+    };
+    let import = |options: &str, out: &str| {
+        let line = format!("import helicopter -o {out}{options}");
+        lumigraph(folder.path(), &line)
+    };
+    import("", "own").ok();
+    assert_eq!(times("own")[..3], [0.0, 0.2, 0.4].map(Some));
+    import(" --frame-rate 8", "rate").ok();
+    assert_eq!(times("rate")[..3], [0.0, 0.125, 0.25].map(Some));
+    fs::write(folder.path().join("two.csv"), "0001.png,7\n0002.png,9\n").unwrap();
+    import(" --times two.csv", "list").ok();
+    assert_eq!(times("list")[..4], [None, Some(7.0), Some(9.0), None]);
+
+    fs::write(folder.path().join("bad.csv"), "0001.png,7\n0001.jpg,9\n").unwrap();
+    let error = import(" --times bad.csv", "bad").error(1);
+    assert!(
+        error.starts_with("bad.csv, line 2: there is no photo 0001.jpg"),
+        "{error}"
+    );
+    assert!(!folder.path().join("bad").exists());
+    for (options, said) in [
+        (" --frame-rate 0", "above zero"),
+        (" --frame-rate 8 --times two.csv", "cannot be used with"),
+    ] {
+        let ran = import(options, "usage");
+        assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    // A held-out photo without a time cannot be drawn at its own.
+    let error = lumigraph(folder.path(), "evaluate list --every 2 --time-window 1").error(1);
+    assert!(error.contains("photo 0000.png has no time"), "{error}");
+}
+
+#[test]
+fn a_scene_without_times_or_period_says_so() {
+    let folder = with_wall();
+    for line in [
+        "evaluate wall --period 2",
+        "render wall --path orbit --time 1 -o out",
+    ] {
+        let error = lumigraph(folder.path(), line).error(1);
+        assert!(
+            error.starts_with("no photo has a time; import the photos with --times"),
+            "{error}"
+        );
+    }
+    let error = lumigraph(folder.path(), "import wall --frame-rate 2 -o scene").ok();
+    assert!(error.stdout.contains("scene: 9 photos"));
+    let error = lumigraph(folder.path(), "evaluate scene --period auto").error(1);
+    assert!(
+        error.contains("7 photos with different times; at least 12"),
+        "{error}"
+    );
+    let ran = lumigraph(folder.path(), "evaluate scene --period never");
+    assert!(
+        ran.code == 2 && ran.stderr.contains("or auto"),
+        "{}",
+        ran.stderr
+    );
+}
