@@ -78,6 +78,7 @@ fn shelf() -> Lumigraph {
         gain: [1.0; 3],
     };
     Lumigraph {
+        points: Vec::new(),
         sources: dataset.photos.iter().map(source).collect(),
         photos: PhotoStore::from_images(photos),
         proxy: proxy::Proxy::Plane(

@@ -20,6 +20,7 @@ mod raster;
 mod rays;
 pub mod reference;
 pub mod score;
+mod surface;
 pub mod trajectory;
 pub mod triangulation;
 
@@ -31,6 +32,7 @@ pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use path::{CameraPath, PathFrame};
 pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
+pub use surface::{FacetMap, NO_FACET, Surface};
 pub use trajectory::Trajectory;
 
 /// Why a frame could not be drawn.

@@ -51,10 +51,15 @@ pub(super) fn sources_at(frame: &Frame<'_>, at: DVec2) -> Vec<VertexSource> {
         return Vec::new();
     };
     // Snapping may have put a vertex of the horizon a little beyond it.
-    let inverse_distance = frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0);
+    let plane = frame
+        .surface
+        .plane_at(Pixel::new(at.x, at.y))
+        .unwrap_or_default();
+    let inverse_distance = plane.dot(ray).max(0.0);
     let point = ProxyPoint {
         ray,
         inverse_distance,
+        plane,
     };
     (0..frame.sources.len())
         .map(|source_idx| VertexSource {

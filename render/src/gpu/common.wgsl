@@ -2,7 +2,7 @@
 // The Rust twin of each function has the same name in `render/src/cpu/`.
 
 struct Params {
-    // Inverse distance along a ray: dot(plane, ray).
+    // Inverse distance along a ray: dot(plane, ray); where `facets` is 0.
     plane: vec3f,
     // 1 where the rays come from the table, 0 for a pinhole.
     rays_in_table: u32,
@@ -22,6 +22,8 @@ struct Params {
     resolution: u32,
     plane_seen: u32,
     gains_differ: u32,
+    // 1 where each pixel sees a plane of its own.
+    facets: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -83,6 +85,8 @@ const LENS_EQUIRECTANGULAR: f32 = 9.0;
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
+// The plane that each pixel sees; w: 1 where there is one.
+@group(0) @binding(3) var planes: texture_2d<f32>;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
     let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
@@ -120,6 +124,14 @@ fn ray_through(pixel: vec2u) -> vec3f {
         return textureLoad(rays, pixel, 0).xyz;
     }
     return vec3f((vec2f(pixel) + 0.5 - params.ray_offset) * params.ray_scale, 1.0);
+}
+
+// The plane of the proxy seen at a pixel; w is 0 where there is none.
+fn plane_at(pixel: vec2u) -> vec4f {
+    if params.facets == 1u {
+        return textureLoad(planes, pixel, 0);
+    }
+    return vec4f(params.plane, f32(params.plane_seen));
 }
 
 // What a rarer lens makes of a point of its camera's frame.
@@ -294,10 +306,15 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
 // The mip level of the projected footprint; see LEVEL_BIAS of frame.rs.
 const LEVEL_BIAS: f32 = 0.25;
 
-fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
+fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
     let ratio = here / sight.depth;
-    return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
+    var area = ratio * ratio * ratio;
+    if params.facets == 1u {
+        // With one plane for all this is in the axes' scale.
+        area *= abs(1.0 - dot(plane, source_data(source_idx, CENTER).xyz));
+    }
+    return max(0.5 * log2(max(area, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
 // angDiff + beta * resDiff.

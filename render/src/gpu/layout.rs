@@ -3,6 +3,7 @@
 
 use crate::frame::{Frame, FrameSource};
 use crate::options::{Blend, Resolution};
+use crate::surface::Surface;
 use bytemuck::{Pod, Zeroable};
 use calibrate::Distortion;
 use glam::{DVec3, Vec3};
@@ -26,7 +27,8 @@ pub(crate) struct Params {
     pub resolution: u32,
     pub plane_seen: u32,
     pub gains_differ: u32,
-    pub padding: [u32; 3],
+    pub facets: u32,
+    pub padding: [u32; 2],
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -88,7 +90,7 @@ impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
         let lens = frame.desired.lens;
         Self {
-            plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
+            plane: common_plane(frame).as_vec3().to_array(),
             rays_in_table: u32::from(lens.distortion() != Distortion::None),
             ray_scale: (1.0 / lens.focal).as_vec2().to_array(),
             ray_offset: lens.principal.as_vec2().to_array(),
@@ -107,9 +109,10 @@ impl Params {
                 Resolution::Footprint | Resolution::Distance => 0,
                 Resolution::Length => 1,
             },
-            plane_seen: u32::from(frame.plane.is_some()),
+            plane_seen: u32::from(frame.surface != Surface::Nothing),
             gains_differ: u32::from(frame.gains_differ()),
-            padding: [0; 3],
+            facets: u32::from(matches!(frame.surface, Surface::Facets(_))),
+            padding: [0; 2],
         }
     }
 }
@@ -118,8 +121,9 @@ impl Source {
     pub(crate) fn of(frame: &Frame<'_>, source_idx: usize, layer: u32) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
         // Depths scaled by the cube root of the ratio of areas make the ratio's cube the
-        // area. In the plane of the proxy that is zero, but nothing is seen from there.
-        let area = frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO));
+        // area (facets add a factor of their own). In the plane of the proxy that is zero,
+        // but nothing is seen from there.
+        let area = frame.area_scale(source_idx, common_plane(frame));
         let scale = area.clamp(1e-12, 1e12).cbrt().recip();
         let axis = |r: usize| {
             let row = source.rotation.row(r).extend(source.translation[r]);
@@ -183,6 +187,14 @@ impl Source {
             gain: gain.extend(0.0).to_array(),
             prism: prism.map(f),
         }
+    }
+}
+
+/// The plane that all pixels see; zero where there are many.
+fn common_plane(frame: &Frame<'_>) -> DVec3 {
+    match frame.surface {
+        Surface::Plane(plane) => plane,
+        Surface::Nothing | Surface::Facets(_) => DVec3::ZERO,
     }
 }
 

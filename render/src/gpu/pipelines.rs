@@ -85,7 +85,7 @@ impl Pipelines {
             made: BTreeMap::new(),
             mark: BTreeMap::new(),
             shaders: SHADERS.map(shader),
-            shared_layout: layout("shared", all, &[buffer(Uniform), table, table]),
+            shared_layout: layout("shared", all, &[buffer(Uniform), table, table, table]),
             triangulated_layout: layout("triangulated", fragment, &[photos, sampler, table]),
             exact_layout: layout("exact", fragment, &[photos, sampler]),
             mark_layout: layout("mark", ShaderStages::COMPUTE, &[writable]),
@@ -198,11 +198,13 @@ impl Pipelines {
         params: &wgpu::Buffer,
         sources: &wgpu::TextureView,
         rays: &wgpu::TextureView,
+        planes: &wgpu::TextureView,
     ) -> BindGroup {
         let resources = [
             params.as_entire_binding(),
             BindingResource::TextureView(sources),
             BindingResource::TextureView(rays),
+            BindingResource::TextureView(planes),
         ];
         group(device, &self.shared_layout, resources)
     }
