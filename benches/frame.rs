@@ -79,6 +79,7 @@ fn shelf() -> Lumigraph {
         time_s: None,
     };
     Lumigraph {
+        points: Vec::new(),
         sources: dataset.photos.iter().map(source).collect(),
         photos: PhotoStore::from_images(photos),
         proxy: proxy::Proxy::Plane(

@@ -24,6 +24,13 @@ pub enum FileError {
     /// A GLB that this program did not write, or no GLB at all.
     #[error("{path}: {reason}", path = .0.display(), reason = .1)]
     Glb(PathBuf, String),
+    /// What has no surface apart from a desired view cannot be looked at.
+    #[error(
+        "{path}: the {kind} proxy is made anew for every view and has no surface of its own \
+         to show; write it as .json",
+        path = .0.display(), kind = .1
+    )]
+    NoSurface(PathBuf, &'static str),
     /// Neither .json nor .glb.
     #[error("{path}: proxies are read and written as .json (exact) or .glb", path = .0.display())]
     Extension(PathBuf),
@@ -41,6 +48,7 @@ pub(crate) struct Stored {
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum StoredSurface {
     Plane { point: [f64; 3], normal: [f64; 3] },
+    Points,
 }
 
 impl Stored {
@@ -50,6 +58,7 @@ impl Stored {
                 point: plane.point().to_array(),
                 normal: plane.normal().to_array(),
             },
+            Proxy::Points => StoredSurface::Points,
         };
         Self {
             version: 1,
@@ -67,6 +76,7 @@ impl Stored {
                     .map(Proxy::Plane)
                     .map_err(|e| FileError::Plane(path.to_owned(), e))
             }
+            StoredSurface::Points => Ok(Proxy::Points),
         }
     }
 }
@@ -111,8 +121,9 @@ pub fn write(path: &Path, proxy: &Proxy, shown_points_in_world: &[DVec3]) -> Res
     let bytes = match extension(path).as_str() {
         "json" => (json(true)? + "\n").into_bytes(),
         "glb" => {
-            let Proxy::Plane(plane) = proxy;
-            glb::quad(plane, shown_points_in_world, json(false)?)
+            let plane = proxy.plane();
+            let plane = plane.ok_or(FileError::NoSurface(path.to_owned(), proxy.kind()))?;
+            glb::quad(&plane, shown_points_in_world, json(false)?)
                 .map_err(|e| FileError::Glb(path.to_owned(), e))?
         }
         _ => return Err(FileError::Extension(path.to_owned())),
@@ -146,7 +157,7 @@ mod tests {
         for name in ["p.json", "p.glb"] {
             let path = folder.path().join(name);
             write(&path, &Proxy::Plane(plane), &shown).unwrap();
-            let Proxy::Plane(back) = read(&path).unwrap();
+            let back = read(&path).unwrap().plane().unwrap();
             assert_eq!(back.point(), plane.point());
             assert!((back.normal() - plane.normal()).length() < 1e-15);
         }

@@ -6,10 +6,10 @@ pub(crate) mod every_lens;
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
 use crate::reference::blend_at;
+use crate::surface::Surface;
 use crate::time::Moment;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
-use proxy::Proxy;
 
 /// A point of the proxy as the desired view sees it: along `ray` from its centre, at
 /// p = ray / `inverse_distance` in the desired camera's frame.
@@ -22,6 +22,8 @@ pub struct ProxyPoint {
     pub ray: DVec3,
     /// Zero at infinity, else positive; in units of the ray's length.
     pub inverse_distance: f64,
+    /// The plane of the proxy there: q with inverse_distance = q · ray.
+    pub plane: DVec3,
 }
 
 /// Mip levels by which photos are sampled sharper than their footprint asks for. A desired
@@ -67,9 +69,8 @@ pub struct Frame<'a> {
     pub options: FieldOptions,
     /// The source views, by the lumigraph's index.
     pub sources: Vec<FrameSource>,
-    /// q with inverse_distance = q · ray, in the desired camera's frame; `None` where the
-    /// plane is seen edge on.
-    pub plane: Option<DVec3>,
+    /// The proxy from there.
+    pub surface: Surface,
 }
 
 impl<'a> Frame<'a> {
@@ -121,16 +122,13 @@ impl<'a> Frame<'a> {
                 }
             })
             .collect();
-        let Proxy::Plane(plane) = lumigraph.proxy;
-        let plane = plane
-            .inverse_distance_from(desired_center)
-            .map(|q| desired_from_world * q);
+        let surface = Surface::of(lumigraph, &desired);
         let mut frame = Self {
             lumigraph,
             desired,
             options,
             sources,
-            plane,
+            surface,
         };
         frame.match_exposures();
         frame
@@ -219,10 +217,12 @@ impl<'a> Frame<'a> {
     /// The proxy point seen at a pixel of the desired image, if there is one.
     pub fn proxy_point(&self, pixel: Pixel) -> Option<ProxyPoint> {
         let ray = self.desired.lens.unproject(pixel)?;
-        let inverse_distance = self.plane?.dot(ray);
+        let plane = self.surface.plane_at(pixel)?;
+        let inverse_distance = plane.dot(ray);
         (inverse_distance >= 0.0).then_some(ProxyPoint {
             ray,
             inverse_distance,
+            plane,
         })
     }
 
@@ -284,7 +284,7 @@ impl<'a> Frame<'a> {
     /// the distance in the depth's place.
     pub fn level_of_detail(&self, source_idx: usize, point: &ProxyPoint) -> f64 {
         let source = &self.sources[source_idx];
-        let scale = self.area_scale(source_idx, self.plane.unwrap_or(DVec3::ZERO));
+        let scale = self.area_scale(source_idx, point.plane);
         let in_source = source.rotation * point.ray + source.translation * point.inverse_distance;
         let ratio =
             depth_for_area(&self.desired.lens, point.ray) / depth_for_area(&source.lens, in_source);

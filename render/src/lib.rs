@@ -24,6 +24,7 @@ pub mod score;
 mod seams;
 mod sensor;
 mod snapshot;
+mod surface;
 mod time;
 pub mod trajectory;
 pub mod triangulation;
@@ -39,6 +40,7 @@ pub use photos::{MAX_LEVELS, PhotoError, PhotoStore, Pyramid};
 pub use score::Score;
 pub use seams::seams;
 pub use snapshot::snapshots;
+pub use surface::{FacetMap, NO_FACET, Surface};
 pub use time::{Moment, TIME_COST, WINDOW_TURNS};
 pub use trajectory::Trajectory;
 

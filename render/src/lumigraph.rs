@@ -1,6 +1,6 @@
 use crate::photos::PhotoStore;
 use calibrate::View;
-use proxy::Proxy;
+use proxy::{Proxy, SparsePoint};
 
 /// One photo with its camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,4 +24,6 @@ pub struct Lumigraph {
     pub photos: PhotoStore,
     /// The surface that carries rays to them.
     pub proxy: Proxy,
+    /// The capture's sparse points, for a proxy that is made of them.
+    pub points: Vec<SparsePoint>,
 }

@@ -134,6 +134,7 @@ mod tests {
         };
         let wall = Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap();
         Lumigraph {
+            points: Vec::new(),
             sources: vec![source(-1.0), source(1.0)],
             photos: PhotoStore::from_images(vec![RgbaImage::new(40, 30); 2]),
             proxy: Proxy::Plane(wall),

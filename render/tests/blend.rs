@@ -12,7 +12,7 @@ use render::blend::Contributor;
 use render::reference::blend_at;
 use render::{
     Blend, FieldOptions, Frame, Lumigraph, MAX_CONTRIBUTORS, PhotoStore, ProxyPoint, Resolution,
-    SourceView,
+    SourceView, Surface,
 };
 
 fn lumigraph(views: Vec<View>, plane: Plane) -> Lumigraph {
@@ -23,6 +23,7 @@ fn lumigraph(views: Vec<View>, plane: Plane) -> Lumigraph {
         time_s: None,
     };
     Lumigraph {
+        points: Vec::new(),
         photos: PhotoStore::new(views.len(), |i| Err(format!("{i} is not needed"))),
         sources: views.into_iter().enumerate().map(source).collect(),
         proxy: Proxy::Plane(plane),
@@ -226,7 +227,7 @@ fn both_blends_match_the_formulas_at_random_points() {
             let options = FieldOptions { blend, ..options };
             let frame = Frame::new(&lumigraph, desired.clone(), options);
             for &pixel in &pixels {
-                let Proxy::Plane(plane) = lumigraph.proxy;
+                let plane = lumigraph.proxy.plane().unwrap();
                 let world_from_camera = desired.camera_from_world.rotation.conjugate();
                 let Some(ray) = desired.lens.unproject(pixel) else {
                     continue;
@@ -388,18 +389,20 @@ fn points(frame: &Frame<'_>, random: &mut Random) -> Vec<ProxyPoint> {
         .filter_map(|pixel| frame.proxy_point(pixel))
         .collect();
     // The horizon; and rays of other lengths.
-    if let Some(q) = frame.plane {
+    if let Surface::Plane(q) = frame.surface {
         let along = q.normalize().any_orthonormal_vector();
         let beside = q.normalize().cross(along);
         let on_the_horizon = [along, -along, beside, -beside].map(|ray| ProxyPoint {
             ray,
             inverse_distance: 0.0,
+            plane: q,
         });
         points.extend(on_the_horizon);
     }
     let longer = |point: &ProxyPoint, factor: f64| ProxyPoint {
         ray: factor * point.ray,
         inverse_distance: factor * point.inverse_distance,
+        plane: point.plane,
     };
     let scaled: Vec<ProxyPoint> = points
         .iter()
@@ -561,6 +564,7 @@ fn the_order_of_the_source_views_changes_nothing() {
         let mut order: Vec<usize> = (0..lumigraph.sources.len()).collect();
         random.shuffle(&mut order);
         let shuffled = Lumigraph {
+            points: Vec::new(),
             sources: order
                 .iter()
                 .map(|&i| lumigraph.sources[i].clone())

@@ -13,7 +13,7 @@ use render::field::FieldEntry;
 use render::picture::contributors_exact;
 use render::{
     Blend, FieldOptions, Frame, Lumigraph, Method, PhotoError, PhotoStore, RenderError, Resolution,
-    SourceView, TriangulatedField, cpu, reference,
+    SourceView, Surface, TriangulatedField, cpu, reference,
 };
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -214,6 +214,7 @@ fn mixed() -> Mixed {
     }
     Mixed {
         lumigraph: Lumigraph {
+            points: Vec::new(),
             sources,
             photos: PhotoStore::from_images(photos),
             proxy: Proxy::Plane(shot.plane),
@@ -299,6 +300,7 @@ fn capture(name: &str) -> Option<Lumigraph> {
     let files: Vec<_> = sources.iter().map(|s| photos.join(&s.name)).collect();
     let load = move |i: usize| capture::decode(&files[i], None).map_err(|e| e.to_string());
     Some(Lumigraph {
+        points: Vec::new(),
         photos: PhotoStore::new(sources.len(), load),
         sources,
         proxy: Proxy::Plane(plane),
@@ -545,7 +547,7 @@ fn what_no_photo_sees_is_transparent() {
         ..middle.clone()
     };
     let frame = Frame::new(&lumigraph, edge_on, FieldOptions::default());
-    assert_eq!(frame.plane, None);
+    assert_eq!(frame.surface, Surface::Nothing);
     for method in METHODS {
         for (engine, picture) in by_all(&frame, method) {
             assert_eq!(picture.unwrap(), nowhere, "edge on, {engine}, {method:?}");
@@ -617,6 +619,7 @@ fn crowd() -> (Lumigraph, View) {
     };
     let desired = between(&views[0], &views[4], 0.3).resized(101, 75);
     let lumigraph = Lumigraph {
+        points: Vec::new(),
         sources: views.iter().enumerate().map(source).collect(),
         photos: PhotoStore::from_images(photos),
         proxy: Proxy::Plane(plane),

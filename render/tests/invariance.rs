@@ -42,11 +42,12 @@ impl Similarity {
         for source in &mut sources {
             source.view = self.view(&source.view);
         }
-        let Proxy::Plane(plane) = &lumigraph.proxy;
+        let plane = lumigraph.proxy.plane().unwrap();
         Lumigraph {
+            points: Vec::new(),
             sources,
             photos: PhotoStore::from_images(photos.to_vec()),
-            proxy: Proxy::Plane(self.plane(plane)),
+            proxy: Proxy::Plane(self.plane(&plane)),
         }
     }
 }
@@ -216,6 +217,7 @@ fn the_order_of_the_photos_changes_nothing() {
             random.shuffle(&mut order);
             let photos = order.iter().map(|&i| shot.photos[i].clone());
             let reordered = Lumigraph {
+                points: Vec::new(),
                 photos: PhotoStore::from_images(photos.collect()),
                 sources: order
                     .iter()

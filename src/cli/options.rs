@@ -128,7 +128,8 @@ impl HoldOutArgs {
 /// Which surface.
 #[derive(Args)]
 pub(super) struct ProxyArgs {
-    /// plane, auto, or a proxy's file (.json or .glb) [default: the scene's own, else auto]
+    /// plane, points, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
+    /// auto]
     #[arg(long, value_name = "KIND|FILE")]
     pub(super) proxy: Option<String>,
 }
@@ -164,12 +165,16 @@ impl ProxyArgs {
         };
         match self.proxy.as_deref() {
             Some("plane" | "auto") => fitted(),
+            Some("points") => Ok(ChosenProxy {
+                proxy: Proxy::Points,
+                origin: "made for every view".to_owned(),
+            }),
             Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
                 proxy: proxy::read(Path::new(file))?,
                 origin: file.to_owned(),
             }),
             Some(other) => Err(Usage(format!(
-                "--proxy {other}: expected plane, auto, or a file ending in .json or .glb"
+                "--proxy {other}: expected plane, points, auto, or a file ending in .json or .glb"
             ))
             .into()),
             None => match &scene.proxy {
@@ -214,16 +219,18 @@ impl ChosenProxy {
 }
 
 pub(super) fn proxy_json(proxy: &Proxy) -> Value {
-    let Proxy::Plane(plane) = proxy;
-    json!({
-        "kind": proxy.kind(),
-        "point": plane.point().to_array(),
-        "normal": plane.normal().to_array(),
-    })
+    let mut value = json!({"kind": proxy.kind()});
+    if let Proxy::Plane(plane) = proxy {
+        value["point"] = json!(plane.point().to_array());
+        value["normal"] = json!(plane.normal().to_array());
+    }
+    value
 }
 
 pub(super) fn proxy_text(proxy: &Proxy) -> String {
-    let Proxy::Plane(plane) = proxy;
+    let Proxy::Plane(plane) = proxy else {
+        return "the sparse points that views like the desired one observe".to_owned();
+    };
     let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
     format!(
         "plane through {} across {}",

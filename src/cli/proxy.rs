@@ -43,14 +43,17 @@ pub(super) struct Args {
 enum Kind {
     /// Parallel to the image planes, at the points' mean inverse depth
     Plane,
+    /// The sparse points that views like the desired one observe, triangulated anew for
+    /// every view
+    Points,
     /// The best that can be fitted; today the plane
     Auto,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let by_hand = match (args.point, args.normal) {
-        (Some(_), Some(_)) if args.kind == Kind::Auto => {
-            let message = "--point and --normal describe a plane; write `plane`, not `auto`";
+        (Some(_), Some(_)) if args.kind != Kind::Plane => {
+            let message = "--point and --normal describe a plane; write `plane`";
             return Err(Usage(message.to_owned()).into());
         }
         (Some(point), Some(normal)) => {
@@ -71,6 +74,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     let (proxy, how, fitted_without) = match by_hand {
         Some(plane) => (Proxy::Plane(plane), "given by hand".to_owned(), None),
+        None if args.kind == Kind::Points => (
+            Proxy::Points,
+            "made for every view".to_owned(),
+            Some(&without),
+        ),
         None => {
             let fit = scene
                 .fit_plane(&without)

@@ -1,8 +1,8 @@
 //! From a scene to what the engine draws from.
 
 use super::{Scene, SceneError};
-use calibrate::{Image, View};
-use proxy::{FitError, PlaneFit, Proxy};
+use calibrate::{Image, ImageId, View};
+use proxy::{FitError, PlaneFit, Proxy, SparsePoint};
 use render::{Lumigraph, PhotoStore, SourceView};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -113,10 +113,42 @@ impl Scene {
             let mask = mask.map_err(|error| error.to_string())?;
             mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))
         });
+        let points = match proxy {
+            Proxy::Plane(_) => Vec::new(),
+            Proxy::Points => self.sparse_points(without, &sources),
+        };
         Ok(Lumigraph {
             sources,
             photos,
             proxy,
+            points,
         })
+    }
+
+    /// The sparse points that do not rest on photos left out, each with the source views
+    /// that observe it.
+    fn sparse_points(
+        &self,
+        without: &BTreeSet<String>,
+        sources: &[SourceView],
+    ) -> Vec<SparsePoint> {
+        let rest = self.reconstruction.without_images(without);
+        let source_of: BTreeMap<&str, u32> =
+            sources.iter().map(|s| s.name.as_str()).zip(0..).collect();
+        let seen_by = |track: &[(ImageId, u32)]| {
+            let source = |(id, _): &(ImageId, u32)| {
+                let image = rest.images.get(id)?;
+                source_of.get(image.name.as_str()).copied()
+            };
+            let seen: BTreeSet<u32> = track.iter().filter_map(source).collect();
+            seen.into_iter().collect()
+        };
+        let points = rest.points.values().filter(|p| p.position.is_finite());
+        points
+            .map(|point| SparsePoint {
+                position: point.position,
+                seen_by: seen_by(&point.track),
+            })
+            .collect()
     }
 }

@@ -16,7 +16,6 @@ use crate::options::Method;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, Span};
 use crate::rays::{RayCache, RayMap};
-use glam::DVec3;
 use image::RgbaImage;
 use lanes::{LANES, Lane, each};
 use rayon::prelude::*;
@@ -206,8 +205,6 @@ struct Engine<'a> {
     frame: &'a Frame<'a>,
     sources: Vec<Source>,
     rays: &'a RayMap,
-    plane: [f32; 3],
-    no_plane: bool,
 }
 
 impl<'a> Engine<'a> {
@@ -217,8 +214,6 @@ impl<'a> Engine<'a> {
             frame,
             sources: (0..sources.len()).map(|i| Source::new(frame, i)).collect(),
             rays,
-            plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
-            no_plane: frame.plane.is_none(),
         }
     }
 
@@ -229,6 +224,7 @@ impl<'a> Engine<'a> {
             y: [0.0; LANES],
             z: [1.0; LANES],
             s: [-1.0; LANES],
+            q: [[0.0; LANES]; 3],
         };
         let width = self.frame.desired.width as usize;
         for k in 0..LANES.min(width - x0) {
@@ -236,9 +232,17 @@ impl<'a> Engine<'a> {
                 continue;
             };
             (tile.x[k], tile.y[k], tile.z[k]) = (x, y, z);
-            if wanted(k) && !self.no_plane {
-                tile.s[k] = self.plane[0] * x + self.plane[1] * y + self.plane[2] * z;
-            }
+            let Some(plane) = self
+                .frame
+                .surface
+                .plane_of(x0 + k, row)
+                .filter(|_| wanted(k))
+            else {
+                continue;
+            };
+            let [qx, qy, qz] = plane.as_vec3().to_array();
+            tile.s[k] = qx * x + qy * y + qz * z;
+            (tile.q[0][k], tile.q[1][k], tile.q[2][k]) = (qx, qy, qz);
         }
         tile
     }

@@ -15,6 +15,8 @@ pub(crate) struct Tile {
     pub z: Lane,
     /// Inverse distance along the ray; negative where there is no proxy point.
     pub s: Lane,
+    /// The proxy's plane there: s = q · ray.
+    pub q: [Lane; 3],
 }
 
 /// A source view in f32, relative to the desired camera.
@@ -27,8 +29,8 @@ pub(crate) struct Source {
     inverse_feather: f32,
     footprint_ratio: f32,
     footprint_ratio_squared_less_one: f32,
-    /// Ratio of areas at equal depth, desired to source pixels.
-    area_scale: f32,
+    /// Of focal lengths, source to desired.
+    focal_ratio_squared: f32,
     by_distance: bool,
     desired_by_distance: bool,
     /// What colours are multiplied by; alpha by one.
@@ -68,7 +70,7 @@ impl Source {
             inverse_feather: (1.0 / source.feather_px.max(1e-9)) as f32,
             footprint_ratio: g as f32,
             footprint_ratio_squared_less_one: (g * g - 1.0) as f32,
-            area_scale: frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO)) as f32,
+            focal_ratio_squared: frame.area_scale(source_idx, DVec3::ZERO) as f32,
             by_distance: source.lens.is_wide(),
             desired_by_distance: frame.desired.lens.is_wide(),
             exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0),
@@ -106,7 +108,9 @@ impl Source {
             return None;
         }
 
-        // 3. Mip level.
+        // 3. Mip level; see [`Frame::level_of_detail`].
+        let [cx, cy, cz] = self.center;
+        let [qx, qy, qz] = &tile.q;
         let level = each(|k| {
             let there = if self.by_distance {
                 (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt()
@@ -119,7 +123,8 @@ impl Source {
                 tile.z[k]
             };
             let ratio = here / there;
-            let area = self.area_scale * ratio * ratio * ratio;
+            let height = (1.0 - cx * qx[k] - cy * qy[k] - cz * qz[k]).abs();
+            let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
             (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
         });
         Some(Sight { u, v, a, level })

@@ -2,6 +2,7 @@
 
 use crate::frame::Frame;
 use crate::reference;
+use crate::surface::Surface;
 use crate::triangulation::Grid;
 use calibrate::Lens;
 use glam::{DVec2, DVec3};
@@ -55,7 +56,7 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.
 pub(super) fn horizon(frame: &Frame<'_>) -> Vec<[DVec2; 2]> {
-    let Some(q) = frame.plane else {
+    let Surface::Plane(q) = frame.surface else {
         return Vec::new();
     };
     // The directions along the plane, by angle from the one that looks most forward.

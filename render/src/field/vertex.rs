@@ -42,11 +42,14 @@ impl Vertex {
 
 /// The proxy point at a position in the desired image; `None` where the lens has no ray.
 pub(super) fn point_at(frame: &Frame<'_>, at: DVec2) -> Option<ProxyPoint> {
-    let ray = frame.desired.lens.unproject(Pixel::new(at.x, at.y))?;
+    let pixel = Pixel::new(at.x, at.y);
+    let ray = frame.desired.lens.unproject(pixel)?;
+    let plane = frame.surface.plane_at(pixel).unwrap_or_default();
     Some(ProxyPoint {
         ray,
         // Snapping may have put a vertex of the horizon a little beyond it.
-        inverse_distance: frame.plane.map_or(0.0, |q| q.dot(ray)).max(0.0),
+        inverse_distance: plane.dot(ray).max(0.0),
+        plane,
     })
 }
 

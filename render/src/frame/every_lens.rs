@@ -112,11 +112,15 @@ pub(crate) fn lumigraph() -> Lumigraph {
         );
     }
     Lumigraph {
+        points: Vec::new(),
         photos: PhotoStore::from_images(vec![RgbaImage::new(1, 1); views.len()]),
         sources: views,
         proxy: Proxy::Plane(Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap()),
     }
 }
+
+/// The proxy's plane from the origin: q with s = q · ray.
+pub(crate) const PLANE: DVec3 = DVec3::new(0.0, 0.0, 0.25);
 
 /// Looks at them all from the origin.
 pub(crate) fn frame(lumigraph: &Lumigraph) -> Frame<'_> {
@@ -155,6 +159,7 @@ pub(crate) fn points(frame: &Frame<'_>, source_idx: usize) -> Vec<([f32; 4], Pix
             let rounded = ProxyPoint {
                 ray: ray.as_dvec3(),
                 inverse_distance: f64::from(point[3]),
+                plane: PLANE,
             };
             if let Some(pixel) = frame.project(source_idx, &rounded) {
                 points.push((point, pixel));
@@ -199,6 +204,7 @@ pub(crate) fn unseen(frame: &Frame<'_>, source_idx: usize) -> Vec<[f32; 4]> {
         let rounded = ProxyPoint {
             ray: ray.as_dvec3(),
             inverse_distance: s,
+            plane: PLANE,
         };
         let sees = frame.project(source_idx, &rounded);
         if sees.is_none_or(|pixel| frame.fov_blend(source_idx, pixel) < 0.0) {

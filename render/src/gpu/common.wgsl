@@ -2,7 +2,7 @@
 // The Rust twin of each function has the same name in `render/src/cpu/`.
 
 struct Params {
-    // Inverse distance along a ray: dot(plane, ray).
+    // Inverse distance along a ray: dot(plane, ray); where `facets` is 0.
     plane: vec3f,
     // 1 where the rays come from the table, 0 for a pinhole.
     rays_in_table: u32,
@@ -24,6 +24,8 @@ struct Params {
     exposures_differ: u32,
     // 1 where times add to the differences.
     timed: u32,
+    // 1 where each pixel sees a plane of its own.
+    facets: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -96,9 +98,11 @@ const LENS_SKEWED_FISHEYE: f32 = 12.0;
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
+// The plane that each pixel sees; w: 1 where there is one.
+@group(0) @binding(3) var planes: texture_2d<f32>;
 // As large as the photos' array; a single texel where nothing is masked.
-@group(0) @binding(3) var masks: texture_2d_array<f32>;
-@group(0) @binding(4) var mask_sampler: sampler;
+@group(0) @binding(4) var masks: texture_2d_array<f32>;
+@group(0) @binding(5) var mask_sampler: sampler;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
     let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
@@ -149,6 +153,14 @@ fn rational(source_idx: u32, n: vec2f, r2: f32, full: bool) -> vec2f {
         radial = (radial + r2 * r2 * r2 * rest.x) / below;
     }
     return n * radial + 2.0 * k.zw * n.x * n.y + k.wz * (r2 + 2.0 * n * n);
+}
+
+// The plane of the proxy seen at a pixel; w is 0 where there is none.
+fn plane_at(pixel: vec2u) -> vec4f {
+    if params.facets == 1u {
+        return textureLoad(planes, pixel, 0);
+    }
+    return vec4f(params.plane, f32(params.plane_seen));
 }
 
 // What a rarer lens makes of a point of its camera's frame.
@@ -362,17 +374,22 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
 // The mip level of the projected footprint; see LEVEL_BIAS of frame.rs.
 const LEVEL_BIAS: f32 = 0.25;
 
-fn level_of_detail(sight: Sight, ray: vec3f) -> f32 {
+fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
     let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
     let ratio = here / sight.depth;
-    return max(0.5 * log2(max(ratio * ratio * ratio, 1.0)) - LEVEL_BIAS, 0.0);
+    var area = ratio * ratio * ratio;
+    if params.facets == 1u {
+        // With one plane for all this is in the axes' scale.
+        area *= abs(1.0 - dot(plane, source_data(source_idx, CENTER).xyz));
+    }
+    return max(0.5 * log2(max(area, 1.0)) - LEVEL_BIAS, 0.0);
 }
 
 // See IGNORED of mask.rs.
 const IGNORED: f32 = 1.0;
 
 // fovBlend and what the ignore mask leaves of it.
-fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
+fn relevance(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
     let fov = fov_blend(source_idx, sight);
     if !MASKED || fov <= 0.0 {
         return fov;
@@ -382,7 +399,7 @@ fn relevance(source_idx: u32, sight: Sight, ray: vec3f) -> f32 {
         return fov;
     }
     let uv = sight.pixel / params.array_size;
-    let level = level_of_detail(sight, ray);
+    let level = level_of_detail(source_idx, sight, ray, plane);
     let value = textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
     return fov * max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
 }

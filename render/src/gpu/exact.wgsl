@@ -12,10 +12,10 @@ struct Nearest {
     a: array<f32, LISTED>,
 }
 
-fn nearest_sources(ray: vec3f, s: f32) -> Nearest {
+fn nearest_sources(ray: vec3f, s: f32, plane: vec3f) -> Nearest {
     var nearest: Nearest;
     for (var i = 0u; i < params.source_count; i++) {
-        let a = relevance(i, see(i, ray, s), ray);
+        let a = relevance(i, see(i, ray, s), ray, plane);
         if a <= 0.0 {
             continue;
         }

@@ -13,11 +13,12 @@ fn whole_image(@builtin(vertex_index) vertex_idx: u32) -> @builtin(position) vec
 @fragment
 fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let ray = ray_through(vec2u(position.xy));
-    let s = dot(params.plane, ray);
-    if s < 0.0 || params.plane_seen == 0u || all(ray == vec3f(0.0)) {
+    let plane = plane_at(vec2u(position.xy));
+    let s = dot(plane.xyz, ray);
+    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
-    var nearest = nearest_sources(ray, s);
+    var nearest = nearest_sources(ray, s, plane.xyz);
     let count = weigh(&nearest);
     var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
@@ -28,7 +29,7 @@ fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let sight = see(source_idx, ray, s);
         let layer = u32(source_data(source_idx, KIND).y);
         let uv = sight.pixel / params.array_size;
-        let level = level_of_detail(sight, ray);
+        let level = level_of_detail(source_idx, sight, ray, plane.xyz);
         let color = textureSampleLevel(photos, photo_sampler, uv, layer, level);
         add(&mix, nearest.a[n], color, source_idx);
     }

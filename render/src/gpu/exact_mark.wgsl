@@ -4,15 +4,16 @@
 
 @compute @workgroup_size(8, 8)
 fn mark(@builtin(global_invocation_id) pixel: vec3u) {
-    if any(pixel.xy >= params.size) || params.plane_seen == 0u {
+    if any(pixel.xy >= params.size) {
         return;
     }
     let ray = ray_through(pixel.xy);
-    let s = dot(params.plane, ray);
-    if s < 0.0 || all(ray == vec3f(0.0)) {
+    let plane = plane_at(pixel.xy);
+    let s = dot(plane.xyz, ray);
+    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
         return;
     }
-    var nearest = nearest_sources(ray, s);
+    var nearest = nearest_sources(ray, s, plane.xyz);
     let count = weigh(&nearest);
     for (var n = 0u; n < count; n++) {
         if nearest.a[n] > 0.0 {

@@ -4,6 +4,7 @@
 use crate::frame::{Frame, FrameSource};
 use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
+use crate::surface::Surface;
 use bytemuck::{Pod, Zeroable};
 use calibrate::Distortion;
 use glam::DVec3;
@@ -28,7 +29,8 @@ pub(crate) struct Params {
     pub plane_seen: u32,
     pub exposures_differ: u32,
     pub timed: u32,
-    pub padding: [u32; 2],
+    pub facets: u32,
+    pub padding: u32,
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -98,7 +100,7 @@ impl Params {
     pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
         let lens = frame.desired.lens;
         Self {
-            plane: frame.plane.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
+            plane: common_plane(frame).as_vec3().to_array(),
             rays_in_table: u32::from(lens.distortion() != Distortion::None),
             ray_scale: (1.0 / lens.focal).as_vec2().to_array(),
             ray_offset: lens.principal.as_vec2().to_array(),
@@ -117,10 +119,11 @@ impl Params {
                 Resolution::Footprint | Resolution::Distance => 0,
                 Resolution::Length => 1,
             },
-            plane_seen: u32::from(frame.plane.is_some()),
+            plane_seen: u32::from(frame.surface != Surface::Nothing),
             exposures_differ: u32::from(frame.exposures_differ()),
             timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
-            padding: [0; 2],
+            facets: u32::from(matches!(frame.surface, Surface::Facets(_))),
+            padding: 0,
         }
     }
 }
@@ -135,8 +138,9 @@ impl Source {
     ) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
         // Depths scaled by the cube root of the ratio of areas make the ratio's cube the
-        // area. In the plane of the proxy that is zero, but nothing is seen from there.
-        let area = frame.area_scale(source_idx, frame.plane.unwrap_or(DVec3::ZERO));
+        // area (facets add a factor of their own). In the plane of the proxy that is zero,
+        // but nothing is seen from there.
+        let area = frame.area_scale(source_idx, common_plane(frame));
         let scale = area.clamp(1e-12, 1e12).cbrt().recip();
         let axis = |r: usize| {
             let row = source.rotation.row(r).extend(source.translation[r]);
@@ -213,6 +217,14 @@ impl Source {
             time_penalty: f(source.time_penalty),
             padding: [0.0; 2],
         }
+    }
+}
+
+/// The plane that all pixels see; zero where there are many.
+fn common_plane(frame: &Frame<'_>) -> DVec3 {
+    match frame.surface {
+        Surface::Plane(plane) => plane,
+        Surface::Nothing | Surface::Facets(_) => DVec3::ZERO,
     }
 }
 

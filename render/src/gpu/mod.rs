@@ -12,6 +12,7 @@ use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
 use crate::rays::RayMap;
+use crate::surface::Surface;
 use calibrate::Lens;
 use image::RgbaImage;
 use layout::{Corner, Entry, Params, Source, Special};
@@ -302,6 +303,7 @@ impl Gpu {
             Order::ByLayer => photos.by_layer(),
         };
         let sources: Vec<Source> = listed.into_iter().map(source).collect();
+        let planes = self.planes(frame);
         let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
         let sources = self.table(
             "sources",
@@ -314,6 +316,7 @@ impl Gpu {
             &params,
             &sources,
             &rays,
+            &planes,
             masks,
             &self.sampler,
         ))
@@ -349,6 +352,18 @@ impl Gpu {
         let view = self.texels("rays", width, height, &texels);
         self.rays = Some((desired.lens, size, view.clone()));
         Ok(view)
+    }
+
+    /// The plane that each pixel sees; a single texel where all see the same.
+    fn planes(&self, frame: &Frame<'_>) -> wgpu::TextureView {
+        let Surface::Facets(map) = &frame.surface else {
+            return self.texels("planes", 1, 1, &[[0.0; 4]]);
+        };
+        let texels: Vec<[f32; 4]> = map
+            .planes()
+            .map(|plane| plane.map_or([0.0; 4], |q| q.as_vec3().extend(1.0).to_array()))
+            .collect();
+        self.texels("planes", frame.desired.width, frame.desired.height, &texels)
     }
 
     /// A list of texels as a texture of rows of `row` texels; never empty.

@@ -88,7 +88,7 @@ impl Pipelines {
             shared_layout: layout(
                 "shared",
                 all,
-                &[buffer(Uniform), table, table, photos, sampler],
+                &[buffer(Uniform), table, table, table, photos, sampler],
             ),
             triangulated_layout: layout("triangulated", fragment, &[photos, sampler, table]),
             exact_layout: layout("exact", fragment, &[photos, sampler]),
@@ -197,6 +197,7 @@ impl Pipelines {
         params: &wgpu::Buffer,
         sources: &wgpu::TextureView,
         rays: &wgpu::TextureView,
+        planes: &wgpu::TextureView,
         masks: &wgpu::TextureView,
         sampler: &wgpu::Sampler,
     ) -> BindGroup {
@@ -204,6 +205,7 @@ impl Pipelines {
             params.as_entire_binding(),
             BindingResource::TextureView(sources),
             BindingResource::TextureView(rays),
+            BindingResource::TextureView(planes),
             BindingResource::TextureView(masks),
             BindingResource::Sampler(sampler),
         ];

@@ -44,8 +44,9 @@ fn entry(entry_idx: u32) -> vec4f {
 @fragment
 fn triangle(in: Corner) -> @location(0) vec4f {
     let ray = ray_through(vec2u(in.position.xy));
-    let s = dot(params.plane, ray);
-    if s < 0.0 || all(ray == vec3f(0.0)) {
+    let plane = plane_at(vec2u(in.position.xy));
+    let s = dot(plane.xyz, ray);
+    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     var mix = Mix(vec4f(0.0), 0.0);
@@ -59,7 +60,7 @@ fn triangle(in: Corner) -> @location(0) vec4f {
         // Every listed view sees all of the triangle: fovBlend and mask are one.
         let sight = see(source_idx, ray, s);
         if sight.depth > 0.0 {
-            let level = level_of_detail(sight, ray);
+            let level = level_of_detail(source_idx, sight, ray, plane.xyz);
             add_photo(&mix, weight, source_idx, vec3f(sight.pixel, level));
         }
     }
@@ -81,8 +82,9 @@ struct Terms {
 @fragment
 fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     let ray = ray_through(vec2u(in.position.xy));
-    let s = dot(params.plane, ray);
-    if s < 0.0 || all(ray == vec3f(0.0)) {
+    let plane = plane_at(vec2u(in.position.xy));
+    let s = dot(plane.xyz, ray);
+    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     let first = in.list.x;
@@ -94,13 +96,13 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         let listed = entry(i);
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
-        let a = relevance(source_idx, sight, ray);
+        let a = relevance(source_idx, sight, ray, plane.xyz);
         if a > 0.0 {
             let diff = max(dot(in.shares, listed.yzw), 0.0);
             nearest = min(nearest, diff);
             terms.diff[count] = diff;
             terms.a[count] = a;
-            terms.texel[count] = vec3f(sight.pixel, level_of_detail(sight, ray));
+            terms.texel[count] = vec3f(sight.pixel, level_of_detail(source_idx, sight, ray, plane.xyz));
             terms.source_idx[count] = source_idx;
             count++;
         }

@@ -88,6 +88,8 @@ impl Capture {
         let to_points = median(points_in_world.iter().filter_map(depth).collect());
         let hit = match proxy {
             Proxy::Plane(plane) => plane.intersect(origin_in_world, forward),
+            // Made of points, it lies where they do.
+            Proxy::Points => None,
         };
         let to_proxy = hit.map(|p| p.distance(origin_in_world));
         // With nothing ahead, as far as the capture is wide.

@@ -176,8 +176,7 @@ fn a_sweep_covers_the_longest_direction() {
 fn a_dolly_keeps_its_distance_from_the_scene() {
     let mut s = grid();
     s.points.clear();
-    let Proxy::Plane(plane) = &mut s.proxy;
-    *plane = Plane::new(DVec3::new(0.0, 0.0, 2.0), DVec3::Z).unwrap();
+    s.proxy = Proxy::Plane(Plane::new(DVec3::new(0.0, 0.0, 2.0), DVec3::Z).unwrap());
     let c = centers(&path(Trajectory::Dolly, &s));
     let reach = c.iter().map(|c| c.z).fold(0.0, f64::max);
     assert!(reach > 0.4 && reach < 0.71, "{reach}");
@@ -233,7 +232,7 @@ fn moving_the_world_moves_the_path() {
             s.points.iter().copied().map(new).collect(),
             DVec3::ZERO,
         );
-        let Proxy::Plane(plane) = s.proxy;
+        let plane = s.proxy.plane().unwrap();
         let normal = old_from_new.inverse().rotation * plane.normal();
         moved.proxy = Proxy::Plane(Plane::new(new(plane.point()), normal).unwrap());
         for (i, old) in s.sources.iter().enumerate() {

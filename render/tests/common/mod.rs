@@ -151,6 +151,7 @@ impl Shot {
 
     pub(crate) fn lumigraph(&self) -> Lumigraph {
         Lumigraph {
+            points: Vec::new(),
             sources: self.sources(),
             photos: PhotoStore::from_images(self.photos.clone()),
             proxy: Proxy::Plane(self.plane),

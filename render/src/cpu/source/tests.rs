@@ -8,6 +8,7 @@ fn tile(points: &[[f32; 4]]) -> Tile {
         y: lane(1),
         z: lane(2),
         s: lane(3),
+        q: every_lens::PLANE.to_array().map(|v| [v as f32; LANES]),
     }
 }
 
@@ -52,6 +53,7 @@ fn levels_of_detail_are_those_of_the_f64_model() {
                 let point = crate::ProxyPoint {
                     ray: glam::Vec3::new(*x, *y, *z).as_dvec3(),
                     inverse_distance: f64::from(*s),
+                    plane: every_lens::PLANE,
                 };
                 let expected = frame.level_of_detail(source_idx, &point);
                 let error = (f64::from(sight.level[k]) - expected).abs();

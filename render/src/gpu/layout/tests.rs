@@ -136,7 +136,7 @@ fn every_lens_projects_as_the_f64_model_does() {
     for (source_idx, view) in lumigraph.sources.iter().enumerate() {
         let name = &view.name;
         let source = &frame.sources[source_idx];
-        let area = frame.area_scale(source_idx, frame.plane.unwrap());
+        let area = frame.area_scale(source_idx, super::common_plane(&frame));
         let expected = every_lens::points(&frame, source_idx);
         let points: Vec<[f32; 4]> = expected.iter().map(|(point, _)| *point).collect();
         let unseen = every_lens::unseen(&frame, source_idx);

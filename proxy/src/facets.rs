@@ -1,0 +1,98 @@
+//! A surface as one viewer sees it: triangles over the sphere of directions.
+
+use glam::{DMat3, DVec3};
+
+/// Flat triangles that tile all directions around a viewer, a Delaunay triangulation of the
+/// sphere, each with the part of the surface seen through it. Inverse distance is linear over a facet's plane, whatever the lens.
+///
+/// Everything is in the viewer's camera frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facets {
+    /// Unit vectors towards the corners.
+    pub directions: Vec<DVec3>,
+    /// 1/distance of the corners; positive.
+    pub inverse_distances: Vec<f64>,
+    /// Corners of each facet, so that det(a, b, c) > 0.
+    pub triangles: Vec<[u32; 3]>,
+    /// The facet across the side that lies opposite each corner.
+    pub neighbours: Vec<[u32; 3]>,
+    /// q of each facet's plane: a ray v meets it at v / s with s = q · v.
+    pub planes: Vec<DVec3>,
+}
+
+impl Facets {
+    /// Facets from corners and triangles of either orientation. Triangles too thin to carry
+    /// a plane take that of equal inverse distance, which is close to the same thing there.
+    ///
+    /// # Panics
+    /// If a side has no triangle beyond it: the sphere must be closed.
+    pub fn new(
+        directions: Vec<DVec3>,
+        inverse_distances: Vec<f64>,
+        mut triangles: Vec<[u32; 3]>,
+    ) -> Self {
+        let corner = |i: u32| directions[i as usize];
+        for [a, b, c] in &mut triangles {
+            if corner(*a).cross(corner(*b)).dot(corner(*c)) < 0.0 {
+                std::mem::swap(b, c);
+            }
+        }
+        let planes = triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(corner);
+                let s = t.map(|i| inverse_distances[i as usize]);
+                plane_through([a, b, c], s)
+            })
+            .collect();
+        let neighbours = neighbours(&triangles);
+        Self {
+            directions,
+            inverse_distances,
+            triangles,
+            neighbours,
+            planes,
+        }
+    }
+
+    /// The facet that a ray passes through, found by walking from facet `start` towards it.
+    pub fn locate(&self, ray: DVec3, start: u32) -> u32 {
+        let mut at = start;
+        // A walk over a Delaunay triangulation never comes back (Edelsbrunner 1990); the
+        // bound is for rounding.
+        'walk: for step in 0..=self.triangles.len() {
+            let corners = self.triangles[at as usize].map(|i| self.directions[i as usize]);
+            // Which side is tried first alternates, so that rounding cannot lead in a circle.
+            for k in 0..3 {
+                let k = (k + step) % 3;
+                let (from, to) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
+                if from.cross(to).dot(ray) < 0.0 {
+                    at = self.neighbours[at as usize][k];
+                    continue 'walk;
+                }
+            }
+            break;
+        }
+        at
+    }
+}
+
+fn plane_through(directions: [DVec3; 3], inverse_distances: [f64; 3]) -> DVec3 {
+    let [a, b, c] = directions;
+    let s = DVec3::from_array(inverse_distances);
+    let q = DMat3::from_cols(a, b, c).transpose().inverse() * s;
+    let middle = (a + b + c).normalize_or(DVec3::Z);
+    let mean = (s.x + s.y + s.z) / 3.0;
+    if q.is_finite() { q } else { middle * mean }
+}
+
+fn neighbours(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let mut across = std::collections::HashMap::new();
+    for (i, t) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            across.insert((t[(k + 1) % 3], t[(k + 2) % 3]), i as u32);
+        }
+    }
+    let of = |t: &[u32; 3]| [0, 1, 2].map(|k| across[&(t[(k + 2) % 3], t[(k + 1) % 3])]);
+    triangles.iter().map(of).collect()
+}

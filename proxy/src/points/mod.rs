@@ -1,0 +1,224 @@
+//! The sparse points as a surface of their own, made anew for each desired view.
+//!
+//! The points that the source views most like the desired one observe are triangulated
+//! over the directions around the desired centre. Inside a triangle inverse distance is
+//! linear, so each is flat. A ring of anchors beyond the image's corners, and one behind the
+//! viewer, make the surface complete. It is the proxy that asks least of a capture: no closed mesh, no agreement
+//! between far views.
+
+mod clean;
+mod nearest;
+
+use crate::Facets;
+use calibrate::{Pixel, View};
+use clean::{without_hidden, without_spikes};
+use glam::{DVec2, DVec3};
+use nearest::Nearest;
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::collections::HashSet;
+
+/// A sparse point and who sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SparsePoint {
+    /// In the world.
+    pub position: DVec3,
+    /// Indices of the source views that observe it.
+    pub seen_by: Vec<u32>,
+}
+
+/// How many of the source views most like the desired one give their points.
+const VIEWS: usize = 6;
+/// Radians added to the angle at a point before views are compared: below it, angles are
+/// as good as equal, and the number of shared points decides.
+const EASY_ANGLE: f64 = 0.1;
+/// Radians that a ratio of distances by the factor e is worth beside an angle.
+const RATIO_WEIGHT: f64 = 0.3;
+/// Anchors around the image, and how many points decide where each lies.
+const ANCHORS: usize = 32;
+const ANCHORED_TO: usize = 8;
+/// The ring's angle from the axis over that of the image's farthest corner; beyond it no
+/// point counts.
+const MARGIN: f64 = 1.1;
+/// The widest ring; what lies behind it is not seen.
+const WIDEST: f64 = 2.8;
+
+/// A point as the desired view sees it: a unit vector in its frame, and 1/distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Node {
+    direction: DVec3,
+    inverse_distance: f64,
+}
+
+impl Node {
+    /// Its place in the chart in which everything is triangulated: the stereographic
+    /// projection from straight behind. A circle there is a circle on the sphere, so the
+    /// triangulation is Delaunay for any lens.
+    fn chart(&self) -> DVec2 {
+        self.direction.truncate() / (1.0 + self.direction.z)
+    }
+}
+
+/// The surface through the points that the `sources` most like `desired` observe; `None`
+/// where fewer than three are in sight.
+///
+/// Outliers go in two steps: points of which half the neighbours lie clearly nearer are
+/// taken to be hidden by them, and points that stick out of all their neighbours go too.
+pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Option<Facets> {
+    // 1. The points in sight.
+    let reach = reach(desired);
+    let center = desired.center();
+    let seen = |point: &SparsePoint| {
+        let offset = desired.camera_from_world.rotation * (point.position - center);
+        let node = Node {
+            direction: offset / offset.length(),
+            inverse_distance: 1.0 / offset.length(),
+        };
+        let finite = node.direction.is_finite() && node.inverse_distance > 0.0;
+        (finite && node.direction.z > reach.cos()).then_some(node)
+    };
+    let in_sight: Vec<(Node, &SparsePoint)> =
+        points.iter().filter_map(|p| Some((seen(p)?, p))).collect();
+
+    // 2. Those that the views most like this one observe.
+    let chosen = views_most_like(center, sources, &in_sight);
+    let mut nodes: Vec<Node> = in_sight
+        .iter()
+        .filter(|(_, p)| p.seen_by.iter().any(|&i| chosen[i as usize]))
+        .map(|(node, _)| *node)
+        .collect();
+    nodes = distinct(nodes);
+    nodes = without_spikes(nodes);
+    nodes = without_hidden(nodes);
+    if nodes.len() < 3 {
+        return None;
+    }
+
+    // 3. Anchors, at the distance of the points nearest to them.
+    let nearest = Nearest::new(&nodes);
+    let anchors: Vec<Node> = (0..ANCHORS)
+        .map(|k| {
+            let turn = std::f64::consts::TAU * (k as f64 + 0.5) / ANCHORS as f64;
+            let across = DVec2::from_angle(turn) * reach.sin();
+            let mut anchor = Node {
+                direction: across.extend(reach.cos()),
+                inverse_distance: 0.0,
+            };
+            anchor.inverse_distance = nearest.inverse_distance(anchor.chart(), ANCHORED_TO);
+            anchor
+        })
+        .collect();
+    nodes.extend(anchors);
+    let mut triangles: Vec<[u32; 3]> = delaunay(&nodes)?
+        .inner_faces()
+        .map(|face| face.vertices().map(|v| v.data().index))
+        .collect();
+
+    // 4. Straight behind is the chart's infinity: with it the triangulation closes.
+    let behind = Node {
+        direction: DVec3::NEG_Z,
+        inverse_distance: nodes[nodes.len() - 1].inverse_distance,
+    };
+    let rim = rim(&triangles);
+    triangles.extend(rim.into_iter().map(|[a, b]| [b, a, nodes.len() as u32]));
+    nodes.push(behind);
+    Some(Facets::new(
+        nodes.iter().map(|n| n.direction).collect(),
+        nodes.iter().map(|n| n.inverse_distance).collect(),
+        triangles,
+    ))
+}
+
+/// The sides that have no triangle beyond them, each in its triangle's direction.
+fn rim(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    let all: HashSet<[u32; 2]> = triangles.iter().flat_map(sides).collect();
+    let outer = |side: &[u32; 2]| !all.contains(&[side[1], side[0]]);
+    triangles.iter().flat_map(sides).filter(outer).collect()
+}
+
+/// Which source views are most like one at `center`: those that share many points with it
+/// and see them from about the same direction and distance.
+fn views_most_like(
+    center: DVec3,
+    sources: &[View],
+    in_sight: &[(Node, &SparsePoint)],
+) -> Vec<bool> {
+    let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
+    let mut likeness = vec![0.0; sources.len()];
+    for (node, point) in in_sight {
+        let here = point.position - center;
+        for &i in &point.seen_by {
+            let there = point.position - centers[i as usize];
+            let angle = there.cross(here).length().atan2(there.dot(here));
+            let ratio = (there.length() * node.inverse_distance).ln().abs();
+            likeness[i as usize] += 1.0 / (EASY_ANGLE + angle + RATIO_WEIGHT * ratio);
+        }
+    }
+    let mut order: Vec<usize> = (0..sources.len()).filter(|&i| likeness[i] > 0.0).collect();
+    order.sort_by(|&i, &j| likeness[j].total_cmp(&likeness[i]).then(i.cmp(&j)));
+    order.truncate(VIEWS);
+    let mut chosen = vec![false; sources.len()];
+    order.into_iter().for_each(|i| chosen[i] = true);
+    chosen
+}
+
+/// The angle from the axis within which all of the image lies, and a margin.
+fn reach(view: &View) -> f64 {
+    const STEPS: u32 = 8;
+    let (width, height) = (f64::from(view.width), f64::from(view.height));
+    let angle = |x: f64, y: f64| {
+        let ray = view.lens.unproject(Pixel::new(x, y))?;
+        Some(ray.truncate().length().atan2(ray.z))
+    };
+    let border = (0..=STEPS).flat_map(|i| {
+        let share = f64::from(i) / f64::from(STEPS);
+        let (x, y) = (share * width, share * height);
+        [(x, 0.0), (x, height), (0.0, y), (width, y)]
+    });
+    let widest = border.filter_map(|(x, y)| angle(x, y)).fold(0.0, f64::max);
+    (widest * MARGIN).clamp(0.1, WIDEST)
+}
+
+/// A vertex of the triangulation.
+struct Vertex {
+    at: Point2<f64>,
+    index: u32,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        self.at
+    }
+}
+
+/// The chart's lattice: whole numbers keep the triangulation's predicates exact and apart.
+const LATTICE: f64 = (1 << 22) as f64;
+
+fn lattice(node: &Node) -> DVec2 {
+    (node.chart() * LATTICE).round()
+}
+
+/// The first node of each place on the lattice.
+fn distinct(mut nodes: Vec<Node>) -> Vec<Node> {
+    let mut taken = HashSet::new();
+    nodes.retain(|node| {
+        let at = lattice(node);
+        taken.insert((at.x as i64, at.y as i64))
+    });
+    nodes
+}
+
+/// `None` where the nodes, which must be distinct, cannot be triangulated.
+fn delaunay(nodes: &[Node]) -> Option<DelaunayTriangulation<Vertex>> {
+    let vertices = nodes.iter().zip(0..).map(|(node, index)| {
+        let at = lattice(node);
+        let at = Point2::new(at.x, at.y);
+        Vertex { at, index }
+    });
+    DelaunayTriangulation::bulk_load_stable(vertices.collect()).ok()
+}
+
+#[cfg(test)]
+mod tests;

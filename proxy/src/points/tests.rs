@@ -1,0 +1,196 @@
+use super::*;
+use calibrate::{Lens, Rigid3};
+use proptest::prelude::*;
+
+fn view(center: DVec3) -> View {
+    View {
+        lens: Lens::pinhole(DVec2::splat(100.0), DVec2::new(80.0, 60.0)),
+        width: 160,
+        height: 120,
+        camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, DVec3::NEG_Y),
+    }
+}
+
+/// Points all over a surface z(x, y), seen by views 0 and 1.
+fn surface(z: impl Fn(f64, f64) -> f64) -> Vec<SparsePoint> {
+    let along = |i: i32| f64::from(i) * 0.37;
+    let at = |i: i32, j: i32| {
+        let (x, y) = (
+            along(i) + 0.01 * f64::from(j),
+            along(j) - 0.02 * f64::from(i),
+        );
+        SparsePoint {
+            position: DVec3::new(x, y, z(x, y)),
+            seen_by: vec![0, 1],
+        }
+    };
+    (-15..=15)
+        .flat_map(|i| (-12..=12).map(move |j| at(i, j)))
+        .collect()
+}
+
+fn sources() -> Vec<View> {
+    vec![view(DVec3::X), view(DVec3::NEG_X)]
+}
+
+/// The distance of the surface along the ray through a pixel.
+fn depth(facets: &Facets, desired: &View, x: f64, y: f64) -> Option<f64> {
+    let ray = desired.lens.unproject(Pixel::new(x, y))?;
+    let facet = facets.locate(ray, 0);
+    Some(ray.z / facets.planes[facet as usize].dot(ray))
+}
+
+#[test]
+fn a_plane_of_points_is_that_plane_all_over_the_image() {
+    let points = surface(|x, y| 5.0 + 0.2 * x - 0.1 * y);
+    let desired = view(DVec3::new(0.2, 0.1, -0.3));
+    let facets = facets(&desired, &sources(), &points).unwrap();
+    for (x, y) in [
+        (0.5, 0.5),
+        (159.5, 0.5),
+        (80.0, 60.0),
+        (31.0, 119.5),
+        (159.5, 119.5),
+    ] {
+        let depth = depth(&facets, &desired, x, y).unwrap();
+        let ray = desired.lens.unproject(Pixel::new(x, y)).unwrap();
+        let at = desired.center() + ray / ray.z * depth;
+        let expected = 5.0 + 0.2 * at.x - 0.1 * at.y;
+        // The anchors only guess.
+        let tolerance = if x == 80.0 { 1e-9 } else { 0.5 };
+        assert!(
+            (at.z - expected).abs() < tolerance,
+            "{x}, {y}: {} {expected}",
+            at.z
+        );
+    }
+}
+
+#[test]
+fn every_pixel_of_any_lens_sees_a_facet() {
+    let points = surface(|x, _| 4.0 + x.sin());
+    let wide = View {
+        lens: Lens::new(
+            DVec2::splat(50.0),
+            DVec2::new(80.0, 60.0),
+            calibrate::Distortion::Fisheye { k: [0.0; 4] },
+        ),
+        ..view(DVec3::ZERO)
+    };
+    for desired in [view(DVec3::new(0.0, 0.3, 0.5)), wide] {
+        let facets = facets(&desired, &sources(), &points).unwrap();
+        let mut last = 0;
+        for y in 0..desired.height {
+            for x in 0..desired.width {
+                let ray = desired.lens.unproject(Pixel::center_of(x, y)).unwrap();
+                last = facets.locate(ray, last);
+                let s = facets.planes[last as usize].dot(ray);
+                let from_afar = facets.planes[facets.locate(ray, 0) as usize].dot(ray);
+                assert!((s - from_afar).abs() < 1e-12, "{x}, {y}: {s}, {from_afar}");
+                assert!(s > 0.0, "{x}, {y}: {s}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_sticks_out_and_what_is_hidden_does_not_count() {
+    let clean = surface(|_, _| 5.0);
+    let desired = view(DVec3::ZERO);
+    let mut spoilt = clean.clone();
+    let seen_by = vec![0, 1];
+    for (i, position) in [
+        DVec3::new(0.1, 0.05, 1.0),
+        DVec3::new(-0.3, 0.4, 40.0),
+        DVec3::new(1.0, -1.0, 9.0),
+        DVec3::new(1.1, -1.0, 9.1),
+        DVec3::new(0.0, 0.0, 1e9),
+        DVec3::new(0.0, 0.0, -3.0),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let seen_by = seen_by.clone();
+        spoilt.insert(17 * i, SparsePoint { position, seen_by });
+    }
+    let facets = facets(&desired, &sources(), &spoilt).unwrap();
+    for (x, y) in [
+        (80.0, 60.0),
+        (82.0, 61.0),
+        (76.0, 66.0),
+        (91.0, 49.0),
+        (40.0, 30.0),
+    ] {
+        let depth = depth(&facets, &desired, x, y).unwrap();
+        assert!((depth - 5.0).abs() < 1e-6, "{x}, {y}: {depth}");
+    }
+}
+
+#[test]
+fn only_the_views_most_alike_give_their_points() {
+    // Seven views beside the desired one see a wall; one far off to the side, which sees
+    // as many points, another.
+    let mut points = surface(|_, _| 5.0);
+    let mut sources: Vec<View> = (0..7)
+        .map(|i| view(DVec3::X * 0.1 * f64::from(i)))
+        .collect();
+    sources.push(view(DVec3::new(30.0, 0.0, 4.0)));
+    for point in &mut points {
+        point.seen_by = (0..7).collect();
+    }
+    let mut other = surface(|_, _| 4.5);
+    other.iter_mut().for_each(|p| p.seen_by = vec![7]);
+    points.extend(other);
+    let desired = view(DVec3::ZERO);
+    let facets = facets(&desired, &sources, &points).unwrap();
+    let depth = depth(&facets, &desired, 80.0, 60.0).unwrap();
+    assert!((depth - 5.0).abs() < 1e-9, "{depth}");
+}
+
+#[test]
+fn too_little_is_no_surface() {
+    let desired = view(DVec3::ZERO);
+    assert_eq!(facets(&desired, &sources(), &[]), None);
+    let behind = surface(|_, _| -5.0);
+    assert_eq!(facets(&desired, &sources(), &behind), None);
+    let one_place = vec![
+        SparsePoint {
+            position: DVec3::new(0.1, 0.2, 3.0),
+            seen_by: vec![0],
+        };
+        50
+    ];
+    assert_eq!(facets(&desired, &sources(), &one_place), None);
+    // In a row they are one, thanks to the anchors.
+    let row: Vec<SparsePoint> = surface(|_, _| 5.0).into_iter().step_by(25).collect();
+    assert!(facets(&desired, &sources(), &row).is_some());
+}
+
+proptest! {
+    /// Whatever the points, the walk finds a facet that holds the ray, and inverse distance
+    /// there is positive and no larger than the largest of its corners'.
+    #[test]
+    fn the_walk_finds_what_holds_the_ray(
+        positions in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f64), 3..60),
+        x in 0.0..160.0_f64,
+        y in 0.0..120.0_f64,
+    ) {
+        let points: Vec<SparsePoint> = positions
+            .into_iter()
+            .map(|p| SparsePoint { position: DVec3::from(p), seen_by: vec![0] })
+            .collect();
+        let desired = view(DVec3::new(0.0, 0.0, -2.0));
+        if let Some(facets) = facets(&desired, &sources(), &points) {
+            let ray = desired.lens.unproject(Pixel::new(x, y)).unwrap().normalize();
+            let facet = facets.locate(ray, 0);
+            let corners = facets.triangles[facet as usize];
+            let directions = corners.map(|i| facets.directions[i as usize]);
+            for k in 0..3 {
+                let side = directions[k].cross(directions[(k + 1) % 3]).dot(ray);
+                prop_assert!(side >= 0.0, "{side}");
+            }
+            let s = facets.planes[facet as usize].dot(ray);
+            prop_assert!(s > 0.0, "{s}");
+        }
+    }
+}

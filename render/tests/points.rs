@@ -1,0 +1,164 @@
+//! The proxy made of sparse points for every view.
+
+mod common;
+
+use calibrate::{ImageId, View};
+use common::{Shot, assert_close, between, gpu, psnr, psnr_covered};
+use glam::{DQuat, DVec3};
+use image::RgbaImage;
+use proxy::{Proxy, SparsePoint};
+use render::{FieldOptions, Frame, Lumigraph, Method, PhotoStore, Surface, cpu, reference};
+use std::collections::BTreeSet;
+
+const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
+
+/// The sparse points, with the source views of the shot that observe them.
+fn points(shot: &Shot) -> Vec<SparsePoint> {
+    let model = &shot.dataset.reconstruction;
+    let source_of = |id: &ImageId| {
+        let name = &model.images[id].name;
+        shot.dataset.photos.iter().position(|p| p.name == *name)
+    };
+    let points = model.points.values().map(|point| {
+        let seen: BTreeSet<u32> = point
+            .track
+            .iter()
+            .filter_map(|(id, _)| Some(source_of(id)? as u32))
+            .collect();
+        SparsePoint {
+            position: point.position,
+            seen_by: seen.into_iter().collect(),
+        }
+    });
+    points.collect()
+}
+
+fn lumigraph(shot: &Shot) -> Lumigraph {
+    Lumigraph {
+        proxy: Proxy::Points,
+        points: points(shot),
+        ..shot.lumigraph()
+    }
+}
+
+fn pictures(frame: &Frame<'_>, method: Method) -> Vec<(&'static str, RgbaImage)> {
+    let mut pictures = vec![("cpu", cpu::render(frame, method).unwrap())];
+    if let Some(mut gpu) = gpu() {
+        pictures.push(("gpu", gpu.render(frame, method).unwrap()));
+    }
+    pictures
+}
+
+fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
+    let middle = between(&shot.views[0], &shot.views[5], 0.45);
+    let lens = calibrate::Lens::new(
+        glam::DVec2::new(95.0, 96.0),
+        glam::DVec2::new(81.0, 59.5),
+        calibrate::Distortion::Fisheye {
+            k: [0.02, -0.01, 0.002, 0.0],
+        },
+    );
+    let nearer = calibrate::Rigid3::new(DQuat::IDENTITY, 0.2 * DVec3::NEG_Z);
+    let near = View {
+        camera_from_world: nearer * middle.camera_from_world,
+        ..middle.clone()
+    };
+    let fisheye = View {
+        lens,
+        ..middle.clone()
+    };
+    vec![("between", middle), ("nearer", near), ("fisheye", fisheye)]
+}
+
+#[test]
+fn every_engine_draws_the_same_picture() {
+    let shot = Shot::of("shelf", 9, None);
+    let lumigraph = lumigraph(&shot);
+    for (name, desired) in desired_views(&shot) {
+        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        assert!(matches!(frame.surface, Surface::Facets(_)), "{name}");
+        let truth = reference::render_exact(&frame).unwrap();
+        for (engine, picture) in pictures(&frame, Method::Exact) {
+            assert_close(&picture, &truth, &format!("{name}, {engine}"));
+        }
+        for (engine, picture) in pictures(&frame, Method::TRIANGULATED) {
+            let db = psnr(&picture, &truth);
+            println!("{name}, {engine}, triangulated against exact: {db:.1} dB");
+            assert!(db >= 50.0, "{name}, {engine}: {db} dB");
+        }
+    }
+}
+
+#[test]
+fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
+    let shot = Shot::of("shelf", 9, None);
+    let lumigraph = lumigraph(&shot);
+    for i in [0, 4, 7] {
+        let frame = Frame::new(&lumigraph, shot.views[i].clone(), FieldOptions::default());
+        for method in METHODS {
+            for (engine, picture) in pictures(&frame, method) {
+                assert!(picture.pixels().all(|p| p.0[3] == 255), "{i}, {engine}");
+                let db = psnr_covered(&picture, &shot.photos[i]);
+                assert!(db >= 50.0, "{i}, {engine}, {method:?}: {db} dB");
+            }
+        }
+    }
+}
+
+#[test]
+fn it_shows_what_no_plane_can() {
+    let shot = Shot::of("shelf", 9, None);
+    let desired = between(&shot.views[0], &shot.views[5], 0.45);
+    let truth = datasets::render_view(&shot.dataset.scene, &desired, 2);
+    let score = |lumigraph: &Lumigraph| {
+        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        psnr(&cpu::render(&frame, Method::Exact).unwrap(), &truth)
+    };
+    let (plane, points) = (score(&shot.lumigraph()), score(&lumigraph(&shot)));
+    println!("plane {plane:.2} dB, points {points:.2} dB");
+    assert!(points > plane + 3.0, "{points} dB, {plane} dB");
+}
+
+#[test]
+fn neither_the_worlds_place_nor_any_order_matters() {
+    let shot = Shot::of("shelf", 9, None);
+    let before = lumigraph(&shot);
+    let desired = between(&shot.views[0], &shot.views[5], 0.45);
+    let render = |lumigraph: &Lumigraph, desired: &View| {
+        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        cpu::render(&frame, Method::Exact).unwrap()
+    };
+    let picture = render(&before, &desired);
+
+    // 1. A world turned, made larger, and far away.
+    let rotation = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 2.0);
+    let place = |p: DVec3| rotation * (p * 1e3) + DVec3::new(4e5, -5e6, 3e3);
+    let moved_view = |view: &View| {
+        let turned = view.camera_from_world.rotation * rotation.conjugate();
+        View {
+            camera_from_world: calibrate::Rigid3::new(turned, -(turned * place(view.center()))),
+            ..view.clone()
+        }
+    };
+    let mut moved = lumigraph(&shot);
+    moved
+        .points
+        .iter_mut()
+        .for_each(|p| p.position = place(p.position));
+    moved
+        .sources
+        .iter_mut()
+        .for_each(|s| s.view = moved_view(&s.view));
+    assert_close(&render(&moved, &moved_view(&desired)), &picture, "moved");
+
+    // 2. Photos and points in the opposite order.
+    let count = shot.views.len() as u32;
+    let mut reversed = lumigraph(&shot);
+    reversed.sources.reverse();
+    reversed.photos = PhotoStore::from_images(shot.photos.iter().rev().cloned().collect());
+    reversed.points.reverse();
+    for point in &mut reversed.points {
+        point.seen_by.iter_mut().for_each(|i| *i = count - 1 - *i);
+    }
+    assert_close(&render(&reversed, &desired), &picture, "reversed");
+}
