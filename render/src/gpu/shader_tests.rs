@@ -126,6 +126,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("EXPOSURE", offset_of!(Source, exposure)),
             ("PRISM", offset_of!(Source, prism)),
             ("SENSOR", offset_of!(Source, shear)),
+            ("REST", offset_of!(Source, mask_layer)),
         ] {
             assert_eq!(constants[name] as usize * TEXEL, offset, "{name}");
         }
@@ -139,8 +140,8 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
     assert_eq!(within(offset_of!(Source, wide), kind), 3);
-    let gain = offset_of!(Source, gain);
-    assert_eq!(within(offset_of!(Source, mask_layer), gain), 3);
+    let rest = offset_of!(Source, mask_layer);
+    assert_eq!(within(offset_of!(Source, time_penalty), rest), 1);
     let pinhole = offset_of!(Source, focal);
     assert_eq!(within(offset_of!(Source, principal), pinhole), 2);
     let sensor = offset_of!(Source, shear);
