@@ -16,6 +16,7 @@ mod proxy;
 mod render;
 mod report;
 mod session;
+mod uncalibrated;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};

@@ -12,3 +12,4 @@ mod render;
 mod repeat;
 mod run;
 mod scene;
+mod uncalibrated;
