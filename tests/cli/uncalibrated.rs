@@ -95,7 +95,6 @@ fn colmap_places_all_photos_of_the_shelf() {
     let found = colmap::read_model(&here.path().join("scene/model")).unwrap();
     assert_eq!(found.images.len(), 9);
     let (angle, distance) = pose_errors(&found, &truth);
-    // Measured 0.03° and 0.4 % of the spread.
     assert!(angle.to_degrees() < 0.2, "{}°", angle.to_degrees());
     assert!(distance < 0.02, "{distance} of the spread");
     let info = lumigraph(here.path(), "info scene --json").ok().json();
