@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change goes in: formatting, lints, documentation and
-# all tests, those on the graphics device included. On Debian and Ubuntu it installs the
-# software Vulkan driver where there is no driver at all.
+# all tests, those on the graphics device and with COLMAP and ffmpeg included. On Debian and
+# Ubuntu it installs what is missing of these two and of the software Vulkan driver.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -23,14 +23,20 @@ has_vulkan_loader() {
     { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep 'libvulkan\.so\.1' >/dev/null
 }
 
-if [ "$(uname -s)" = Linux ] && ! { has_vulkan_driver && has_vulkan_loader; }; then
-    step "installing the software Vulkan driver"
-    as_root=()
+install_missing() {
+    local missing=() as_root=()
+    has_vulkan_driver && has_vulkan_loader || missing+=(mesa-vulkan-drivers libvulkan1)
+    command -v colmap >/dev/null || missing+=(colmap)
+    command -v ffmpeg >/dev/null || missing+=(ffmpeg)
+    if [ ${#missing[@]} -eq 0 ]; then return; fi
+    step "installing ${missing[*]}"
     if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
     "${as_root[@]}" apt-get update
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
-fi
+        apt-get install -y --no-install-recommends "${missing[@]}"
+}
+
+if [ "$(uname -s)" = Linux ]; then install_missing; fi
 
 step "formatting"
 cargo fmt --all --check
@@ -42,6 +48,6 @@ step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
 step "tests"
-LUMIGRAPH_REQUIRE_GPU=1 cargo test --workspace
+LUMIGRAPH_REQUIRE_GPU=1 LUMIGRAPH_REQUIRE_TOOLS=1 cargo test --workspace
 
 step "all is well"

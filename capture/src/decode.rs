@@ -114,6 +114,17 @@ pub fn decode_reduced(
     Ok(resize(&picture, width, height))
 }
 
+/// A file's first part, which holds the EXIF data of a JPEG.
+pub(crate) fn head(path: &Path) -> Result<Vec<u8>, CaptureError> {
+    let failed = read_failed(path);
+    let file = File::open(path).map_err(&failed)?;
+    let mut head = Vec::new();
+    // An EXIF segment has at most 64 KiB; a JFIF header may come before it.
+    let read = file.take(2 * HEAD_BYTES).read_to_end(&mut head);
+    read.map_err(&failed)?;
+    Ok(head)
+}
+
 /// JPEG or PNG, by a file's first bytes: its extension may be wrong.
 pub(crate) fn format_of(path: &Path, bytes: &[u8]) -> Result<ImageFormat, CaptureError> {
     if bytes.is_empty() {

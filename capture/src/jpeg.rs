@@ -34,7 +34,7 @@ pub(crate) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
 
 /// The markers in their order, each with what its segment holds. Ends where the bytes do,
 /// be it amid a segment.
-fn markers(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+pub(crate) fn markers(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     let mut rest = bytes;
     std::iter::from_fn(move || {
         loop {

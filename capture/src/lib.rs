@@ -1,5 +1,5 @@
-//! Photo sets: finding, ordering, decoding and dating photos, and the masks, mattes and depth
-//! maps beside them.
+//! Photo sets: finding, ordering, decoding and dating photos, the masks, mattes and depth maps
+//! beside them, and taking photos out of videos.
 //!
 //! A photo is its **stored pixel grid**: EXIF orientation is not applied, because
 //! calibrations speak about the pixels as stored. The first pixel's centre is at
@@ -9,10 +9,14 @@
 mod beside;
 mod decode;
 mod error;
+mod exif;
 mod jpeg;
 mod photo_set;
 mod resize;
+mod sequence;
 mod times;
+mod tool;
+pub mod video;
 mod warp;
 mod write;
 
@@ -21,11 +25,14 @@ pub use beside::{
 };
 pub use decode::{decode, decode_reduced, photo_size};
 pub use error::CaptureError;
+pub use exif::{Exif, read_exif};
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
 pub use resize::{reduced_size, resize};
+pub use sequence::is_sequence;
 pub use times::{
-    NameTime, TimeListError, Times, exif_time_s, from_earliest, number_in_name, read_times,
-    time_in_name, times_of_names,
+    NameTime, TimeListError, Times, from_earliest, number_in_name, read_times, time_in_name,
+    times_of_names,
 };
+pub use tool::{Tool, ToolError, fingerprint};
 pub use warp::{Footprint, Kernel, warp};
 pub use write::{copy_photo, write_mask, write_png};

@@ -1,14 +1,18 @@
 //! `lumigraph import`
 
+use super::Usage;
 use super::exposure::ExposureArgs;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
 use super::session::progress;
-use lumigraph::scene::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, TimeSource};
+use super::uncalibrated::UncalibratedArgs;
+use lumigraph::scene::{
+    DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, TimeSource, Warning,
+};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Make a scene of photos and their calibration
+/// Make a scene of photos and their calibration, or of photos alone
 ///
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
 /// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
@@ -20,13 +24,18 @@ use std::path::PathBuf;
 ///
 /// Masks and depth maps in PHOTOS/masks and PHOTOS/depth are found by the photos' names.
 ///
+/// Without a calibration, COLMAP is run if it is installed. A video may be given instead of
+/// photos: ffmpeg takes its sharpest frames, into the scene's folder. Interrupted, the same
+/// command goes on where it was.
+///
 ///     lumigraph import my-capture -o my-scene
 ///     lumigraph import photos --calibration out_camera_data.yml -o my-scene
 ///     lumigraph import my-capture --undistort -o my-scene
+///     lumigraph import sweep.mp4 --frames 60 -o my-scene
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// The capture, or its photos
+    /// The capture, or its photos, or a video
     photos: PathBuf,
     /// The COLMAP model, a folder with one in the usual places, or OpenCV's file
     /// [default: PHOTOS]
@@ -70,6 +79,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "times",
         allow_negative_numbers = true)]
     frame_rate: Option<f64>,
+    #[command(flatten)]
+    uncalibrated: UncalibratedArgs,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -82,7 +93,25 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let options = ImportOptions {
+    // Before what may take hours.
+    Scene::check_free(&args.output, args.force)?;
+
+    // 1. The photos.
+    let is_video = args.photos.is_file();
+    if !is_video && args.uncalibrated.asks_for_frames() {
+        let message = "--frames and --fps are for a video's file, and PHOTOS is none";
+        return Err(Usage(message.to_owned()).into());
+    }
+    let (capture, frames) = if is_video {
+        let folder = Scene::frames_folder(&args.output);
+        let frames = args.uncalibrated.extract(&args.photos, &folder)?;
+        (folder, frames)
+    } else {
+        (args.photos.clone(), Vec::new())
+    };
+
+    // 2. Their calibration.
+    let mut options = ImportOptions {
         calibration: args.calibration.clone(),
         keys: args.keys.keys(),
         times: match (&args.times, args.frame_rate) {
@@ -97,8 +126,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         depth: args.depth.clone(),
         depth_scale: args.depth_scale,
     };
-    let (mut scene, warnings) = Scene::import(&args.photos, &options)?;
+    let imported = match Scene::import(&capture, &options) {
+        Err(SceneError::Uncalibrated { .. }) => {
+            let work = Scene::colmap_folder(&args.output);
+            let uncalibrated = &args.uncalibrated;
+            options.calibration = Some(uncalibrated.calibrate(&capture, is_video, &work)?);
+            let (scene, mut warnings) = Scene::import(&capture, &options)?;
+            // Said already, and why.
+            warnings.retain(|w| !matches!(w, Warning::Uncalibrated { .. }));
+            Ok((scene, warnings))
+        }
+        imported => {
+            if args.uncalibrated.asks_for_matching() && imported.is_ok() {
+                say!("note: --matching changes nothing: the photos have a calibration");
+            }
+            imported
+        }
+    };
+    let (mut scene, warnings) = imported?;
     print_warnings(&warnings);
+    for photo in &mut scene.photos {
+        if let Some(frame) = frames.iter().find(|frame| frame.name == photo.name) {
+            photo.time_s = Some(frame.time_s);
+        }
+    }
     let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
     say!("exposure: {}", exposure.text());
     if args.undistort {

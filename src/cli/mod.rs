@@ -19,6 +19,7 @@ mod render;
 mod report;
 mod session;
 mod time;
+mod uncalibrated;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};

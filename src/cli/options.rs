@@ -93,7 +93,7 @@ impl KeyArgs {
 }
 
 /// Warnings printed one by one; more than these are only counted.
-const WARNINGS_SHOWN: usize = 10;
+pub(super) const WARNINGS_SHOWN: usize = 10;
 
 pub(super) fn print_warnings(warnings: &[Warning]) {
     for warning in warnings.iter().take(WARNINGS_SHOWN) {

@@ -15,6 +15,7 @@ use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
 };
 use serde_json::Value;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -283,7 +284,7 @@ pub(super) fn points(scene: &Scene, without: &BTreeSet<String>) -> Vec<DVec3> {
 }
 
 /// A progress bar on stderr, where that is a terminal.
-pub(super) fn progress(total: usize, doing: &'static str) -> ProgressBar {
+pub(super) fn progress(total: usize, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
         bar.set_style(style);

@@ -3,7 +3,7 @@
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration};
-use calibrate::{Reconstruction, colmap};
+use calibrate::{Reconstruction, colmap, colmap::ColmapError};
 use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -63,6 +63,12 @@ pub(super) fn find(
         .chain(others(folder));
     let source = match (found.next(), model) {
         (Some(source), _) => source,
+        (None, Err(source)) if given.is_none() && is_nothing_there(&source) => {
+            return Err(SceneError::Uncalibrated {
+                folder: folder.to_owned(),
+                source,
+            });
+        }
         (None, Err(error)) => return Err(error.into()),
         (None, Ok(model)) => Source::Colmap(model),
     };
@@ -74,6 +80,11 @@ pub(super) fn find(
         )));
     }
     Ok(source)
+}
+
+/// Whether not even a part of a model was found.
+fn is_nothing_there(error: &ColmapError) -> bool {
+    matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
 }
 
 /// The other programs' calibrations in a folder, by name.

@@ -7,6 +7,17 @@ pub enum SceneError {
     /// The calibration cannot be found or read.
     #[error(transparent)]
     Calibration(#[from] calibrate::colmap::ColmapError),
+    /// There is no calibration at all.
+    #[error(
+        "{source}; or have the photos calibrated: `lumigraph import {} -o SCENE` runs COLMAP",
+        folder.display()
+    )]
+    Uncalibrated {
+        /// The capture.
+        folder: PathBuf,
+        /// Where it was looked for.
+        source: calibrate::colmap::ColmapError,
+    },
     /// An OpenCV calibration cannot be read.
     #[error(transparent)]
     OpenCv(#[from] calibrate::opencv::OpenCvError),

@@ -2,7 +2,8 @@
 //!
 //! The folder holds `scene.json` (format: [`mod@file`]), a COLMAP text model in `model/`
 //! and, once there is one, the proxy's file. Photos stay where they are and are named by
-//! their path relative to the folder.
+//! their path relative to the folder. For photos that came without a calibration, COLMAP's
+//! work is in `colmap/`; those taken out of a video are in `photos/`.
 
 mod beside;
 mod calibration;

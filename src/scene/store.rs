@@ -13,6 +13,22 @@ use std::path::{Path, PathBuf};
 const SCENE_FILE: &str = "scene.json";
 const MODEL_FOLDER: &str = "model";
 const PROXY_FILE: &str = "proxy.json";
+/// In the order in which they take their places: a folder without the last is no scene.
+const PARTS: [&str; 6] = [
+    IMAGES_FOLDER,
+    MASKS_FOLDER,
+    MATTES_FOLDER,
+    MODEL_FOLDER,
+    PROXY_FILE,
+    SCENE_FILE,
+];
+/// COLMAP's work, for photos without a calibration. Like the frames it stays when the scene
+/// is written again: both took long to make.
+const COLMAP_FOLDER: &str = "colmap";
+/// The photos that were taken out of a video.
+const FRAMES_FOLDER: &str = "photos";
+/// What [`capture::video::extract`] leaves of the latter if it is killed.
+const PARTIAL_FRAMES: &str = ".photos.partial";
 
 impl Scene {
     /// Opens a scene's folder, or imports a capture's in memory with the defaults.
@@ -142,11 +158,66 @@ impl Scene {
         })
     }
 
-    /// Writes the scene as a new folder, complete or not at all.
+    /// The folder of a scene in which COLMAP works, for photos without a calibration.
+    pub fn colmap_folder(folder: &Path) -> PathBuf {
+        folder.join(COLMAP_FOLDER)
+    }
+
+    /// The folder of a scene for photos that are taken out of a video.
+    pub fn frames_folder(folder: &Path) -> PathBuf {
+        folder.join(FRAMES_FOLDER)
+    }
+
+    /// Whether a scene may be written to a folder.
     ///
     /// # Errors
     /// The folder holds something: an earlier scene, unless `replace`; anything that is no
-    /// part of a scene, always. Files that cannot be written.
+    /// part of a scene, always.
+    pub fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
+        if !folder.exists() {
+            return Ok(());
+        }
+        let occupied = |problem: String| SceneError::Occupied {
+            path: folder.to_owned(),
+            problem,
+        };
+        let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
+        let is_scene = Self::is_scene(folder);
+        let mut parts = vec![
+            SCENE_FILE,
+            MODEL_FOLDER,
+            PROXY_FILE,
+            COLMAP_FOLDER,
+            FRAMES_FOLDER,
+            PARTIAL_FRAMES,
+        ];
+        // Other photos are part of a scene only where it says that they are its own.
+        if is_scene && holds_photos(folder) {
+            parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER]);
+        }
+        for entry in entries {
+            let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if !parts.contains(&name.as_str()) {
+                return Err(occupied(format!(
+                    "holds {name}, which is no part of a scene; choose another folder"
+                )));
+            }
+        }
+        if is_scene && !replace {
+            return Err(occupied(
+                "holds a scene already; replace it with --force, or choose another folder"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Writes the scene's files, complete or not at all. COLMAP's work and the frames of a
+    /// video, which may be in the folder already, stay.
+    ///
+    /// # Errors
+    /// As [`Scene::check_free`]; files that cannot be written.
     pub fn save(&mut self, folder: &Path, replace: bool) -> Result<(), SceneError> {
         self.write_folder(folder, replace, |_, _| Ok(()))
     }
@@ -159,7 +230,7 @@ impl Scene {
         replace: bool,
         fill: impl FnOnce(&mut Self, &Path) -> Result<(), SceneError>,
     ) -> Result<(), SceneError> {
-        check_free(folder, replace)?;
+        Self::check_free(folder, replace)?;
         let parent = match folder.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
@@ -181,12 +252,23 @@ impl Scene {
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
-        // 2. It takes the destination's place.
-        if folder.exists() {
-            let old = made.path().join("old");
-            std::fs::rename(folder, &old).map_err(|e| io(folder, "replace the folder", e))?;
+        // 2. They take their places.
+        let old = made.path().join("old");
+        std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
+        std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
+        let rename = |part: &str, from: &Path, to: &Path| {
+            let (from, to) = (from.join(part), to.join(part));
+            if !from.exists() {
+                return Ok(());
+            }
+            std::fs::rename(from, to).map_err(|e| io(&folder.join(part), "replace", e))
+        };
+        for part in PARTS.iter().rev() {
+            rename(part, folder, &old)?;
         }
-        std::fs::rename(&new, folder).map_err(|e| io(folder, "rename a folder to this", e))?;
+        for part in PARTS {
+            rename(part, &new, folder)?;
+        }
         self.folder = Some(folder.to_owned());
         Ok(())
     }
@@ -279,39 +361,6 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneErr
     let temporary = path.with_extension("json.tmp");
     std::fs::write(&temporary, text + "\n").map_err(|e| io(&temporary, "write", e))?;
     std::fs::rename(&temporary, path).map_err(|e| io(path, "write", e))
-}
-
-/// Whether a scene may be written to a folder.
-pub(super) fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
-    if !folder.exists() {
-        return Ok(());
-    }
-    let occupied = |problem: String| SceneError::Occupied {
-        path: folder.to_owned(),
-        problem,
-    };
-    let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
-    let is_scene = Scene::is_scene(folder);
-    let mut parts = vec![SCENE_FILE, MODEL_FOLDER, PROXY_FILE];
-    // Photos are part of a scene only where it says that they are its own.
-    if is_scene && holds_photos(folder) {
-        parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER]);
-    }
-    for entry in entries {
-        let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if !parts.contains(&name.as_str()) {
-            return Err(occupied(format!(
-                "holds {name}, which is no part of a scene; choose another folder"
-            )));
-        }
-    }
-    if is_scene && !replace {
-        return Err(occupied(
-            "holds a scene already; replace it with --force, or choose another folder".to_owned(),
-        ));
-    }
-    Ok(())
 }
 
 /// Whether the scene in a folder was undistorted into it.

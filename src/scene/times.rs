@@ -1,7 +1,7 @@
 //! When the photos were taken: from a list, a frame rate, the cameras or the names.
 
 use super::{Photo, SceneError};
-use capture::{PhotoSet, Times, exif_time_s, from_earliest, number_in_name, read_times};
+use capture::{PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
 use std::path::{Path, PathBuf};
 
 /// Where photos' times come from.
@@ -36,7 +36,7 @@ pub(super) fn set_times(
         TimeSource::Found => {
             let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
             let by_name = capture::times_of_names(&names);
-            let by_camera = photos.iter().map(|p| exif_time_s(&p.path)).collect();
+            let by_camera = photos.iter().map(|p| read_exif(&p.path).ok()?.taken_s).collect();
             let by_camera = from_earliest(by_camera);
             let count = |times: &Times| times.iter().flatten().count();
             if count(&by_name) > count(&by_camera) {

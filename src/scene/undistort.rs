@@ -1,7 +1,6 @@
 //! A scene whose photos are a pinhole's: its folder holds them, in `images/`, and in
 //! `masks/` what to ignore where a photo does not fill its picture.
 
-use super::store::check_free;
 use super::{Photo, Scene, SceneError, Warning, picture_files};
 use calibrate::Pixel;
 use calibrate::undistort::{Undistortion, undistort};
@@ -41,7 +40,7 @@ impl Scene {
         strict: bool,
         progress: &(dyn Fn() + Sync),
     ) -> Result<Vec<Warning>, SceneError> {
-        check_free(folder, replace)?;
+        Self::check_free(folder, replace)?;
         let (reconstruction, undistortions) = undistort(&self.reconstruction)?;
         if let Some(photo) = self.photos.iter().find(|p| p.depth_map.is_some()) {
             return Err(SceneError::DepthMap(photo.name.clone()));

@@ -63,9 +63,20 @@ fn truncated_empty_and_garbled_models() {
 fn no_model_and_no_photos() {
     let folder = with_wall();
     fs::remove_dir_all(folder.path().join("wall/sparse")).unwrap();
-    let error = all_fail(&folder);
+    // Importing would run COLMAP.
+    let error = lumigraph(folder.path(), "info wall --json").error(1);
     assert!(
         error.contains("wall") && error.contains("no COLMAP model"),
+        "{error}"
+    );
+    assert!(
+        error.contains("`lumigraph import wall -o SCENE` runs COLMAP"),
+        "{error}"
+    );
+    fs::write(folder.path().join("wall/cameras.txt"), "").unwrap();
+    let error = all_fail(&folder);
+    assert!(
+        error.contains("lacks images.txt and points3D.txt"),
         "{error}"
     );
 

@@ -16,3 +16,4 @@ mod repeat;
 mod run;
 mod scene;
 mod time;
+mod uncalibrated;

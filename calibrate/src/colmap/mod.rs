@@ -20,6 +20,7 @@ mod binary;
 mod check;
 mod error;
 mod find;
+pub mod run;
 mod text;
 mod write;
 

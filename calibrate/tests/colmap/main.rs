@@ -4,4 +4,6 @@ mod captures;
 mod errors;
 mod find;
 mod round_trip;
+#[cfg(unix)]
+mod run;
 mod synthetic;

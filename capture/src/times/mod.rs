@@ -1,11 +1,10 @@
 //! When photos were taken: by a list, by their names, or by what the camera wrote.
 
-mod exif;
 mod list;
 mod name;
 
-pub use exif::exif_time_s;
 pub use list::{TimeListError, read_times};
+pub(crate) use name::seconds_since_1970;
 pub use name::{NameTime, number_in_name, time_in_name};
 
 /// Times found for a photo set, in its order.

@@ -132,7 +132,7 @@ fn date_at(name: &[u8], at: usize) -> Option<f64> {
 
 /// Seconds from 1970 to a date (month, day, hour, minute, second); `None` where there is no
 /// such date.
-pub(super) fn seconds_since_1970(year: u32, rest: [u32; 5]) -> Option<f64> {
+pub(crate) fn seconds_since_1970(year: u32, rest: [u32; 5]) -> Option<f64> {
     let [month, day, hour, minute, second] = rest;
     let leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
     let february = if leap { 29 } else { 28 };

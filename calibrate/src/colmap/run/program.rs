@@ -1,0 +1,219 @@
+//! COLMAP's programs and their options, old and new.
+
+use super::error::{OVERLAP, io_error};
+use super::{Event, Matching, Options, RunError, Step, log};
+use capture::{PhotoSet, Tool, ToolError};
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub(super) const LIST: &str = "photos.txt";
+const DATABASE: &str = "database.db";
+/// Where models are once the mapper is through, a folder each.
+pub(super) const MODELS: &str = "sparse";
+
+/// Photos that make a model: COLMAP would throw away further ones of less than ten, and
+/// nobody would learn why their photos are in none.
+const SMALLEST_MODEL: &str = "3";
+
+/// COLMAP, about to be run on a photo set.
+pub(super) struct Program<'a> {
+    colmap: &'a Tool,
+    version: String,
+    photos: &'a PhotoSet,
+    work: PathBuf,
+    options: Options,
+}
+
+impl Step {
+    /// The file that keeps what COLMAP said.
+    pub(super) fn log(self) -> &'static str {
+        match self {
+            Self::Features => "features.log",
+            Self::Matching => "matching.log",
+            Self::Mapping => "mapping.log",
+        }
+    }
+
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Features => "check that the photos can be read, and that the disk is not full",
+            Self::Matching => "check that memory and disk suffice; start again to go on",
+            Self::Mapping => OVERLAP,
+        }
+    }
+}
+
+impl<'a> Program<'a> {
+    pub(super) fn open(
+        colmap: &'a Tool,
+        photos: &'a PhotoSet,
+        work: &Path,
+        options: Options,
+    ) -> Result<Self, RunError> {
+        let help = colmap.text(&["help"])?;
+        let version = log::messages(&help).find(|line| line.starts_with("COLMAP"));
+        Ok(Self {
+            colmap,
+            version: version.unwrap_or("COLMAP").to_owned(),
+            photos,
+            work: work.to_owned(),
+            options,
+        })
+    }
+
+    /// As in "COLMAP 3.8 -- Structure-from-Motion and Multi-View Stereo".
+    pub(super) fn version(&self) -> &str {
+        &self.version
+    }
+
+    /// Writes the list of photos: COLMAP would take every file in their folder for one.
+    pub(super) fn write_list(&self) -> Result<(), RunError> {
+        let names = self.photos.photos.iter().map(|p| p.name.as_str());
+        let unfit = |name: &&str| name.contains(['\n', '\r']) || name.trim() != *name;
+        if let Some(name) = names.clone().find(unfit) {
+            let name = name.to_owned();
+            return Err(RunError::Name { name });
+        }
+        let list = names.fold(String::new(), |list, name| list + name + "\n");
+        let path = self.work.join(LIST);
+        fs::write(&path, list).map_err(io_error(path, "write"))
+    }
+
+    /// Removes what an interrupted run left of a step. Matching goes on where it was; the
+    /// other two begin anew: a second run of the first would give the rest of the photos
+    /// another camera, and the mapper goes on from whole models only.
+    fn remove_unfinished(&self, step: Step) -> Result<(), RunError> {
+        let left: &[&str] = match step {
+            Step::Features => &[DATABASE, "database.db-shm", "database.db-wal"],
+            Step::Matching => return Ok(()),
+            Step::Mapping => &[MODELS, "sparse.partial"],
+        };
+        for name in left.iter().chain([&step.log()]) {
+            let path = self.work.join(name);
+            let removed = match path.is_dir() {
+                true => fs::remove_dir_all(&path),
+                false if path.exists() => fs::remove_file(&path),
+                false => Ok(()),
+            };
+            removed.map_err(io_error(&path, "remove what an interrupted run left"))?;
+        }
+        Ok(())
+    }
+
+    /// Runs a step to its end.
+    pub(super) fn run(&self, step: Step, report: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        let command = match (step, self.options.matching) {
+            (Step::Features, _) => "feature_extractor",
+            (Step::Matching, Matching::Sequential) => "sequential_matcher",
+            (Step::Matching, Matching::Exhaustive) => "exhaustive_matcher",
+            (Step::Mapping, _) => "mapper",
+        };
+        let help = self.colmap.text(&[command, "-h"])?;
+        let models = self.work.join(MODELS);
+        let partial = models.with_extension("partial");
+        self.remove_unfinished(step)?;
+        if step == Step::Mapping {
+            fs::create_dir(&partial).map_err(io_error(&partial, "make the folder"))?;
+        }
+
+        let mut arguments = Arguments::new(command, &help);
+        arguments.give("--database_path", self.work.join(DATABASE));
+        match step {
+            Step::Features => {
+                arguments.give("--image_path", &self.photos.root);
+                arguments.give("--image_list_path", self.work.join(LIST));
+                arguments.give("--ImageReader.camera_model", self.options.lens.name());
+                if self.options.shared_camera {
+                    arguments.give("--ImageReader.single_camera", "1");
+                }
+                let names = ["--SiftExtraction.use_gpu", "--FeatureExtraction.use_gpu"];
+                arguments.give_known(&names, "0");
+            }
+            Step::Matching => {
+                let names = ["--SiftMatching.use_gpu", "--FeatureMatching.use_gpu"];
+                arguments.give_known(&names, "0");
+                // Smaller blocks than usual, as progress is told a block at a time.
+                arguments.give_known(&["--ExhaustiveMatching.block_size"], "10");
+            }
+            Step::Mapping => {
+                arguments.give("--image_path", &self.photos.root);
+                arguments.give("--output_path", &partial);
+                arguments.give_known(&["--Mapper.min_model_size"], SMALLEST_MODEL);
+            }
+        }
+
+        let photos = self.photos.photos.len() as u64;
+        report(Event::Progress {
+            step,
+            done: 0,
+            total: photos,
+        });
+        let mut on_line = |line: &str| {
+            if let Some((done, total)) = log::progress(step, line, photos) {
+                report(Event::Progress { step, done, total });
+            }
+        };
+        let log = self.work.join(step.log());
+        let ran = self.colmap.run(&arguments.words, &log, &mut on_line);
+        ran.map_err(|source| match source {
+            ToolError::Failed { .. } => RunError::Failed {
+                source,
+                remedy: step.remedy(),
+            },
+            other => other.into(),
+        })?;
+        if step == Step::Mapping {
+            fs::rename(&partial, &models).map_err(io_error(models, "rename a folder to this"))?;
+        }
+        Ok(())
+    }
+}
+
+/// A command line.
+struct Arguments<'a> {
+    help: &'a str,
+    words: Vec<OsString>,
+}
+
+impl<'a> Arguments<'a> {
+    fn new(command: &str, help: &'a str) -> Self {
+        Self {
+            help,
+            words: vec![command.into()],
+        }
+    }
+
+    fn give(&mut self, name: &str, value: impl Into<OsString>) {
+        self.words.extend([name.into(), value.into()]);
+    }
+
+    /// Gives an option that has had several names by the one that this COLMAP's help
+    /// knows; not at all where it knows none.
+    fn give_known(&mut self, names: &[&str], value: &str) {
+        let is_known = |name: &&&str| self.help.split_whitespace().any(|word| word == **name);
+        if let Some(name) = names.iter().find(is_known) {
+            self.give(name, value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_option_goes_by_the_name_in_the_help() {
+        let given = |help: &str| {
+            let mut arguments = Arguments::new("feature_extractor", help);
+            arguments.give_known(&["--Sift.use_gpu", "--Feature.use_gpu"], "0");
+            arguments.words[1..].to_vec()
+        };
+        assert_eq!(given("  --Sift.use_gpu arg (=1)"), ["--Sift.use_gpu", "0"]);
+        assert_eq!(
+            given("I1 x] --Feature.use_gpu arg"),
+            ["--Feature.use_gpu", "0"]
+        );
+        assert!(given("  --Sift.use_gpu_index arg (=-1)").is_empty());
+    }
+}

@@ -1,0 +1,78 @@
+//! What a camera writes beside the picture.
+
+use crate::times::seconds_since_1970;
+use crate::{CaptureError, decode};
+use exif::{In, Reader, Tag, Value};
+use std::io::Cursor;
+use std::path::Path;
+
+/// What is known of how a photo was taken; what is not there, or not readable, is `None`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exif {
+    /// The lens's focal length.
+    pub focal_length_mm: Option<f64>,
+    /// When the photo was taken, in seconds since the year 1970 by the camera's clock,
+    /// which knows no time zone: DateTimeOriginal and SubSecTimeOriginal.
+    pub taken_s: Option<f64>,
+}
+
+/// Reads a photo's EXIF data. A photo without has none of them.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn read_exif(path: &Path) -> Result<Exif, CaptureError> {
+    let head = decode::head(path)?;
+    let Ok(tags) = Reader::new().read_from_container(&mut Cursor::new(head)) else {
+        return Ok(Exif::default());
+    };
+    let value = |tag: Tag| tags.get_field(tag, In::PRIMARY).map(|field| &field.value);
+    let text = |tag: Tag| match value(tag)? {
+        Value::Ascii(parts) => Some(String::from_utf8_lossy(parts.first()?).into_owned()),
+        _ => None,
+    };
+    let focal_length_mm = match value(Tag::FocalLength) {
+        Some(Value::Rational(mm)) => mm.first().map(exif::Rational::to_f64),
+        _ => None,
+    };
+    let whole = text(Tag::DateTimeOriginal).and_then(|text| seconds(&text));
+    let digits = text(Tag::SubSecTimeOriginal).unwrap_or_default();
+    Ok(Exif {
+        focal_length_mm: focal_length_mm.filter(|mm| mm.is_finite() && *mm > 0.0),
+        taken_s: whole.map(|whole| whole + fraction(digits.trim())),
+    })
+}
+
+/// `2012:07:01 12:34:56`; a clock that was never set says `0000:00:00 00:00:00`.
+fn seconds(text: &str) -> Option<f64> {
+    let numbers: Vec<u32> = text
+        .split([':', ' '])
+        .map(|part| part.parse().ok())
+        .collect::<Option<_>>()?;
+    let [year, month, day, hour, minute, second] = numbers[..] else {
+        return None;
+    };
+    seconds_since_1970(year, [month, day, hour, minute, second])
+}
+
+/// Digits behind the point; some cameras pad them with blanks.
+fn fraction(digits: &str) -> f64 {
+    let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+    let fraction = is_number.then(|| format!("0.{digits}").parse().ok());
+    fraction.flatten().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_counted_from_1970() {
+        assert_eq!(seconds("1970:01:01 00:00:00"), Some(0.0));
+        assert_eq!(seconds("2000:03:01 00:00:01"), Some(951_868_801.0));
+        assert_eq!(seconds("0000:00:00 00:00:00"), None);
+        assert_eq!(seconds("2012:07:01"), None);
+        assert_eq!(fraction("25"), 0.25);
+        assert_eq!(fraction(""), 0.0);
+        assert_eq!(fraction("?"), 0.0);
+    }
+}

@@ -1,0 +1,115 @@
+/// How many frames to take out of a video.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FrameCount {
+    /// Three a second, but at least 20 and at most 150.
+    Auto,
+    /// So many.
+    Frames(usize),
+    /// So many a second.
+    PerSecond(f64),
+}
+
+const AUTO_PER_SECOND: f64 = 3.0;
+const AUTO_AT_LEAST: usize = 20;
+const AUTO_AT_MOST: usize = 150;
+
+/// A frame that was looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScoredFrame {
+    /// When it is shown.
+    pub time_s: f64,
+    /// The larger the sharper; comparable between frames of one video.
+    pub sharpness: f64,
+}
+
+/// The indices of the sharpest frame of each of so many equal stretches of time, rising.
+/// The earlier of equally sharp ones; none where a stretch has no frame. Frames come in the
+/// order of their times.
+pub fn choose(frames: &[ScoredFrame], count: FrameCount) -> Vec<usize> {
+    let [first, .., last] = frames else {
+        return (0..frames.len()).collect();
+    };
+    // The last frame is shown about as long as the others.
+    let step_s = (last.time_s - first.time_s) / (frames.len() - 1) as f64;
+    let duration_s = last.time_s - first.time_s + step_s;
+    if !(duration_s > 0.0) {
+        return vec![0];
+    }
+    let per_second = |fps: f64| (fps * duration_s).round() as usize;
+    let stretches = match count {
+        FrameCount::Auto => per_second(AUTO_PER_SECOND).clamp(AUTO_AT_LEAST, AUTO_AT_MOST),
+        FrameCount::Frames(count) => count,
+        FrameCount::PerSecond(fps) => per_second(fps),
+    };
+    let stretches = stretches.clamp(1, frames.len());
+    let mut best: Vec<Option<usize>> = vec![None; stretches];
+    for (i, frame) in frames.iter().enumerate() {
+        let share = (frame.time_s - first.time_s) / duration_s;
+        // A frame on a border begins the later stretch, however its time was rounded.
+        let stretch = ((share * stretches as f64 + 1e-6) as usize).min(stretches - 1);
+        let sharper = |other: usize| frame.sharpness > frames[other].sharpness;
+        if best[stretch].is_none_or(sharper) {
+            best[stretch] = Some(i);
+        }
+    }
+    best.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(fps: f64, sharpness: &[f64]) -> Vec<ScoredFrame> {
+        let frame = |(i, &sharpness): (usize, &f64)| ScoredFrame {
+            time_s: 5.0 + i as f64 / fps,
+            sharpness,
+        };
+        sharpness.iter().enumerate().map(frame).collect()
+    }
+
+    #[test]
+    fn the_sharpest_of_each_stretch_the_earlier_of_equals() {
+        let six = frames(30.0, &[1.0, 3.0, 2.0, 7.0, 7.0, 5.0]);
+        assert_eq!(choose(&six, FrameCount::Frames(2)), [1, 3]);
+        assert_eq!(choose(&six, FrameCount::Frames(1)), [3]);
+        assert_eq!(choose(&six, FrameCount::Frames(100)), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(choose(&six, FrameCount::PerSecond(10.0)), [1, 3]);
+        assert_eq!(
+            choose(&six, FrameCount::Auto).len(),
+            6,
+            "no more than there are"
+        );
+    }
+
+    #[test]
+    fn the_rate_follows_the_length() {
+        let count = |seconds: usize| {
+            let frames = frames(30.0, &vec![1.0; 30 * seconds]);
+            choose(&frames, FrameCount::Auto).len()
+        };
+        assert_eq!([1, 10, 30, 600].map(count), [20, 30, 90, 150]);
+    }
+
+    #[test]
+    fn time_counts_and_not_the_number_of_frames() {
+        // Ten frames in the first tenth of a second, then one after a second.
+        let mut varied = frames(100.0, &[1.0; 10]);
+        varied[4].sharpness = 2.0;
+        varied.push(ScoredFrame {
+            time_s: 6.0,
+            sharpness: 0.5,
+        });
+        assert_eq!(choose(&varied, FrameCount::Frames(4)), [4, 10]);
+    }
+
+    #[test]
+    fn degenerate_videos_give_what_they_have() {
+        assert_eq!(choose(&[], FrameCount::Auto), [0; 0]);
+        assert_eq!(choose(&frames(1.0, &[1.0]), FrameCount::Auto), [0]);
+        let still = [ScoredFrame {
+            time_s: 0.0,
+            sharpness: 1.0,
+        }; 3];
+        assert_eq!(choose(&still, FrameCount::Auto), [0]);
+    }
+}

@@ -1,0 +1,161 @@
+//! Photos out of a video: of each stretch of time the sharpest frame, through `ffmpeg`.
+//!
+//! The video is decoded twice: once small and grey, to score how sharp every frame is, and
+//! once at full size for the chosen ones alone. Times are those of presentation, so a
+//! variable frame rate is no matter; frames come turned as the video asks for.
+//!
+//! ```no_run
+//! use capture::video::{self, FrameCount};
+//! use std::path::Path;
+//!
+//! let ffmpeg = video::ffmpeg();
+//! let (video, folder) = (Path::new("desk.mp4"), Path::new("photos"));
+//! let frames = video::extract(&ffmpeg, video, FrameCount::Auto, folder, &mut |_| {})?;
+//! println!("{} at {} s", frames[0].name, frames[0].time_s);
+//! # Ok::<(), video::VideoError>(())
+//! ```
+
+mod choose;
+mod error;
+mod list;
+mod scan;
+
+pub use choose::{FrameCount, ScoredFrame, choose};
+pub use error::VideoError;
+pub use list::VideoFrame;
+pub use scan::{scan, sharpness};
+
+use crate::Tool;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A step of an extraction, for progress.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VideoProgress {
+    /// So many frames were scored, up to this time.
+    Scored {
+        /// Frames so far.
+        frames: usize,
+        /// Of the last one.
+        time_s: f64,
+    },
+    /// So many of the chosen frames are being written.
+    Writing {
+        /// How many in all.
+        frames: usize,
+    },
+    /// An earlier run had written them already.
+    Done {
+        /// How many.
+        frames: usize,
+    },
+}
+
+/// The program that decodes videos.
+pub fn ffmpeg() -> Tool {
+    Tool {
+        program: PathBuf::from("ffmpeg"),
+        install: "install ffmpeg: `apt-get install ffmpeg` on Debian and Ubuntu, `brew install \
+                  ffmpeg` on macOS, elsewhere from https://ffmpeg.org/download.html",
+    }
+}
+
+/// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
+/// named by their time in seconds, and a list of them. Where an earlier run did the same
+/// with the same video, nothing is done; another video's frames are replaced. An
+/// interrupted run leaves no folder, or the earlier one.
+///
+/// # Errors
+/// `ffmpeg` is missing or fails; a file that is no video or has but one frame; files that
+/// cannot be read or written.
+pub fn extract(
+    ffmpeg: &Tool,
+    video: &Path,
+    count: FrameCount,
+    folder: &Path,
+    report: &mut dyn FnMut(VideoProgress),
+) -> Result<Vec<VideoFrame>, VideoError> {
+    let source = list::source(video, count)?;
+    if let Some(frames) = list::read(folder, &source) {
+        report(VideoProgress::Done {
+            frames: frames.len(),
+        });
+        return Ok(frames);
+    }
+
+    if !list::may_replace(folder) {
+        return Err(VideoError::Occupied {
+            folder: folder.to_owned(),
+        });
+    }
+
+    // 1. Which frames.
+    let passthrough = scan::passthrough(ffmpeg)?;
+    let scored = scan::scan_with(ffmpeg, passthrough, video, report)?;
+    if scored.len() < 2 {
+        return Err(VideoError::NoVideo {
+            path: video.to_owned(),
+            frames: scored.len(),
+        });
+    }
+    let chosen = choose(&scored, count);
+    report(VideoProgress::Writing {
+        frames: chosen.len(),
+    });
+
+    // 2. Their pixels, into a folder beside the final one.
+    let failed = VideoError::write_at;
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let partial = folder.with_file_name(format!(".{name}.partial"));
+    if partial.exists() {
+        fs::remove_dir_all(&partial).map_err(failed(&partial))?;
+    }
+    fs::create_dir_all(&partial).map_err(failed(&partial))?;
+    write_frames(ffmpeg, passthrough, video, &chosen, &partial)?;
+    let mut frames = Vec::new();
+    for (i, &frame_idx) in chosen.iter().enumerate() {
+        let time_s = scored[frame_idx].time_s;
+        let name = format!("{time_s:010.3}s.jpg");
+        let written = partial.join(format!("{}.jpg", i + 1));
+        if !written.is_file() || frames.iter().any(|f: &VideoFrame| f.name == name) {
+            return Err(VideoError::Changed {
+                path: video.to_owned(),
+                frame: frame_idx,
+            });
+        }
+        fs::rename(&written, partial.join(&name)).map_err(failed(&written))?;
+        frames.push(VideoFrame { name, time_s });
+    }
+    list::write(&partial, &source, &frames)?;
+
+    // 3. It takes its place.
+    if folder.exists() {
+        fs::remove_dir_all(folder).map_err(failed(folder))?;
+    }
+    fs::rename(&partial, folder).map_err(failed(folder))?;
+    Ok(frames)
+}
+
+/// Writes the frames of these indices as 1.jpg, 2.jpg, ….
+fn write_frames(
+    ffmpeg: &Tool,
+    passthrough: [&str; 2],
+    video: &Path,
+    chosen: &[usize],
+    folder: &Path,
+) -> Result<(), VideoError> {
+    let any: Vec<String> = chosen.iter().map(|n| format!("eq(n,{n})")).collect();
+    // JPEG's colours are BT.601 in full range whatever the video's are.
+    let filter = format!(
+        "select='{}',scale=out_color_matrix=bt601:out_range=full,format=yuvj420p",
+        any.join("+")
+    );
+    let mut arguments = scan::input(video);
+    arguments.extend(["-vf", &filter].map(Into::into));
+    arguments.extend(passthrough.map(Into::into));
+    let quality = "-c:v mjpeg -q:v 1 -qmin 1 -bitexact -f image2";
+    arguments.extend(quality.split(' ').map(Into::into));
+    arguments.push(folder.join("%d.jpg").into());
+    ffmpeg.stream(&arguments, &mut |_| {}, |_| Ok(()))?;
+    Ok(())
+}

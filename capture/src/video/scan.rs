@@ -1,0 +1,200 @@
+use super::{ScoredFrame, VideoError, VideoProgress};
+use crate::{Tool, ToolError};
+use std::ffi::OsString;
+use std::io::{self, BufRead, BufReader};
+use std::path::Path;
+
+/// Frames are reduced to this longer side before they are scored: what is sharp to the
+/// pixel in a full frame is often only its noise.
+const SCORED_SIDE: u32 = 480;
+
+/// Decodes a video once, reduced, and scores every frame.
+///
+/// # Errors
+/// `ffmpeg` is missing, or the file is nothing that it can decode.
+pub fn scan(
+    ffmpeg: &Tool,
+    video: &Path,
+    report: &mut dyn FnMut(VideoProgress),
+) -> Result<Vec<ScoredFrame>, VideoError> {
+    scan_with(ffmpeg, passthrough(ffmpeg)?, video, report)
+}
+
+pub(super) fn scan_with(
+    ffmpeg: &Tool,
+    passthrough: [&str; 2],
+    video: &Path,
+    report: &mut dyn FnMut(VideoProgress),
+) -> Result<Vec<ScoredFrame>, VideoError> {
+    // Frames come on stdout, each with its size, and what they are on stderr, line by line.
+    let filter = format!(
+        "scale=w={SCORED_SIDE}:h={SCORED_SIDE}:force_original_aspect_ratio=decrease:flags=area,\
+         format=gray,showinfo=checksum=0"
+    );
+    let mut arguments = input(video);
+    arguments.extend(["-vf", &filter].map(Into::into));
+    arguments.extend(passthrough.map(Into::into));
+    arguments.extend("-c:v pgm -f image2pipe pipe:1".split(' ').map(Into::into));
+    let mut times_s: Vec<f64> = Vec::new();
+    let mut on_line = |line: &str| {
+        let Some(time_s) = shown_at_s(line) else {
+            return;
+        };
+        times_s.push(time_s);
+        report(VideoProgress::Scored {
+            frames: times_s.len(),
+            time_s,
+        });
+    };
+    let scores = ffmpeg.stream(&arguments, &mut on_line, |stdout| {
+        let mut stdout = BufReader::new(stdout);
+        let mut scores = Vec::new();
+        while let Some(picture) = read_pgm(&mut stdout)? {
+            scores.push(sharpness(&picture.pixels, picture.width));
+        }
+        Ok(scores)
+    });
+    let scores = scores.map_err(|source| match source {
+        ToolError::Failed { .. } => VideoError::Decode {
+            path: video.to_owned(),
+            source,
+        },
+        other => other.into(),
+    })?;
+    let frames = times_s.into_iter().zip(scores);
+    let frame = |(time_s, sharpness)| ScoredFrame { time_s, sharpness };
+    Ok(frames.map(frame).collect())
+}
+
+/// What all calls begin with.
+pub(super) fn input(video: &Path) -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = "-hide_banner -nostdin -nostats -v info -i"
+        .split(' ')
+        .map(Into::into)
+        .collect();
+    // A name with a colon would be taken for a protocol's.
+    arguments.push("file:".into());
+    if let Some(name) = arguments.last_mut() {
+        name.push(video);
+    }
+    arguments.extend("-map 0:v:0 -an -sn -dn".split(' ').map(Into::into));
+    arguments
+}
+
+/// The option that lets every frame through, once: its name changed in ffmpeg 5.1.
+pub(super) fn passthrough(ffmpeg: &Tool) -> Result<[&'static str; 2], ToolError> {
+    let help = ffmpeg.text(&["-hide_banner", "-h", "long"])?;
+    Ok(if help.contains("-fps_mode") {
+        ["-fps_mode", "passthrough"]
+    } else {
+        ["-vsync", "passthrough"]
+    })
+}
+
+/// The time in a line that the filter `showinfo` prints of a frame.
+fn shown_at_s(line: &str) -> Option<f64> {
+    if !line.contains("showinfo") {
+        return None;
+    }
+    let (_, time) = line.split_once("pts_time:")?;
+    time.split_whitespace().next()?.parse().ok()
+}
+
+struct GreyPicture {
+    width: usize,
+    pixels: Vec<u8>,
+}
+
+/// A binary grey picture of 8 bits; `None` at the end.
+fn read_pgm(stream: &mut impl BufRead) -> io::Result<Option<GreyPicture>> {
+    if stream.fill_buf()?.is_empty() {
+        return Ok(None);
+    }
+    let mut words = Vec::new();
+    while words.len() < 4 {
+        let mut line = String::new();
+        if stream.read_line(&mut line)? == 0 {
+            break;
+        }
+        words.extend(line.split_whitespace().map(str::to_owned));
+    }
+    let number = |i: usize| words.get(i).and_then(|w| w.parse::<usize>().ok());
+    let (Some("P5"), Some(width), Some(height), Some(255)) = (
+        words.first().map(String::as_str),
+        number(1),
+        number(2),
+        number(3),
+    ) else {
+        return Err(io::Error::other("expected grey pictures of 8 bits"));
+    };
+    let mut pixels = vec![0; width * height];
+    stream.read_exact(&mut pixels)?;
+    Ok(Some(GreyPicture { width, pixels }))
+}
+
+/// How sharp a grey picture is, row by row: the variance of its Laplacian (Pech-Pacheco
+/// et al., "Diatom autofocusing in brightfield microscopy", ICPR 2000). 0 where a side has
+/// less than three pixels.
+pub fn sharpness(pixels: &[u8], width: usize) -> f64 {
+    if width < 3 || pixels.len() < 3 * width {
+        return 0.0;
+    }
+    let (mut count, mut sum, mut sum_of_squares) = (0_i64, 0_i64, 0_i64);
+    for y in 1..pixels.len() / width - 1 {
+        for x in 1..width - 1 {
+            let at = y * width + x;
+            let [left, right, above, below] =
+                [at - 1, at + 1, at - width, at + width].map(|i| i64::from(pixels[i]));
+            let laplacian = left + right + above + below - 4 * i64::from(pixels[at]);
+            count += 1;
+            sum += laplacian;
+            sum_of_squares += laplacian * laplacian;
+        }
+    }
+    let mean = sum as f64 / count as f64;
+    sum_of_squares as f64 / count as f64 - mean * mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blur_lowers_the_score_and_brightness_does_not_change_it() {
+        let stripes: Vec<u8> = (0..64 * 64)
+            .map(|i| 40 + 80 * ((i / 4) % 2) as u8)
+            .collect();
+        let mut blurred = stripes.clone();
+        for i in 1..stripes.len() - 1 {
+            let sum: u32 = stripes[i - 1..=i + 1].iter().map(|&p| u32::from(p)).sum();
+            blurred[i] = (sum / 3) as u8;
+        }
+        let brighter: Vec<u8> = stripes.iter().map(|p| p + 100).collect();
+        assert!(sharpness(&stripes, 64) > 2.0 * sharpness(&blurred, 64));
+        assert_eq!(sharpness(&stripes, 64), sharpness(&brighter, 64));
+        assert_eq!(sharpness(&[7; 64], 8), 0.0);
+        assert_eq!(sharpness(&[7; 4], 2), 0.0);
+    }
+
+    #[test]
+    fn pictures_follow_each_other_in_the_pipe() {
+        let mut pipe = io::Cursor::new(b"P5\n3 2\n255\nabcdefP5 1 1 255\n\n");
+        let first = read_pgm(&mut pipe).unwrap().unwrap();
+        assert_eq!((first.width, first.pixels), (3, b"abcdef".to_vec()));
+        assert_eq!(read_pgm(&mut pipe).unwrap().unwrap().pixels, b"\n");
+        assert!(read_pgm(&mut pipe).unwrap().is_none());
+        assert!(read_pgm(&mut &b"P5\n3 2\n255\nab"[..]).is_err());
+        assert!(read_pgm(&mut &b"P6\n3 2\n255\nabcdef"[..]).is_err());
+    }
+
+    #[test]
+    fn times_are_found_in_what_the_filter_prints() {
+        let line = "[Parsed_showinfo_2 @ 0x55] n:   3 pts:   1536 pts_time:0.12    pos: 1 fmt:gray";
+        assert_eq!(shown_at_s(line), Some(0.12));
+        assert_eq!(
+            shown_at_s("[Parsed_showinfo_2 @ 0x55] color_range:tv"),
+            None
+        );
+        assert_eq!(shown_at_s("frame pts_time:0.5"), None);
+    }
+}

@@ -1,0 +1,255 @@
+//! Taking photos out of videos: with ffmpeg itself where it is installed, and with
+//! scripts in its place.
+
+use capture::video::{self, FrameCount, VideoError, VideoProgress};
+use capture::{Tool, ToolError};
+use image::{Rgb, RgbImage, imageops};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// ffmpeg; `None`, said aloud, where it is missing, unless the environment has
+/// `LUMIGRAPH_REQUIRE_TOOLS=1`.
+fn ffmpeg() -> Option<Tool> {
+    let ffmpeg = video::ffmpeg();
+    match ffmpeg.text(&["-version"]) {
+        Ok(_) => Some(ffmpeg),
+        Err(error) if std::env::var("LUMIGRAPH_REQUIRE_TOOLS").as_deref() == Ok("1") => {
+            panic!("LUMIGRAPH_REQUIRE_TOOLS is 1, but: {error}")
+        }
+        Err(error) => {
+            eprintln!("SKIPPED: {error}");
+            None
+        }
+    }
+}
+
+/// A checked pattern that moves to the right; its colours change softly, as a video keeps
+/// colours at half the size, and tell the frames apart.
+fn frame(i: u32) -> RgbImage {
+    RgbImage::from_fn(320, 240, |x, y| {
+        let is_light = ((x + 320 - i) / 10 + y / 10).is_multiple_of(2);
+        let level = if is_light { 80 } else { 0 };
+        Rgb([170, 20 + 2 * i, y / 3].map(|base| (base + level) as u8))
+    })
+}
+
+/// A video of 24 frames at 8 a second, of which all but `sharp` are blurred.
+fn write_video(ffmpeg: &Tool, folder: &Path, sharp: &[u32], extra: &[&str]) -> PathBuf {
+    for i in 0..24 {
+        let picture = match sharp.contains(&i) {
+            true => frame(i),
+            false => imageops::blur(&frame(i), 2.0),
+        };
+        picture.save(folder.join(format!("{i}.png"))).unwrap();
+    }
+    let (pictures, video) = (folder.join("%d.png"), folder.join("sweep.mp4"));
+    let words = "-y -v error -framerate 8 -start_number 0 -i";
+    let mut arguments: Vec<&str> = words.split(' ').collect();
+    arguments.push(pictures.to_str().unwrap());
+    arguments.extend(extra);
+    arguments.extend(["-pix_fmt", "yuv420p", video.to_str().unwrap()]);
+    ffmpeg
+        .run(&arguments, &folder.join("log"), &mut |_| {})
+        .unwrap();
+    video
+}
+
+#[test]
+fn the_sharp_frames_are_taken_with_their_times() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let sharp = [2, 7, 13, 18];
+    let video = write_video(&ffmpeg, here.path(), &sharp, &[]);
+    let photos = here.path().join("photos");
+    let mut scored = 0;
+    let mut extract = |count| {
+        let mut on_progress = |progress| {
+            if let VideoProgress::Scored { frames, .. } = progress {
+                scored = frames;
+            }
+        };
+        let frames = video::extract(&ffmpeg, &video, count, &photos, &mut on_progress).unwrap();
+        (frames, std::mem::take(&mut scored))
+    };
+
+    let (frames, scored) = extract(FrameCount::Frames(4));
+    assert_eq!(scored, 24);
+    let names: Vec<&str> = frames.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "000000.250s.jpg",
+            "000000.875s.jpg",
+            "000001.625s.jpg",
+            "000002.250s.jpg"
+        ]
+    );
+    for (frame_of_video, i) in frames.iter().zip(sharp) {
+        assert!((frame_of_video.time_s - f64::from(i) / 8.0).abs() < 1e-6);
+        let photo = photos.join(&frame_of_video.name);
+        let pixels = capture::decode(&photo, Some((320, 240))).unwrap();
+        let mut off = 0.0;
+        for (ours, theirs) in pixels.pixels().zip(frame(i).pixels()) {
+            off += (0..3)
+                .map(|c| f64::from(ours[c].abs_diff(theirs[c])))
+                .sum::<f64>();
+        }
+        // Both codecs lose a little.
+        let mean = off / f64::from(3 * 320 * 240);
+        assert!(mean < 4.0, "frame {i}: {mean} levels off");
+    }
+
+    // Nothing is done twice; another count is another extraction.
+    let before = fs::metadata(photos.join(names[0]))
+        .unwrap()
+        .modified()
+        .unwrap();
+    assert_eq!(extract(FrameCount::Frames(4)), (frames.clone(), 0));
+    let after = fs::metadata(photos.join(names[0]))
+        .unwrap()
+        .modified()
+        .unwrap();
+    assert_eq!(before, after);
+    let (three, scored) = extract(FrameCount::Frames(3));
+    assert_eq!((three.len(), scored), (3, 24));
+    assert_eq!(fs::read_dir(&photos).unwrap().count(), 4, "and frames.txt");
+    fs::remove_file(photos.join(&three[1].name)).unwrap();
+    assert_eq!(
+        extract(FrameCount::Frames(3)),
+        (three, 24),
+        "one was missing"
+    );
+}
+
+#[test]
+fn a_variable_rate_keeps_its_times() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    // The second half is shown at half the rate.
+    let slower = [
+        "-vf",
+        "setpts='if(lt(N,12),PTS,2*PTS-12/8/TB)'",
+        "-fps_mode",
+        "vfr",
+    ];
+    let video = write_video(&ffmpeg, here.path(), &[0], &slower);
+    let scored = video::scan(&ffmpeg, &video, &mut |_| {}).unwrap();
+    let times: Vec<f64> = scored.iter().map(|f| f.time_s).collect();
+    let expected = (0..24).map(|i| f64::from(if i < 12 { i } else { 2 * i - 12 }) / 8.0);
+    assert_eq!(times.len(), 24);
+    for (time, expected) in times.iter().zip(expected) {
+        assert!((time - expected).abs() < 1e-3, "{times:?}");
+    }
+    let sharpest = scored.iter().map(|f| f.sharpness).fold(0.0, f64::max);
+    assert_eq!(scored[0].sharpness, sharpest);
+}
+
+#[test]
+fn what_is_no_video_is_refused() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let photos = here.path().join("photos");
+    let error = |file: &str| {
+        let file = here.path().join(file);
+        let count = FrameCount::Auto;
+        video::extract(&ffmpeg, &file, count, &photos, &mut |_| {}).unwrap_err()
+    };
+    fs::write(here.path().join("notes.mp4"), "no video").unwrap();
+    assert!(matches!(error("notes.mp4"), VideoError::Decode { .. }));
+    assert!(matches!(error("gone.mp4"), VideoError::Read { .. }));
+    frame(0).save(here.path().join("a.png")).unwrap();
+    assert!(matches!(
+        error("a.png"),
+        VideoError::NoVideo { frames: 1, .. }
+    ));
+    assert!(!photos.exists() && !here.path().join(".photos.partial").exists());
+}
+
+#[test]
+fn a_missing_program_says_how_to_install_it() {
+    let here = tempfile::tempdir().unwrap();
+    let gone = Tool {
+        program: here.path().join("ffmpeg"),
+        ..video::ffmpeg()
+    };
+    let file = here.path().join("a.mp4");
+    fs::write(&file, "").unwrap();
+    let photos = here.path().join("photos");
+    let error = video::extract(&gone, &file, FrameCount::Auto, &photos, &mut |_| {}).unwrap_err();
+    assert!(matches!(error, VideoError::Tool(ToolError::Missing { .. })));
+    assert!(
+        error.to_string().contains("apt-get install ffmpeg"),
+        "{error}"
+    );
+}
+
+#[cfg(unix)]
+mod scripts {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn script(folder: &Path, text: &str) -> Tool {
+        let program = folder.join("program");
+        fs::write(&program, format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        Tool {
+            program,
+            install: "write it",
+        }
+    }
+
+    #[test]
+    fn a_failure_quotes_the_last_lines_and_the_log() {
+        let here = tempfile::tempdir().unwrap();
+        let tool = script(
+            here.path(),
+            "for i in 1 2 3 4 5 6 7 8 9; do echo line $i; done; echo; echo bad >&2; exit 3",
+        );
+        let log = here.path().join("log");
+        let mut lines = 0;
+        let error = tool.run(&["match"], &log, &mut |_| lines += 1).unwrap_err();
+        assert_eq!(lines, 11);
+        let quoted: String = (3..=9).map(|i| format!("    line {i}\n")).collect();
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "`program match` failed (exit status: 3); the last lines of {}:\n{quoted}    bad",
+                log.display()
+            )
+        );
+        // A second run's lines follow the first's.
+        tool.run(&["match"], &log, &mut |_| {}).unwrap_err();
+        assert_eq!(fs::read_to_string(&log).unwrap().lines().count(), 22);
+    }
+
+    #[test]
+    fn an_interrupted_extraction_leaves_the_earlier_one() {
+        let here = tempfile::tempdir().unwrap();
+        // Scores two frames, then fails to write them.
+        let tool = script(
+            here.path(),
+            "case \"$*\" in
+            *long*) echo -fps_mode ;;
+            *showinfo*) printf 'P5 1 1 255\\naP5 1 1 255\\nb'
+                printf '[showinfo] pts_time:0\\n[showinfo] pts_time:1\\n' >&2 ;;
+            *) echo disk full >&2; exit 1 ;;
+            esac",
+        );
+        let video = here.path().join("a.mp4");
+        let photos = here.path().join("photos");
+        fs::write(&video, "video").unwrap();
+        fs::create_dir(&photos).unwrap();
+        fs::write(photos.join("earlier.jpg"), "").unwrap();
+        let extract = || {
+            let count = FrameCount::Auto;
+            let frames = video::extract(&tool, &video, count, &photos, &mut |_| {});
+            frames.unwrap_err().to_string()
+        };
+        let error = extract();
+        assert!(error.contains("something other than"), "{error}");
+        fs::write(photos.join("frames.txt"), "# of another video\n").unwrap();
+        let error = extract();
+        assert!(error.contains("disk full"), "{error}");
+        assert!(photos.join("earlier.jpg").is_file());
+    }
+}

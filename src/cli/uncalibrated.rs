@@ -1,0 +1,165 @@
+//! Photos without a calibration, and videos: what `import` has other programs do.
+
+use super::options::WARNINGS_SHOWN;
+use super::output::say;
+use super::session::{progress, spinner};
+use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
+use capture::video::{self, FrameCount, VideoFrame, VideoProgress};
+use capture::{PhotoSet, find_photos_folder};
+use clap::ValueEnum;
+use indicatif::ProgressBar;
+use lumigraph::scene::SceneError;
+use std::path::{Path, PathBuf};
+
+/// How photos without a calibration are had.
+#[derive(clap::Args)]
+pub(super) struct UncalibratedArgs {
+    /// Without a calibration: which pairs of photos COLMAP matches [default: neighbours for
+    /// videos and long numbered sequences, else all]
+    #[arg(long, value_enum)]
+    matching: Option<MatchingName>,
+    /// Of a video: take the sharpest frames of so many equal stretches [default: 3 a second,
+    /// at least 20 and at most 150]
+    #[arg(long, value_name = "N", conflicts_with = "fps",
+        value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..))]
+    frames: Option<usize>,
+    /// Of a video: take so many frames a second
+    #[arg(long, value_parser = positive)]
+    fps: Option<f64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MatchingName {
+    /// Each photo with those near it in the order of names
+    Sequential,
+    /// All pairs
+    Exhaustive,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && f64::is_finite(value) => Ok(value),
+        _ => Err("expected a number greater than zero".to_owned()),
+    }
+}
+
+impl UncalibratedArgs {
+    pub(super) fn asks_for_frames(&self) -> bool {
+        self.frames.is_some() || self.fps.is_some()
+    }
+
+    pub(super) fn asks_for_matching(&self) -> bool {
+        self.matching.is_some()
+    }
+
+    /// Writes a video's sharpest frames into a folder.
+    pub(super) fn extract(&self, video: &Path, folder: &Path) -> anyhow::Result<Vec<VideoFrame>> {
+        let count = match (self.frames, self.fps) {
+            (Some(frames), _) => FrameCount::Frames(frames),
+            (None, Some(fps)) => FrameCount::PerSecond(fps),
+            (None, None) => FrameCount::Auto,
+        };
+        let bar = spinner("scoring frames");
+        let frames = video::extract(&video::ffmpeg(), video, count, folder, &mut |at| match at {
+            VideoProgress::Scored { frames, time_s } => {
+                bar.set_message(format!("scoring frames: {frames}, up to {time_s:.1} s"));
+            }
+            VideoProgress::Writing { frames } => {
+                bar.set_message(format!("writing {frames} frames"));
+            }
+            VideoProgress::Done { frames } => bar.suspend(|| {
+                say!("note: the {frames} frames were taken by an earlier run");
+            }),
+        });
+        bar.finish_and_clear();
+        let frames = frames?;
+        let (count, folder) = (frames.len(), folder.display());
+        say!(
+            "note: {count} frames of {} are in {folder}",
+            video.display()
+        );
+        Ok(frames)
+    }
+
+    /// Has COLMAP calibrate a capture's photos, says what it could not do, and returns the
+    /// folder of the model.
+    pub(super) fn calibrate(
+        &self,
+        capture: &Path,
+        is_video: bool,
+        work: &Path,
+    ) -> anyhow::Result<PathBuf> {
+        let folder =
+            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
+        let photos = PhotoSet::open(&folder)?;
+        let mut options = Options::for_photos(&photos, is_video)?;
+        match self.matching {
+            Some(MatchingName::Sequential) => options.matching = Matching::Sequential,
+            Some(MatchingName::Exhaustive) => options.matching = Matching::Exhaustive,
+            None => {}
+        }
+        say!(
+            "note: no calibration comes with the {} photos; COLMAP works it out in {}",
+            photos.photos.len(),
+            work.display()
+        );
+        let mut bars = Bars::default();
+        let made = run::run(&run::colmap(), &photos, work, &options, &mut |event| {
+            bars.show(event);
+        });
+        bars.end();
+        let made = made?;
+        report(&made, photos.photos.len(), options.matching);
+        Ok(made.model)
+    }
+}
+
+/// A progress bar for the step at hand.
+#[derive(Default)]
+struct Bars {
+    current: Option<(Step, ProgressBar)>,
+}
+
+impl Bars {
+    fn show(&mut self, event: Event) {
+        match event {
+            Event::StartingOver => {
+                say!("note: photos or options changed since COLMAP last ran: it starts over");
+            }
+            Event::Finished(step) => say!("note: {step} was finished by an earlier run"),
+            Event::Progress { step, done, total } => {
+                if self.current.as_ref().is_none_or(|(of, _)| *of != step) {
+                    self.end();
+                    let doing = format!("COLMAP: {step}");
+                    self.current = Some((step, progress(total as usize, doing)));
+                }
+                if let Some((_, bar)) = &self.current {
+                    bar.set_length(total);
+                    bar.set_position(done);
+                }
+            }
+        }
+    }
+
+    fn end(&mut self) {
+        if let Some((_, bar)) = self.current.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn report(made: &Outcome, photos: usize, matching: Matching) {
+    for photo in made.unplaced.iter().take(WARNINGS_SHOWN) {
+        say!("warning: photo {} is not placed: {}", photo.name, photo.why);
+    }
+    if let Some(more) = made.unplaced.len().checked_sub(WARNINGS_SHOWN + 1) {
+        say!("warning: and {} more photos are not placed", more + 1);
+    }
+    if !made.unplaced.is_empty() && matching == Matching::Sequential {
+        say!("note: --matching exhaustive takes longer and may place more photos");
+    }
+    say!(
+        "note: COLMAP placed {} of {photos} photos; `info` gives the reprojection error",
+        made.reconstruction.images.len()
+    );
+}
