@@ -23,7 +23,7 @@ fn photos(times_s: &[f64], shows: impl Fn(usize, f64) -> f64) -> Vec<Snapshot> {
         let color = |place: usize| {
             let seen = noise(seed + 500 + place as u64 % 97) > -0.9;
             let still = 0.4 + 0.2 * noise(place as u64) + 0.05 * swing * noise(7 * place as u64);
-            let value = if place % 10 == 0 {
+            let value = if place.is_multiple_of(10) {
                 shows(place, time_s)
             } else {
                 still

@@ -300,6 +300,7 @@ fn a_mask_that_hides_nothing_changes_nothing_and_one_that_hides_all_removes_the_
     sources.remove(4);
     photos.remove(4);
     let fewer = Lumigraph {
+        points: Vec::new(),
         sources,
         photos: PhotoStore::from_images(photos),
         proxy: Proxy::Plane(shot.plane),
@@ -345,6 +346,7 @@ fn the_order_of_masked_photos_changes_nothing() {
         pixel.0[3] = (20.0 * (70.0 - radius)).clamp(0.0, 255.0) as u8;
     }
     let reordered = Lumigraph {
+        points: Vec::new(),
         photos: store(photos, masks),
         sources: order
             .iter()

@@ -36,7 +36,10 @@ pub(super) fn set_times(
         TimeSource::Found => {
             let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
             let by_name = capture::times_of_names(&names);
-            let by_camera = photos.iter().map(|p| read_exif(&p.path).ok()?.taken_s).collect();
+            let by_camera = photos
+                .iter()
+                .map(|p| read_exif(&p.path).ok()?.taken_s)
+                .collect();
             let by_camera = from_earliest(by_camera);
             let count = |times: &Times| times.iter().flatten().count();
             if count(&by_name) > count(&by_camera) {

@@ -209,7 +209,10 @@ impl Source {
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0).to_array(),
+            exposure: DVec3::from_array(source.exposure)
+                .as_vec3()
+                .extend(1.0)
+                .to_array(),
             prism: prism.map(f),
             shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),

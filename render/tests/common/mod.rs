@@ -257,28 +257,3 @@ pub(crate) fn assert_close(a: &RgbaImage, b: &RgbaImage, what: &str) {
         b.get_pixel(differing[0].0, differing[0].1),
     );
 }
-
-/// The picture by the plain engine.
-pub(crate) fn by_reference(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
-    Ok(match method {
-        Method::Exact => reference::render_exact(frame)?,
-        Method::Triangulated { cells_across } => {
-            field::render_reference(frame, &TriangulatedField::new(frame, cells_across)?)?
-        }
-    })
-}
-
-/// The picture by every engine there is, each with its name.
-pub(crate) fn by_all(
-    frame: &Frame<'_>,
-    method: Method,
-) -> Vec<(&'static str, Result<RgbaImage, RenderError>)> {
-    let mut pictures = vec![
-        ("reference", by_reference(frame, method)),
-        ("cpu", cpu::render(frame, method)),
-    ];
-    if let Some(mut gpu) = gpu() {
-        pictures.push(("gpu", gpu.render(frame, method)));
-    }
-    pictures
-}
