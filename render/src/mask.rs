@@ -15,10 +15,11 @@ pub struct Mask {
     blocks: Vec<Blocks>,
 }
 
-/// A filtered value of this (of 255) or less ignores. At a photo's own place it has all the
-/// weight that its mask leaves, however little, and rounding would decide beside a mask's
-/// edge: from here on the mask rises, to one.
-pub(crate) const IGNORED: u8 = 1;
+/// A filtered value of this (of 255) or less ignores; from here on the mask rises, to one.
+/// At a photo's own place it has all the weight that its mask leaves, however little, and
+/// with zero as the limit rounding would decide beside a mask's edge. No stored value lies
+/// on half a step.
+pub(crate) const IGNORED: f32 = 0.5;
 
 /// Sides of the smallest blocks, in pixels.
 const BLOCK: u32 = 8;

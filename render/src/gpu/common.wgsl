@@ -386,7 +386,7 @@ fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f
 }
 
 // See IGNORED of mask.rs.
-const IGNORED: f32 = 1.0;
+const IGNORED: f32 = 0.5;
 
 // fovBlend and what the ignore mask leaves of it.
 fn relevance(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
