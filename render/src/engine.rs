@@ -27,7 +27,7 @@ pub enum Engine {
     /// wgpu.
     Gpu(Box<Gpu>),
     /// f32, all threads.
-    Cpu(Cpu),
+    Cpu(Box<Cpu>),
     /// f64.
     Reference,
 }
@@ -42,10 +42,10 @@ impl Engine {
         Ok(match choice {
             DeviceChoice::Auto => match Gpu::open() {
                 Ok(gpu) if !gpu.is_software() => Self::Gpu(Box::new(gpu)),
-                _ => Self::Cpu(Cpu::default()),
+                _ => Self::Cpu(Box::default()),
             },
             DeviceChoice::Gpu => Self::Gpu(Box::new(Gpu::open()?)),
-            DeviceChoice::Cpu => Self::Cpu(Cpu::default()),
+            DeviceChoice::Cpu => Self::Cpu(Box::default()),
             DeviceChoice::Reference => Self::Reference,
         })
     }
