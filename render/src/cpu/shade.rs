@@ -17,9 +17,9 @@ pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
 /// What a mask leaves of its photo, 0…1; trilinear.
 #[inline]
 pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
-    trilinear(&mask.levels, u, v, level, |[value]: [u8; 1]| {
-        f32::from(value)
-    }) / 255.0
+    let texel = |[value]: [u8; 1]| f32::from(value);
+    let value = trilinear(&mask.levels, u, v, level, texel);
+    ((value - IGNORED) / (255.0 - IGNORED)).max(0.0)
 }
 
 /// `texel` makes a number or several of a texel's bytes.
