@@ -56,11 +56,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The COLMAP model in a folder that holds neither photos nor a scene.
+/// The COLMAP model that a folder itself is, if it holds neither photos nor a scene.
 fn bare_model(folder: &Path) -> Option<PathBuf> {
     let model = colmap::find_model(folder).ok()?;
     let has_photos = find_photos_folder(folder).is_some() || Scene::is_scene(folder);
-    (!has_photos).then_some(model)
+    (model == folder && !has_photos).then_some(model)
 }
 
 fn gather(scene: &Scene) -> anyhow::Result<Value> {

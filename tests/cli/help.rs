@@ -20,7 +20,7 @@ fn usage_errors_exit_with_2() {
         ("render wall --path orbit --frames 0 -o out", "--frames"),
         ("evaluate wall --k 17", "1..=16"),
         ("evaluate wall --beta -1", "zero or more"),
-        ("evaluate wall --proxy tunnel", "plane, auto"),
+        ("evaluate wall --proxy tunnel", "plane, points, auto"),
         ("evaluate wall --every 1", "--every"),
         ("proxy wall plane", "-o"),
         ("proxy wall plane --point 1,2,3", "--normal"),
@@ -28,7 +28,7 @@ fn usage_errors_exit_with_2() {
             "proxy wall plane --point 1,2,3 --normal 0,0,0 -o p.json",
             "the plane's normal is zero",
         ),
-        ("proxy wall tunnel", "plane, auto"),
+        ("proxy wall tunnel", "plane, points, auto"),
         ("generate moon -o moon", "shelf, wall, helicopter"),
     ] {
         let ran = lumigraph(folder.path(), line);

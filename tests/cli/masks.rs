@@ -101,7 +101,14 @@ fn what_masks_cover_is_not_seen() {
             .keys()
             .map(String::as_str)
             .collect();
-        let scores = ["psnr", "ssim", "psnr_covered", "coverage"];
+        let scores = [
+            "psnr",
+            "psnr_exposed",
+            "ssim",
+            "psnr_covered",
+            "coverage",
+            "seams",
+        ];
         let masked = ["psnr_masked", "ssim_masked", "coverage_masked"];
         assert_eq!(
             keys,

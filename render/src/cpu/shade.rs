@@ -1,6 +1,6 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
-use crate::mask::Mask;
+use crate::mask::{IGNORED, Mask};
 use crate::photos::Pyramid;
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
