@@ -12,7 +12,7 @@ mod photo_set;
 mod resize;
 mod write;
 
-pub use decode::{decode, decode_reduced, photo_size};
+pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
 pub use resize::{reduced_size, resize};

@@ -11,7 +11,7 @@ mod glb;
 mod plane;
 
 pub use cloud::{CloudStatistics, isolated_points, statistics};
-pub use file::{FileError, read, write};
+pub use file::{FileError, parse, read, write};
 pub use fit::{FitError, PlaneFit, fit_plane};
 pub use plane::{Plane, PlaneError};
 

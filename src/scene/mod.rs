@@ -15,6 +15,7 @@ mod store;
 
 pub use error::{SceneError, Warning};
 pub use import::ImportOptions;
+pub use split::SplitFile;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{Extra, Settings};

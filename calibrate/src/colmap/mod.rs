@@ -28,6 +28,7 @@ pub use find::find_model;
 pub use write::{write_binary, write_text};
 
 use crate::Reconstruction;
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -68,6 +69,56 @@ impl Format {
 /// this version does not read, or records that contradict each other.
 pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
     let format = find::format_in(folder).ok_or_else(|| find::no_model(folder, &[folder]))?;
+    parse(format, folder, |path| {
+        let bytes = fs::read(path).map_err(|source| ColmapError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Cow::Owned(bytes))
+    })
+}
+
+/// Reads the contents of `cameras.bin`, `images.bin` and `points3D.bin`; `folder` is only
+/// named in errors.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn parse_binary(folder: &Path, contents: [&[u8]; 3]) -> Result<Reconstruction, ColmapError> {
+    let mut contents = contents.into_iter();
+    parse(Format::Binary, folder, |_| {
+        Ok(Cow::Borrowed(contents.next().unwrap_or_default()))
+    })
+}
+
+/// Reads the contents of `cameras.txt`, `images.txt` and `points3D.txt`; `folder` is only
+/// named in errors.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn parse_text(folder: &Path, contents: [&[u8]; 3]) -> Result<Reconstruction, ColmapError> {
+    let mut contents = contents.into_iter();
+    parse(Format::Text, folder, |_| {
+        Ok(Cow::Borrowed(contents.next().unwrap_or_default()))
+    })
+}
+
+/// Asks for the three files one after the other, so that only one is held at a time.
+fn parse<'a>(
+    format: Format,
+    folder: &Path,
+    mut content_of: impl FnMut(&Path) -> Result<Cow<'a, [u8]>, ColmapError>,
+) -> Result<Reconstruction, ColmapError> {
+    // Having no bytes is an error, except that COLMAP's own instructions for known poses
+    // ask for an empty `points3D.txt`.
+    let mut read = |path: &Path| {
+        let bytes = content_of(path)?;
+        if bytes.is_empty() && !path.ends_with("points3D.txt") {
+            return Err(ColmapError::Empty {
+                path: path.to_owned(),
+            });
+        }
+        Ok(bytes)
+    };
     let files = format.files(folder);
     let [cameras, images, points] = &files;
     let reconstruction = match format {
@@ -84,19 +135,4 @@ pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
     };
     check::references(&reconstruction, &files)?;
     Ok(reconstruction)
-}
-
-/// A file's bytes; having none is an error, except that COLMAP's own instructions for
-/// known poses ask for an empty `points3D.txt`.
-fn read(path: &Path) -> Result<Vec<u8>, ColmapError> {
-    let bytes = fs::read(path).map_err(|source| ColmapError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    if bytes.is_empty() && !path.ends_with("points3D.txt") {
-        return Err(ColmapError::Empty {
-            path: path.to_owned(),
-        });
-    }
-    Ok(bytes)
 }
