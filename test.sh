@@ -44,6 +44,12 @@ cargo fmt --all --check
 step "lints"
 cargo clippy --workspace --all-targets -- -D warnings
 
+step "fuzz targets"
+# Only whether they compile: fuzz/README.md says how to run them.
+cargo fmt --manifest-path fuzz/Cargo.toml --check
+CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}" \
+    cargo check --manifest-path fuzz/Cargo.toml --no-default-features --features renderer --all-targets
+
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 

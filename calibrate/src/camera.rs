@@ -6,6 +6,12 @@ use std::f64::consts::{FRAC_PI_2, PI};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CameraId(pub u32);
 
+impl From<CameraId> for u64 {
+    fn from(id: CameraId) -> u64 {
+        id.0.into()
+    }
+}
+
 /// A camera as calibration files store it: a named model and its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {

@@ -10,6 +10,18 @@ pub struct ImageId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Point3DId(pub u64);
 
+impl From<ImageId> for u64 {
+    fn from(id: ImageId) -> u64 {
+        id.0.into()
+    }
+}
+
+impl From<Point3DId> for u64 {
+    fn from(id: Point3DId) -> u64 {
+        id.0
+    }
+}
+
 /// A calibrated photo set: cameras, posed images and sparse points, as structure from
 /// motion leaves them. Units are the capture's own.
 #[derive(Clone, Debug, Default, PartialEq)]

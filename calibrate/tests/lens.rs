@@ -690,3 +690,25 @@ fn a_sphere_has_its_seam_and_its_poles_in_the_image() {
         }
     }
 }
+
+/// Found by fuzzing: the square of such a pixel's distance is no number.
+#[test]
+fn pixels_too_far_out_have_no_ray() {
+    let models = [
+        Distortion::None,
+        Distortion::Fov { omega: 0.5 },
+        Distortion::Division { k: -0.1 },
+        Distortion::Eucm {
+            alpha: 0.3,
+            beta: 1.0,
+        },
+    ];
+    for distortion in models {
+        let lens = Lens::new(DVec2::splat(1e-134), DVec2::splat(1e20), distortion);
+        assert_eq!(
+            lens.unproject(Pixel::new(0.25, 0.25)),
+            None,
+            "{distortion:?}"
+        );
+    }
+}

@@ -215,7 +215,8 @@ fn decode_beside(
     photo_size: (u32, u32),
 ) -> Result<DynamicImage, CaptureError> {
     let check = |found| check_size(kind, path, found, photo, photo_size);
-    decode::decode_any(path, check)
+    let bytes = std::fs::read(path).map_err(decode::read_failed(path))?;
+    decode::decode_any(path, &bytes, check)
 }
 
 fn check_size(

@@ -1,7 +1,7 @@
 use crate::{CaptureError, jpeg, reduced_size, resize};
 use image::{DynamicImage, ImageError, ImageFormat, ImageReader, RgbaImage};
 use std::fs::{self, File};
-use std::io::{BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 /// Size of the first part of a JPEG in which its size is looked for; more only where
@@ -13,8 +13,20 @@ const HEAD_BYTES: u64 = 1 << 16;
 /// # Errors
 /// A file that cannot be read, or is no JPEG or PNG picture.
 pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
+    let file = File::open(path).map_err(read_failed(path))?;
+    content_size(path, BufReader::new(file))
+}
+
+/// The same for a photo's content, read from where `file` stands, its beginning; `path` is
+/// only named in errors.
+///
+/// # Errors
+/// As for [`photo_size`].
+pub fn content_size(
+    path: &Path,
+    mut file: impl BufRead + Seek,
+) -> Result<(u32, u32), CaptureError> {
     let failed = read_failed(path);
-    let mut file = File::open(path).map_err(&failed)?;
     let mut head = Vec::new();
     let mut wanted = HEAD_BYTES;
     loop {
@@ -31,7 +43,7 @@ pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
             }
             format => {
                 drop(head);
-                let file = BufReader::new(File::open(path).map_err(&failed)?);
+                file.rewind().map_err(&failed)?;
                 return ImageReader::with_format(file, format)
                     .into_dimensions()
                     .map_err(|error| decode_failed(path, &error, None));
@@ -53,6 +65,19 @@ pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
 /// A file that cannot be read, is no JPEG or PNG picture, is damaged or cut short, needs
 /// more than 512 MiB, or has another size than `expected_size`.
 pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImage, CaptureError> {
+    let bytes = fs::read(path).map_err(read_failed(path))?;
+    decode_content(path, &bytes, expected_size)
+}
+
+/// Decodes a photo's content; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`decode`].
+pub fn decode_content(
+    path: &Path,
+    bytes: &[u8],
+    expected_size: Option<(u32, u32)>,
+) -> Result<RgbaImage, CaptureError> {
     let check = |found| match expected_size {
         Some(expected) if found != expected => Err(CaptureError::Size {
             path: path.to_owned(),
@@ -61,37 +86,37 @@ pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImag
         }),
         _ => Ok(()),
     };
-    Ok(decode_any(path, check)?.into_rgba8())
+    Ok(decode_any(path, bytes, check)?.into_rgba8())
 }
 
-/// Decodes a picture as stored, once `check` accepts its size. See [`decode`].
+/// Decodes a picture's content as stored, once `check` accepts its size. See [`decode`].
 pub(crate) fn decode_any(
     path: &Path,
+    bytes: &[u8],
     check: impl Fn((u32, u32)) -> Result<(), CaptureError>,
 ) -> Result<DynamicImage, CaptureError> {
-    let bytes = fs::read(path).map_err(read_failed(path))?;
-    let format = format_of(path, &bytes)?;
+    let format = format_of(path, bytes)?;
 
     // 1. The size first: a picture of the wrong one is not worth decoding.
     let size = match format {
-        ImageFormat::Jpeg => jpeg::size(&bytes),
+        ImageFormat::Jpeg => jpeg::size(bytes),
         _ => None,
     };
     let size = match size {
         Some(size) => size,
-        None => ImageReader::with_format(Cursor::new(&bytes), format)
+        None => ImageReader::with_format(Cursor::new(bytes), format)
             .into_dimensions()
             .map_err(|error| decode_failed(path, &error, None))?,
     };
     check(size)?;
 
     // 2. The JPEG decoder would paint what is missing grey.
-    if format == ImageFormat::Jpeg && !jpeg::is_complete(&bytes) {
+    if format == ImageFormat::Jpeg && !jpeg::is_complete(bytes) {
         return Err(decode_error(path, "the JPEG data have no end"));
     }
 
     // 3. The pixels.
-    ImageReader::with_format(Cursor::new(&bytes), format)
+    ImageReader::with_format(Cursor::new(bytes), format)
         .decode()
         .map_err(|error| decode_failed(path, &error, Some(size)))
 }

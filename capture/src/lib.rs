@@ -23,7 +23,7 @@ mod write;
 pub use beside::{
     Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_mask, match_by_name,
 };
-pub use decode::{decode, decode_reduced, photo_size};
+pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use exif::{Exif, read_exif};
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};

@@ -8,6 +8,12 @@ use std::borrow::Cow;
 
 /// The extras of the first node, as JSON text.
 pub(crate) fn extras(bytes: &[u8]) -> Result<String, String> {
+    // gltf 1.4 takes the header's 12 bytes off the length that it states, however short.
+    if let Some([b'g', b'l', b'T', b'F', _, _, _, _, length @ ..]) = bytes.first_chunk::<12>()
+        && (u32::from_le_bytes(*length) as usize) < 12
+    {
+        return Err("not a glTF file: its header states a length without itself".to_owned());
+    }
     let gltf = gltf::Gltf::from_slice(bytes).map_err(|e| format!("not a glTF file: {e}"))?;
     let extras = gltf.nodes().next().and_then(|node| node.extras().clone());
     extras.map(|raw| raw.get().to_owned()).ok_or_else(|| {

@@ -16,7 +16,7 @@ pub mod points;
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
 pub use facets::Facets;
-pub use file::{FileError, read, write};
+pub use file::{FileError, parse, read, write};
 pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use plane::{Plane, PlaneError};
 pub use points::SparsePoint;

@@ -13,7 +13,9 @@
 //! Paths are relative to the scene's folder, with `/` between their parts. Keys that this
 //! version does not know are kept when the file is written again.
 
+use super::SceneError;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Keys that this version does not know, with their values.
 pub type Extra = serde_json::Map<String, serde_json::Value>;
@@ -39,6 +41,30 @@ pub struct SceneFile {
     /// Everything else.
     #[serde(flatten)]
     pub other: Extra,
+}
+
+impl SceneFile {
+    /// Reads the content of a file; `path` is only named in errors.
+    ///
+    /// # Errors
+    /// It is not the JSON that was expected, or of a later version.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
+        let json = |source| SceneError::Json {
+            path: path.to_owned(),
+            expected: "a scene",
+            source,
+        };
+        // The version first: of a later one nothing else need be readable.
+        let value: serde_json::Value = serde_json::from_slice(bytes).map_err(json)?;
+        let version = value.get("version").and_then(serde_json::Value::as_u64);
+        if let Some(version) = version.filter(|&v| v != 1) {
+            return Err(SceneError::Version {
+                path: path.to_owned(),
+                found: u32::try_from(version).unwrap_or(u32::MAX),
+            });
+        }
+        serde_json::from_slice(bytes).map_err(json)
+    }
 }
 
 /// A photo.

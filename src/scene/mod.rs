@@ -26,6 +26,7 @@ pub use exposure::Matched;
 pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
 pub use relative::relative;
+pub use split::SplitFile;
 pub use times::TimeSource;
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};

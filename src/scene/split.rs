@@ -5,9 +5,29 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-#[derive(Deserialize)]
-struct Split {
-    test: Vec<String>,
+/// The file.
+#[derive(Clone, Debug, Deserialize)]
+pub struct SplitFile {
+    /// The names of the photos that are held out.
+    pub test: Vec<String>,
+}
+
+impl SplitFile {
+    /// Reads the content of a file; `path` is only named in errors.
+    ///
+    /// # Errors
+    /// It is not the JSON that was expected, or names no photo.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
+        let split: Self = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
+            path: path.to_owned(),
+            expected: "a split, {\"test\": [\"a.jpg\", …]}",
+            source,
+        })?;
+        if split.test.is_empty() {
+            return Err(SceneError::EmptySplit(path.to_owned()));
+        }
+        Ok(split)
+    }
 }
 
 impl Scene {
@@ -22,14 +42,7 @@ impl Scene {
             doing: "read the split",
             source,
         })?;
-        let read: Split = serde_json::from_slice(&bytes).map_err(|source| SceneError::Json {
-            path: split.to_owned(),
-            expected: "a split, {\"test\": [\"a.jpg\", …]}",
-            source,
-        })?;
-        if read.test.is_empty() {
-            return Err(SceneError::EmptySplit(split.to_owned()));
-        }
+        let read = SplitFile::parse(split, &bytes)?;
         // Splits speak of the photos as the capture calls them.
         let called = |photo: &Photo| photo.original.clone().map(|was| (was, photo.name.clone()));
         let renamed: BTreeMap<String, String> = self.photos.iter().filter_map(called).collect();

@@ -47,21 +47,7 @@ impl Scene {
             return Self::import(folder, &options);
         }
         let bytes = std::fs::read(&path).map_err(|e| io(&path, "read the scene", e))?;
-        let json = |source| SceneError::Json {
-            path: path.clone(),
-            expected: "a scene",
-            source,
-        };
-        // The version first: of a later one nothing else need be readable.
-        let value: serde_json::Value = serde_json::from_slice(&bytes).map_err(json)?;
-        let version = value.get("version").and_then(serde_json::Value::as_u64);
-        if let Some(version) = version.filter(|&v| v != 1) {
-            return Err(SceneError::Version {
-                path,
-                found: u32::try_from(version).unwrap_or(u32::MAX),
-            });
-        }
-        let file: SceneFile = serde_json::from_slice(&bytes).map_err(json)?;
+        let file = SceneFile::parse(&path, &bytes)?;
         let mut scene = Self::from_file(file, folder, &path)?;
         let warnings = scene.leave_out_unusable(strict)?;
         scene.check_beside()?;

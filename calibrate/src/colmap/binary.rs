@@ -13,18 +13,23 @@ use std::path::Path;
 
 /// Stands for "no point" in a keypoint.
 const NO_POINT: u64 = u64::MAX;
+/// Bytes of a camera without its parameters: id, model, width, height.
+const CAMERA_BYTES: usize = 24;
+/// Bytes of an image without keypoints: id, pose, camera, a name of its end alone, count.
+const IMAGE_BYTES: usize = 73;
+/// Bytes of a point that no image sees: id, position, colour, error, count.
+const POINT_BYTES: usize = 51;
 /// Bytes of a keypoint: x, y and a point's id.
-const KEYPOINT_BYTES: u64 = 24;
+const KEYPOINT_BYTES: usize = 24;
 /// Bytes of a track's element: an image's id and a keypoint's index.
-const TRACK_BYTES: u64 = 8;
+const TRACK_BYTES: usize = 8;
 
 /// Reads `cameras.bin`.
 pub(super) fn read_cameras(
     path: &Path,
     bytes: &[u8],
 ) -> Result<BTreeMap<CameraId, Camera>, ColmapError> {
-    let mut cameras = BTreeMap::new();
-    read_records(path, bytes, "camera", |cursor| {
+    read_records(path, bytes, "camera", CAMERA_BYTES, |cursor| {
         let id = cursor.u32("its id")?;
         let place = cursor.place();
         let model_id = cursor.u32("its model")?.cast_signed();
@@ -50,12 +55,8 @@ pub(super) fn read_cameras(
             height,
             params,
         };
-        let added = check::insert(&mut cameras, CameraId(id), camera, || {
-            format!("camera {id}")
-        });
-        cursor.accept(added)
-    })?;
-    Ok(cameras)
+        Ok((CameraId(id), camera))
+    })
 }
 
 /// Reads `images.bin`.
@@ -63,8 +64,7 @@ pub(super) fn read_images(
     path: &Path,
     bytes: &[u8],
 ) -> Result<BTreeMap<ImageId, Image>, ColmapError> {
-    let mut images = BTreeMap::new();
-    read_records(path, bytes, "image", |cursor| {
+    read_records(path, bytes, "image", IMAGE_BYTES, |cursor| {
         let id = cursor.u32("its id")?;
         let wxyz = cursor.f64s("its rotation")?;
         let translation = cursor.f64s("its translation")?;
@@ -72,24 +72,31 @@ pub(super) fn read_images(
         let camera_id = CameraId(cursor.u32("its camera's id")?);
         let name = cursor.string("its name")?;
         let name = cursor.accept(check::name(name))?;
-        let count = cursor.count("keypoints", KEYPOINT_BYTES)?;
-        let mut keypoints = Vec::with_capacity(count);
-        for index in 0..count {
-            let [x, y] = cursor.f64s("a keypoint")?;
-            let point = cursor.u64("a keypoint's point")?;
-            let point = (point != NO_POINT).then_some(Point3DId(point));
-            keypoints.push(cursor.accept(check::keypoint(index, x, y, point))?);
-        }
+        let keypoints = read_keypoints(cursor)?;
         let image = Image {
             name,
             camera_id,
             camera_from_world,
             keypoints,
         };
-        let added = check::insert(&mut images, ImageId(id), image, || format!("image {id}"));
-        cursor.accept(added)
-    })?;
-    Ok(images)
+        Ok((ImageId(id), image))
+    })
+}
+
+fn read_keypoints(cursor: &mut Cursor<'_>) -> Result<Vec<Keypoint>, ColmapError> {
+    let stored = cursor.elements::<KEYPOINT_BYTES>("keypoints")?;
+    let mut keypoints = Vec::with_capacity(stored.len());
+    for (index, bytes) in stored.iter().enumerate() {
+        let (words, _) = bytes.as_chunks();
+        let [x, y] = [0, 1].map(|i| f64::from_le_bytes(words[i]));
+        let point = u64::from_le_bytes(words[2]);
+        let point = (point != NO_POINT).then_some(Point3DId(point));
+        keypoints.push(check::keypoint(index, x, y, point).map_err(|problem| {
+            cursor.offset -= KEYPOINT_BYTES * (stored.len() - index - 1);
+            cursor.malformed(problem)
+        })?);
+    }
+    Ok(keypoints)
 }
 
 /// Reads `points3D.bin`.
@@ -97,38 +104,37 @@ pub(super) fn read_points(
     path: &Path,
     bytes: &[u8],
 ) -> Result<BTreeMap<Point3DId, Point3D>, ColmapError> {
-    let mut points = BTreeMap::new();
-    read_records(path, bytes, "point", |cursor| {
+    read_records(path, bytes, "point", POINT_BYTES, |cursor| {
         let id = cursor.u64("its id")?;
         let position = check::position(id, cursor.f64s("its position")?);
         let position = cursor.accept(position)?;
         let color = cursor.take("its colour")?;
         let error_px = check::error_px(cursor.f64("its error")?);
-        let count = cursor.count("track elements", TRACK_BYTES)?;
-        let mut track = Vec::with_capacity(count);
-        for _ in 0..count {
-            let image_id = ImageId(cursor.u32("a track's image")?);
-            track.push((image_id, cursor.u32("a track's keypoint")?));
-        }
+        let track = cursor.elements::<TRACK_BYTES>("track elements")?;
+        let track = track.iter().map(|bytes| {
+            let (words, _) = bytes.as_chunks();
+            let [image_id, keypoint] = [0, 1].map(|i| u32::from_le_bytes(words[i]));
+            (ImageId(image_id), keypoint)
+        });
         let point = Point3D {
             position,
             color,
             error_px,
-            track,
+            track: track.collect(),
         };
-        let added = check::insert(&mut points, Point3DId(id), point, || format!("point {id}"));
-        cursor.accept(added)
-    })?;
-    Ok(points)
+        Ok((Point3DId(id), point))
+    })
 }
 
-/// Reads the count, calls `read` for each record, and expects nothing after the last.
-fn read_records(
+/// Reads the count, calls `read` for each record of at least `least_bytes`, and expects
+/// nothing after the last, and no id twice.
+fn read_records<Id: Copy + Ord + Into<u64>, Record>(
     path: &Path,
     bytes: &[u8],
     kind: &'static str,
-    mut read: impl FnMut(&mut Cursor<'_>) -> Result<(), ColmapError>,
-) -> Result<(), ColmapError> {
+    least_bytes: usize,
+    mut read: impl FnMut(&mut Cursor<'_>) -> Result<(Id, Record), ColmapError>,
+) -> Result<BTreeMap<Id, Record>, ColmapError> {
     let mut cursor = Cursor {
         path,
         bytes,
@@ -138,17 +144,37 @@ fn read_records(
         count: 0,
     };
     cursor.count = cursor.u64("their number")?;
+    let room = (cursor.count as usize).min(cursor.left() / least_bytes);
+    let mut records = Vec::with_capacity(room);
+    let mut ends = Vec::with_capacity(room);
     for number in 1..=cursor.count {
         cursor.number = number;
-        read(&mut cursor)?;
+        records.push(read(&mut cursor)?);
+        ends.push(cursor.offset);
     }
-    match cursor.left() {
-        0 => Ok(()),
-        left => {
-            let end = format!("{left} bytes follow the last {kind}, expected the file's end");
-            Err(cursor.malformed(end))
+    let left = cursor.left();
+    if left > 0 {
+        let end = format!("{left} bytes follow the last {kind}, expected the file's end");
+        return Err(cursor.malformed(end));
+    }
+    // COLMAP writes them by id, and the map is made in one go; its older versions wrote
+    // them in any order.
+    if !records.is_sorted_by(|(a, _), (b, _)| a < b) {
+        if let Some(twice) = first_repeated(records.iter().map(|&(id, _)| id)) {
+            (cursor.number, cursor.offset) = (twice as u64 + 1, ends[twice]);
+            return Err(cursor.malformed(check::twice(kind, records[twice].0)));
         }
+        records.sort_unstable_by_key(|&(id, _)| id);
     }
+    Ok(records.into_iter().collect())
+}
+
+/// The index of the first id that was there before.
+fn first_repeated<Id: Copy + Ord>(ids: impl Iterator<Item = Id>) -> Option<usize> {
+    let mut by_id: Vec<(Id, usize)> = ids.zip(0..).collect();
+    by_id.sort_unstable();
+    let repeated = by_id.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+    repeated.map(|pair| pair[1].1).min()
 }
 
 /// The bytes of a file, read from front to back.
@@ -230,20 +256,26 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    /// How many `elements` of `bytes` each follow: not more than there is room for.
-    fn count(&mut self, elements: &str, bytes: u64) -> Result<usize, ColmapError> {
-        let place = self.place();
+    /// A count and as many `elements` of `N` bytes each, if there is room for them.
+    fn elements<const N: usize>(&mut self, elements: &str) -> Result<&'a [[u8; N]], ColmapError> {
+        let start = self.offset;
         let count = self.u64(elements)?;
-        let left = self.left() as u64;
-        if count > left / bytes {
+        let (room, _) = self.bytes[self.offset..].as_chunks();
+        let found = usize::try_from(count)
+            .ok()
+            .and_then(|count| room.get(..count));
+        let found = found.ok_or_else(|| {
             let problem = format!(
-                "the file is cut short or garbled: {count} {elements} announced, but the {left} \
+                "the file is cut short or garbled: {count} {elements} announced, but the {} \
                  bytes left hold at most {}",
-                left / bytes
+                self.left(),
+                room.len()
             );
-            return Err(malformed(self.path, place, problem));
-        }
-        Ok(count as usize)
+            self.offset = start;
+            self.malformed(problem)
+        })?;
+        self.offset += N * found.len();
+        Ok(found)
     }
 
     /// A string that ends with a zero byte.

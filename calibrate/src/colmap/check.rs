@@ -83,15 +83,15 @@ pub(super) fn error_px(stored: f64) -> f64 {
 }
 
 /// Adds a record under its id, which must be new.
-pub(super) fn insert<Id: Ord, Record>(
+pub(super) fn insert<Id: Copy + Ord + Into<u64>, Record>(
     records: &mut BTreeMap<Id, Record>,
+    kind: &str,
     id: Id,
     record: Record,
-    called: impl FnOnce() -> String,
 ) -> Result<(), String> {
     match records.insert(id, record) {
         None => Ok(()),
-        Some(_) => Err(format!("{} is there twice, expected once", called())),
+        Some(_) => Err(twice(kind, id)),
     }
 }
 
@@ -107,6 +107,45 @@ pub(super) fn lenses(cameras: &BTreeMap<CameraId, Camera>, path: &Path) -> Resul
     Ok(())
 }
 
+/// What is wrong with two records of one id.
+pub(super) fn twice(kind: &str, id: impl Into<u64>) -> String {
+    format!("{kind} {} is there twice, expected once", id.into())
+}
+
+/// Finds records by id: at once where ids leave few numbers out, as COLMAP's do, else as
+/// the map does. Millions of observations each ask for two.
+struct Lookup<'a, Id, Record> {
+    records: &'a BTreeMap<Id, Record>,
+    /// By id, where that is not much longer than `records`.
+    table: Vec<Option<&'a Record>>,
+}
+
+impl<'a, Id: Copy + Ord + Into<u64>, Record> Lookup<'a, Id, Record> {
+    fn new(records: &'a BTreeMap<Id, Record>) -> Self {
+        let last = records.last_key_value().map_or(0, |(&id, _)| index(id));
+        let mut table = Vec::new();
+        if last / 8 <= records.len() {
+            table.resize(last + 1, None);
+            for (&id, record) in records {
+                table[index(id)] = Some(record);
+            }
+        }
+        Self { records, table }
+    }
+
+    fn get(&self, id: Id) -> Option<&'a Record> {
+        match self.table.get(index(id)) {
+            Some(&found) => found,
+            None => self.records.get(&id),
+        }
+    }
+}
+
+/// An id as an index; the last one of all where it is too large for one.
+fn index(id: impl Into<u64>) -> usize {
+    usize::try_from(id.into()).unwrap_or(usize::MAX)
+}
+
 /// Checks what only the three `files` together can show.
 pub(super) fn references(
     reconstruction: &Reconstruction,
@@ -120,6 +159,8 @@ pub(super) fn references(
     let [cameras_path, images_path, points_path] = files;
 
     lenses(cameras, cameras_path)?;
+    let image_of = Lookup::new(images);
+    let point_of = Lookup::new(points);
     if images.is_empty() {
         return Err(ColmapError::NoImages {
             path: images_path.clone(),
@@ -150,7 +191,7 @@ pub(super) fn references(
         }
         for (index, keypoint) in image.keypoints.iter().enumerate() {
             if let Some(point) = keypoint.point
-                && !points.contains_key(&point)
+                && point_of.get(point).is_none()
             {
                 return Err(inconsistent(
                     images_path,
@@ -166,7 +207,7 @@ pub(super) fn references(
     }
     for (id, point) in points {
         for &(image_id, keypoint) in &point.track {
-            track_element(images.get(&image_id), image_id, keypoint, images_path).map_err(
+            track_element(image_of.get(image_id), image_id, keypoint, images_path).map_err(
                 |problem| inconsistent(points_path, format!("point {} is {problem}", id.0)),
             )?;
         }

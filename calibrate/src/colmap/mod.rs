@@ -29,6 +29,7 @@ pub use find::find_model;
 pub use write::{write_binary, write_text};
 
 use crate::{Camera, CameraId, Reconstruction};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,6 +71,44 @@ impl Format {
 /// this version does not read, or records that contradict each other.
 pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
     let format = find::format_in(folder).ok_or_else(|| find::no_model(folder, &[folder]))?;
+    parse(format, folder, |path| read_file(path).map(Cow::Owned))
+}
+
+/// Reads the contents of `cameras.bin`, `images.bin` and `points3D.bin`; `folder` is only
+/// named in errors.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn parse_binary(folder: &Path, contents: [&[u8]; 3]) -> Result<Reconstruction, ColmapError> {
+    let mut contents = contents.into_iter();
+    parse(Format::Binary, folder, |_| {
+        Ok(Cow::Borrowed(contents.next().unwrap_or_default()))
+    })
+}
+
+/// Reads the contents of `cameras.txt`, `images.txt` and `points3D.txt`; `folder` is only
+/// named in errors.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn parse_text(folder: &Path, contents: [&[u8]; 3]) -> Result<Reconstruction, ColmapError> {
+    let mut contents = contents.into_iter();
+    parse(Format::Text, folder, |_| {
+        Ok(Cow::Borrowed(contents.next().unwrap_or_default()))
+    })
+}
+
+/// Asks for the three files one after the other, so that only one is held at a time.
+fn parse<'a>(
+    format: Format,
+    folder: &Path,
+    mut content_of: impl FnMut(&Path) -> Result<Cow<'a, [u8]>, ColmapError>,
+) -> Result<Reconstruction, ColmapError> {
+    let mut read = |path: &Path| {
+        let bytes = content_of(path)?;
+        check_content(path, &bytes)?;
+        Ok(bytes)
+    };
     let files = format.files(folder);
     let [cameras, images, points] = &files;
     let reconstruction = match format {
@@ -93,7 +132,8 @@ pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
 /// # Errors
 /// As for [`read_model`].
 pub fn read_cameras(path: &Path) -> Result<BTreeMap<CameraId, Camera>, ColmapError> {
-    let bytes = read(path)?;
+    let bytes = read_file(path)?;
+    check_content(path, &bytes)?;
     let cameras = if path.extension() == Some("bin".as_ref()) {
         binary::read_cameras(path, &bytes)?
     } else {
@@ -113,17 +153,20 @@ pub fn is_part(path: &Path) -> bool {
     })
 }
 
-/// A file's bytes; having none is an error, except that COLMAP's own instructions for
-/// known poses ask for an empty `points3D.txt`.
-fn read(path: &Path) -> Result<Vec<u8>, ColmapError> {
-    let bytes = fs::read(path).map_err(|source| ColmapError::Read {
+fn read_file(path: &Path) -> Result<Vec<u8>, ColmapError> {
+    fs::read(path).map_err(|source| ColmapError::Read {
         path: path.to_owned(),
         source,
-    })?;
+    })
+}
+
+/// Having no bytes is an error, except that COLMAP's own instructions for known poses ask
+/// for an empty `points3D.txt`.
+fn check_content(path: &Path, bytes: &[u8]) -> Result<(), ColmapError> {
     if bytes.is_empty() && !path.ends_with("points3D.txt") {
         return Err(ColmapError::Empty {
             path: path.to_owned(),
         });
     }
-    Ok(bytes)
+    Ok(())
 }

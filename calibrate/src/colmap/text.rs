@@ -39,9 +39,7 @@ pub(super) fn read_cameras(
             height,
             params,
         };
-        let added = check::insert(&mut cameras, CameraId(id), camera, || {
-            format!("camera {id}")
-        });
+        let added = check::insert(&mut cameras, "camera", CameraId(id), camera);
         line.accept(added)?;
     }
     Ok(cameras)
@@ -73,7 +71,7 @@ pub(super) fn read_images(
             camera_from_world,
             keypoints,
         };
-        let added = check::insert(&mut images, ImageId(id), image, || format!("image {id}"));
+        let added = check::insert(&mut images, "image", ImageId(id), image);
         line.accept(added)?;
     }
     Ok(images)
@@ -133,7 +131,7 @@ pub(super) fn read_points(
             error_px,
             track: pairs.iter().map(|&[i, k]| (ImageId(i), k)).collect(),
         };
-        let added = check::insert(&mut points, Point3DId(id), point, || format!("point {id}"));
+        let added = check::insert(&mut points, "point", Point3DId(id), point);
         line.accept(added)?;
     }
     Ok(points)

@@ -233,11 +233,12 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
     })
 }
 
-/// The text of a file.
-pub(super) fn read_text(path: &Path) -> Result<String, FormatError> {
-    String::from_utf8(read(path)?).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
+/// A file's bytes as text, without the byte order mark that some editors put first.
+pub(super) fn text<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str, FormatError> {
+    let text = str::from_utf8(bytes).map_err(|error| {
+        let at = error.valid_up_to();
         Problem::broken("found a byte that is not UTF-8, expected text")
             .at(path, format!("byte {at}"))
-    })
+    })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }

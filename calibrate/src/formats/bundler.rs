@@ -26,8 +26,22 @@ const HEADER: &str = "# Bundle file v0.";
 /// An unreadable file, a list that is missing or of another length, a pose that is no
 /// rotation, a camera without a lens, a photo of unknown size, two photos of one name.
 pub fn read_bundler(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
-    let text = build::read_text(path)?;
-    let mut words = Words::new(path, &text);
+    let bytes = build::read(path)?;
+    let list = find_list(path)?;
+    parse_bundler(path, &bytes, (&list, &build::read(&list)?), size_of)
+}
+
+/// Reads the content of a `bundle.out` and of its list; the paths are only named in errors.
+///
+/// # Errors
+/// As for [`read_bundler`].
+pub fn parse_bundler(
+    path: &Path,
+    bytes: &[u8],
+    list: (&Path, &[u8]),
+    size_of: SizeOf<'_>,
+) -> Result<Reconstruction, FormatError> {
+    let mut words = Words::new(path, build::text(path, bytes)?);
     let header = words.line().unwrap_or_default();
     if !header.starts_with(HEADER) {
         let problem = format!("found {header:.40?}, expected \"{HEADER}3\"");
@@ -35,7 +49,7 @@ pub fn read_bundler(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, 
     }
     let camera_count: usize = words.parse("header", "the number of cameras")?;
     let point_count: u64 = words.parse("header", "the number of points")?;
-    let names = names(path)?;
+    let names = names(list)?;
     if names.len() != camera_count {
         return Err(words.error(
             "header",
@@ -130,8 +144,8 @@ fn read_point(
     builder.point(&place, Point3DId(id), position, color, &observations)
 }
 
-/// The photos' names, one a line. A line may end with Bundler's "0 FOCAL".
-fn names(bundle: &Path) -> Result<Vec<String>, FormatError> {
+/// Where the list of the photos lies.
+fn find_list(bundle: &Path) -> Result<PathBuf, FormatError> {
     let folder = bundle.parent().unwrap_or(Path::new(""));
     let stem = bundle.file_stem().unwrap_or_default().to_string_lossy();
     let places: [PathBuf; 3] = [
@@ -139,20 +153,24 @@ fn names(bundle: &Path) -> Result<Vec<String>, FormatError> {
         folder.join(format!("{}.list.txt", stem.trim_end_matches(".bundle"))),
         folder.join("..").join("list.txt"),
     ];
-    let Some(list) = places.iter().find(|place| place.is_file()) else {
+    let list = places.iter().find(|place| place.is_file());
+    list.cloned().ok_or_else(|| {
         let looked: Vec<_> = places.iter().map(|p| p.display().to_string()).collect();
-        return Err(Problem::new(
+        Problem::new(
             format!(
                 "the format does not name the photos, and there is no list of them ({})",
                 looked.join(", ")
             ),
             "put Bundler's list.txt beside the file",
         )
-        .at(bundle, "header"));
-    };
-    let text = build::read_text(list)?;
+        .at(bundle, "header")
+    })
+}
+
+/// The photos' names, one a line. A line may end with Bundler's "0 FOCAL".
+fn names((list, bytes): (&Path, &[u8])) -> Result<Vec<String>, FormatError> {
     let mut names = Vec::new();
-    for (index, line) in text.lines().enumerate() {
+    for (index, line) in build::text(list, bytes)?.lines().enumerate() {
         if line.trim().is_empty() {
             continue;
         }

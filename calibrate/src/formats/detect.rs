@@ -1,8 +1,11 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
+
+/// What some editors put before UTF-8 text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// The formats read here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -43,9 +46,19 @@ struct Frame {
 /// that is none of them, is cut short, or cannot be read. A JSON file is read once to its
 /// end, without keeping it; of any other only the beginning is read.
 pub fn detect(path: &Path) -> Option<Format> {
-    let mut file = File::open(path).ok()?;
+    detect_content(BufReader::new(File::open(path).ok()?))
+}
+
+/// The same for a file's content, read from where `file` stands, its beginning.
+pub fn detect_content(mut file: impl BufRead + Seek) -> Option<Format> {
     let mut start = Vec::new();
     file.by_ref().take(256).read_to_end(&mut start).ok()?;
+    let mark = if start.starts_with(BYTE_ORDER_MARK) {
+        BYTE_ORDER_MARK.len()
+    } else {
+        0
+    };
+    start.drain(..mark);
     let begins = |magic: &str| start.starts_with(magic.as_bytes());
     if begins("# Bundle file v0.") {
         return Some(Format::Bundler);
@@ -61,8 +74,8 @@ pub fn detect(path: &Path) -> Option<Format> {
     if start.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
         return None;
     }
-    file.rewind().ok()?;
-    let keys: Keys = serde_json::from_reader(BufReader::new(file)).ok()?;
+    file.seek(SeekFrom::Start(mark as u64)).ok()?;
+    let keys: Keys = serde_json::from_reader(file).ok()?;
     if keys.sfm_data_version.is_some() && keys.views.is_some() && keys.extrinsics.is_some() {
         return Some(Format::OpenMvg);
     }

@@ -5,10 +5,9 @@ use super::error::{FormatError, Problem};
 use serde_json::Value;
 use std::path::Path;
 
-/// Parses a whole file.
-pub(super) fn parse(path: &Path) -> Result<Value, FormatError> {
-    let bytes = build::read(path)?;
-    serde_json::from_slice(&bytes).map_err(|error| {
+/// Parses a file's content.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Value, FormatError> {
+    serde_json::from_str(build::text(path, bytes)?).map_err(|error| {
         let place = format!("line {} column {}", error.line(), error.column());
         Problem::broken(format!("not JSON: {error}")).at(path, place)
     })

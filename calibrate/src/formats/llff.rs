@@ -30,8 +30,20 @@ pub fn read_llff(
     names: &[String],
     size_of: SizeOf<'_>,
 ) -> Result<Reconstruction, FormatError> {
-    let bytes = build::read(path)?;
-    let rows = rows(&bytes).map_err(|problem| problem.at(path, "header"))?;
+    parse_llff(path, &build::read(path)?, names, size_of)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_llff`].
+pub fn parse_llff(
+    path: &Path,
+    bytes: &[u8],
+    names: &[String],
+    size_of: SizeOf<'_>,
+) -> Result<Reconstruction, FormatError> {
+    let rows = rows(bytes).map_err(|problem| problem.at(path, "header"))?;
     let mut names = match names {
         [] => (0..rows.len()).map(|row| format!("{row:04}")).collect(),
         names => names.to_vec(),

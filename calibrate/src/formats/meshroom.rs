@@ -26,7 +26,15 @@ use std::path::Path;
 /// An unreadable file, a pose that is no rotation, a lens that is not read here, a view
 /// of a rig, two views of one name.
 pub fn read_meshroom(path: &Path) -> Result<Reconstruction, FormatError> {
-    let value = json::parse(path)?;
+    parse_meshroom(path, &build::read(path)?)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_meshroom`].
+pub fn parse_meshroom(path: &Path, bytes: &[u8]) -> Result<Reconstruction, FormatError> {
+    let value = json::parse(path, bytes)?;
     let root = Json::root(path, &value);
     let version: [f64; 3] = root.field("version")?.numbers()?;
 

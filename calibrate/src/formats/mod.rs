@@ -22,14 +22,14 @@ mod transforms;
 mod words;
 
 pub use build::SizeOf;
-pub use bundler::read_bundler;
-pub use detect::{Format, detect};
+pub use bundler::{parse_bundler, read_bundler};
+pub use detect::{Format, detect, detect_content};
 pub use error::FormatError;
-pub use llff::{read_llff, read_llff_bounds};
-pub use meshroom::read_meshroom;
-pub use nvm::read_nvm;
-pub use openmvg::read_openmvg;
-pub use transforms::read_transforms;
+pub use llff::{parse_llff, read_llff, read_llff_bounds};
+pub use meshroom::{parse_meshroom, read_meshroom};
+pub use nvm::{parse_nvm, read_nvm};
+pub use openmvg::{parse_openmvg, read_openmvg};
+pub use transforms::{parse_transforms, read_transforms};
 
 use crate::Reconstruction;
 use std::path::Path;

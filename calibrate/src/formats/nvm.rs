@@ -30,8 +30,19 @@ const QUATERNION_TOLERANCE: f64 = 1e-3;
 /// An unreadable file, another version, a quaternion that is no rotation, a camera
 /// without a lens, a photo of unknown size, two photos of one name.
 pub fn read_nvm(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
-    let text = build::read_text(path)?;
-    let mut words = Words::new(path, &text);
+    parse_nvm(path, &build::read(path)?, size_of)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_nvm`].
+pub fn parse_nvm(
+    path: &Path,
+    bytes: &[u8],
+    size_of: SizeOf<'_>,
+) -> Result<Reconstruction, FormatError> {
+    let mut words = Words::new(path, build::text(path, bytes)?);
     let header = words.line().unwrap_or_default();
     let shared = fixed_calibration(header).map_err(|problem| words.error("header", problem))?;
     let image_count: u32 = words.parse("header", "the number of images")?;

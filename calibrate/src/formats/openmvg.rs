@@ -30,7 +30,15 @@ const NAMED: u32 = 1 << 31;
 /// An unreadable file, a pose that is no rotation, a lens that is not read here, two
 /// views of one name.
 pub fn read_openmvg(path: &Path) -> Result<Reconstruction, FormatError> {
-    let value = json::parse(path)?;
+    parse_openmvg(path, &build::read(path)?)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_openmvg`].
+pub fn parse_openmvg(path: &Path, bytes: &[u8]) -> Result<Reconstruction, FormatError> {
+    let value = json::parse(path, bytes)?;
     let root = Json::root(path, &value);
     let mut builder = Builder::new(path);
 

@@ -30,7 +30,19 @@ const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
 /// An unreadable file, a pose that is no rotation, intrinsics that are missing,
 /// impossible or of a lens that is not read here, two frames of one name.
 pub fn read_transforms(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
-    let value = json::parse(path)?;
+    parse_transforms(path, &build::read(path)?, size_of)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_transforms`].
+pub fn parse_transforms(
+    path: &Path,
+    bytes: &[u8],
+    size_of: SizeOf<'_>,
+) -> Result<Reconstruction, FormatError> {
+    let value = json::parse(path, bytes)?;
     let root = Json::root(path, &value);
     let mut builder = Builder::new(path);
     for (index, frame) in root.field("frames")?.items()?.enumerate() {

@@ -205,7 +205,8 @@ impl Lens {
 
     /// The ray through a pixel: a unit direction in the camera's frame.
     ///
-    /// `None` where no ray within the lens' one-to-one range falls on that pixel.
+    /// `None` where no ray within the lens' one-to-one range falls on that pixel, and
+    /// where it lies so far out that numbers overflow.
     pub fn unproject(&self, pixel: Pixel) -> Option<DVec3> {
         let mut distorted = (DVec2::new(pixel.x, pixel.y) - self.principal) / self.focal;
         if let Some(homography) = self.distortion.sensor() {
@@ -221,7 +222,7 @@ impl Lens {
             } else {
                 DVec2::ZERO
             };
-            (direction * rho).extend(z).normalize()
+            (direction * rho).extend(z).try_normalize()
         };
         let at_angle = |undistorted: DVec2| {
             let theta = undistorted.length();
@@ -230,20 +231,20 @@ impl Lens {
             (undistorted * per_angle).extend(cos)
         };
         match self.distortion {
-            Distortion::None => Some(distorted.extend(1.0).normalize()),
+            Distortion::None => distorted.extend(1.0).try_normalize(),
             Distortion::Rational { k, p } => {
                 let undistorted = plane::invert(distorted, &k, &p, &[0.0; 4], self.limit)?;
-                Some(undistorted.extend(1.0).normalize())
+                undistorted.extend(1.0).try_normalize()
             }
             Distortion::Tilted { k, p, s, .. } => {
                 let undistorted = plane::invert(distorted, &k, &p, &s, self.limit)?;
-                Some(undistorted.extend(1.0).normalize())
+                undistorted.extend(1.0).try_normalize()
             }
             Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
                 let theta = invert::invert_monotone(radius, self.limit, |theta| {
                     fisheye::polynomial(theta, &k)
                 })?;
-                Some(sideways(theta.sin_cos()))
+                sideways(theta.sin_cos())
             }
             Distortion::ThinPrismFisheye { k, p, s } => {
                 fisheye::invert_thin_prism(distorted, &k, &p, &s, self.limit).map(at_angle)
@@ -251,13 +252,13 @@ impl Lens {
             Distortion::RadTanThinPrismFisheye { k, p, s } => {
                 fisheye::invert_rad_tan_thin_prism(distorted, &k, &p, &s, self.limit).map(at_angle)
             }
-            Distortion::Fov { omega } => closed::invert_fov(radius, omega).map(sideways),
-            Distortion::Division { k } => closed::invert_division(radius, k).map(sideways),
+            Distortion::Fov { omega } => closed::invert_fov(radius, omega).and_then(sideways),
+            Distortion::Division { k } => closed::invert_division(radius, k).and_then(sideways),
             Distortion::InverseRadial { k } => {
-                closed::invert_inverse_radial(radius, k).map(sideways)
+                closed::invert_inverse_radial(radius, k).and_then(sideways)
             }
             Distortion::Eucm { alpha, beta } => {
-                closed::invert_eucm(radius, alpha, beta).map(sideways)
+                closed::invert_eucm(radius, alpha, beta).and_then(sideways)
             }
             Distortion::Equirectangular => equirectangular::ray(distorted),
         }

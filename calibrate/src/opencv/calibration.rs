@@ -41,26 +41,42 @@ pub struct OpenCvCalibration {
 /// value that makes no camera or no pose; the model of another program.
 pub fn read_calibration(path: &Path, keys: &Keys) -> Result<OpenCvCalibration, OpenCvError> {
     let storage = FileStorage::read(path)?;
-    let values = Values::of(path, &storage);
+    let mut calibration = calibration(path, &storage, keys)?;
+    let notes = &mut calibration.notes;
+    if calibration.cameras.len() == 2 && calibration.right_from_left.is_none() {
+        calibration.right_from_left = rig_beside(path, notes)?;
+    }
+    if calibration.image_names.is_empty() {
+        calibration.image_names = names_beside(path, views(&calibration.poses), notes);
+    }
+    Ok(calibration)
+}
+
+/// The calibration in a storage file's values alone; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read_calibration`].
+pub fn calibration(
+    path: &Path,
+    storage: &FileStorage,
+    keys: &Keys,
+) -> Result<OpenCvCalibration, OpenCvError> {
+    let values = Values::of(path, storage);
     let mut notes = Vec::new();
     let cameras = cameras::cameras(&values, keys, &mut notes)?;
     let poses = poses::of_views(&values)?;
-    let mut right_from_left = None;
-    if cameras.len() == 2 {
-        right_from_left = poses::of_rig(&values)?;
-        if right_from_left.is_none() {
-            right_from_left = rig_beside(path, &mut notes)?;
-        }
-    }
+    let right_from_left = match cameras.len() {
+        2 => poses::of_rig(&values)?,
+        _ => None,
+    };
     let board = match cameras.as_slice() {
         [camera] => board::board(&values, camera, &poses, &mut notes),
         _ => None,
     };
-    let views = if poses.is_empty() { 2 } else { poses.len() };
-    let image_names = match names_within(&values) {
-        names if names.len() == views => names,
-        _ => names_beside(path, views, &mut notes),
-    };
+    let mut image_names = names_within(&values);
+    if image_names.len() != views(&poses) {
+        image_names.clear();
+    }
     Ok(OpenCvCalibration {
         cameras,
         poses,
@@ -69,6 +85,11 @@ pub fn read_calibration(path: &Path, keys: &Keys) -> Result<OpenCvCalibration, O
         board,
         notes,
     })
+}
+
+/// How many photos a file with these poses speaks of: a stereo rig's two without any.
+fn views(poses: &[Rigid3]) -> usize {
+    if poses.is_empty() { 2 } else { poses.len() }
 }
 
 /// The stereo rig's pose in the file that OpenCV's stereo sample writes beside this one.

@@ -27,7 +27,7 @@ mod xml;
 mod yaml;
 
 pub use board::Board;
-pub use calibration::{OpenCvCalibration, find_calibrations, read_calibration};
+pub use calibration::{OpenCvCalibration, calibration, find_calibrations, read_calibration};
 pub use cameras::{Keys, OpenCvCamera};
 pub use error::OpenCvError;
 pub use storage::{DataType, Entries, FileStorage, Matrix, Node, Value};

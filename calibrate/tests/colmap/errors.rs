@@ -1,7 +1,7 @@
 //! What is refused, and in which words.
 
 use crate::synthetic::small;
-use calibrate::colmap::{read_model, write_binary, write_text};
+use calibrate::colmap::{parse_binary, read_model, write_binary, write_text};
 use calibrate::{CameraId, ImageId, Point3DId, Reconstruction};
 use proptest::prelude::*;
 use std::fs;
@@ -402,6 +402,42 @@ fn a_text_model_is_not_hidden_behind_a_binary_one() {
             "{}: the folder already holds a binary model, which would be read instead of the \
              text model to be written; choose another folder, or remove the .bin files first",
             folder.path().display()
+        )
+    );
+}
+
+/// Older versions of COLMAP wrote records in any order.
+#[test]
+fn binary_records_come_in_any_order_but_once() {
+    let mut model = small();
+    model.points.clear();
+    for keypoint in model.images.values_mut().flat_map(|i| &mut i.keypoints) {
+        keypoint.point = None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_binary(&model, folder.path()).unwrap();
+    let [cameras, images] =
+        ["cameras.bin", "images.bin"].map(|file| fs::read(folder.path().join(file)).unwrap());
+    let with_points = |ids: [u64; 3]| {
+        let mut points = 3_u64.to_le_bytes().to_vec();
+        for id in ids {
+            points.extend(id.to_le_bytes());
+            points.extend([0; 43]);
+        }
+        parse_binary(Path::new("model"), [&cameras, &images, &points])
+    };
+    let ids: Vec<u64> = with_points([9, 4, u64::MAX - 1])
+        .unwrap()
+        .points
+        .keys()
+        .map(|id| id.0)
+        .collect();
+    assert_eq!(ids, [4, 9, u64::MAX - 1]);
+    assert_eq!(
+        with_points([9, 4, 9]).unwrap_err().to_string(),
+        format!(
+            "model/points3D.bin, point 3 of 3, byte 161: point 9 is there twice, expected \
+             once{REMEDY}"
         )
     );
 }

@@ -78,17 +78,25 @@ const ROTATION_TOLERANCE: f64 = 1e-6;
 /// The file, the frame by its index, and what is wrong with it.
 pub fn read(path: &Path) -> Result<CameraPath, PathFileError> {
     let bytes = std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))?;
+    parse(path, &bytes)
+}
+
+/// Reads the content of a file; `path` is only named in errors.
+///
+/// # Errors
+/// As for [`read`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
     let json = |e| PathFileError::Json(path.to_owned(), e);
     // The version first: a later one may have other keys.
     #[derive(Deserialize)]
     struct Version {
         version: u64,
     }
-    let Version { version } = serde_json::from_slice(&bytes).map_err(json)?;
+    let Version { version } = serde_json::from_slice(bytes).map_err(json)?;
     if version != 1 {
         return Err(PathFileError::Version(path.to_owned(), version));
     }
-    let stored: Stored = serde_json::from_slice(&bytes).map_err(json)?;
+    let stored: Stored = serde_json::from_slice(bytes).map_err(json)?;
     debug_assert_eq!(stored.version, version);
 
     let camera_path = match (stored.frames, stored.keyframes) {

@@ -3,7 +3,7 @@
 mod file;
 mod spline;
 
-pub use file::{PathFileError, read, write};
+pub use file::{PathFileError, parse, read, write};
 pub(crate) use spline::{Curve, mean_rotation};
 
 use calibrate::{Camera, CameraError, ModelKind, Rigid3, View};

@@ -1,0 +1,20 @@
+//! The three files together; or one of them, the first byte says which, with the other
+//! two of a model that is whole.
+#![no_main]
+use calibrate::colmap::parse_binary;
+use libfuzzer_sys::fuzz_target;
+use lumigraph_fuzz::{model, reconstruction, three};
+use std::path::Path;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((&which, data)) = data.split_first() else {
+        return;
+    };
+    let whole = model::binary();
+    let mut files = whole.each_ref().map(Vec::as_slice);
+    match files.get_mut(usize::from(which)) {
+        Some(file) => *file = data,
+        None => files = three(data),
+    }
+    reconstruction(data.len(), || parse_binary(Path::new("model"), files));
+});

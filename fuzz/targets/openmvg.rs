@@ -1,0 +1,9 @@
+#![no_main]
+use calibrate::formats::parse_openmvg;
+use libfuzzer_sys::fuzz_target;
+use lumigraph_fuzz::reconstruction;
+use std::path::Path;
+
+fuzz_target!(|data: &[u8]| {
+    reconstruction(data.len(), || parse_openmvg(Path::new("file"), data));
+});
