@@ -1,5 +1,6 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
+use crate::frame::SHOULDER;
 use crate::mask::Mask;
 use crate::photos::Pyramid;
 use glam::Vec4;
@@ -12,6 +13,14 @@ pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
     let texel =
         |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
     trilinear(&photo.levels, u, v, level, texel)
+}
+
+/// [`crate::frame::exposed`] for a colour of 0…255.
+#[inline]
+pub(crate) fn exposed(color: Vec4, exposure: Vec4) -> Vec4 {
+    let white = ((1.0 - SHOULDER) as f32 * color.w).max(f32::MIN_POSITIVE);
+    let share = (Vec4::splat(color.w) - color) / white;
+    color + (exposure - 1.0) * color * share.clamp(Vec4::ZERO, Vec4::ONE)
 }
 
 /// What a mask leaves of its photo, 0…1; trilinear.
