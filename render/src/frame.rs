@@ -35,6 +35,24 @@ pub const LEVEL_BIAS: f64 = 0.25;
 /// over.
 const EXPOSURE_GRID: f64 = 16.0;
 
+/// From this stored value up to 1, colours keep more and more of themselves when a photo is
+/// brought to another exposure: cameras compress what is bright, and where light was clipped
+/// no factor says how much there was. Of 0, 0.25, 0.5, 0.7, 0.9 and 1 this is the highest at
+/// which no capture's held-out score lost 0.1 dB to matching.
+pub(crate) const SHOULDER: f64 = 0.25;
+
+/// A photo's colour, premultiplied, 0…1, brought to another exposure: red, green and blue
+/// are multiplied by a factor each. From [`SHOULDER`] on the factor fades to one, so that
+/// white stays white.
+pub(crate) fn exposed([r, g, b, alpha]: [f64; 4], exposure: [f64; 3]) -> [f64; 4] {
+    let channel = |v: f64, factor: f64| {
+        let share = (alpha - v) / ((1.0 - SHOULDER) * alpha).max(f64::MIN_POSITIVE);
+        v + (factor - 1.0) * v * share.clamp(0.0, 1.0)
+    };
+    let [x, y, z] = exposure;
+    [channel(r, x), channel(g, y), channel(b, z), alpha]
+}
+
 /// A source view, relative to the desired one.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameSource {
@@ -52,7 +70,8 @@ pub struct FrameSource {
     pub footprint_ratio: f64,
     /// Pixels from the border over which it fades in.
     pub feather_px: f64,
-    /// What red, green and blue are multiplied by to bring it to the frame's exposure.
+    /// What red, green and blue are multiplied by to bring it to the frame's exposure; see
+    /// [`exposed`].
     pub exposure: [f64; 3],
     /// What its time adds to its difference; infinite where it takes no part.
     pub time_penalty: f64,

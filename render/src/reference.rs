@@ -3,7 +3,7 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
-use crate::frame::{Frame, ProxyPoint};
+use crate::frame::{Frame, ProxyPoint, exposed};
 use crate::image_out::straight_rgba8;
 use crate::mask::IGNORED;
 use crate::photos::{PhotoError, Pyramid};
@@ -69,11 +69,10 @@ pub fn color_at(
         };
         let photo = frame.lumigraph.photos.get(source_idx)?;
         let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
-        let exposure = frame.sources[source_idx].exposure;
-        for c in 0..3 {
-            color[c] += weight * exposure[c] * sample[c];
+        let sample = exposed(sample, frame.sources[source_idx].exposure);
+        for c in 0..4 {
+            color[c] += weight * sample[c];
         }
-        color[3] += weight * sample[3];
     }
     Ok(color)
 }

@@ -402,7 +402,12 @@ mod tests {
             p.0 = [p.0[0] & 0xFE, p.0[1], p.0[2] & 0xFE, 255];
         }
         let s = score(&darker, &even).unwrap();
-        assert!(s.psnr < 15.0, "{}", s.psnr);
+        // Red and blue are off by as much as they are.
+        let off = darker.pixels().map(|p| {
+            let [r, _, b, _] = p.0.map(u64::from);
+            r * r + b * b
+        });
+        assert_eq!(s.psnr, psnr(off.sum(), 40 * 23));
         assert_eq!(s.psnr_exposed, f64::INFINITY);
         // What is not covered has no say.
         let mut half = darker.clone();

@@ -1,6 +1,6 @@
 //! How visible it is in a frame where one photo's part ends and another's begins.
 
-use crate::frame::Frame;
+use crate::frame::{Frame, exposed};
 use crate::photos::PhotoError;
 use crate::reference::{blend_at, sample};
 use calibrate::Pixel;
@@ -53,10 +53,10 @@ fn variance(frame: &Frame<'_>, pixel: Pixel) -> Result<Option<f64>, PhotoError> 
         };
         let level = frame.level_of_detail(i, &point) + COARSER;
         let color = sample(frame.lumigraph.photos.get(i)?, at, level);
+        let color = exposed(color, frame.sources[i].exposure);
         for c in 0..3 {
-            let value = color[c] * frame.sources[i].exposure[c];
-            first[c] += weight * value;
-            second[c] += weight * value * value;
+            first[c] += weight * color[c];
+            second[c] += weight * color[c] * color[c];
         }
     }
     let of_channel = |c: usize| (second[c] - first[c] * first[c]).max(0.0);

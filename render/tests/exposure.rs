@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Shot, assert_close, between, by_all};
-use image::RgbaImage;
+use image::{Rgba, RgbaImage};
 use render::{FieldOptions, Frame, Lumigraph, Method, PhotoStore, seams};
 
 /// A gain of each channel for the photo of an index, at most one so that nothing is clipped.
@@ -21,6 +21,15 @@ fn exposed(photo: &RgbaImage, gain: [f64; 3]) -> RgbaImage {
         }
     }
     photo
+}
+
+/// The wall in light so poor that no photo's values reach the shoulder.
+fn dim_wall() -> Shot {
+    let mut shot = Shot::of("wall", 9, None);
+    for photo in &mut shot.photos {
+        *photo = exposed(photo, [0.25; 3]);
+    }
+    shot
 }
 
 /// The same places photographed with each photo's own gain, which is known if `known`.
@@ -48,7 +57,7 @@ fn pictures(frame: &Frame<'_>) -> Vec<(&'static str, RgbaImage)> {
 
 #[test]
 fn a_frame_is_as_if_all_photos_had_its_exposure() {
-    let shot = Shot::of("wall", 9, None);
+    let shot = dim_wall();
     let (plain, known) = (shot.lumigraph(), altered(&shot, true));
     let options = FieldOptions::default();
     for share in [0.1, 0.5] {
@@ -88,16 +97,48 @@ fn at_a_photos_own_place_its_exposure_is_kept() {
     }
 }
 
+/// All photos in one colour.
+fn plain_wall(color: Rgba<u8>) -> Shot {
+    let mut shot = Shot::of("wall", 9, None);
+    for photo in &mut shot.photos {
+        photo.pixels_mut().for_each(|pixel| *pixel = color);
+    }
+    shot
+}
+
 #[test]
 fn seams_go_where_gains_are_known() {
-    let shot = Shot::of("wall", 9, None);
-    let desired = between(&shot.views[3], &shot.views[4], 0.5);
-    let of = |lumigraph: &Lumigraph| {
-        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+    let seams_of = |shot: &Shot, lumigraph: &Lumigraph| {
+        let desired = between(&shot.views[3], &shot.views[4], 0.5);
+        let frame = Frame::new(lumigraph, desired, FieldOptions::default());
         seams(&frame).unwrap().unwrap()
     };
+    // Without details nothing but exposure is left to differ.
+    let shot = plain_wall(Rgba([60, 60, 60, 255]));
+    let of = |lumigraph: &Lumigraph| seams_of(&shot, lumigraph);
     let plain = of(&shot.lumigraph());
     let (known, unknown) = (of(&altered(&shot, true)), of(&altered(&shot, false)));
-    assert!(plain < 1.0 && known < 1.0, "{plain}, {known}");
+    assert!(plain < 1e-4 && known < 0.5, "{plain}, {known}");
     assert!(unknown > 5.0 * known, "{unknown}, {known}");
+    // With them, what is left is what they leave between photos of one exposure.
+    let shot = dim_wall();
+    let of = |lumigraph: &Lumigraph| seams_of(&shot, lumigraph);
+    let (plain, known) = (of(&shot.lumigraph()), of(&altered(&shot, true)));
+    assert!(known < plain + 0.1, "{known}, {plain}");
+}
+
+#[test]
+fn white_stays_white() {
+    let shot = plain_wall(Rgba([255; 4]));
+    let mut lumigraph = shot.lumigraph();
+    let sources = lumigraph.sources.iter_mut().enumerate();
+    sources.for_each(|(i, source)| source.gain = gain(i));
+    let desired = between(&shot.views[3], &shot.views[4], 0.5);
+    let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+    assert!(frame.exposures_differ());
+    for (what, picture) in pictures(&frame) {
+        let seen = picture.pixels().filter(|p| p.0[3] == 255);
+        assert!(seen.clone().count() > 10_000, "{what}");
+        assert!(seen.into_iter().all(|p| p.0 == [255; 4]), "{what}");
+    }
 }

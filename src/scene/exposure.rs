@@ -1,10 +1,11 @@
 //! The photos' gains.
 
 use super::file::{ExposureEntry, Extra};
-use super::{Scene, Warning};
+use super::{Photo, Scene, Warning};
 use calibrate::exposure::{self, Verdict};
+use capture::{CaptureError, apply_matte};
+use image::RgbaImage;
 use std::collections::BTreeSet;
-use std::path::Path;
 
 /// What matching the exposures of a scene's photos has found.
 #[derive(Clone, Debug)]
@@ -26,9 +27,10 @@ impl Scene {
         let rest = self.reconstruction.without_images(without);
         let used = || self.photos.iter().filter(|p| !without.contains(&p.name));
         let names: Vec<&str> = used().map(|p| p.name.as_str()).collect();
-        let files: Vec<&Path> = used().map(|p| p.path.as_path()).collect();
+        let photos: Vec<&Photo> = used().collect();
         let patches = exposure::patches(&rest, &names);
-        let (observations, failed) = exposure::sample_files(&files, &patches);
+        let (observations, failed) =
+            exposure::sample_all(&patches, |idx| self.what_counts(photos[idx]));
         let matched = exposure::estimate(names.len(), &patches.points_in_world, &observations);
 
         let warnings = failed.into_iter().map(|(idx, error)| Warning::LeftOut {
@@ -52,6 +54,20 @@ impl Scene {
             verdict: matched.verdict,
             warnings,
         }
+    }
+
+    /// A photo's pixels, transparent where its matte or its ignore mask says so.
+    fn what_counts(&self, photo: &Photo) -> Result<RgbaImage, CaptureError> {
+        let mut images = self.reconstruction.images.values();
+        let image = images.find(|image| image.name == photo.name);
+        let image = image.expect("only photos with a pose see points");
+        let camera = &self.reconstruction.cameras[&image.camera_id];
+        let size = (camera.width, camera.height);
+        let mut pixels = photo.decode(size)?;
+        if let Some(mask) = photo.decode_ignore_mask(size)? {
+            apply_matte(&mut pixels, &mask);
+        }
+        Ok(pixels)
     }
 
     /// Whether the scene's gains rest on none of the photos of the given names: they were

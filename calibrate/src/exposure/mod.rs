@@ -16,7 +16,7 @@ mod sample;
 mod solve;
 
 pub use estimate::{Evidence, Exposure, MIN_SPREAD, Verdict, estimate};
-pub use sample::{Patch, Patches, patches, sample, sample_files};
+pub use sample::{Patch, Patches, patches, sample, sample_all};
 
 /// What one photo shows of one sparse point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,6 @@ use glam::DVec3;
 use image::RgbaImage;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Where in a photo a sparse point is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,15 +148,16 @@ fn mean_color(photo: &RgbaImage, patch: &Patch) -> Option<[Option<f64>; 3]> {
     }))
 }
 
-/// [`sample`] for photos in files, several at a time, each forgotten once looked at. Those
-/// without patches are not opened. With it come the photos that cannot be decoded.
-pub fn sample_files(
-    files: &[&Path],
+/// [`sample`] for every photo, several at a time, each forgotten once looked at; `decode`
+/// gives a photo's pixels by its index. Those without patches are not asked for. With it
+/// come the photos that cannot be decoded.
+pub fn sample_all(
     patches: &Patches,
+    decode: impl Fn(usize) -> Result<RgbaImage, CaptureError> + Sync,
 ) -> (Vec<Observation>, Vec<(usize, CaptureError)>) {
     let look = |(idx, of_photo): (usize, &Vec<Patch>)| match of_photo.as_slice() {
         [] => Ok(Vec::new()),
-        some => capture::decode(files[idx], None).map(|photo| sample(&photo, idx, some)),
+        some => decode(idx).map(|photo| sample(&photo, idx, some)),
     };
     let looked: Vec<Result<Vec<Observation>, CaptureError>> =
         patches.of_photo.par_iter().enumerate().map(look).collect();

@@ -127,8 +127,7 @@ pub(crate) fn parse(sample: Sample, bytes: &[u8]) -> Result<Reconstruction, Stri
             let calibration = read.map_err(|e| e.to_string())?;
             let count = calibration.photo_poses().len();
             let names: Vec<String> = (0..count).map(|i| format!("{i}.jpg")).collect();
-            let whole = calibration.reconstruction(&names, (640, 480));
-            return whole.map_err(|e| e.to_string());
+            return Ok(calibration.reconstruction(&names, (640, 480)));
         }
     };
     whole.map_err(|e| e.to_string())

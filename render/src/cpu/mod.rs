@@ -278,7 +278,7 @@ impl<'a> Engine<'a> {
                 let w = weight[k];
                 if w > 0.0 {
                     let sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
-                    color[k] += sample * (exposure * w);
+                    color[k] += shade::exposed(sample, exposure) * w;
                     sum[k] += w;
                 }
             }

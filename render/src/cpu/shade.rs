@@ -14,6 +14,14 @@ pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
     trilinear(&photo.levels, u, v, level, texel)
 }
 
+/// [`crate::frame::exposed`] for a colour of 0…255.
+#[inline]
+pub(crate) fn exposed(color: Vec4, exposure: Vec4) -> Vec4 {
+    let white = ((1.0 - SHOULDER) as f32 * color.w).max(f32::MIN_POSITIVE);
+    let share = (Vec4::splat(color.w) - color) / white;
+    color + (exposure - 1.0) * color * share.clamp(Vec4::ZERO, Vec4::ONE)
+}
+
 /// What a mask leaves of its photo, 0…1; trilinear.
 #[inline]
 pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {

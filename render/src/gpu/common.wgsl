@@ -31,6 +31,8 @@ struct Params {
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
 const CONTRIBUTORS = 16u;
 const SAME_RAY: f32 = 1e-12;
+// SHOULDER of frame.rs.
+const SHOULDER: f32 = 0.25;
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 const INFINITY: f32 = 3e38;
 
@@ -434,9 +436,16 @@ struct Mix {
     sum: f32,
 }
 
+// The frame's exposure: multiplied, but for what is clipped; see `exposed` in frame.rs.
+fn exposed(color: vec4f, exposure: vec4f) -> vec4f {
+    let white = max(color.a, 1e-9);
+    let share = clamp((color.a - color) / ((1.0 - SHOULDER) * white), vec4f(0.0), vec4f(1.0));
+    return color + (exposure - 1.0) * color * share;
+}
+
 fn add(mix: ptr<function, Mix>, weight: f32, color: vec4f, source_idx: u32) {
     if params.exposures_differ == 1u {
-        (*mix).color += weight * source_data(source_idx, EXPOSURE) * color;
+        (*mix).color += weight * exposed(color, source_data(source_idx, EXPOSURE));
     } else {
         (*mix).color += weight * color;
     }
