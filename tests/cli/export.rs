@@ -137,6 +137,8 @@ fn an_undistorted_scene_holds_its_photos() {
     assert_eq!(scene["photos"][8]["path"], "images/0008.png");
     assert_eq!(scene["photos"][8]["original"], "0008.jpg");
     assert!(scene["photos"][0].get("original").is_none());
+    assert_eq!(scene["photos"][8]["depth_map"], "depth/0008.png.png");
+    assert_eq!(scene["photos"][8]["depth_scale"], 0.001);
     assert_eq!(scene["settings"]["undistorted"], true);
     let flat = model(&folder, "flat/model");
     let camera = flat.cameras.values().next().unwrap();
