@@ -38,9 +38,11 @@ fn through_a_fisheye() -> Dataset {
     shelf
 }
 
-fn psnr(folder: &Path, line: &str) -> f64 {
-    let result = lumigraph(folder, line).ok().json();
-    result["mean"]["psnr_covered"].as_f64().unwrap()
+/// Of views of held-out photos, where their photos show something.
+fn psnr(folder: &Path, scene: &str, key: &str) -> f64 {
+    let line = format!("evaluate {scene} --proxy plane --json");
+    let result = lumigraph(folder, &line).ok().json();
+    result["mean"][key].as_f64().unwrap()
 }
 
 #[test]
@@ -84,6 +86,10 @@ fn a_fisheyes_photos_masks_and_depth_become_a_pinholes() {
         let share = ignored as f64 / mask.len() as f64;
         let psnr = render::score::score(&picture, &truth).unwrap().psnr;
         println!("{}: {psnr:.2} dB, {share:.3} ignored", photo.name);
+        // Measured 34.5 to 34.8 dB, and 37.4 where a third is ignored.
+        assert!(psnr > 33.5, "{}: {psnr} dB", photo.name);
+        let expected = if photo.name == "0003.png" { 0.63 } else { 0.39 };
+        assert!((share - expected).abs() < 0.02, "{}: {share}", photo.name);
 
         // 2. Its depth, but where a step is nearer than half a pixel.
         let depth = open(&entry["depth_map"]).into_luma16();
@@ -98,15 +104,13 @@ fn a_fisheyes_photos_masks_and_depth_become_a_pinholes() {
             }
         }
         let (known, close) = (known as f64, close as f64);
-        println!(
-            "{:.3} of depths are known, {:.4} of them right",
-            known / depth.len() as f64,
-            close / known
-        );
+        // All that is used is known, and 99.3 % or more right.
+        assert!(known / depth.len() as f64 > 0.98 * (1.0 - share));
+        assert!(close / known > 0.985, "{}: {close} of {known}", photo.name);
     }
 
-    // 3. Views are as good.
-    for line in ["evaluate shelf --json", "evaluate flat --json"] {
-        println!("{line}: {:.2} dB", psnr(folder.path(), line));
-    }
+    // 3. Views are as good, though of less.
+    let original = psnr(folder.path(), "shelf", "psnr_covered");
+    let undistorted = psnr(folder.path(), "flat", "psnr_masked");
+    println!("views: {original:.2} dB, undistorted {undistorted:.2} dB");
 }
