@@ -47,20 +47,21 @@ fn the_kernel_beats_bilinear_and_a_cubic_is_enough() {
         height: 360,
         params: params.to_vec(),
     };
+    // Measured: bilinear 35.51 and 32.32 dB, cubic 36.90 and 33.10, Lanczos 37.26 and 33.29.
     for (camera, at_least) in [
         (
             lens(
                 ModelKind::OpenCv,
                 &[460.0, 460.0, 236.0, 182.0, -0.2, 0.03, 1e-3, -1e-3],
             ),
-            0.5,
+            1.1,
         ),
         (
             lens(
                 ModelKind::OpenCvFisheye,
                 &[300.0, 300.0, 240.0, 180.0, 0.02, -0.01, 0.0, 0.0],
             ),
-            0.5,
+            0.6,
         ),
     ] {
         let kernels = [Kernel::Bilinear, Kernel::CatmullRom, Kernel::Lanczos3];

@@ -1,6 +1,6 @@
 //! What is exported reads back the same.
 
-use calibrate::export::{ExportError, FrameFiles, opencv_yaml, transforms_json};
+use calibrate::export::{ExportError, FrameFiles, check_colmap, opencv_yaml, transforms_json};
 use calibrate::formats::read_transforms;
 use calibrate::opencv::{Keys, read_calibration};
 use calibrate::{
@@ -47,6 +47,21 @@ fn fisheyes() -> Vec<Camera> {
         camera(SimpleRadialFisheye, &[0.02]),
         camera(RadialFisheye, &[0.02, -0.003]),
         camera(OpenCvFisheye, &[0.02, -0.003, 1e-4, -1e-5]),
+    ]
+}
+
+/// What OpenCV alone has: 12 coefficients, 14, a skewed fisheye.
+fn opencvs_own() -> Vec<Camera> {
+    use ModelKind::*;
+    let rational = [0.1, -0.2, 1e-3, -2e-4, 0.03, 0.0, 0.0, 0.0];
+    let prisms = [1e-3, -2e-3, 3e-4, 1e-4];
+    vec![
+        camera(OpenCvTilted, &[&rational[..], &prisms, &[0.0; 2]].concat()),
+        camera(
+            OpenCvTilted,
+            &[&rational[..], &[0.0; 4], &[0.05, -0.02]].concat(),
+        ),
+        camera(OpenCvSkewedFisheye, &[0.02, -0.003, 1e-4, -1e-5, 0.01]),
     ]
 }
 
@@ -151,6 +166,50 @@ proptest! {
 }
 
 #[test]
+fn opencvs_own_lenses_read_back_from_its_files() {
+    for (camera, rows, skew) in [
+        (&opencvs_own()[0], 12, "0.0"),
+        (&opencvs_own()[1], 14, "0.0"),
+        (&opencvs_own()[2], 4, "5.173"),
+    ] {
+        let whole = reconstruction(std::slice::from_ref(camera), &[Rigid3::IDENTITY; 2]);
+        assert_same(&through_opencv(&whole), &whole);
+        let text = opencv_yaml(&whole, &|image| image.name.clone()).unwrap();
+        let shape = format!("distortion_coefficients: !!opencv-matrix\n   rows: {rows}\n");
+        assert!(text.contains(&shape), "{text}");
+        assert!(
+            text.contains(&format!("data: [ 517.3000000001, {skew}")),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn colmap_lacks_some_models() {
+    let check = |camera: &Camera| {
+        let whole = reconstruction(std::slice::from_ref(camera), &[Rigid3::IDENTITY; 2]);
+        check_colmap(&whole).map_err(|error| error.to_string())
+    };
+    for camera in [expressible(), fisheyes()].concat() {
+        assert_eq!(check(&camera), Ok(()));
+    }
+    let refused = |model: &str, remedy: &str| {
+        Err(format!(
+            "camera 3 is {model}, which COLMAP cannot express; import the photos with \
+             --undistort and export that scene{remedy}"
+        ))
+    };
+    let [_, tilted, skewed] = &opencvs_own()[..] else {
+        panic!("three cameras");
+    };
+    let as_opencv = ", or export as opencv";
+    assert_eq!(check(tilted), refused("OPENCV_TILTED", as_opencv));
+    assert_eq!(check(skewed), refused("OPENCV_SKEWED_FISHEYE", as_opencv));
+    let inverse = camera(ModelKind::InverseRadial, &[-0.1]);
+    assert_eq!(check(&inverse), refused("INVERSE_RADIAL", ""));
+}
+
+#[test]
 fn a_transforms_file_holds_many_cameras() {
     let poses: Vec<Rigid3> = (0..7)
         .map(|i| Rigid3::new(DQuat::from_rotation_y(0.1 * f64::from(i)), DVec3::X))
@@ -236,6 +295,24 @@ fn what_cannot_be_expressed_is_named() {
              cannot express; {remedy}"
         )
     );
+    let only_opencv = "import the photos with --undistort and export that scene, or export as \
+                       opencv";
+    for (camera, what) in [
+        (
+            &opencvs_own()[0],
+            "OPENCV_TILTED with thin prisms or a tilted sensor",
+        ),
+        (
+            &opencvs_own()[1],
+            "OPENCV_TILTED with thin prisms or a tilted sensor",
+        ),
+        (&opencvs_own()[2], "OPENCV_SKEWED_FISHEYE with skew"),
+    ] {
+        assert_eq!(
+            transforms(std::slice::from_ref(camera)),
+            format!("camera 3 is {what}, which transforms.json cannot express; {only_opencv}")
+        );
+    }
     let whole = one(std::slice::from_ref(&rational));
     assert_same(&through_opencv(&whole), &whole);
 

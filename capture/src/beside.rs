@@ -2,7 +2,9 @@
 
 use crate::decode::{format_of, read_failed};
 use crate::{CaptureError, PhotoSet, decode};
-use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, ImageReader, RgbaImage};
+use image::{
+    ColorType, DynamicImage, GrayImage, ImageBuffer, ImageDecoder, ImageReader, Luma, RgbaImage,
+};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
@@ -196,16 +198,30 @@ pub fn decode_depth(
     photo_size: (u32, u32),
     units_per_step: f64,
 ) -> Result<DepthMap, CaptureError> {
-    let picture = decode_beside(Beside::DepthMap, path, photo, photo_size)?;
-    check_depth_format(path, picture.color())?;
     let (width, height) = photo_size;
-    let steps = picture.into_luma16().into_raw().into_iter();
-    let depths = steps.map(|steps| (f64::from(steps) * units_per_step) as f32);
+    let steps = decode_depth_steps(path, photo, photo_size)?.into_raw();
+    let depths = steps
+        .into_iter()
+        .map(|steps| (f64::from(steps) * units_per_step) as f32);
     Ok(DepthMap {
         width,
         height,
         depths: depths.collect(),
     })
+}
+
+/// Decodes a depth map's values as they are stored: see [`decode_depth`].
+///
+/// # Errors
+/// As for [`decode_depth`].
+pub fn decode_depth_steps(
+    path: &Path,
+    photo: &str,
+    photo_size: (u32, u32),
+) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, CaptureError> {
+    let picture = decode_beside(Beside::DepthMap, path, photo, photo_size)?;
+    check_depth_format(path, picture.color())?;
+    Ok(picture.into_luma16())
 }
 
 fn decode_beside(

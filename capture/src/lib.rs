@@ -21,7 +21,8 @@ mod warp;
 mod write;
 
 pub use beside::{
-    Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_mask, match_by_name,
+    Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_depth_steps,
+    decode_mask, match_by_name,
 };
 pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
@@ -34,5 +35,5 @@ pub use times::{
     times_of_names,
 };
 pub use tool::{Tool, ToolError, fingerprint};
-pub use warp::{Footprint, Kernel, warp};
-pub use write::{copy_photo, write_mask, write_png};
+pub use warp::{Footprint, Kernel, warp, warp_depth_steps};
+pub use write::{copy_photo, write_depth_steps, write_mask, write_png};

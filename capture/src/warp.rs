@@ -1,4 +1,4 @@
-use image::{Rgba, RgbaImage};
+use image::{ImageBuffer, Luma, Rgba, RgbaImage};
 
 /// Where a pixel of a warped picture comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +90,21 @@ pub fn warp(
             return Rgba([0; 4]);
         }
         Rgba([byte(r / a), byte(g / a), byte(b / a), byte(a)])
+    })
+}
+
+/// A depth map resampled as [`warp`] does a picture, by the nearest pixel: depths in between
+/// would be those of neither surface. 0, unknown, where `footprint_of` is nowhere.
+pub fn warp_depth_steps(
+    source: &ImageBuffer<Luma<u16>, Vec<u16>>,
+    (width, height): (u32, u32),
+    footprint_of: impl Fn(u32, u32) -> Option<Footprint>,
+) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    ImageBuffer::from_fn(width, height, |column, row| {
+        footprint_of(column, row).map_or(Luma([0]), |Footprint { center: [x, y], .. }| {
+            let index = |place: f64, side: u32| place.clamp(0.0, f64::from(side - 1)) as u32;
+            *source.get_pixel(index(x, source.width()), index(y, source.height()))
+        })
     })
 }
 
@@ -198,6 +213,20 @@ mod tests {
             assert!((127..=128).contains(&edge[3]), "{kernel:?}");
             assert_eq!(moved.get_pixel(1, 1).0, [0; 4]);
         }
+    }
+
+    #[test]
+    fn depth_is_of_the_nearest_pixel() {
+        let source = ImageBuffer::from_fn(4, 3, |x, y| Luma([(1000 * x + 60_000 * y) as u16]));
+        let same = warp_depth_steps(&source, (4, 3), stretched(1.0, 0.0));
+        assert_eq!(same, source);
+        for shift in [1.49, 0.51] {
+            let moved = warp_depth_steps(&source, (4, 3), stretched(1.0, shift));
+            assert_eq!(moved.get_pixel(1, 0), source.get_pixel(2, 1), "{shift}");
+            assert_eq!(moved.get_pixel(3, 2), source.get_pixel(3, 2), "{shift}");
+        }
+        let nowhere = warp_depth_steps(&source, (2, 1), |_, _| None);
+        assert!(nowhere.pixels().all(|p| p.0 == [0]));
     }
 
     #[test]

@@ -1,6 +1,8 @@
 use crate::CaptureError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbaImage};
+use image::{
+    EncodableLayout, GrayImage, ImageBuffer, Luma, PixelWithColorType, Primitive, RgbaImage,
+};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -12,14 +14,7 @@ use std::path::Path;
 /// # Errors
 /// A file or folder that cannot be written.
 pub fn write_png(path: &Path, image: &RgbaImage) -> Result<(), CaptureError> {
-    write(path, |temporary| {
-        encode(
-            temporary,
-            image,
-            image.dimensions(),
-            ExtendedColorType::Rgba8,
-        )
-    })
+    write(path, |temporary| encode(temporary, image))
 }
 
 /// [`write_png`] for a mask, which has one channel.
@@ -27,9 +22,18 @@ pub fn write_png(path: &Path, image: &RgbaImage) -> Result<(), CaptureError> {
 /// # Errors
 /// As [`write_png`].
 pub fn write_mask(path: &Path, mask: &GrayImage) -> Result<(), CaptureError> {
-    write(path, |temporary| {
-        encode(temporary, mask, mask.dimensions(), ExtendedColorType::L8)
-    })
+    write(path, |temporary| encode(temporary, mask))
+}
+
+/// [`write_png`] for a depth map's steps, which have 16 bits.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_depth_steps(
+    path: &Path,
+    steps: &ImageBuffer<Luma<u16>, Vec<u16>>,
+) -> Result<(), CaptureError> {
+    write(path, |temporary| encode(temporary, steps))
 }
 
 /// Copies a file as it is, in the way of [`write_png`].
@@ -69,15 +73,18 @@ fn write(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), 
     })
 }
 
-fn encode(
+fn encode<S: Primitive, P: PixelWithColorType<Subpixel = S>>(
     path: &Path,
-    bytes: &[u8],
-    (width, height): (u32, u32),
-    color: ExtendedColorType,
-) -> io::Result<()> {
+    picture: &ImageBuffer<P, Vec<S>>,
+) -> io::Result<()>
+where
+    [S]: EncodableLayout,
+{
     let mut out = BufWriter::new(File::create(path)?);
-    PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(bytes, width, height, color)
+    let encoder =
+        PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive);
+    picture
+        .write_with_encoder(encoder)
         .map_err(|error| match error {
             image::ImageError::IoError(error) => error,
             other => io::Error::other(other),

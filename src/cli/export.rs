@@ -3,7 +3,7 @@
 use super::Usage;
 use super::options::SceneArgs;
 use super::output::{print, write_file};
-use calibrate::export::{FrameFiles, opencv_yaml, transforms_json};
+use calibrate::export::{FrameFiles, check_colmap, opencv_yaml, transforms_json};
 use calibrate::{Image, colmap};
 use clap::ValueEnum;
 use lumigraph::scene::{Photo, Scene, relative};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// A COLMAP model is a folder; transforms.json (nerfstudio) and OpenCV's calibration are a
 /// file, which names the photos by their paths from where it lies. Photos are not copied.
 /// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
-/// all of them can.
+/// all of them can. Tilted sensors and skewed fisheyes are OpenCV's alone.
 ///
 ///     lumigraph export my-scene --format colmap -o model
 ///     lumigraph export my-scene --format transforms -o my-scene/transforms.json
@@ -54,6 +54,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let scene = args.scene.open()?;
     let whole = &scene.reconstruction;
+    if !is_file {
+        check_colmap(whole)?;
+    }
     match args.format {
         Format::Colmap => colmap::write_binary(whole, output)?,
         Format::ColmapText => colmap::write_text(whole, output)?,

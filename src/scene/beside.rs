@@ -5,9 +5,10 @@ use capture::{Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside
 use image::{GrayImage, RgbaImage};
 use std::path::{Path, PathBuf};
 
-/// Where masks and depth maps are looked for in a capture, if nobody says.
-const MASKS_FOLDER: &str = "masks";
-const DEPTH_FOLDER: &str = "depth";
+/// Where masks and depth maps are looked for in a capture, if nobody says, and where they are
+/// in a scene that was undistorted.
+pub(super) const MASKS_FOLDER: &str = "masks";
+pub(super) const DEPTH_FOLDER: &str = "depth";
 
 /// Whether a file of a capture is a mask or a depth map by its place.
 pub(super) fn is_beside(name: &str) -> bool {

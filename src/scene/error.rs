@@ -46,12 +46,6 @@ pub enum SceneError {
     /// Photos cannot be written under their names.
     #[error(transparent)]
     Name(#[from] super::NameError),
-    /// A photo with a depth map is to be undistorted.
-    #[error(
-        "photo {0} has a depth map, and depth maps are not undistorted; import without them, or \
-         without --undistort"
-    )]
-    DepthMap(String),
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),

@@ -1,8 +1,9 @@
 //! A scene's folder.
 
+use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
 use super::relative::relative;
-use super::undistort::{IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER};
+use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use proxy::Proxy;
@@ -14,10 +15,11 @@ const SCENE_FILE: &str = "scene.json";
 const MODEL_FOLDER: &str = "model";
 const PROXY_FILE: &str = "proxy.json";
 /// In the order in which they take their places: a folder without the last is no scene.
-const PARTS: [&str; 6] = [
+const PARTS: [&str; 7] = [
     IMAGES_FOLDER,
     MASKS_FOLDER,
     MATTES_FOLDER,
+    DEPTH_FOLDER,
     MODEL_FOLDER,
     PROXY_FILE,
     SCENE_FILE,
@@ -179,7 +181,7 @@ impl Scene {
         ];
         // Other photos are part of a scene only where it says that they are its own.
         if is_scene && holds_photos(folder) {
-            parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER]);
+            parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER, DEPTH_FOLDER]);
         }
         for entry in entries {
             let entry = entry.map_err(|e| io(folder, "list the folder", e))?;

@@ -1,19 +1,21 @@
 //! A scene whose photos are a pinhole's: its folder holds them, in `images/`, and in
-//! `masks/` what to ignore where a photo does not fill its picture.
+//! `masks/`, `mattes/` and `depth/` what belongs to them.
 
+use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::{Photo, Scene, SceneError, Warning, picture_files};
-use calibrate::Pixel;
 use calibrate::undistort::{Undistortion, undistort};
-use capture::{CaptureError, Footprint, Kernel, copy_photo, warp, write_mask, write_png};
-use image::{GrayImage, Luma, RgbaImage};
+use calibrate::{Camera, Pixel};
+use capture::{
+    Beside, CaptureError, Footprint, Kernel, copy_photo, decode_depth_steps, warp,
+    warp_depth_steps, write_depth_steps, write_mask, write_png,
+};
+use image::{DynamicImage, GrayImage, Luma};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Photos, in a scene that was undistorted.
 pub(super) const IMAGES_FOLDER: &str = "images";
-/// Ignore masks, in a scene that was undistorted.
-pub(super) const MASKS_FOLDER: &str = "masks";
 /// Silhouettes, in a scene that was undistorted.
 pub(super) const MATTES_FOLDER: &str = "mattes";
 /// Sharper than a tent, and computed without a transcendental function, so that every machine
@@ -27,12 +29,15 @@ impl Scene {
     /// A pinhole's photos are copied as they are. All others become PNG files of the size that
     /// [`calibrate::undistort`] chooses, their names' extension replaced; [`Photo::original`]
     /// is what they were called. Masks and mattes are undistorted likewise, as
-    /// `masks/NAME.png` and `mattes/NAME.png`. `progress` is called after each photo.
+    /// `masks/NAME.png` and `mattes/NAME.png`, and depth maps by their nearest pixels, as
+    /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z.
+    /// Where a photo does not fill its picture, that is ignored. `progress` is called after
+    /// each photo.
     ///
     /// # Errors
     /// As [`Scene::save`]; a camera that has no undistorted picture; two photos that would
-    /// have one name; a depth map. A photo that cannot be decoded is left out, or with
-    /// `strict` an error, as at the import.
+    /// have one name. A photo that cannot be decoded, or what lies beside it, is left out, or
+    /// with `strict` an error, as at the import.
     pub fn save_undistorted(
         &mut self,
         folder: &Path,
@@ -42,9 +47,6 @@ impl Scene {
     ) -> Result<Vec<Warning>, SceneError> {
         Self::check_free(folder, replace)?;
         let (reconstruction, undistortions) = undistort(&self.reconstruction)?;
-        if let Some(photo) = self.photos.iter().find(|p| p.depth_map.is_some()) {
-            return Err(SceneError::DepthMap(photo.name.clone()));
-        }
         let cameras: BTreeMap<&str, &Undistortion> = self
             .images_by_name()
             .into_iter()
@@ -81,6 +83,7 @@ impl Scene {
                         path,
                         ignore_mask,
                         object_matte,
+                        depth_map,
                         ..
                     }) => {
                         let there = |file: PathBuf| folder.join(file);
@@ -91,6 +94,7 @@ impl Scene {
                         photo.path = there(path);
                         photo.ignore_mask = ignore_mask.map(there);
                         photo.object_matte = object_matte.map(there);
+                        photo.depth_map = depth_map.map(there);
                         photo.name = name;
                     }
                     Err(error @ CaptureError::Write { .. }) => return Err(error.into()),
@@ -117,8 +121,8 @@ impl Scene {
     }
 }
 
-/// Writes a photo without distortion, and its masks, into the scene's folder. What comes back
-/// has the new name, and paths from that folder.
+/// Writes a photo without distortion, and what lies beside it, into the scene's folder. What
+/// comes back has the new name, and paths from that folder.
 fn write_photo(
     photo: &Photo,
     undistortion: &Undistortion,
@@ -126,52 +130,70 @@ fn write_photo(
     folder: &Path,
 ) -> Result<Photo, CaptureError> {
     let file = Path::new(IMAGES_FOLDER).join(new_name);
-    let size = {
-        let camera = undistortion.camera();
-        (camera.width, camera.height)
-    };
+    let Camera { width, height, .. } = undistortion.camera();
+    let size = (width, height);
     let footprint_of = |column, row| footprint(undistortion, column, row);
+
+    // 1. The photo. One that stays is decoded, too, so that a damaged one is found now.
+    let picture = capture::decode(&photo.path, undistortion.is_identity().then_some(size))?;
+    let photo_size = picture.dimensions();
     if undistortion.is_identity() {
-        // Decoded, so that a damaged one is found now.
-        capture::decode(&photo.path, Some(size))?;
         copy_photo(&photo.path, &folder.join(&file))?;
     } else {
-        let picture = capture::decode(&photo.path, None)?;
         let picture = warp(&picture, size, KERNEL, footprint_of);
         write_png(&folder.join(&file), &picture)?;
     }
 
-    // What to ignore: what was, and what the photo does not fill.
-    let mut name = new_name.as_os_str().to_owned();
-    name.push(".png");
-    let warped = |mask: &Path| -> Result<GrayImage, CaptureError> {
-        let mask: RgbaImage = capture::decode(mask, None)?;
-        let mask = warp(&mask, size, KERNEL, footprint_of);
-        Ok(image::DynamicImage::from(mask).into_luma8())
+    // 2. What lies beside it, named after it.
+    let beside = |folder_name: &str| {
+        let mut name = new_name.as_os_str().to_owned();
+        name.push(".png");
+        Path::new(folder_name).join(name)
     };
-    let ignored = match &photo.ignore_mask {
-        Some(mask) => Some(warped(mask)?),
-        None if undistortion.is_filled() => None,
-        None => Some(GrayImage::from_fn(size.0, size.1, |column, row| {
-            Luma([if footprint_of(column, row).is_some() {
-                255
-            } else {
-                0
-            }])
-        })),
+    let warped = |mask: GrayImage| {
+        let mask = DynamicImage::from(mask).into_rgba8();
+        DynamicImage::from(warp(&mask, size, KERNEL, footprint_of)).into_luma8()
     };
     let written = |folder_name: &str, mask: Option<GrayImage>| {
         let Some(mask) = mask else { return Ok(None) };
-        let file = Path::new(folder_name).join(&name);
+        let file = beside(folder_name);
         write_mask(&folder.join(&file), &mask)?;
         Ok(Some(file))
     };
-    let matte = photo.object_matte.as_deref().map(warped).transpose()?;
+    // To ignore: what was, and what the photo does not fill.
+    let ignored = match photo.decode_ignore_mask(photo_size)? {
+        None if undistortion.is_filled() => None,
+        Some(mask) => Some(warped(mask)),
+        None => Some(warped(GrayImage::from_pixel(
+            photo_size.0,
+            photo_size.1,
+            Luma([255]),
+        ))),
+    };
+    let matte = match &photo.object_matte {
+        Some(path) => {
+            let kind = Beside::ObjectMatte;
+            let matte = capture::decode_mask(kind, path, &photo.name, photo_size)?;
+            Some(warped(matte))
+        }
+        None => None,
+    };
+    let depth_map = match &photo.depth_map {
+        Some(path) => {
+            let steps = decode_depth_steps(path, &photo.name, photo_size)?;
+            let file = beside(DEPTH_FOLDER);
+            let steps = warp_depth_steps(&steps, size, footprint_of);
+            write_depth_steps(&folder.join(&file), &steps)?;
+            Some(file)
+        }
+        None => None,
+    };
     Ok(Photo {
         name: slashed(new_name),
         path: file,
         ignore_mask: written(MASKS_FOLDER, ignored)?,
         object_matte: written(MATTES_FOLDER, matte)?,
+        depth_map,
         ..photo.clone()
     })
 }

@@ -240,6 +240,18 @@ fn a_scene_without_points_says_how_to_go_on() {
     }
     fs::remove_dir_all(wall.join("sparse")).unwrap();
     calibrate::colmap::write_text(&model, &wall.join("sparse/0")).unwrap();
+    // The cameras look at something.
+    let ran = lumigraph(folder.path(), "evaluate wall").ok();
+    assert!(
+        ran.stderr.contains("the optical axes of 7 photos"),
+        "{}",
+        ran.stderr
+    );
+    // Side by side they tell no distance.
+    for image in model.images.values_mut() {
+        image.camera_from_world.rotation = glam::DQuat::IDENTITY;
+    }
+    calibrate::colmap::write_text(&model, &wall.join("sparse/0")).unwrap();
     let error = lumigraph(folder.path(), "evaluate wall").error(1);
     assert!(error.contains("proxy SCENE plane --point"), "{error}");
     let by_hand = "proxy wall plane --point 0,0,2 --normal 0,0,1 -o p.json";

@@ -17,3 +17,4 @@ mod run;
 mod scene;
 mod time;
 mod uncalibrated;
+mod undistort;

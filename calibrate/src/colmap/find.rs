@@ -2,7 +2,7 @@ use super::{ColmapError, Format, Incomplete};
 use std::path::{Path, PathBuf};
 
 /// The folder that holds a capture's COLMAP model: the first of `sparse/0`, `sparse`,
-/// `dense/sparse`, `model` and `folder` itself with all three files, binary or text.
+/// `dense/sparse`, `model`, `folder` itself and its `0` with all three files, binary or text.
 ///
 /// # Errors
 /// No such folder, or no model in any of those places.
@@ -18,6 +18,7 @@ pub fn find_model(folder: &Path) -> Result<PathBuf, ColmapError> {
         folder.join("dense").join("sparse"),
         folder.join("model"),
         folder.to_owned(),
+        folder.join("0"),
     ];
     places
         .iter()

@@ -1,18 +1,18 @@
-use crate::CameraError;
+use crate::{CameraError, ModelKind};
 
 /// Why a reconstruction cannot be said in another program's format.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExportError {
     /// A lens that the format lacks.
     #[error(
-        "camera {camera_id} is {model}{what}, which {format} cannot express; import the photos \
-         with --undistort and export that scene, or export as colmap"
+        "camera {camera_id} is {}{what}, which {format} cannot express; {}",
+        model.name(), remedy(*model)
     )]
     Lens {
         /// The camera.
         camera_id: u32,
-        /// Its model, by COLMAP's name.
-        model: &'static str,
+        /// Its model.
+        model: ModelKind,
         /// What about it, beginning with a blank; empty: all of it.
         what: &'static str,
         /// The format.
@@ -51,4 +51,18 @@ pub enum ExportError {
     /// There is nothing to export.
     #[error("the reconstruction has no images; there is nothing to export")]
     NoImages,
+}
+
+/// What to do about a model that some format lacks.
+fn remedy(model: ModelKind) -> &'static str {
+    match model {
+        ModelKind::Equirectangular => "export as colmap, or cut the panoramas into views first",
+        ModelKind::OpenCvTilted | ModelKind::OpenCvSkewedFisheye => {
+            "import the photos with --undistort and export that scene, or export as opencv"
+        }
+        _ if model.colmap_id().is_some() => {
+            "import the photos with --undistort and export that scene, or export as colmap"
+        }
+        _ => "import the photos with --undistort and export that scene",
+    }
 }

@@ -1,14 +1,19 @@
 //! COLMAP's models as OpenCV's, where they are the same lens.
 
 use super::ExportError;
-use crate::{Camera, CameraId, Distortion, Lens};
+use crate::{Camera, CameraId, Distortion, Lens, Reconstruction};
 
 /// What OpenCV's two models have in common with ours.
 pub(super) enum Terms {
-    /// k₁ … k₆ and p₁, p₂; all zero for a pinhole.
-    Standard { k: [f64; 6], p: [f64; 2] },
-    /// The fisheye's polynomial.
-    Fisheye { k: [f64; 4] },
+    /// As [`Distortion::Tilted`]'s; all zero for a pinhole.
+    Standard {
+        k: [f64; 6],
+        p: [f64; 2],
+        s: [f64; 4],
+        tau: [f64; 2],
+    },
+    /// As [`Distortion::SkewedFisheye`]'s.
+    Fisheye { k: [f64; 4], alpha: f64 },
 }
 
 /// A camera's lens and its terms in OpenCV's model.
@@ -24,13 +29,18 @@ pub(super) fn terms(
         camera_id: id.0,
         source,
     })?;
+    let flat = |k, p| Terms::Standard {
+        k,
+        p,
+        s: [0.0; 4],
+        tau: [0.0; 2],
+    };
     let terms = match lens.distortion() {
-        Distortion::None => Terms::Standard {
-            k: [0.0; 6],
-            p: [0.0; 2],
-        },
-        Distortion::Rational { k, p } => Terms::Standard { k, p },
-        Distortion::Fisheye { k } => Terms::Fisheye { k },
+        Distortion::None => flat([0.0; 6], [0.0; 2]),
+        Distortion::Rational { k, p } => flat(k, p),
+        Distortion::Tilted { k, p, s, tau } => Terms::Standard { k, p, s, tau },
+        Distortion::Fisheye { k } => Terms::Fisheye { k, alpha: 0.0 },
+        Distortion::SkewedFisheye { k, alpha } => Terms::Fisheye { k, alpha },
         _ => return Err(refused(id, camera, "", format)),
     };
     Ok((lens, terms))
@@ -45,8 +55,20 @@ pub(super) fn refused(
 ) -> ExportError {
     ExportError::Lens {
         camera_id: id.0,
-        model: camera.model.name(),
+        model: camera.model,
         what,
         format,
+    }
+}
+
+/// Whether COLMAP has all cameras' models. Our own reading of its text format knows others.
+///
+/// # Errors
+/// A camera whose model COLMAP lacks.
+pub fn check_colmap(reconstruction: &Reconstruction) -> Result<(), ExportError> {
+    let lacking = |(_, camera): &(&CameraId, &Camera)| camera.model.colmap_id().is_none();
+    match reconstruction.cameras.iter().find(lacking) {
+        Some((&id, camera)) => Err(refused(id, camera, "", "COLMAP")),
+        None => Ok(()),
     }
 }

@@ -11,5 +11,6 @@ mod opencv;
 mod transforms;
 
 pub use error::ExportError;
+pub use lens::check_colmap;
 pub use opencv::opencv_yaml;
 pub use transforms::{FrameFiles, transforms_json};

@@ -29,19 +29,20 @@ pub fn opencv_yaml(
     }
     let camera = &reconstruction.cameras[&id];
     let (lens, terms) = terms(id, camera, "OpenCV's calibration file")?;
-    let (is_fisheye, coefficients) = match terms {
-        // 5 as OpenCV's own programs write them, 8 where the further ones are needed.
-        Terms::Standard { k, p } => {
-            let all = [k[0], k[1], p[0], p[1], k[2], k[3], k[4], k[5]];
-            let count = if k[3..] == [0.0; 3] { 5 } else { 8 };
-            (false, all[..count].to_vec())
+    let (is_fisheye, coefficients, skew) = match terms {
+        // 5 as OpenCV's own programs write them, more where the further ones are needed.
+        Terms::Standard { k, p, s, tau } => {
+            let all = [&k[..2], &p, &k[2..], &s, &tau].concat();
+            let is_enough = |count: &usize| all[*count..].iter().all(|term| *term == 0.0);
+            let count = [5, 8, 12].into_iter().find(is_enough).unwrap_or(14);
+            (false, all[..count].to_vec(), 0.0)
         }
-        Terms::Fisheye { k } => (true, k.to_vec()),
+        Terms::Fisheye { k, alpha } => (true, k.to_vec(), alpha * lens.focal.x),
     };
     let (focal, principal) = (lens.focal, lens.principal - 0.5);
     #[rustfmt::skip]
     let matrix = [
-        focal.x, 0.0, principal.x,
+        focal.x, skew, principal.x,
         0.0, focal.y, principal.y,
         0.0, 0.0, 1.0,
     ];

@@ -131,15 +131,22 @@ fn keys(id: CameraId, camera: &Camera) -> Result<(Kind, Map<String, Value>), Exp
             let what = " with a denominator (k4, k5, k6)";
             return Err(refused(id, camera, what, FORMAT));
         }
-        Terms::Standard { k, p } if k == [0.0; 6] && p == [0.0; 2] => Kind::Pinhole,
-        Terms::Standard { k, p } => {
+        Terms::Standard { s, tau, .. } if s != [0.0; 4] || tau != [0.0; 2] => {
+            let what = " with thin prisms or a tilted sensor";
+            return Err(refused(id, camera, what, FORMAT));
+        }
+        Terms::Fisheye { alpha, .. } if alpha != 0.0 => {
+            return Err(refused(id, camera, " with skew", FORMAT));
+        }
+        Terms::Standard { k, p, .. } if k == [0.0; 6] && p == [0.0; 2] => Kind::Pinhole,
+        Terms::Standard { k, p, .. } => {
             add(&["k1", "k2", "p1", "p2"], &[k[0], k[1], p[0], p[1]]);
             if k[2] != 0.0 {
                 add(&["k3"], &k[2..3]);
             }
             Kind::OpenCv
         }
-        Terms::Fisheye { k } => {
+        Terms::Fisheye { k, .. } => {
             add(&["k1", "k2", "k3", "k4"], &k);
             Kind::Fisheye
         }

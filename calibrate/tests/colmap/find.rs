@@ -23,7 +23,7 @@ fn no_model_says_where_it_looked_and_what_is_missing() {
     let error = find_model(root).unwrap_err().to_string();
     let expected = "ROOT: no COLMAP model here; looked for cameras, images and points3D (all \
         three as .bin or all three as .txt) in ROOT/sparse/0, ROOT/sparse, ROOT/dense/sparse, \
-        ROOT/model, ROOT; ROOT/sparse/0 lacks points3D.bin; give the folder that holds the three \
+        ROOT/model, ROOT, ROOT/0; ROOT/sparse/0 lacks points3D.bin; give the folder that holds the three \
         files, or make them with `colmap mapper` or `colmap model_converter`";
     assert_eq!(error.replace(&*root.to_string_lossy(), "ROOT"), expected);
 }
