@@ -1,5 +1,6 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
+use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
 use crate::photos::Pyramid;
 use glam::Vec4;
