@@ -3,9 +3,9 @@
 //!
 //! Photos a whole number of periods apart look alike, others do not. Two photos are
 //! compared at the same places of the surface, and only with others taken from nearby, so
-//! that what differs is time rather than viewpoint. For each candidate the pairs' differences
-//! are folded by their lags (phase dispersion minimisation, Stellingwerf 1978, with lags in
-//! the place of times).
+//! that what differs is time rather than viewpoint. For each candidate the pairs' differences,
+//! less their mean over a period of lags around, are folded by their lags (phase dispersion
+//! minimisation, Stellingwerf 1978, with lags in the place of times).
 
 use glam::DVec3;
 
@@ -72,9 +72,6 @@ const OVERSAMPLING: f64 = 8.0;
 const DEALS: u64 = 19;
 /// A period explains at least this much.
 const MIN_EXPLAINED: f64 = 0.15;
-/// Multiples of a period explain as much as it does; the shortest that explains this part of
-/// the best is it.
-const AS_GOOD: f64 = 0.85;
 
 /// Two photos.
 struct Pair {
@@ -83,7 +80,7 @@ struct Pair {
     difference: f64,
 }
 
-/// The shortest period that explains how the photos differ.
+/// The period that best explains how the photos differ.
 ///
 /// It lies between twice the typical time from photo to photo and half the whole time; the
 /// order of the photos does not matter.
@@ -136,12 +133,7 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
         largest(&scores(&dealt))
     });
     let chance = chance.fold(0.0, f64::max);
-    // The highest frequency that is as good, and there the top of its peak.
-    let as_good = (0..count).rev().find(|&i| own[i] >= AS_GOOD * best);
-    let mut at = as_good.unwrap_or(0);
-    while at > 0 && own[at - 1] > own[at] {
-        at -= 1;
-    }
+    let at = own.iter().position(|&score| score == best).unwrap_or(0);
     if best <= chance.max(MIN_EXPLAINED) {
         return Err(PeriodError::Unclear {
             best_s: 1.0 / candidates[at],
@@ -211,46 +203,92 @@ fn difference(a: &Snapshot, b: &Snapshot) -> Option<f64> {
     (count as usize >= MIN_PLACES).then(|| mean.max(f64::MIN_POSITIVE).ln())
 }
 
-/// (Lag in seconds, difference) of each pair.
-fn lags(pairs: &[Pair], times_s: &[f64]) -> Vec<(f64, f64)> {
+/// Pairs in the order of their lags.
+struct Lags {
+    /// (Lag in seconds, difference).
+    pairs: Vec<(f64, f64)>,
+    /// The sum of the differences before each pair, and of all.
+    sums: Vec<f64>,
+}
+
+fn lags(pairs: &[Pair], times_s: &[f64]) -> Lags {
     let lag = |pair: &Pair| {
         let [i, j] = pair.photos;
         ((times_s[i] - times_s[j]).abs(), pair.difference)
     };
-    pairs.iter().map(lag).collect()
+    let mut pairs: Vec<(f64, f64)> = pairs.iter().map(lag).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut sums = vec![0.0];
+    sums.extend(pairs.iter().scan(0.0, |sum, (_, difference)| {
+        *sum += difference;
+        Some(*sum)
+    }));
+    Lags { pairs, sums }
 }
 
-/// The part of the differences' variance that lags folded by a period explain; zero where
-/// photos a whole number of periods apart are not those that differ least.
+/// Some differences: their sum and how many they are.
+type Bin = (f64, usize);
+
+fn mean((sum, count): Bin) -> f64 {
+    sum / count as f64
+}
+
+/// The part of the differences' variance that lags folded by a period explain, where photos
+/// differ the more the further they are from a whole number of periods apart.
 ///
-/// Lags of less than half a period stay out: that photos of one moment look alike is no sign
-/// of a period.
-fn explained(lags: &[(f64, f64)], hz: f64) -> f64 {
+/// Without that order, periods of several turns explain as much as one turn does, and of
+/// photos at even steps so do the aliases that deal the same lags in another order. From
+/// each difference its mean over the period around its lag is taken off, or what changes
+/// slowly would repeat, too; lags within half a period of the ends have no such mean.
+fn explained(lags: &Lags, hz: f64) -> f64 {
+    let half_s = 0.5 / hz;
+    let longest_s = lags.pairs.last().map_or(0.0, |pair| pair.0);
     let mut bins = [(0.0, 0_usize); BINS];
     let mut squares = 0.0;
-    for &(lag_s, difference) in lags {
-        let turns = lag_s * hz;
-        if turns < 0.5 {
+    let mut sum = 0.0;
+    let (mut from, mut to) = (0, 0);
+    for &(lag_s, difference) in &lags.pairs {
+        if lag_s < half_s || lag_s + half_s > longest_s {
             continue;
         }
+        while lags.pairs[from].0 < lag_s - half_s {
+            from += 1;
+        }
+        while to < lags.pairs.len() && lags.pairs[to].0 <= lag_s + half_s {
+            to += 1;
+        }
+        let off = difference - mean((lags.sums[to] - lags.sums[from], to - from));
+        let turns = lag_s * hz;
         let apart = (turns - turns.round()).abs();
         let bin = ((2.0 * BINS as f64 * apart) as usize).min(BINS - 1);
-        bins[bin].0 += difference;
+        bins[bin].0 += off;
         bins[bin].1 += 1;
+        sum += difference;
         squares += difference * difference;
     }
     if bins.iter().any(|(_, count)| *count < MIN_IN_BIN) {
         return 0.0;
     }
-    let mean = |(sum, count): (f64, usize)| sum / count as f64;
-    if bins[1..].iter().any(|bin| mean(*bin) <= mean(bins[0])) {
-        return 0.0;
+    let of_bins = |bins: &[Bin]| -> f64 { bins.iter().map(|bin| bin.0 * mean(*bin)).sum() };
+    let all = bins
+        .iter()
+        .fold((0.0, 0), |all, bin| (all.0 + bin.0, all.1 + bin.1));
+    let between = of_bins(&ascending(&bins)) - of_bins(&[all]);
+    (between / (squares - of_bins(&[(sum, all.1)]))).max(0.0)
+}
+
+/// Bins whose means ascend, of neighbours joined where they do not: isotonic regression by
+/// pooling adjacent violators (Ayer et al. 1955).
+fn ascending(bins: &[Bin]) -> Vec<Bin> {
+    let mut joined: Vec<Bin> = Vec::new();
+    for &next in bins {
+        let mut next = next;
+        while let Some(last) = joined.pop_if(|last| mean(*last) >= mean(next)) {
+            next = (next.0 + last.0, next.1 + last.1);
+        }
+        joined.push(next);
     }
-    let sum: f64 = bins.iter().map(|bin| bin.0).sum();
-    let count: usize = bins.iter().map(|bin| bin.1).sum();
-    let common = sum * sum / count as f64;
-    let between: f64 = bins.iter().map(|bin| bin.0 * mean(*bin)).sum();
-    ((between - common) / (squares - common)).max(0.0)
+    joined
 }
 
 /// Pseudo-random numbers, the same everywhere: SplitMix64 (Steele et al. 2014).

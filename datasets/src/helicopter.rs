@@ -21,8 +21,8 @@ const PERIOD_S: f64 = 1.37;
 /// From photo to photo: 5 a second.
 const STEP_S: f64 = 0.2;
 
-/// A toy helicopter on a paved yard, its rotor turning, as a hand-held camera sees it that
-/// swings to and fro: Buehler et al. 2001, §5, Helicopter.
+/// A toy helicopter on a paved yard, its rotor turning, as a hand-held camera sees it from
+/// above that swings to and fro: Buehler et al. 2001, §5, Helicopter.
 ///
 /// The rotor's blades differ in colour, so that it looks the same only after a whole turn,
 /// [`Motion::period_s`]. By default 96 photos of 480 × 360, five a second, over 14 turns
@@ -34,12 +34,12 @@ const STEP_S: f64 = 0.2;
 pub fn helicopter(options: &Options) -> Result<Dataset, DatasetError> {
     let chosen = options.or_defaults((480, 360), 96)?;
     let (width, height) = (f64::from(chosen.width), f64::from(chosen.height));
-    let focal = 1.4 * width.max(height * 4.0 / 3.0);
+    let focal = 1.9 * width.max(height * 4.0 / 3.0);
     let times_s: Vec<f64> = (0..chosen.views).map(|i| STEP_S * i as f64).collect();
     let (scene, object_idxs) = scene(2.0 * DISTANCE / focal);
     let plan = Plan {
         name: "helicopter",
-        kind: "synthetic: a toy helicopter whose rotor turns, hand-held to and fro; times in \
+        kind: "synthetic: a toy helicopter whose rotor turns, hand-held from above; times in \
                times.csv, seconds.",
         stresses: "Motion that repeats every 1.37 s, its shadow included; few photos of any \
                    one moment. Sparse points lie on what stands still.",
@@ -64,16 +64,16 @@ pub fn helicopter(options: &Options) -> Result<Dataset, DatasetError> {
     Ok(plan.into_dataset(&chosen))
 }
 
-/// Photo `i`: a swing from side to side, slowly up and down, with an unsteady hand.
+/// Photo `i`: a swing from side to side, slowly to and fro, with an unsteady hand.
 fn hand_held(i: usize, time_s: f64) -> Rigid3 {
     let r = |k: i32| signed(SEED, i as i32, k, 4);
-    let side = 0.24 * (TAU * time_s / 7.7).sin() + 0.008 * r(0);
-    let up = 0.95 + 0.05 * (TAU * time_s / 17.0).cos() + 0.008 * r(1);
-    let direction = DVec3::new(side.sin() * up.cos(), up.sin(), side.cos() * up.cos());
+    let side = 0.15 * (TAU * time_s / 7.7).sin() + 0.008 * r(0);
+    let tilt = 0.1 + 0.05 * (TAU * time_s / 17.0).cos() + 0.008 * r(1);
+    let direction = DVec3::new(side.sin() * tilt.cos(), side.cos() * tilt.cos(), tilt.sin());
     let center = TARGET + DISTANCE * (1.0 + 0.02 * r(2)) * direction;
     let target = TARGET + 0.02 * DVec3::new(r(3), r(4), r(5));
     let roll = Rigid3::new(DQuat::from_rotation_z(0.02 * r(6)), DVec3::ZERO);
-    roll * Rigid3::looking_at(center, target, DVec3::Y)
+    roll * Rigid3::looking_at(center, target, DVec3::NEG_Z)
 }
 
 /// The scene at time 0, and which of its objects turn.
@@ -176,7 +176,7 @@ fn rotor(objects: &mut Vec<Object>) {
     objects.push(object(hub, HUB, DQuat::IDENTITY, plain(0xd8d2c0, 91)));
     for (i, color) in [0xd0342c, 0xf0c030, 0x2e5fb8].into_iter().enumerate() {
         let turn = DQuat::from_rotation_y(TAU * i as f64 / 3.0);
-        let half = DVec3::new(0.20, 0.006, 0.034);
+        let half = DVec3::new(0.20, 0.006, 0.05);
         let at = HUB + turn * DVec3::new(0.22, 0.0, 0.0);
         let texture = plain(color, 92 + i as u32);
         objects.push(object(Shape::Cuboid { half }, at, turn, texture));
