@@ -176,8 +176,9 @@ fn rotor(objects: &mut Vec<Object>) {
     objects.push(object(hub, HUB, DQuat::IDENTITY, plain(0xd8d2c0, 91)));
     for (i, color) in [0xd0342c, 0xf0c030, 0x2e5fb8].into_iter().enumerate() {
         let turn = DQuat::from_rotation_y(TAU * i as f64 / 3.0);
-        let half = DVec3::new(0.20, 0.006, 0.05);
-        let at = HUB + turn * DVec3::new(0.22, 0.0, 0.0);
+        let half = DVec3::new(0.19, 0.006, 0.05);
+        // So far out that the blades, all of one height, do not overlap.
+        let at = HUB + turn * DVec3::new(0.23, 0.0, 0.0);
         let texture = plain(color, 92 + i as u32);
         objects.push(object(Shape::Cuboid { half }, at, turn, texture));
     }

@@ -60,7 +60,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 fn bare_model(folder: &Path) -> Option<PathBuf> {
     let model = colmap::find_model(folder).ok()?;
     let has_photos = find_photos_folder(folder).is_some() || Scene::is_scene(folder);
-    (model == folder && !has_photos).then_some(model)
+    let is_it = model == folder || model == folder.join("0");
+    (is_it && !has_photos).then_some(model)
 }
 
 fn gather(scene: &Scene) -> anyhow::Result<Value> {
