@@ -37,8 +37,8 @@ const EXPOSURE_GRID: f64 = 16.0;
 
 /// From this stored value up to 1, colours keep more and more of themselves when a photo is
 /// brought to another exposure: cameras compress what is bright, and where light was clipped
-/// no factor says how much there was. Of 0, 0.25, 0.5, 0.7, 0.9 and 1 this is the highest at
-/// which no capture's held-out score lost 0.1 dB to matching.
+/// no factor says how much there was. Chosen among 0, 0.25, 0.5, 0.7, 0.9 and 1 by the held-out
+/// scores of seven photo sets, of which none loses 0.1 dB to matching with it.
 pub(crate) const SHOULDER: f64 = 0.25;
 
 /// A photo's colour, premultiplied, 0…1, brought to another exposure: red, green and blue
@@ -71,7 +71,7 @@ pub struct FrameSource {
     /// Pixels from the border over which it fades in.
     pub feather_px: f64,
     /// What red, green and blue are multiplied by to bring it to the frame's exposure; see
-    /// [`exposed`].
+    /// `exposed`.
     pub exposure: [f64; 3],
     /// What its time adds to its difference; infinite where it takes no part.
     pub time_penalty: f64,

@@ -21,6 +21,8 @@ pub const DEPTH_UNITS_PER_STEP: f64 = 0.001;
 
 /// Alpha and mask agree where both are on the same side of half in this share of pixels.
 const AGREES: f64 = 0.99;
+/// So many masks, spread over the photos, decide whether all are silhouettes.
+const MASKS_JUDGED: usize = 5;
 
 impl Photo {
     /// Its pixels as stored, cut out by its object matte if it has one.
@@ -177,34 +179,71 @@ impl Scene {
         Ok(())
     }
 
-    /// Says so where the ignore masks only repeat the photos' alpha channels, judged by the
-    /// first photo that has one.
-    pub(super) fn note_masks_that_repeat_alpha(&self, warnings: &mut Vec<Warning>) {
-        let Some(photo) = self.photos.iter().find(|p| p.ignore_mask.is_some()) else {
+    /// Says so where ignore masks are an object's silhouettes, and leaves them out unless
+    /// they were `asked` for: as ignore masks they would take the background away, and with
+    /// it most of the picture.
+    pub(super) fn judge_masks(&mut self, asked: bool, warnings: &mut Vec<Warning>) {
+        let note = if let Some(name) = self.repeated_alpha() {
+            let remedy = if asked {
+                "--no-masks leaves them out"
+            } else {
+                "they are left out"
+            };
+            format!(
+                "the ignore masks repeat the photos' alpha ({name}, for one), which is an object \
+                 matte already; {remedy}"
+            )
+        } else if !asked && self.masks_keep_little() {
+            format!(
+                "the masks in {MASKS_FOLDER} keep less than half of each photo, as an object's \
+                 silhouettes do, and are left out; --mattes {MASKS_FOLDER} cuts the photos out \
+                 along them, --masks {MASKS_FOLDER} ignores all else"
+            )
+        } else {
             return;
         };
-        let decoded = capture::photo_size(&photo.path).and_then(|size| {
-            let pixels = photo.decode(size)?;
-            Ok((pixels, photo.decode_ignore_mask(size)?))
-        });
-        // What is wrong with them is said when they are needed.
-        let Ok((pixels, Some(mask))) = decoded else {
-            return;
-        };
+        warnings.push(Warning::Note(note));
+        if !asked {
+            self.photos.iter_mut().for_each(|p| p.ignore_mask = None);
+        }
+    }
+
+    /// Whether the ignore masks only repeat the photos' alpha channels, judged by the first
+    /// photo that has one; its name.
+    fn repeated_alpha(&self) -> Option<String> {
+        let photo = self.photos.iter().find(|p| p.ignore_mask.is_some())?;
+        // What is wrong with a file is said when it is needed.
+        let size = capture::photo_size(&photo.path).ok()?;
+        let pixels = photo.decode(size).ok()?;
+        let mask = photo.decode_ignore_mask(size).ok()??;
         if pixels.pixels().all(|p| p.0[3] == 255) {
-            return;
+            return None;
         }
         let both = pixels.pixels().zip(mask.pixels());
         let agreeing = both
             .filter(|(p, m)| (p.0[3] >= 128) == (m.0[0] >= 128))
             .count();
-        if agreeing as f64 >= AGREES * pixels.pixels().len() as f64 {
-            warnings.push(Warning::Note(format!(
-                "the ignore masks repeat the photos' alpha ({}, for one), which is an object \
-                 matte already; --no-masks leaves them out",
-                photo.name
-            )));
-        }
+        let repeats = agreeing as f64 >= AGREES * pixels.pixels().len() as f64;
+        repeats.then(|| photo.name.clone())
+    }
+
+    /// Whether each of a few ignore masks keeps less than half of its photo.
+    fn masks_keep_little(&self) -> bool {
+        let masked: Vec<&Photo> = self
+            .photos
+            .iter()
+            .filter(|p| p.ignore_mask.is_some())
+            .collect();
+        let step = masked.len().div_ceil(MASKS_JUDGED).max(1);
+        let keeps_little = |photo: &&Photo| {
+            let size = capture::photo_size(&photo.path).ok();
+            let mask = size.and_then(|size| photo.decode_ignore_mask(size).ok()?);
+            mask.is_some_and(|mask| {
+                let kept = mask.pixels().filter(|p| p.0[0] >= 128).count();
+                2 * kept < mask.pixels().len()
+            })
+        };
+        !masked.is_empty() && masked.iter().step_by(step).all(keeps_little)
     }
 }
 

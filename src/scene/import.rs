@@ -153,7 +153,7 @@ impl Scene {
         // 4. What lies beside them.
         scene.find_beside(capture, options, &mut warnings)?;
         scene.check_beside()?;
-        scene.note_masks_that_repeat_alpha(&mut warnings);
+        scene.judge_masks(options.masks.is_some(), &mut warnings);
         Ok((scene, warnings))
     }
 

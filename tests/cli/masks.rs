@@ -285,11 +285,32 @@ fn masks_that_repeat_the_alpha_are_pointed_out() {
     assert!(!ran.stderr.contains(note), "{}", ran.stderr);
     // A matte that repeats the alpha changes nothing.
     lumigraph(folder.path(), "import wall --no-masks -o c").ok();
+    let ran = lumigraph(folder.path(), "import wall --masks masks -o d").ok();
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    assert!(ran.stdout.contains("9 ignore masks"), "{}", ran.stdout);
     let evaluated = |scene: &str| {
         let line = format!("evaluate {scene} --json");
         lumigraph(folder.path(), &line).ok().json()["mean"]["psnr"].clone()
     };
     assert_eq!(evaluated("b"), evaluated("c"));
+    // Nobody asked for the masks: they were left out.
+    assert_eq!(evaluated("a"), evaluated("c"));
+}
+
+#[test]
+fn silhouettes_are_no_ignore_masks_unless_asked_for() {
+    let folder = with_wall();
+    for i in 0..9 {
+        let object =
+            GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| Luma([if x < 40 { 255 } else { 0 }]));
+        save(at(&folder, &format!("wall/masks/{i:04}.png")), &object);
+    }
+    let ran = lumigraph(folder.path(), "import wall -o a").ok();
+    assert!(ran.stderr.contains("--mattes masks cuts"), "{}", ran.stderr);
+    assert!(!ran.stdout.contains("ignore masks"), "{}", ran.stdout);
+    let ran = lumigraph(folder.path(), "import wall --masks masks -o b").ok();
+    assert!(!ran.stderr.contains("--mattes"), "{}", ran.stderr);
+    assert!(ran.stdout.contains("9 ignore masks"), "{}", ran.stdout);
 }
 
 #[test]

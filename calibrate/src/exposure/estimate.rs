@@ -53,7 +53,7 @@ const CLUSTER: f64 = 10.0;
 /// places in the world are `points_in_world`.
 ///
 /// Whether they mean anything is asked of the points in two halves that lie in different
-/// places ([`halves`]). Each is fitted by itself. What the two agree on, Σ a·b / n over n
+/// places (`halves`). Each is fitted by itself. What the two agree on, Σ a·b / n over n
 /// photos, is the variance of the true gains; what they don't, Σ (a − b)² / 2n, that of
 /// either's errors, whatever those are due to: noise, highlights, false matches.
 ///
