@@ -161,6 +161,28 @@ fn the_chessboard_is_what_colmap_says() {
     assert_eq!(find_calibrations(&capture), [file]);
 }
 
+/// Found by fuzzing: most corners in place, one of them no number.
+#[test]
+fn corners_that_are_no_numbers_are_left_out() {
+    let text = format!(
+        "%YAML:1.0\nimage_size: [ 640, 480 ]\nboard_width: 2\nboard_height: 2\nsquare_size: 1.\n{}{}\
+         image_points: !!opencv-matrix\n   rows: 1\n   cols: 4\n   dt: \"2d\"\n   \
+         data: [ .Nan, 239.5, 419.5, 239.5, 319.5, 341.5, 419.5, 341.5 ]\n",
+        matrix("K", 3, 3, K),
+        matrix("extrinsic_parameters", 1, 6, "0., 0., 0., 0., 0., 5.")
+    );
+    let calibration = read(&text).unwrap();
+    assert_eq!(calibration.board, None);
+    let said = calibration
+        .notes
+        .iter()
+        .any(|note| note.contains("not all numbers"));
+    assert!(said, "{:?}", calibration.notes);
+    // With a number in its place the board is there.
+    let calibration = read(&text.replace(".Nan", "319.5")).unwrap();
+    assert!(calibration.board.is_some(), "{:?}", calibration.notes);
+}
+
 #[test]
 fn the_principal_point_moves_by_half_a_pixel() {
     let text = format!(

@@ -206,6 +206,14 @@ mod tests {
             message("a.glb", "glTF\x02\0\0\0\x0b\0\0\0"),
             "DIR/a.glb: not a glTF file: its header states a length without itself"
         );
+        // And so was this: gltf's checks look up an accessor that is not there.
+        let nothing = r#"{"asset": {"version": "2.0"},
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"#;
+        let error = message("a.glb", nothing);
+        assert!(
+            error.starts_with("DIR/a.glb: this mesh does not say"),
+            "{error}"
+        );
         assert_eq!(
             message("a.stl", ""),
             "DIR/a.stl: proxies are read and written as .json (exact) or .glb"

@@ -43,6 +43,14 @@ pub(super) fn board(
             })
             .collect(),
     };
+    let numbers = found.data.iter().all(|v| v.is_finite());
+    if !numbers || !board.corners.iter().all(|c| c.is_finite()) {
+        notes.push(
+            "the board's corners, or where they were found, are not all numbers: they are left out"
+                .to_owned(),
+        );
+        return None;
+    }
     let error = median_error_px(&board, camera, poses);
     if error <= MEDIAN_ERROR_PX {
         return Some(board);
