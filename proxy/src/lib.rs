@@ -10,6 +10,7 @@ mod facets;
 mod file;
 mod fit;
 mod glb;
+mod mesh;
 mod plane;
 pub mod points;
 
@@ -18,6 +19,7 @@ pub use cloud::{CloudStatistics, isolated_points, statistics};
 pub use facets::Facets;
 pub use file::{FileError, parse, read, write};
 pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
+pub use mesh::Mesh;
 pub use plane::{Plane, PlaneError};
 pub use points::SparsePoint;
 
