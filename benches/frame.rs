@@ -87,6 +87,7 @@ fn shelf() -> Lumigraph {
                 .expect("the shelf has points")
                 .plane,
         ),
+        visibility: None,
     }
 }
 

@@ -52,18 +52,20 @@ enum StoredSurface {
 }
 
 impl Stored {
-    fn of(proxy: &Proxy) -> Self {
+    /// `None` for a mesh, which JSON is no place for.
+    fn of(proxy: &Proxy) -> Option<Self> {
         let surface = match proxy {
             Proxy::Plane(plane) => StoredSurface::Plane {
                 point: plane.point().to_array(),
                 normal: plane.normal().to_array(),
             },
             Proxy::Points => StoredSurface::Points,
+            Proxy::Mesh(_) => return None,
         };
-        Self {
+        Some(Self {
             version: 1,
             surface,
-        }
+        })
     }
 
     fn proxy(&self, path: &Path) -> Result<Proxy, FileError> {
@@ -119,6 +121,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
 pub fn write(path: &Path, proxy: &Proxy, shown_points_in_world: &[DVec3]) -> Result<(), FileError> {
     let json = |pretty: bool| {
         let stored = Stored::of(proxy);
+        let stored = stored.ok_or(FileError::NoSurface(path.to_owned(), proxy.kind()))?;
         let text = if pretty {
             serde_json::to_string_pretty(&stored)
         } else {

@@ -1,8 +1,8 @@
 //! The approximate surface that carries rays to the photos.
 //!
 //! A desired ray meets the proxy at a point, and that point is looked up in the photos.
-//! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond) and the sparse
-//! [`points`] themselves, triangulated anew for each desired view.
+//! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond), the sparse [`points`]
+//! themselves, triangulated anew for each desired view, and meshes ([`Solid`]).
 
 mod axes;
 mod cloud;
@@ -13,6 +13,9 @@ mod glb;
 mod mesh;
 mod plane;
 pub mod points;
+mod solid;
+
+use std::sync::Arc;
 
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
@@ -22,14 +25,17 @@ pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use mesh::Mesh;
 pub use plane::{Plane, PlaneError};
 pub use points::SparsePoint;
+pub use solid::{Hit, MeshKind, Solid};
 
 /// The approximate surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Proxy {
     /// An infinite plane, seen from both sides.
     Plane(Plane),
     /// The sparse points that views like the desired one observe; see [`points`].
     Points,
+    /// Triangles.
+    Mesh(Arc<Solid>),
 }
 
 impl Proxy {
@@ -37,7 +43,7 @@ impl Proxy {
     pub fn plane(&self) -> Option<Plane> {
         match self {
             Self::Plane(plane) => Some(*plane),
-            Self::Points => None,
+            Self::Points | Self::Mesh(_) => None,
         }
     }
 
@@ -46,6 +52,7 @@ impl Proxy {
         match self {
             Self::Plane(_) => "plane",
             Self::Points => "points",
+            Self::Mesh(solid) => solid.kind().name(),
         }
     }
 }

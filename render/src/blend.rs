@@ -12,7 +12,8 @@ pub struct Candidate {
     pub diff: f64,
     /// fovBlend, 0…1.
     pub fov: f64,
-    /// What its ignore mask leaves of it, 0…1; 1 without one.
+    /// What its ignore mask leaves of it, and what hides the point from it, 0…1; 1 without
+    /// either.
     pub mask: f64,
 }
 

@@ -8,6 +8,7 @@ use crate::options::{FieldOptions, Resolution};
 use crate::reference::blend_at;
 use crate::surface::Surface;
 use crate::time::Moment;
+use crate::visibility::visible;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
 
@@ -292,6 +293,18 @@ impl<'a> Frame<'a> {
         }
         let s = border / source.feather_px;
         s * s * (3.0 - 2.0 * s)
+    }
+
+    /// How much a source view counts for a proxy point that falls on a pixel of its image:
+    /// 1 where nothing is before it, little where something is.
+    pub fn visible(&self, source_idx: usize, point: &ProxyPoint, pixel: Pixel) -> f64 {
+        let Some(visibility) = &self.lumigraph.visibility else {
+            return 1.0;
+        };
+        let source = &self.sources[source_idx];
+        let in_source = source.rotation * point.ray + source.translation * point.inverse_distance;
+        let nearest = visibility.map(source_idx).inverse_distance(pixel);
+        visible(point.inverse_distance / in_source.length(), nearest)
     }
 
     /// The mip level at which a source photo is sampled: half the binary logarithm of how

@@ -28,6 +28,7 @@ mod surface;
 mod time;
 pub mod trajectory;
 pub mod triangulation;
+mod visibility;
 
 pub use engine::{DeviceChoice, Engine};
 pub use field::TriangulatedField;
@@ -43,6 +44,7 @@ pub use snapshot::snapshots;
 pub use surface::{FacetMap, NO_FACET, Surface};
 pub use time::{Moment, TIME_COST, WINDOW_TURNS};
 pub use trajectory::Trajectory;
+pub use visibility::{DistanceMap, Visibility};
 
 /// Why a frame could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,4 +1,5 @@
 use crate::photos::PhotoStore;
+use crate::visibility::Visibility;
 use calibrate::View;
 use proxy::{Proxy, SparsePoint};
 
@@ -26,4 +27,7 @@ pub struct Lumigraph {
     pub proxy: Proxy,
     /// The capture's sparse points, for a proxy that is made of them.
     pub points: Vec<SparsePoint>,
+    /// Which photos see what of the proxy, where it can hide a part of itself and that is
+    /// to count; see [`Visibility::of`].
+    pub visibility: Option<Visibility>,
 }

@@ -138,6 +138,7 @@ mod tests {
             sources: vec![source(-1.0), source(1.0)],
             photos: PhotoStore::from_images(vec![RgbaImage::new(40, 30); 2]),
             proxy: Proxy::Plane(wall),
+            visibility: None,
         }
     }
 

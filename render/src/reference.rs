@@ -47,7 +47,7 @@ pub(crate) fn candidate(
         source_idx,
         diff: diff(),
         fov,
-        mask,
+        mask: mask * frame.visible(source_idx, point, pixel),
     })
 }
 

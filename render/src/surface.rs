@@ -3,7 +3,7 @@
 use crate::lumigraph::Lumigraph;
 use calibrate::{Pixel, View};
 use glam::DVec3;
-use proxy::{Facets, Proxy, points};
+use proxy::{Facets, Proxy, Solid, points};
 use rayon::prelude::*;
 
 /// What each pixel of the desired view looks at: a plane, by its vector q (a ray v meets
@@ -21,11 +21,11 @@ pub enum Surface {
 /// No facet.
 pub const NO_FACET: u32 = u32::MAX;
 
-/// Facets and which of them each pixel sees.
+/// Flat facets and which of them each pixel sees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FacetMap {
-    /// The facets, in the desired camera's frame.
-    pub facets: Facets,
+    /// The facets' vectors q, in the desired camera's frame.
+    pub planes: Vec<DVec3>,
     /// Row by row, the facet at each pixel's centre; [`NO_FACET`] where the lens has no ray.
     pub facet_of: Vec<u32>,
     size: [u32; 2],
@@ -43,9 +43,10 @@ impl Surface {
             Proxy::Points => {
                 let views: Vec<View> = lumigraph.sources.iter().map(|s| s.view.clone()).collect();
                 points::facets(desired, &views, &lumigraph.points).map_or(Self::Nothing, |facets| {
-                    Self::Facets(FacetMap::new(facets, desired))
+                    Self::Facets(FacetMap::of_facets(facets, desired))
                 })
             }
+            Proxy::Mesh(solid) => Self::Facets(FacetMap::of_mesh(solid, desired)),
         }
     }
 
@@ -81,27 +82,55 @@ impl FacetMap {
     }
 
     fn plane_of(&self, facet: u32) -> Option<DVec3> {
-        (facet != NO_FACET).then(|| self.facets.planes[facet as usize])
+        (facet != NO_FACET).then(|| self.planes[facet as usize])
     }
 
-    fn new(facets: Facets, desired: &View) -> Self {
+    fn of_facets(facets: Facets, desired: &View) -> Self {
+        let planes = facets.planes.clone();
+        Self::new(desired, planes, |ray, last| {
+            facets.locate(ray, if last == NO_FACET { 0 } else { last })
+        })
+    }
+
+    fn of_mesh(solid: &Solid, desired: &View) -> Self {
+        let center = desired.center();
+        let rotation = desired.camera_from_world.rotation;
+        let mesh = solid.mesh();
+        let plane = |i: usize| {
+            let [a, b, c] = mesh.corners(i).map(|p| rotation * (p - center));
+            let normal = (b - a).cross(c - a);
+            let q = normal / normal.dot(a);
+            // Seen edge on, it is seen nowhere.
+            if q.is_finite() { q } else { DVec3::ZERO }
+        };
+        let triangles = (0..mesh.triangles.len()).into_par_iter();
+        let planes: Vec<DVec3> = triangles.map(plane).collect();
+        let world_from_camera = rotation.conjugate();
+        Self::new(desired, planes, |ray, _| {
+            let hit = solid.first_hit(center, world_from_camera * ray);
+            hit.map_or(NO_FACET, |hit| hit.triangle_idx)
+        })
+    }
+
+    /// `find` says which facet a ray meets, given what its left neighbour's did.
+    fn new(desired: &View, planes: Vec<DVec3>, find: impl Fn(DVec3, u32) -> u32 + Sync) -> Self {
         let (width, height) = (desired.width as usize, desired.height as usize);
         let row = |y: usize| {
-            let mut last = 0;
+            let mut last = NO_FACET;
             (0..width)
                 .map(|x| {
                     let center = Pixel::center_of(x as u32, y as u32);
                     let Some(ray) = desired.lens.unproject(center) else {
                         return NO_FACET;
                     };
-                    last = facets.locate(ray, last);
+                    last = find(ray, last);
                     last
                 })
                 .collect::<Vec<u32>>()
         };
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
         Self {
-            facets,
+            planes,
             facet_of: rows.concat(),
             size: [desired.width, desired.height],
         }

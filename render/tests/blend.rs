@@ -27,6 +27,7 @@ fn lumigraph(views: Vec<View>, plane: Plane) -> Lumigraph {
         photos: PhotoStore::new(views.len(), |i| Err(format!("{i} is not needed"))),
         sources: views.into_iter().enumerate().map(source).collect(),
         proxy: Proxy::Plane(plane),
+        visibility: None,
     }
 }
 
@@ -570,7 +571,8 @@ fn the_order_of_the_source_views_changes_nothing() {
                 .map(|&i| lumigraph.sources[i].clone())
                 .collect(),
             photos: PhotoStore::from_images(Vec::new()),
-            proxy: lumigraph.proxy,
+            proxy: lumigraph.proxy.clone(),
+            visibility: None,
         };
         for blend in [Blend::Consistent, Blend::Paper] {
             let options = FieldOptions {

@@ -218,6 +218,7 @@ fn mixed() -> Mixed {
             sources,
             photos: PhotoStore::from_images(photos),
             proxy: Proxy::Plane(shot.plane),
+            visibility: None,
         },
         views,
     }
@@ -304,6 +305,7 @@ fn capture(name: &str) -> Option<Lumigraph> {
         photos: PhotoStore::new(sources.len(), load),
         sources,
         proxy: Proxy::Plane(plane),
+        visibility: None,
     })
 }
 
@@ -623,6 +625,7 @@ fn crowd() -> (Lumigraph, View) {
         sources: views.iter().enumerate().map(source).collect(),
         photos: PhotoStore::from_images(photos),
         proxy: Proxy::Plane(plane),
+        visibility: None,
     };
     (lumigraph, desired)
 }

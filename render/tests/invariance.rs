@@ -48,6 +48,7 @@ impl Similarity {
             sources,
             photos: PhotoStore::from_images(photos.to_vec()),
             proxy: Proxy::Plane(self.plane(&plane)),
+            visibility: None,
         }
     }
 }
@@ -224,6 +225,7 @@ fn the_order_of_the_photos_changes_nothing() {
                     .map(|&i| lumigraph.sources[i].clone())
                     .collect(),
                 proxy: lumigraph.proxy,
+                visibility: None,
             };
             let after = pictures(&reordered, &desired);
             for ((engine, before), (_, after)) in before.iter().zip(&after) {

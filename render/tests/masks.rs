@@ -304,6 +304,7 @@ fn a_mask_that_hides_nothing_changes_nothing_and_one_that_hides_all_removes_the_
         sources,
         photos: PhotoStore::from_images(photos),
         proxy: Proxy::Plane(shot.plane),
+        visibility: None,
     };
     for (name, desired) in desired_views(&shot) {
         for method in METHODS {
@@ -352,7 +353,8 @@ fn the_order_of_masked_photos_changes_nothing() {
             .iter()
             .map(|&i| lumigraph.sources[i].clone())
             .collect(),
-        proxy: lumigraph.proxy,
+        proxy: lumigraph.proxy.clone(),
+        visibility: None,
     };
     for (name, desired) in desired_views(&shot) {
         for method in METHODS {

@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         without.insert(args.view.clone());
     }
     let proxy = args.proxy.choose(&scene, &without)?;
-    let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+    let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
     let (view, time_s) = match &args.path {
         None => (scene.view(&args.view)?, scene.time_s(&args.view)),
         Some(path) => {

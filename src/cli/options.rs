@@ -191,7 +191,7 @@ impl ProxyArgs {
                         return fitted();
                     }
                     Ok(ChosenProxy {
-                        proxy: own.proxy,
+                        proxy: own.proxy.clone(),
                         origin: "the scene's own".to_owned(),
                     })
                 }

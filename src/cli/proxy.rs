@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             ::proxy::write(file, &proxy, &shown)?;
             file.clone()
         }
-        None => scene.set_proxy(proxy, fitted_without)?,
+        None => scene.set_proxy(proxy.clone(), fitted_without)?,
     };
     print(&format!(
         "{}: {}, {how}\n",

@@ -88,7 +88,7 @@ impl Session {
         }
         let proxy = proxy.choose(&scene, &without)?;
         let exposure = exposure.choose(&mut scene, &without);
-        let lumigraph = scene.lumigraph(&without, proxy.proxy)?;
+        let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,
@@ -258,7 +258,9 @@ impl Session {
         }
         say!("warning: photo {name} is left out: {error}");
         self.without.insert(name);
-        self.lumigraph = self.scene.lumigraph(&self.without, self.proxy.proxy)?;
+        self.lumigraph = self
+            .scene
+            .lumigraph(&self.without, self.proxy.proxy.clone())?;
         Ok(())
     }
 }

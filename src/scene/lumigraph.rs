@@ -3,7 +3,7 @@
 use super::{Scene, SceneError};
 use calibrate::{Image, ImageId, View};
 use proxy::{FitError, PlaneFit, Proxy, SparsePoint};
-use render::{Lumigraph, PhotoStore, SourceView};
+use render::{Lumigraph, PhotoStore, SourceView, Visibility};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -114,14 +114,16 @@ impl Scene {
             mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))
         });
         let points = match proxy {
-            Proxy::Plane(_) => Vec::new(),
+            Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),
             Proxy::Points => self.sparse_points(without, &sources),
         };
+        let visibility = Visibility::of(&proxy, &sources);
         Ok(Lumigraph {
             sources,
             photos,
             proxy,
             points,
+            visibility,
         })
     }
 

@@ -247,14 +247,28 @@ impl<'a> Engine<'a> {
         tile
     }
 
-    /// Takes what a photo's mask ignores off its relevance, in the pixels that are `wanted`.
+    /// Takes what a photo's mask ignores and what hides points from it off its relevance, in
+    /// the pixels that are `wanted`.
     fn mask(&self, source_idx: usize, sight: &mut Sight, wanted: impl Fn(usize) -> bool) {
-        let Some(mask) = self.frame.lumigraph.photos.mask(source_idx) else {
-            return;
-        };
-        for k in 0..LANES {
-            if sight.a[k] > 0.0 && wanted(k) {
-                sight.a[k] *= shade::sample_mask(mask, sight.u[k], sight.v[k], sight.level[k]);
+        let lumigraph = self.frame.lumigraph;
+        let seen = |sight: &Sight, k: usize| sight.a[k] > 0.0 && wanted(k);
+        if let Some(mask) = lumigraph.photos.mask(source_idx) {
+            for k in 0..LANES {
+                if seen(sight, k) {
+                    sight.a[k] *= shade::sample_mask(mask, sight.u[k], sight.v[k], sight.level[k]);
+                }
+            }
+        }
+        if let Some(visibility) = &lumigraph.visibility {
+            if !(0..LANES).any(|k| seen(sight, k)) {
+                return;
+            }
+            let map = visibility.map(source_idx);
+            for k in 0..LANES {
+                if seen(sight, k) {
+                    let at = [sight.u[k], sight.v[k]];
+                    sight.a[k] *= shade::visible(map, at, sight.inverse_distance[k]);
+                }
             }
         }
     }

@@ -3,6 +3,7 @@
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
 use crate::photos::Pyramid;
+use crate::visibility::{DistanceMap, HIDDEN, TEXEL_PER_PIXEL, TOLERANCE};
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
 use std::ops::{Add, Mul, Sub};
@@ -87,4 +88,16 @@ where
     let top = at(row0 + x0) + (at(row0 + x1) - at(row0 + x0)) * fx;
     let low = at(row1 + x0) + (at(row1 + x1) - at(row1 + x0)) * fx;
     top + (low - top) * fy
+}
+
+/// How much a photo counts at a point: see [`crate::visibility`].
+pub(super) fn visible(map: &DistanceMap, [u, v]: [f32; 2], inverse_distance: f32) -> f32 {
+    let nearest = map.sample(u * TEXEL_PER_PIXEL, v * TEXEL_PER_PIXEL);
+    let slack = nearest * TOLERANCE as f32;
+    let beyond = nearest - inverse_distance / map.unit as f32;
+    if beyond <= slack {
+        return 1.0;
+    }
+    let s = ((2.0 * slack - beyond) / slack).clamp(0.0, 1.0);
+    HIDDEN as f32 + (1.0 - HIDDEN as f32) * s * s * (3.0 - 2.0 * s)
 }

@@ -38,6 +38,8 @@ pub(crate) struct Source {
     beta: f32,
     by_length: bool,
     time_penalty: f32,
+    /// Whether something can hide points from it.
+    occluded: bool,
 }
 
 /// Where a tile's proxy points fall in one photo, and what they are worth there.
@@ -50,6 +52,8 @@ pub(crate) struct Sight {
     pub a: Lane,
     /// Mip level, ≥ 0.
     pub level: Lane,
+    /// Inverse distance from the source centre; only where something can hide the point.
+    pub inverse_distance: Lane,
 }
 
 /// What keeps a view on its image's very edge in play when there is no other: too little
@@ -77,6 +81,7 @@ impl Source {
             beta: frame.options.beta as f32,
             by_length: frame.options.resolution == Resolution::Length,
             time_penalty: source.time_penalty as f32,
+            occluded: frame.lumigraph.visibility.is_some(),
         }
     }
 
@@ -127,7 +132,18 @@ impl Source {
             let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
             (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
         });
-        Some(Sight { u, v, a, level })
+        let mut inverse_distance = [0.0; LANES];
+        if self.occluded {
+            inverse_distance =
+                each(|k| tile.s[k] / (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt());
+        }
+        Some(Sight {
+            u,
+            v,
+            a,
+            level,
+            inverse_distance,
+        })
     }
 
     /// angDiff + β·resDiff and what time adds; see [`Frame::difference`].

@@ -165,7 +165,9 @@ fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [&Vertex; 3]) -> S
             _ => return Sees::Part,
         }
     }
-    if inside >= source.feather_px + CLEARANCE_PX {
+    // What hides something from a view has borders anywhere.
+    let hidden = frame.lumigraph.visibility.is_some();
+    if !hidden && inside >= source.feather_px + CLEARANCE_PX {
         Sees::All
     } else {
         Sees::Part

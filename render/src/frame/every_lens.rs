@@ -116,6 +116,7 @@ pub(crate) fn lumigraph() -> Lumigraph {
         photos: PhotoStore::from_images(vec![RgbaImage::new(1, 1); views.len()]),
         sources: views,
         proxy: Proxy::Plane(Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap()),
+        visibility: None,
     }
 }
 

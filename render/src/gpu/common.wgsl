@@ -70,7 +70,9 @@ const EXPOSURE = 9u;
 const PRISM = 10u;
 // Shear and horizon of a sensor that is tilted or skewed (`Sensor` of sensor.rs).
 const SENSOR = 11u;
-// Layer of the masks' array, negative without a mask; what its time adds to its difference.
+// Layer of the masks' array, negative without a mask; what its time adds to its difference;
+// layer of the distance maps' array, negative without one; what turns the inverse of a scaled
+// distance into the map's units.
 const REST = 12u;
 
 // The one kind of lens that all source views have; negative where they differ. Set when a
@@ -79,6 +81,9 @@ override COMMON_LENS: f32 = -1.0;
 
 // Whether any source view has an ignore mask. Set likewise.
 override MASKED: bool = false;
+
+// Whether the proxy can hide a part of itself. Set likewise.
+override OCCLUDED: bool = false;
 
 const LENS_PINHOLE: f32 = 0.0;
 const LENS_RATIONAL: f32 = 1.0;
@@ -105,6 +110,8 @@ const LENS_SKEWED_FISHEYE: f32 = 12.0;
 // As large as the photos' array; a single texel where nothing is masked.
 @group(0) @binding(4) var masks: texture_2d_array<f32>;
 @group(0) @binding(5) var mask_sampler: sampler;
+// Half as large as the photos' array; a single texel where nothing can be hidden.
+@group(0) @binding(6) var distances: texture_2d_array<f32>;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
     let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
@@ -119,6 +126,8 @@ struct Sight {
     depth: f32,
     // Squared radius, or theta for a fisheye; beyond the lens' limit the pixel means nothing.
     reach: f32,
+    // 1/distance, scaled as the axes are; only where something can hide the point.
+    inverse_distance: f32,
 }
 
 // atan2 for y >= 0; the polynomial is Cephes' atanf.
@@ -320,7 +329,10 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
     if COMMON_LENS < 0.0 {
         lens = source_data(source_idx, KIND).x;
     }
-    var sight = Sight(vec2f(0.0), 0.0, 0.0);
+    var sight = Sight(vec2f(0.0), 0.0, 0.0, 0.0);
+    if OCCLUDED {
+        sight.inverse_distance = s / length(p);
+    }
     var bent: vec2f;
     if lens == LENS_FISHEYE {
         let radius = length(p.xy);
@@ -390,20 +402,43 @@ fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f
 // See IGNORED of mask.rs.
 const IGNORED: f32 = 0.5;
 
-// fovBlend and what the ignore mask leaves of it.
-fn relevance(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
-    let fov = fov_blend(source_idx, sight);
-    if !MASKED || fov <= 0.0 {
-        return fov;
-    }
-    let layer = source_data(source_idx, REST).x;
-    if layer < 0.0 {
-        return fov;
+// TOLERANCE and HIDDEN of visibility.rs.
+const TOLERANCE: f32 = 0.02;
+const HIDDEN: f32 = 1e-3;
+
+// How much a photo counts at a point: little where something is before it.
+fn visible(source_idx: u32, sight: Sight) -> f32 {
+    let rest = source_data(source_idx, REST);
+    if rest.z < 0.0 {
+        return 1.0;
     }
     let uv = sight.pixel / params.array_size;
-    let level = level_of_detail(source_idx, sight, ray, plane);
-    let value = textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
-    return fov * max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
+    let nearest = textureSampleLevel(distances, mask_sampler, uv, u32(rest.z), 0.0).r;
+    let slack = nearest * TOLERANCE;
+    let beyond = nearest - sight.inverse_distance * rest.w;
+    if beyond <= slack {
+        return 1.0;
+    }
+    let s = clamp((2.0 * slack - beyond) / slack, 0.0, 1.0);
+    return HIDDEN + (1.0 - HIDDEN) * s * s * (3.0 - 2.0 * s);
+}
+
+// fovBlend, what the ignore mask leaves of it, and what is before the point.
+fn relevance(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
+    var a = fov_blend(source_idx, sight);
+    if MASKED && a > 0.0 {
+        let layer = source_data(source_idx, REST).x;
+        if layer >= 0.0 {
+            let uv = sight.pixel / params.array_size;
+            let level = level_of_detail(source_idx, sight, ray, plane);
+            let value = textureSampleLevel(masks, mask_sampler, uv, u32(layer), level).r;
+            a *= max((value * 255.0 - IGNORED) / (255.0 - IGNORED), 0.0);
+        }
+    }
+    if OCCLUDED && a > 0.0 {
+        a *= visible(source_idx, sight);
+    }
+    return a;
 }
 
 // angDiff + beta * resDiff, and what time adds.

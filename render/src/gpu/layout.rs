@@ -58,7 +58,9 @@ pub(crate) struct Source {
     pub horizon: [f32; 2],
     pub mask_layer: f32,
     pub time_penalty: f32,
-    pub padding: [f32; 2],
+    pub distance_layer: f32,
+    /// What turns the inverse of a scaled distance into the distance map's units.
+    pub distance_scale: f32,
 }
 
 /// `Corner`'s inputs of triangulated.wgsl.
@@ -129,12 +131,12 @@ impl Params {
 }
 
 impl Source {
-    /// `layers` are those of the photo's and the mask's array; of a photo that is not on the
-    /// device any will do.
+    /// `layers` are those of the photo's, the mask's and the distance map's array; of a photo
+    /// that is not on the device any will do.
     pub(crate) fn of(
         frame: &Frame<'_>,
         source_idx: usize,
-        [photo, mask]: [Option<u32>; 2],
+        [photo, mask, distances]: [Option<u32>; 3],
     ) -> Self {
         let source: &FrameSource = &frame.sources[source_idx];
         // Depths scaled by the cube root of the ratio of areas make the ratio's cube the
@@ -218,7 +220,11 @@ impl Source {
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),
             mask_layer: mask.map_or(-1.0, |layer| layer as f32),
             time_penalty: f(source.time_penalty),
-            padding: [0.0; 2],
+            distance_layer: distances.map_or(-1.0, |layer| layer as f32),
+            distance_scale: distances.map_or(0.0, |_| {
+                let visibility = frame.lumigraph.visibility.as_ref();
+                visibility.map_or(0.0, |v| f(scale / v.map(source_idx).unit))
+            }),
         }
     }
 }
@@ -239,6 +245,8 @@ pub(crate) struct Special {
     pub common_lens: Option<f32>,
     /// Whether any source view has an ignore mask.
     pub masked: bool,
+    /// Whether the proxy can hide a part of itself.
+    pub occluded: bool,
 }
 
 impl Special {
@@ -248,23 +256,26 @@ impl Special {
         Self {
             common_lens: first.filter(|first| kinds.all(|kind| kind == *first)),
             masked: frame.lumigraph.photos.any_masked(),
+            occluded: frame.lumigraph.visibility.is_some(),
         }
     }
 
     /// The shaders' constants.
-    pub(super) fn constants(self) -> [(&'static str, f64); 2] {
+    pub(super) fn constants(self) -> [(&'static str, f64); 3] {
         let lens = f64::from(self.common_lens.unwrap_or(-1.0));
+        let flag = |set: bool| f64::from(u8::from(set));
         [
             ("COMMON_LENS", lens),
-            ("MASKED", f64::from(u8::from(self.masked))),
+            ("MASKED", flag(self.masked)),
+            ("OCCLUDED", flag(self.occluded)),
         ]
     }
 
     /// Different for each.
-    pub(super) fn key(self) -> (u32, bool) {
+    pub(super) fn key(self) -> (u32, bool, bool) {
         // Lenses' numbers are small and whole; those of views that differ share one more.
         let lens = self.common_lens.map_or(u32::MAX, |lens| lens as u32);
-        (lens, self.masked)
+        (lens, self.masked, self.occluded)
     }
 }
 

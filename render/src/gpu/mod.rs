@@ -34,7 +34,8 @@ pub struct Gpu {
     sampler: wgpu::Sampler,
     photos: Option<Layers>,
     masks: Option<Layers>,
-    no_masks: wgpu::TextureView,
+    distances: Option<Layers>,
+    no_layers: wgpu::TextureView,
     rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
     target: Option<Target>,
     failure: Arc<Mutex<Option<String>>>,
@@ -93,7 +94,7 @@ impl Gpu {
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
             ..Default::default()
         });
-        let no_masks = photos::no_layers(&device);
+        let no_layers = photos::no_layers(&device);
         let description = format!("{} ({:?})", info.name, info.backend);
         Ok(Self {
             device,
@@ -104,7 +105,8 @@ impl Gpu {
             sampler,
             photos: None,
             masks: None,
-            no_masks,
+            distances: None,
+            no_layers,
             rays: None,
             target: None,
             failure,
@@ -271,12 +273,25 @@ impl Gpu {
             frame,
             wanted,
         )?;
-        // The exact field weighs all views, and asks all masks.
+        // The exact field weighs all views, and asks all masks and distance maps.
         let store = &frame.lumigraph.photos;
-        let mut masked: Vec<usize> = match order {
+        let weighed: Vec<usize> = match order {
             Order::AsGiven => (0..frame.sources.len()).collect(),
             Order::ByLayer => wanted.to_vec(),
         };
+        if frame.lumigraph.visibility.is_some() {
+            Layers::ensure(
+                &mut self.distances,
+                Content::Distances,
+                device,
+                queue,
+                frame,
+                &weighed,
+            )?;
+        } else {
+            self.distances = None;
+        }
+        let mut masked = weighed;
         masked.retain(|&i| store.is_masked(i));
         if store.any_masked() {
             Layers::ensure(
@@ -292,11 +307,15 @@ impl Gpu {
         }
         let rays = self.rays(frame)?;
         let photos = self.photos.as_ref().expect("ensured above");
-        let masks = self.masks.as_ref();
+        let (masks, distances) = (self.masks.as_ref(), self.distances.as_ref());
         let params = Params::of(frame, photos.size);
         let source = |i| {
-            let mask = masks.and_then(|masks| masks.layer(i));
-            Source::of(frame, i, [photos.layer(i), mask])
+            let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
+            Source::of(
+                frame,
+                i,
+                [photos.layer(i), layer_of(masks), layer_of(distances)],
+            )
         };
         let listed = match order {
             Order::AsGiven => frame.taking_part().collect(),
@@ -310,15 +329,16 @@ impl Gpu {
             bytemuck::cast_slice(&sources),
             layout::SOURCE_ROW,
         );
-        let masks = masks.map_or(&self.no_masks, |masks| &masks.view);
+        let view = |layers: Option<&'_ Layers>| layers.map_or(&self.no_layers, |l| &l.view).clone();
         Ok(self.pipelines.shared_group(
             &self.device,
             &params,
             &sources,
             &rays,
             &planes,
-            masks,
+            &view(masks),
             &self.sampler,
+            &view(distances),
         ))
     }
 

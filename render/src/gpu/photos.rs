@@ -3,7 +3,8 @@
 use crate::RenderError;
 use crate::frame::Frame;
 use crate::photos::MAX_LEVELS;
-use image::{ImageBuffer, Pixel};
+use crate::visibility::{DistanceMap, REDUCTION};
+use image::{ImageBuffer, Luma, Pixel};
 
 /// What a texture array holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +13,18 @@ pub(crate) enum Content {
     Photos,
     /// The ignore masks of the views that have one.
     Masks,
+    /// Distance maps, half as large as the photos.
+    Distances,
+}
+
+impl Content {
+    /// Tells what the layers were made from.
+    fn id(self, frame: &Frame<'_>) -> u64 {
+        match (self, &frame.lumigraph.visibility) {
+            (Self::Distances, Some(visibility)) => visibility.id(),
+            _ => frame.lumigraph.photos.id(),
+        }
+    }
 }
 
 /// A texture array with the photo, or the mask, of one source view a layer.
@@ -25,7 +38,7 @@ pub(crate) struct Layers {
     texture: wgpu::Texture,
     pub view: wgpu::TextureView,
     pub size: [u32; 2],
-    /// The photo store that the layers came from.
+    /// Of what the layers came from.
     store_id: u64,
     /// By source view.
     layers: Vec<Option<u32>>,
@@ -47,7 +60,7 @@ impl Layers {
         frame: &Frame<'_>,
         wanted: &[usize],
     ) -> Result<(), RenderError> {
-        let store_id = frame.lumigraph.photos.id();
+        let store_id = content.id(frame);
         let of_this_store = current.as_ref().filter(|p| p.store_id == store_id);
         let missing = |p: &Self| wanted.iter().filter(|&&i| p.layers[i].is_none()).count() as u32;
         if of_this_store.is_none_or(|p| p.used_layers + missing(p) > p.capacity) {
@@ -100,6 +113,11 @@ impl Layers {
         let (label, format) = match content {
             Content::Photos => ("photos", wgpu::TextureFormat::Rgba8Unorm),
             Content::Masks => ("masks", wgpu::TextureFormat::R8Unorm),
+            Content::Distances => ("distances", wgpu::TextureFormat::R16Float),
+        };
+        let (size, mip_level_count) = match content {
+            Content::Photos | Content::Masks => (size, MAX_LEVELS as u32),
+            Content::Distances => (size.map(|side| side / REDUCTION), 1),
         };
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
@@ -108,7 +126,7 @@ impl Layers {
                 height: size[1],
                 depth_or_array_layers: capacity,
             },
-            mip_level_count: MAX_LEVELS as u32,
+            mip_level_count,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format,
@@ -144,6 +162,10 @@ impl Layers {
                         Some(mask) => self.upload(queue, &mask.levels),
                         None => continue,
                     },
+                    Content::Distances => match &frame.lumigraph.visibility {
+                        Some(visibility) => self.upload_map(queue, visibility.map(source_idx)),
+                        None => continue,
+                    },
                 }
                 self.layers[source_idx] = Some(self.used_layers);
                 self.used_layers += 1;
@@ -162,31 +184,61 @@ impl Layers {
             // What is one texel sooner stays one.
             let image = &levels[level.min(levels.len() - 1)];
             let padded = pad(image, self.size[0] >> level, self.size[1] >> level);
-            let (width, height) = padded.dimensions();
-            queue.write_texture(
-                wgpu::TexelCopyTextureInfo {
-                    texture: &self.texture,
-                    mip_level: level as u32,
-                    origin: wgpu::Origin3d {
-                        x: 0,
-                        y: 0,
-                        z: self.used_layers,
-                    },
-                    aspect: wgpu::TextureAspect::All,
-                },
+            let texel_bytes = u32::from(P::CHANNEL_COUNT);
+            self.write(
+                queue,
+                level as u32,
+                padded.dimensions(),
                 padded.as_raw(),
-                wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(width * u32::from(P::CHANNEL_COUNT)),
-                    rows_per_image: Some(height),
-                },
-                wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
+                texel_bytes,
             );
         }
+    }
+
+    /// Fills the first layer that is free with half floats.
+    fn upload_map(&self, queue: &wgpu::Queue, map: &DistanceMap) {
+        let halves = map.values.iter().map(|v| half::f16::from_f32(*v).to_bits());
+        let image: ImageBuffer<Luma<u16>, Vec<u16>> =
+            ImageBuffer::from_raw(map.size[0], map.size[1], halves.collect())
+                .expect("as many values as texels");
+        let padded = pad(&image, self.size[0], self.size[1]);
+        let bytes = bytemuck::cast_slice(padded.as_raw());
+        self.write(queue, 0, padded.dimensions(), bytes, 2);
+    }
+
+    /// Writes the corner of a level of the first layer that is free.
+    fn write(
+        &self,
+        queue: &wgpu::Queue,
+        mip_level: u32,
+        (width, height): (u32, u32),
+        bytes: &[u8],
+        texel_bytes: u32,
+    ) {
+        let origin = wgpu::Origin3d {
+            x: 0,
+            y: 0,
+            z: self.used_layers,
+        };
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.texture,
+                mip_level,
+                origin,
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(width * texel_bytes),
+                rows_per_image: Some(height),
+            },
+            wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+        );
     }
 
     /// The layer of a source view, if it is on the device.
@@ -233,11 +285,11 @@ fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
 }
 
 /// Repeats the last column and row once, where there is room.
-fn pad<P: Pixel<Subpixel = u8>>(
-    image: &ImageBuffer<P, Vec<u8>>,
+fn pad<P: Pixel>(
+    image: &ImageBuffer<P, Vec<P::Subpixel>>,
     room_width: u32,
     room_height: u32,
-) -> ImageBuffer<P, Vec<u8>> {
+) -> ImageBuffer<P, Vec<P::Subpixel>> {
     let (width, height) = image.dimensions();
     let padded_width = (width + 1).min(room_width);
     let padded_height = (height + 1).min(room_height);

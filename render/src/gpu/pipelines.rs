@@ -34,8 +34,8 @@ pub(crate) enum Pass {
 /// The pipelines made so far, and all that it takes to make more. Each exists once for
 /// everything that shaders are specialised to.
 pub(crate) struct Pipelines {
-    made: BTreeMap<(Pass, (u32, bool)), wgpu::RenderPipeline>,
-    mark: BTreeMap<(u32, bool), wgpu::ComputePipeline>,
+    made: BTreeMap<(Pass, (u32, bool, bool)), wgpu::RenderPipeline>,
+    mark: BTreeMap<(u32, bool, bool), wgpu::ComputePipeline>,
     shaders: [wgpu::ShaderModule; 3],
     shared_layout: BindGroupLayout,
     triangulated_layout: BindGroupLayout,
@@ -88,7 +88,15 @@ impl Pipelines {
             shared_layout: layout(
                 "shared",
                 all,
-                &[buffer(Uniform), table, table, table, photos, sampler],
+                &[
+                    buffer(Uniform),
+                    table,
+                    table,
+                    table,
+                    photos,
+                    sampler,
+                    photos,
+                ],
             ),
             triangulated_layout: layout("triangulated", fragment, &[photos, sampler, table]),
             exact_layout: layout("exact", fragment, &[photos, sampler]),
@@ -200,6 +208,7 @@ impl Pipelines {
         planes: &wgpu::TextureView,
         masks: &wgpu::TextureView,
         sampler: &wgpu::Sampler,
+        distances: &wgpu::TextureView,
     ) -> BindGroup {
         let resources = [
             params.as_entire_binding(),
@@ -208,6 +217,7 @@ impl Pipelines {
             BindingResource::TextureView(planes),
             BindingResource::TextureView(masks),
             BindingResource::Sampler(sampler),
+            BindingResource::TextureView(distances),
         ];
         group(device, &self.shared_layout, resources)
     }

@@ -90,6 +90,10 @@ impl Capture {
             Proxy::Plane(plane) => plane.intersect(origin_in_world, forward),
             // Made of points, it lies where they do.
             Proxy::Points => None,
+            Proxy::Mesh(solid) => {
+                let hit = solid.first_hit(origin_in_world, forward);
+                hit.map(|hit| origin_in_world + forward * hit.along)
+            }
         };
         let to_proxy = hit.map(|p| p.distance(origin_in_world));
         // With nothing ahead, as far as the capture is wide.

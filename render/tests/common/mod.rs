@@ -155,6 +155,7 @@ impl Shot {
             sources: self.sources(),
             photos: PhotoStore::from_images(self.photos.clone()),
             proxy: Proxy::Plane(self.plane),
+            visibility: None,
         }
     }
 }

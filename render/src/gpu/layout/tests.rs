@@ -18,7 +18,7 @@ struct Projector<'a> {
 impl<'a> Projector<'a> {
     fn new(gpu: &'a Gpu, frame: &Frame<'_>) -> Self {
         let sources: Vec<Source> = (0..frame.sources.len())
-            .map(|i| Source::of(frame, i, [None; 2]))
+            .map(|i| Source::of(frame, i, [None; 3]))
             .collect();
         let layout = |bindings: &[(u32, wgpu::BindingType)]| {
             let entry = |&(binding, ty): &(u32, wgpu::BindingType)| wgpu::BindGroupLayoutEntry {

@@ -1,0 +1,156 @@
+//! Which source views see a proxy point, and which have something before it.
+
+use crate::lumigraph::SourceView;
+use calibrate::{Pixel, View};
+use half::f16;
+use proxy::{Proxy, Solid};
+use rayon::prelude::*;
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+
+/// Of a source view that something hides a point from, this much is left: nothing beside a
+/// view that sees it, and something where no view does.
+pub(crate) const HIDDEN: f64 = 1e-3;
+
+/// How much farther than what a source view sees a point may lie, relatively, before it
+/// starts to count as hidden; at twice that it is. Meshes are not exact, and slanted
+/// surfaces change within a texel.
+pub(crate) const TOLERANCE: f64 = 0.02;
+
+/// Photo pixels a texel of a map, across and down.
+pub(crate) const REDUCTION: u32 = 2;
+
+/// How far the proxy is in each direction that a source view sees: a texel for some pixels.
+#[derive(Clone, PartialEq)]
+pub struct DistanceMap {
+    /// In texels.
+    pub size: [u32; 2],
+    /// Row by row, 1/distance over [`Self::unit`]; zero where there is nothing. These are
+    /// the largest of 3 × 3 rays, so that what lies beside something nearer, where no proxy
+    /// is exact, counts as hidden by it. They fit 16 bits.
+    pub values: Vec<f32>,
+    /// What the values are in units of, 1/world units.
+    pub unit: f64,
+}
+
+/// What the source views see of a proxy that can occlude itself, by way of a distance map
+/// for each, made when first needed.
+pub struct Visibility {
+    id: u64,
+    solid: Arc<Solid>,
+    views: Vec<View>,
+    maps: Vec<OnceLock<DistanceMap>>,
+}
+
+impl Visibility {
+    /// Tells it from every other in the program, for caches.
+    pub(crate) fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// Of a proxy; `None` for one that cannot hide any part of itself.
+    pub fn of(proxy: &Proxy, sources: &[SourceView]) -> Option<Self> {
+        static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+        match proxy {
+            Proxy::Mesh(solid) if solid.kind().can_occlude_itself() => Some(Self {
+                id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+                solid: Arc::clone(solid),
+                views: sources.iter().map(|s| s.view.clone()).collect(),
+                maps: sources.iter().map(|_| OnceLock::new()).collect(),
+            }),
+            _ => None,
+        }
+    }
+
+    /// The map of a source view.
+    pub fn map(&self, source_idx: usize) -> &DistanceMap {
+        self.maps[source_idx].get_or_init(|| DistanceMap::new(&self.solid, &self.views[source_idx]))
+    }
+}
+
+impl fmt::Debug for Visibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let made = self.maps.iter().filter(|m| m.get().is_some()).count();
+        write!(f, "Visibility({made} of {} maps)", self.maps.len())
+    }
+}
+
+impl DistanceMap {
+    /// Casts a ray for each texel.
+    pub fn new(solid: &Solid, view: &View) -> Self {
+        let size = [view.width, view.height].map(|side| side.div_ceil(REDUCTION));
+        let [width, height] = size.map(|side| side as usize);
+        let center = view.center();
+        let world_from_camera = view.camera_from_world.rotation.conjugate();
+        let ray = |x: usize, y: usize| {
+            let at = |i: usize| (i as f64 + 0.5) * f64::from(REDUCTION);
+            let ray = view.lens.unproject(Pixel::new(at(x), at(y)))?;
+            let hit = solid.first_hit(center, world_from_camera * ray)?;
+            Some(1.0 / (hit.along * ray.length()))
+        };
+        let row = |y: usize| -> Vec<f64> { (0..width).map(|x| ray(x, y).unwrap_or(0.0)).collect() };
+        let rows: Vec<Vec<f64>> = (0..height).into_par_iter().map(row).collect();
+
+        // The unit keeps the values within what 16 bits hold.
+        let nearest = rows.iter().flatten().copied().fold(0.0, f64::max);
+        let unit = if nearest > 0.0 && nearest.is_finite() {
+            nearest
+        } else {
+            1.0
+        };
+        let around = |i: usize, side: usize| i.saturating_sub(1)..(i + 2).min(side);
+        let values = (0..height)
+            .flat_map(|y| (0..width).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let block = around(y, height).flat_map(|y| around(x, width).map(move |x| (x, y)));
+                let value = block.map(|(x, y)| rows[y][x]).fold(0.0, f64::max);
+                f16::from_f64(value / unit).to_f32()
+            });
+        Self {
+            size,
+            values: values.collect(),
+            unit,
+        }
+    }
+
+    /// The inverse distance in a direction, given by a pixel of the photo; bilinear.
+    pub(crate) fn inverse_distance(&self, pixel: Pixel) -> f64 {
+        let reduction = f64::from(REDUCTION);
+        self.unit
+            * f64::from(self.sample((pixel.x / reduction) as f32, (pixel.y / reduction) as f32))
+    }
+
+    /// The value at a position in texels.
+    pub(crate) fn sample(&self, x: f32, y: f32) -> f32 {
+        let [width, height] = self.size;
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (left, top) = (x.floor(), y.floor());
+        let (fx, fy) = (x - left, y - top);
+        let column = |x: f32| x.clamp(0.0, (width - 1) as f32) as usize;
+        let row = |y: f32| y.clamp(0.0, (height - 1) as f32) as usize * width as usize;
+        let (x0, x1, y0, y1) = (column(left), column(left + 1.0), row(top), row(top + 1.0));
+        let across = |y: usize| {
+            let (a, b) = (self.values[y + x0], self.values[y + x1]);
+            a + fx * (b - a)
+        };
+        let (upper, lower) = (across(y0), across(y1));
+        upper + fy * (lower - upper)
+    }
+}
+
+/// How much of a source view counts at a point at the given inverse distance from it, in a
+/// direction in which the proxy's is `nearest`.
+pub(crate) fn visible(inverse_distance: f64, nearest: f64) -> f64 {
+    // Multiplied through by `nearest`: at infinity both are zero.
+    let slack = nearest * TOLERANCE;
+    let beyond = nearest - inverse_distance;
+    if beyond <= slack {
+        return 1.0;
+    }
+    let s = ((2.0 * slack - beyond) / slack).clamp(0.0, 1.0);
+    HIDDEN + (1.0 - HIDDEN) * s * s * (3.0 - 2.0 * s)
+}
+
+/// The reduction, for the twins that sample the maps by pixels of the photo.
+pub(crate) const TEXEL_PER_PIXEL: f32 = 1.0 / REDUCTION as f32;
