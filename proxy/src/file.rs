@@ -60,7 +60,7 @@ impl Stored {
                 normal: plane.normal().to_array(),
             },
             Proxy::Points => StoredSurface::Points,
-            Proxy::Mesh(_) => return None,
+            Proxy::Dense(_) | Proxy::Mesh(_) => return None,
         };
         Some(Self {
             version: 1,

@@ -6,6 +6,7 @@
 
 mod axes;
 mod cloud;
+pub mod dense;
 mod facets;
 mod file;
 mod fit;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
+pub use dense::DensePoints;
 pub use facets::Facets;
 pub use file::{FileError, parse, read, write};
 pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
@@ -34,6 +36,8 @@ pub enum Proxy {
     Plane(Plane),
     /// The sparse points that views like the desired one observe; see [`points`].
     Points,
+    /// As [`Self::Points`], with more points than the capture's own; see [`dense`].
+    Dense(Arc<DensePoints>),
     /// Triangles.
     Mesh(Arc<Solid>),
 }
@@ -43,7 +47,7 @@ impl Proxy {
     pub fn plane(&self) -> Option<Plane> {
         match self {
             Self::Plane(plane) => Some(*plane),
-            Self::Points | Self::Mesh(_) => None,
+            Self::Points | Self::Dense(_) | Self::Mesh(_) => None,
         }
     }
 
@@ -52,6 +56,7 @@ impl Proxy {
         match self {
             Self::Plane(_) => "plane",
             Self::Points => "points",
+            Self::Dense(_) => "dense",
             Self::Mesh(solid) => solid.kind().name(),
         }
     }

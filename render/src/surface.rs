@@ -40,7 +40,7 @@ impl Surface {
                 .map_or(Self::Nothing, |q| {
                     Self::Plane(desired.camera_from_world.rotation * q)
                 }),
-            Proxy::Points => {
+            Proxy::Points | Proxy::Dense(_) => {
                 let views: Vec<View> = lumigraph.sources.iter().map(|s| s.view.clone()).collect();
                 points::facets(desired, &views, &lumigraph.points).map_or(Self::Nothing, |facets| {
                     Self::Facets(FacetMap::of_facets(facets, desired))

@@ -9,8 +9,8 @@ use calibrate::opencv::Keys;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use lumigraph::scene::{Photo, Scene, Warning};
-use proxy::{FitBasis, Proxy};
+use lumigraph::scene::{Kind, Photo, Scene, Warning};
+use proxy::Proxy;
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -128,7 +128,7 @@ impl HoldOutArgs {
 /// Which surface.
 #[derive(Args)]
 pub(super) struct ProxyArgs {
-    /// plane, points, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
+    /// plane, points, dense, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
     /// auto]
     #[arg(long, value_name = "KIND|FILE")]
     pub(super) proxy: Option<String>,
@@ -147,34 +147,28 @@ impl ProxyArgs {
         scene: &Scene,
         without: &BTreeSet<String>,
     ) -> anyhow::Result<ChosenProxy> {
-        let fitted = || {
-            let fit = scene
-                .fit_plane(without)
-                .context("no proxy can be fitted to this scene")?;
-            let origin = match fit.basis {
-                FitBasis::Points { .. } => "fitted".to_owned(),
-                basis => {
-                    say!("note: the proxy is a plane fitted to {basis}; see `lumigraph proxy`");
-                    format!("fitted to {basis}")
-                }
-            };
+        let fitted = |kind: Kind| {
+            let fitted = scene
+                .fit(kind, without)
+                .context("no such proxy can be fitted to this scene")?;
+            if let Some(note) = fitted.note {
+                say!("note: {note}; see `lumigraph proxy`");
+            }
             Ok(ChosenProxy {
-                proxy: Proxy::Plane(fit.plane),
-                origin,
+                proxy: fitted.proxy,
+                origin: fitted.how,
             })
         };
         match self.proxy.as_deref() {
-            Some("plane" | "auto") => fitted(),
-            Some("points") => Ok(ChosenProxy {
-                proxy: Proxy::Points,
-                origin: "made for every view".to_owned(),
-            }),
+            Some("auto") => fitted(Kind::Plane),
+            Some(name) if let Some(kind) = Kind::from_name(name) => fitted(kind),
             Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
                 proxy: proxy::read(Path::new(file))?,
                 origin: file.to_owned(),
             }),
             Some(other) => Err(Usage(format!(
-                "--proxy {other}: expected plane, points, auto, or a file ending in .json or .glb"
+                "--proxy {other}: expected plane, points, dense, auto, or a file ending in .json or \
+                 .glb"
             ))
             .into()),
             None => match &scene.proxy {
@@ -188,14 +182,14 @@ impl ProxyArgs {
                             "note: the scene's own proxy was fitted with held-out {name}; \
                              fitting another without"
                         );
-                        return fitted();
+                        return fitted(Kind::Plane);
                     }
                     Ok(ChosenProxy {
                         proxy: own.proxy.clone(),
                         origin: "the scene's own".to_owned(),
                     })
                 }
-                None => fitted(),
+                None => fitted(Kind::Plane),
             },
         }
     }
@@ -228,8 +222,19 @@ pub(super) fn proxy_json(proxy: &Proxy) -> Value {
 }
 
 pub(super) fn proxy_text(proxy: &Proxy) -> String {
-    let Proxy::Plane(plane) = proxy else {
-        return "the sparse points that views like the desired one observe".to_owned();
+    let plane = match proxy {
+        Proxy::Plane(plane) => plane,
+        Proxy::Points => {
+            return "the sparse points that views like the desired one observe".to_owned();
+        }
+        Proxy::Dense(dense) => {
+            let count = dense.points.len();
+            return format!("those of {count} dense points that views like the desired one see");
+        }
+        Proxy::Mesh(solid) => {
+            let count = solid.mesh().triangles.len();
+            return format!("{} of {count} triangles", solid.kind().name());
+        }
     };
     let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
     format!(

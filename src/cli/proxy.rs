@@ -46,8 +46,21 @@ enum Kind {
     /// The sparse points that views like the desired one observe, triangulated anew for
     /// every view
     Points,
+    /// These points, and those that photos agree on between them
+    Dense,
     /// The best that can be fitted; today the plane
     Auto,
+}
+
+impl Kind {
+    fn fitted(self) -> lumigraph::scene::Kind {
+        use lumigraph::scene::Kind as Of;
+        match self {
+            Self::Plane | Self::Auto => Of::Plane,
+            Self::Points => Of::Points,
+            Self::Dense => Of::Dense,
+        }
+    }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
@@ -74,17 +87,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     let (proxy, how, fitted_without) = match by_hand {
         Some(plane) => (Proxy::Plane(plane), "given by hand".to_owned(), None),
-        None if args.kind == Kind::Points => (
-            Proxy::Points,
-            "made for every view".to_owned(),
-            Some(&without),
-        ),
         None => {
-            let fit = scene
-                .fit_plane(&without)
-                .context("no plane can be fitted to this scene")?;
-            let how = format!("fitted at distance {:.4} to {}", fit.distance, fit.basis);
-            (Proxy::Plane(fit.plane), how, Some(&without))
+            let fitted = scene
+                .fit(args.kind.fitted(), &without)
+                .context("no such proxy can be fitted to this scene")?;
+            (fitted.proxy, fitted.how, Some(&without))
         }
     };
     let file = match &args.output {

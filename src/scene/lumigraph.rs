@@ -1,8 +1,8 @@
 //! From a scene to what the engine draws from.
 
-use super::{Scene, SceneError};
+use super::{Photo, Scene, SceneError};
 use calibrate::{Image, ImageId, View};
-use proxy::{FitError, PlaneFit, Proxy, SparsePoint};
+use proxy::{DensePoints, Proxy, SparsePoint};
 use render::{Lumigraph, PhotoStore, SourceView, Visibility};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -46,34 +46,6 @@ impl Scene {
         images.map(|image| (image.name.as_str(), image)).collect()
     }
 
-    /// The plane that fits the sparse points when the photos of the given names were never
-    /// taken; without points, that through what the cameras look at.
-    ///
-    /// # Errors
-    /// Nothing to fit to.
-    pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
-        let rest = self.reconstruction.without_images(without);
-        match proxy::fit_plane(&rest) {
-            Err(FitError::NoPoints) => {
-                let bounds = self.photos.iter().filter_map(|photo| {
-                    let bounds = photo.depth_bounds?;
-                    Some((photo.name.clone(), bounds))
-                });
-                Ok(proxy::plane_across_axes(&rest, &bounds.collect())?)
-            }
-            fit => Ok(fit?),
-        }
-    }
-
-    /// The best surface that can be fitted without the photos of the given names; today
-    /// the plane.
-    ///
-    /// # Errors
-    /// Nothing to fit to.
-    pub fn fit_proxy(&self, without: &BTreeSet<String>) -> Result<Proxy, SceneError> {
-        Ok(Proxy::Plane(self.fit_plane(without)?.plane))
-    }
-
     /// Everything that views are rendered from: the photos but those of the given names,
     /// in the order of their names, decoded when first needed.
     ///
@@ -84,11 +56,9 @@ impl Scene {
         without: &BTreeSet<String>,
         proxy: Proxy,
     ) -> Result<Lumigraph, SceneError> {
-        let images = self.images_by_name();
         let mut sources = Vec::new();
         let mut files = Vec::new();
-        for photo in self.photos.iter().filter(|p| !without.contains(&p.name)) {
-            let view = self.view_of(images[photo.name.as_str()])?;
+        for (photo, view) in self.sources(without)? {
             files.push((photo.clone(), (view.width, view.height)));
             sources.push(SourceView {
                 name: photo.name.clone(),
@@ -113,9 +83,10 @@ impl Scene {
             let mask = mask.map_err(|error| error.to_string())?;
             mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))
         });
-        let points = match proxy {
+        let points = match &proxy {
             Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),
-            Proxy::Points => self.sparse_points(without, &sources),
+            Proxy::Points => self.sparse_points(without, &names_of(&sources)),
+            Proxy::Dense(dense) => renamed(dense, &names_of(&sources)),
         };
         let visibility = Visibility::of(&proxy, &sources);
         Ok(Lumigraph {
@@ -127,20 +98,34 @@ impl Scene {
         })
     }
 
-    /// The sparse points that do not rest on photos left out, each with the source views
-    /// that observe it.
-    fn sparse_points(
+    /// The photos but those of the given names, with their cameras, in the order of their
+    /// names.
+    ///
+    /// # Errors
+    /// A camera has no lens.
+    pub(super) fn sources(
         &self,
         without: &BTreeSet<String>,
-        sources: &[SourceView],
+    ) -> Result<Vec<(&Photo, View)>, SceneError> {
+        let images = self.images_by_name();
+        let rest = self.photos.iter().filter(|p| !without.contains(&p.name));
+        rest.map(|photo| Ok((photo, self.view_of(images[photo.name.as_str()])?)))
+            .collect()
+    }
+
+    /// The sparse points that do not rest on photos left out, each with those of the named
+    /// photos that observe it.
+    pub(super) fn sparse_points(
+        &self,
+        without: &BTreeSet<String>,
+        names: &[String],
     ) -> Vec<SparsePoint> {
         let rest = self.reconstruction.without_images(without);
-        let source_of: BTreeMap<&str, u32> =
-            sources.iter().map(|s| s.name.as_str()).zip(0..).collect();
+        let index_of: BTreeMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
         let seen_by = |track: &[(ImageId, u32)]| {
             let source = |(id, _): &(ImageId, u32)| {
                 let image = rest.images.get(id)?;
-                source_of.get(image.name.as_str()).copied()
+                index_of.get(image.name.as_str()).copied()
             };
             let seen: BTreeSet<u32> = track.iter().filter_map(source).collect();
             seen.into_iter().collect()
@@ -153,4 +138,23 @@ impl Scene {
             })
             .collect()
     }
+}
+
+fn names_of(sources: &[SourceView]) -> Vec<String> {
+    sources.iter().map(|s| s.name.clone()).collect()
+}
+
+/// The points with the views of other names; points that none of them sees are left out.
+fn renamed(dense: &DensePoints, names: &[String]) -> Vec<SparsePoint> {
+    let index_of: BTreeMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
+    let index = |i: &u32| index_of.get(dense.names[*i as usize].as_str()).copied();
+    let point = |point: &SparsePoint| {
+        let mut seen_by: Vec<u32> = point.seen_by.iter().filter_map(index).collect();
+        seen_by.sort_unstable();
+        (!seen_by.is_empty()).then_some(SparsePoint {
+            position: point.position,
+            seen_by,
+        })
+    };
+    dense.points.iter().filter_map(point).collect()
 }

@@ -1,0 +1,150 @@
+//! The points that depths of several photos agree on.
+
+use super::DepthMap;
+use super::small::SmallPhoto;
+use crate::SparsePoint;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Relative difference of depths up to which two photos agree.
+const AGREE: f64 = 0.012;
+/// How many others must agree, where there are so many.
+const OTHERS: usize = 2;
+
+/// A point that a photo and some of its neighbours agree on.
+struct Agreed {
+    position: DVec3,
+    seen_by: Vec<u32>,
+    cell: usize,
+}
+
+/// Points about `spacing` pixels apart in each photo.
+pub(super) fn points(
+    photos: &[Option<SmallPhoto>],
+    maps: &[Option<DepthMap>],
+    neighbours: &[Vec<usize>],
+    spacing: u32,
+) -> Vec<SparsePoint> {
+    let spacing = spacing as usize;
+    // Whoever compared with a photo can agree with it.
+    let mut related: Vec<Vec<usize>> = neighbours.to_vec();
+    for (i, of) in neighbours.iter().enumerate() {
+        of.iter().for_each(|&j| related[j].push(i));
+    }
+    for of in &mut related {
+        of.sort_unstable();
+        of.dedup();
+    }
+    let agreed: Vec<Vec<Agreed>> = (0..photos.len())
+        .into_par_iter()
+        .map(|i| of_photo(i, photos, maps, &related[i], spacing))
+        .collect();
+
+    // Of points that several photos have only the first stays.
+    let columns = |photo: &SmallPhoto| photo.width.div_ceil(spacing);
+    let mut taken: Vec<Vec<f64>> = photos
+        .iter()
+        .map(|photo| match photo {
+            Some(photo) => vec![0.0; columns(photo) * photo.height.div_ceil(spacing)],
+            None => Vec::new(),
+        })
+        .collect();
+    let mut points = Vec::new();
+    for (i, agreed) in agreed.into_iter().enumerate() {
+        let Some(photo) = &photos[i] else { continue };
+        for point in agreed {
+            let Some((_, depth)) = photo.project(point.position) else {
+                continue;
+            };
+            if alike(taken[i][point.cell], 1.0 / depth) {
+                continue;
+            }
+            for &j in &point.seen_by {
+                let Some(other) = &photos[j as usize] else {
+                    continue;
+                };
+                if let Some((at, depth)) = other.project(point.position)
+                    && let Some(index) = other.index(at)
+                {
+                    let (x, y) = (index % other.width, index / other.width);
+                    let cell = y / spacing * columns(other) + x / spacing;
+                    taken[j as usize][cell] = 1.0 / depth;
+                }
+            }
+            points.push(SparsePoint {
+                position: point.position,
+                seen_by: point.seen_by,
+            });
+        }
+    }
+    points
+}
+
+fn alike(a: f64, b: f64) -> bool {
+    (a - b).abs() <= AGREE * a.max(b)
+}
+
+/// One point for each cell of a photo in which there is any, that nearest to its middle.
+fn of_photo(
+    i: usize,
+    photos: &[Option<SmallPhoto>],
+    maps: &[Option<DepthMap>],
+    related: &[usize],
+    spacing: usize,
+) -> Vec<Agreed> {
+    let (Some(photo), Some(map)) = (&photos[i], &maps[i]) else {
+        return Vec::new();
+    };
+    let with_maps: Vec<(usize, &SmallPhoto, &DepthMap)> = related
+        .iter()
+        .filter_map(|&j| Some((j, photos[j].as_ref()?, maps[j].as_ref()?)))
+        .collect();
+    let needed = OTHERS.min(with_maps.len());
+    if needed == 0 {
+        return Vec::new();
+    }
+    let agrees = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
+        let (at, depth) = other.project(position)?;
+        let inverse = f64::from(map.inverse_depths[other.index(at)?]);
+        alike(inverse, 1.0 / depth).then_some(())
+    };
+    let middle = spacing / 2;
+    let mut order: Vec<(usize, usize)> = (0..spacing)
+        .flat_map(|y| (0..spacing).map(move |x| (x, y)))
+        .collect();
+    order.sort_by_key(|&(x, y)| (x.abs_diff(middle).pow(2) + y.abs_diff(middle).pow(2), y, x));
+    let (columns, rows) = (
+        photo.width.div_ceil(spacing),
+        photo.height.div_ceil(spacing),
+    );
+    let in_cell = |cell: usize| {
+        let (left, top) = (cell % columns * spacing, cell / columns * spacing);
+        order.iter().find_map(|&(dx, dy)| {
+            let (x, y) = (left + dx, top + dy);
+            if x >= photo.width || y >= photo.height {
+                return None;
+            }
+            let inverse = f64::from(map.inverse_depths[y * photo.width + x]);
+            if inverse <= 0.0 {
+                return None;
+            }
+            let position = photo.point(x, y, inverse);
+            let mut seen_by: Vec<u32> = with_maps
+                .iter()
+                .filter(|(_, other, map)| agrees(position, other, map).is_some())
+                .map(|(j, ..)| *j as u32)
+                .collect();
+            if seen_by.len() < needed || !position.is_finite() {
+                return None;
+            }
+            seen_by.push(i as u32);
+            seen_by.sort_unstable();
+            Some(Agreed {
+                position,
+                seen_by,
+                cell,
+            })
+        })
+    };
+    (0..columns * rows).filter_map(in_cell).collect()
+}

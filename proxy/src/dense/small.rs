@@ -1,0 +1,135 @@
+//! Photos made small and straight for comparing.
+
+use calibrate::{Pixel, View};
+use glam::{DMat3, DVec3};
+use image::RgbaImage;
+use image::imageops::{FilterType, resize};
+
+/// The widest angle from the axis that a straight photo shows, radians: beyond it a pinhole
+/// spends its pixels on little.
+const WIDEST: f64 = 0.95;
+/// Alpha from which on a pixel is used.
+const OPAQUE: u8 = 128;
+
+/// A reduced photo through a pinhole.
+#[derive(Clone, Debug)]
+pub(super) struct SmallPhoto {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// In pixels; the principal point is the image's middle.
+    pub(super) focal: f64,
+    /// Turns world directions into the camera's.
+    pub(super) rotation: DMat3,
+    /// In the world.
+    pub(super) center: DVec3,
+    /// −128…127, row by row: sums of squares stay small.
+    pub(super) grays: Vec<f32>,
+    /// Whether a pixel shows anything.
+    pub(super) used: Vec<bool>,
+}
+
+impl SmallPhoto {
+    /// `None` for a view without any ray to look along.
+    pub(super) fn new(view: &View, photo: &RgbaImage, long_side: u32) -> Option<Self> {
+        // 1. The pinhole: as wide as the photo, within reason.
+        let long = f64::from(view.width.max(view.height));
+        let scale = (f64::from(long_side) / long).min(1.0);
+        let tangent = |x: f64, y: f64| {
+            let ray = view.lens.unproject(Pixel::new(x, y))?;
+            let limit = WIDEST.tan();
+            let part = |v: f64| {
+                if ray.z > 0.0 {
+                    (v / ray.z).abs().min(limit)
+                } else {
+                    limit
+                }
+            };
+            Some((part(ray.x), part(ray.y)))
+        };
+        let (w, h) = (f64::from(view.width), f64::from(view.height));
+        let across = [tangent(0.0, h / 2.0), tangent(w, h / 2.0)];
+        let down = [tangent(w / 2.0, 0.0), tangent(w / 2.0, h)];
+        let tan_x = across.iter().flatten().map(|t| t.0).fold(0.0, f64::max);
+        let tan_y = down.iter().flatten().map(|t| t.1).fold(0.0, f64::max);
+        let focal = view.lens.mean_focal() * scale;
+        if !(tan_x > 0.0 && tan_y > 0.0 && focal > 0.0) {
+            return None;
+        }
+        let side = |tangent: f64| {
+            (2.0 * focal * tangent)
+                .round()
+                .clamp(8.0, 2.0 * f64::from(long_side))
+        };
+        let (width, height) = (side(tan_x) as usize, side(tan_y) as usize);
+
+        // 2. The photo reduced by area, then looked up through its lens.
+        let reduced = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
+        let small = resize(
+            photo,
+            reduced(view.width),
+            reduced(view.height),
+            FilterType::Triangle,
+        );
+        let to_small = [f64::from(small.width()) / w, f64::from(small.height()) / h];
+        let mut grays = vec![0.0; width * height];
+        let mut used = vec![false; width * height];
+        for y in 0..height {
+            for x in 0..width {
+                let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / focal;
+                let ray = DVec3::new(at(x, width), at(y, height), 1.0);
+                let Some(pixel) = view.lens.project(ray).filter(|p| view.contains(*p)) else {
+                    continue;
+                };
+                let (gray, alpha) = sample(&small, pixel.x * to_small[0], pixel.y * to_small[1]);
+                grays[y * width + x] = gray - 128.0;
+                used[y * width + x] = alpha >= f32::from(OPAQUE);
+            }
+        }
+        Some(Self {
+            width,
+            height,
+            focal,
+            rotation: view.camera_from_world.matrix(),
+            center: view.center(),
+            grays,
+            used,
+        })
+    }
+
+    /// A point's position in pixels (the first pixel's centre is (0.5, 0.5)) and its depth
+    /// along z; `None` behind the camera.
+    pub(super) fn project(&self, point_in_world: DVec3) -> Option<([f64; 2], f64)> {
+        let p = self.rotation * (point_in_world - self.center);
+        let at = |v: f64, side: usize| self.focal * v / p.z + side as f64 / 2.0;
+        (p.z > 0.0).then(|| ([at(p.x, self.width), at(p.y, self.height)], p.z))
+    }
+
+    /// The index of the pixel that a position falls on, if it lies in the photo.
+    pub(super) fn index(&self, [x, y]: [f64; 2]) -> Option<usize> {
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        inside.then(|| y as usize * self.width + x as usize)
+    }
+
+    /// The point at an inverse depth behind a pixel's centre.
+    pub(super) fn point(&self, x: usize, y: usize, inverse_depth: f64) -> DVec3 {
+        let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / self.focal;
+        let ray = DVec3::new(at(x, self.width), at(y, self.height), 1.0);
+        self.center + self.rotation.transpose() * (ray / inverse_depth)
+    }
+}
+
+/// Bilinear gray and alpha.
+fn sample(image: &RgbaImage, x: f64, y: f64) -> (f32, f32) {
+    let (x, y) = (x - 0.5, y - 0.5);
+    let (fx, fy) = ((x - x.floor()) as f32, (y - y.floor()) as f32);
+    let texel = |dx: f64, dy: f64| {
+        let column = (x.floor() + dx).clamp(0.0, f64::from(image.width() - 1)) as u32;
+        let row = (y.floor() + dy).clamp(0.0, f64::from(image.height() - 1)) as u32;
+        let [r, g, b, a] = image.get_pixel(column, row).0.map(f32::from);
+        (0.299 * r + 0.587 * g + 0.114 * b, a)
+    };
+    let mix = |a: (f32, f32), b: (f32, f32), f: f32| (a.0 + f * (b.0 - a.0), a.1 + f * (b.1 - a.1));
+    let upper = mix(texel(0.0, 0.0), texel(1.0, 0.0), fx);
+    let lower = mix(texel(0.0, 1.0), texel(1.0, 1.0), fx);
+    mix(upper, lower, fy)
+}

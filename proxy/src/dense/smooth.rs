@@ -1,0 +1,123 @@
+//! Depths from costs: semi-global matching.
+
+use super::DepthMap;
+use super::small::SmallPhoto;
+use super::sweep::Costs;
+
+/// What it costs neighbours to be one step apart, and to be farther apart; the latter less
+/// across an edge of the photo.
+const STEP: u16 = 8;
+const JUMP: u16 = 80;
+const LEAST_JUMP: u16 = 20;
+/// Steps of gray that halve the cost of a jump.
+const EDGE: f32 = 8.0;
+
+/// The inverse depth of each pixel that the photo uses.
+pub(super) fn depths(photo: &SmallPhoto, costs: &Costs) -> DepthMap {
+    let (width, height, count) = (photo.width, photo.height, costs.count);
+    let mut sums = vec![0_u16; costs.costs.len()];
+    // Four directions on the way down, and their opposites on the way up.
+    for backwards in [false, true] {
+        for (dx, dy) in [(1_isize, 0_isize), (1, 1), (0, 1), (-1, 1)] {
+            add_path(photo, costs, [dx, dy], backwards, &mut sums);
+        }
+    }
+    let inverse_depth = |pixel: usize| -> f32 {
+        if !photo.used[pixel] {
+            return 0.0;
+        }
+        let sums = &sums[pixel * count..][..count];
+        let best = (0..count).min_by_key(|&d| sums[d]).unwrap_or(0);
+        if best == 0 || best == count - 1 {
+            // On the range's end it may as well lie beyond.
+            return 0.0;
+        }
+        let [before, at, after] = [best - 1, best, best + 1].map(|d| f64::from(sums[d]));
+        let bend = before - 2.0 * at + after;
+        let shift = if bend > 0.0 {
+            0.5 * (before - after) / bend
+        } else {
+            0.0
+        };
+        (costs.first + costs.step * (best as f64 + shift.clamp(-0.5, 0.5))) as f32
+    };
+    DepthMap {
+        inverse_depths: (0..width * height).map(inverse_depth).collect(),
+    }
+}
+
+/// Adds the least costs of paths in one direction.
+fn add_path(
+    photo: &SmallPhoto,
+    costs: &Costs,
+    [dx, dy]: [isize; 2],
+    backwards: bool,
+    sums: &mut [u16],
+) {
+    let (width, height, count) = (photo.width, photo.height, costs.count);
+    let towards = if backwards { 1 } else { -1 };
+    // Of this row and the one before it, with each pixel's least value at its end.
+    let stride = count + 1;
+    let mut last = vec![0_u16; width * stride];
+    let mut current = last.clone();
+    let mut previous = vec![0_u16; stride];
+    for row in 0..height {
+        let y = if backwards { height - 1 - row } else { row };
+        std::mem::swap(&mut last, &mut current);
+        for column in 0..width {
+            let x = if backwards {
+                width - 1 - column
+            } else {
+                column
+            };
+            let pixel = y * width + x;
+            let own = &costs.costs[pixel * count..][..count];
+            let (px, py) = (x as isize + towards * dx, y as isize + towards * dy);
+            let inside = px >= 0 && py >= 0 && px < width as isize && py < height as isize;
+            let out = x * stride..(x + 1) * stride;
+            if inside {
+                let from = if dy == 0 { &current } else { &last };
+                previous.copy_from_slice(&from[px as usize * stride..][..stride]);
+                let before = py as usize * width + px as usize;
+                let difference = (photo.grays[pixel] - photo.grays[before]).abs();
+                let jump = (f32::from(JUMP) / (1.0 + difference / EDGE)) as u16;
+                step_path(&previous, own, jump.max(LEAST_JUMP), &mut current[out]);
+            } else {
+                start_path(own, &mut current[out]);
+            }
+            let path = &current[x * stride..][..count];
+            let sums = &mut sums[pixel * count..][..count];
+            sums.iter_mut().zip(path).for_each(|(s, p)| *s += p);
+        }
+    }
+}
+
+fn start_path(own: &[u8], out: &mut [u16]) {
+    let count = own.len();
+    let mut least = u16::MAX;
+    for d in 0..count {
+        out[d] = u16::from(own[d]);
+        least = least.min(out[d]);
+    }
+    out[count] = least;
+}
+
+/// Hirschmüller 2008, equation 13.
+fn step_path(previous: &[u16], own: &[u8], jump: u16, out: &mut [u16]) {
+    let count = own.len();
+    let floor = previous[count];
+    let far = floor + jump;
+    let mut least = u16::MAX;
+    for d in 0..count {
+        let below = if d > 0 { previous[d - 1] + STEP } else { far };
+        let above = if d + 1 < count {
+            previous[d + 1] + STEP
+        } else {
+            far
+        };
+        let value = u16::from(own[d]) + previous[d].min(below).min(above).min(far) - floor;
+        out[d] = value;
+        least = least.min(value);
+    }
+    out[count] = least;
+}
