@@ -95,7 +95,7 @@ fn shelf() -> Lumigraph {
 fn open(capture: &Path) -> Result<Lumigraph, Box<dyn std::error::Error>> {
     let (scene, _) = Scene::open(capture, false)?;
     let rest: BTreeSet<String> = scene.names().into_iter().skip(PHOTOS).collect();
-    let proxy = scene.fit_proxy(&rest)?;
+    let proxy = proxy::Proxy::Plane(scene.fit_plane(&rest)?.plane);
     Ok(scene.lumigraph(&rest, proxy)?)
 }
 

@@ -10,7 +10,7 @@
 //! use std::path::Path;
 //!
 //! let (scene, _warnings) = Scene::open(Path::new("my-capture"), false)?;
-//! let proxy = scene.fit_proxy(&BTreeSet::new())?;
+//! let proxy = scene.fit_best(&BTreeSet::new())?.proxy;
 //! let lumigraph = scene.lumigraph(&BTreeSet::new(), proxy)?;
 //! let desired = scene.view("a.jpg")?;
 //! let frame = Frame::new(&lumigraph, desired, FieldOptions::default());

@@ -224,7 +224,7 @@ fn the_order_of_the_photos_changes_nothing() {
                     .iter()
                     .map(|&i| lumigraph.sources[i].clone())
                     .collect(),
-                proxy: lumigraph.proxy,
+                proxy: lumigraph.proxy.clone(),
                 visibility: None,
             };
             let after = pictures(&reordered, &desired);

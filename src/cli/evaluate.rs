@@ -1,11 +1,12 @@
 //! `lumigraph evaluate`
 
 use super::exposure::ExposureArgs;
-use super::options::{DrawArgs, FieldArgs, ProxyArgs, SceneArgs, resized};
+use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::surface::ProxyArgs;
 use super::time::TimeArgs;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;

@@ -3,9 +3,10 @@
 use super::exposure::ExposureArgs;
 use super::frames::{NamedView, of_path};
 use super::npz::{Weights, npz};
-use super::options::{FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs, resized, size};
+use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
+use super::surface::ProxyArgs;
 use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::anyhow;
 use calibrate::{Pixel, View};

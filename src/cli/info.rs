@@ -1,11 +1,10 @@
 //! `lumigraph info`
 
 use super::info_of_file;
-use super::options::{
-    KeyArgs, SceneArgs, beside_counts, beside_text, proxy_json, proxy_text, tie_text,
-};
+use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, tie_text};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
+use super::surface::{proxy_json, proxy_text};
 use calibrate::{TRUSTED_TIE, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;

@@ -18,6 +18,7 @@ mod proxy;
 mod render;
 mod report;
 mod session;
+mod surface;
 mod time;
 mod uncalibrated;
 

@@ -1,20 +1,17 @@
 //! Options that several subcommands share.
 
-use super::Usage;
 use super::output::say;
-use anyhow::Context;
 use calibrate::View;
 use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use lumigraph::scene::{Kind, Photo, Scene, Warning};
-use proxy::Proxy;
+use lumigraph::scene::{Photo, Scene, Warning};
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
-use serde_json::{Value, json};
+
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Which photo set.
 #[derive(Args)]
@@ -123,125 +120,6 @@ impl HoldOutArgs {
             None => Ok(BTreeSet::new()),
         }
     }
-}
-
-/// Which surface.
-#[derive(Args)]
-pub(super) struct ProxyArgs {
-    /// plane, points, dense, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
-    /// auto]
-    #[arg(long, value_name = "KIND|FILE")]
-    pub(super) proxy: Option<String>,
-}
-
-/// A proxy and where it came from.
-pub(super) struct ChosenProxy {
-    pub(super) proxy: Proxy,
-    origin: String,
-}
-
-impl ProxyArgs {
-    /// The proxy asked for. A fitted one rests on none of the photos in `without`.
-    pub(super) fn choose(
-        &self,
-        scene: &Scene,
-        without: &BTreeSet<String>,
-    ) -> anyhow::Result<ChosenProxy> {
-        let fitted = |kind: Kind| {
-            let fitted = scene
-                .fit(kind, without)
-                .context("no such proxy can be fitted to this scene")?;
-            if let Some(note) = fitted.note {
-                say!("note: {note}; see `lumigraph proxy`");
-            }
-            Ok(ChosenProxy {
-                proxy: fitted.proxy,
-                origin: fitted.how,
-            })
-        };
-        match self.proxy.as_deref() {
-            Some("auto") => fitted(Kind::Plane),
-            Some(name) if let Some(kind) = Kind::from_name(name) => fitted(kind),
-            Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
-                proxy: proxy::read(Path::new(file))?,
-                origin: file.to_owned(),
-            }),
-            Some(other) => Err(Usage(format!(
-                "--proxy {other}: expected plane, points, dense, auto, or a file ending in .json or \
-                 .glb"
-            ))
-            .into()),
-            None => match &scene.proxy {
-                Some(own) => {
-                    let saw = own
-                        .fitted_without
-                        .as_ref()
-                        .and_then(|unseen| without.iter().find(|name| !unseen.contains(name)));
-                    if let Some(name) = saw {
-                        say!(
-                            "note: the scene's own proxy was fitted with held-out {name}; \
-                             fitting another without"
-                        );
-                        return fitted(Kind::Plane);
-                    }
-                    Ok(ChosenProxy {
-                        proxy: own.proxy.clone(),
-                        origin: "the scene's own".to_owned(),
-                    })
-                }
-                None => fitted(Kind::Plane),
-            },
-        }
-    }
-}
-
-fn is_proxy_file(name: &str) -> bool {
-    let extension = Path::new(name).extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("json") || extension.eq_ignore_ascii_case("glb")
-}
-
-impl ChosenProxy {
-    pub(super) fn json(&self) -> Value {
-        let mut value = proxy_json(&self.proxy);
-        value["from"] = json!(self.origin);
-        value
-    }
-
-    pub(super) fn text(&self) -> String {
-        format!("{} ({})", proxy_text(&self.proxy), self.origin)
-    }
-}
-
-pub(super) fn proxy_json(proxy: &Proxy) -> Value {
-    let mut value = json!({"kind": proxy.kind()});
-    if let Proxy::Plane(plane) = proxy {
-        value["point"] = json!(plane.point().to_array());
-        value["normal"] = json!(plane.normal().to_array());
-    }
-    value
-}
-
-pub(super) fn proxy_text(proxy: &Proxy) -> String {
-    let plane = match proxy {
-        Proxy::Plane(plane) => plane,
-        Proxy::Points => {
-            return "the sparse points that views like the desired one observe".to_owned();
-        }
-        Proxy::Dense(dense) => {
-            let count = dense.points.len();
-            return format!("those of {count} dense points that views like the desired one see");
-        }
-        Proxy::Mesh(solid) => {
-            let count = solid.mesh().triangles.len();
-            return format!("{} of {count} triangles", solid.kind().name());
-        }
-    };
-    let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
-    format!(
-        "plane through {} across {}",
-        triple(plane.point()),
-        triple(plane.normal())
-    )
 }
 
 /// How source views are weighted.

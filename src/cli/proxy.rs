@@ -1,10 +1,10 @@
 //! `lumigraph proxy`
 
 use super::Usage;
-use super::options::{HoldOutArgs, SceneArgs, proxy_text, triple};
+use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print};
+use super::surface::{fit, proxy_text};
 use ::proxy::{Plane, Proxy};
-use anyhow::Context;
 use clap::ValueEnum;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -48,17 +48,19 @@ enum Kind {
     Points,
     /// These points, and those that photos agree on between them
     Dense,
-    /// The best that can be fitted; today the plane
+    /// The one of them that shows best what photos left out for it show
     Auto,
 }
 
 impl Kind {
-    fn fitted(self) -> lumigraph::scene::Kind {
+    /// `None` for the best.
+    fn fitted(self) -> Option<lumigraph::scene::Kind> {
         use lumigraph::scene::Kind as Of;
         match self {
-            Self::Plane | Self::Auto => Of::Plane,
-            Self::Points => Of::Points,
-            Self::Dense => Of::Dense,
+            Self::Auto => None,
+            Self::Plane => Some(Of::Plane),
+            Self::Points => Some(Of::Points),
+            Self::Dense => Some(Of::Dense),
         }
     }
 }
@@ -88,9 +90,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let (proxy, how, fitted_without) = match by_hand {
         Some(plane) => (Proxy::Plane(plane), "given by hand".to_owned(), None),
         None => {
-            let fitted = scene
-                .fit(args.kind.fitted(), &without)
-                .context("no such proxy can be fitted to this scene")?;
+            let fitted = fit(&scene, args.kind.fitted(), &without)?;
             (fitted.proxy, fitted.how, Some(&without))
         }
     };

@@ -2,11 +2,12 @@
 
 use super::exposure::ExposureArgs;
 use super::frames::{ViewArgs, frames};
-use super::options::{DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::surface::ProxyArgs;
 use super::time::{AtArgs, TimeArgs};
 use lumigraph::scene::picture_files;
 use serde_json::json;

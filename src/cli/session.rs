@@ -1,8 +1,9 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
-use super::options::{ChosenProxy, DrawArgs, FieldArgs, HoldOutArgs, ProxyArgs, SceneArgs};
+use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
+use super::surface::{ChosenProxy, ProxyArgs};
 use super::time::{AtArgs, Clock, InWindow, TimeArgs};
 use anyhow::bail;
 use calibrate::View;

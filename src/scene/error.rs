@@ -49,6 +49,9 @@ pub enum SceneError {
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),
+    /// A proxy could not be tried out.
+    #[error("{0}")]
+    Trial(String),
     /// The list of times cannot be read.
     #[error(transparent)]
     Times(#[from] capture::TimeListError),

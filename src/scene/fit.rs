@@ -1,5 +1,6 @@
 //! Fitting a scene's proxy.
 
+use super::auto::Trial;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
 use image::RgbaImage;
@@ -47,6 +48,8 @@ pub struct Fitted {
     pub how: String,
     /// What people should know of it, if anything.
     pub note: Option<String>,
+    /// Where the kind was chosen by trial: what became of each.
+    pub trials: Vec<Trial>,
 }
 
 impl Scene {
@@ -55,6 +58,26 @@ impl Scene {
     /// # Errors
     /// The scene does not have what it takes; the message says what that is.
     pub fn fit(&self, kind: Kind, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        self.fit_with(kind, without, &DenseOptions::default())
+    }
+
+    /// As [`Self::fit`], no finer than pictures of `long_side` pixels can tell.
+    pub(super) fn fit_coarsely(
+        &self,
+        kind: Kind,
+        without: &BTreeSet<String>,
+        long_side: u32,
+    ) -> Result<Fitted, SceneError> {
+        let spacing = 3;
+        self.fit_with(kind, without, &DenseOptions { long_side, spacing })
+    }
+
+    fn fit_with(
+        &self,
+        kind: Kind,
+        without: &BTreeSet<String>,
+        dense: &DenseOptions,
+    ) -> Result<Fitted, SceneError> {
         match kind {
             Kind::Plane => {
                 let fit = self.fit_plane(without)?;
@@ -66,14 +89,16 @@ impl Scene {
                     how: format!("fitted at distance {:.4} to {}", fit.distance, fit.basis),
                     proxy: Proxy::Plane(fit.plane),
                     note,
+                    trials: Vec::new(),
                 })
             }
             Kind::Points => Ok(Fitted {
                 proxy: Proxy::Points,
                 how: "made for every view".to_owned(),
                 note: None,
+                trials: Vec::new(),
             }),
-            Kind::Dense => self.fit_dense(without),
+            Kind::Dense => self.fit_dense(without, dense),
         }
     }
 
@@ -96,13 +121,17 @@ impl Scene {
         }
     }
 
-    fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+    fn fit_dense(
+        &self,
+        without: &BTreeSet<String>,
+        options: &DenseOptions,
+    ) -> Result<Fitted, SceneError> {
         let sources = self.sources(without)?;
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
         let names: Vec<String> = sources.iter().map(|(p, _)| p.name.clone()).collect();
         let sparse = self.sparse_points(without, &names);
         let photo = |i: usize| usable(sources[i].0, &views[i]);
-        let points = densify(&views, &sparse, photo, &DenseOptions::default());
+        let points = densify(&views, &sparse, photo, options);
         let how = format!(
             "{} points, {} of them found between the sparse ones",
             points.len(),
@@ -112,6 +141,7 @@ impl Scene {
             proxy: Proxy::Dense(Arc::new(DensePoints { names, points })),
             how,
             note: None,
+            trials: Vec::new(),
         })
     }
 }

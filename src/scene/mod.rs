@@ -5,6 +5,7 @@
 //! their path relative to the folder. For photos that came without a calibration, COLMAP's
 //! work is in `colmap/`; those taken out of a video are in `photos/`.
 
+mod auto;
 mod beside;
 mod calibration;
 mod error;
@@ -20,6 +21,7 @@ mod store;
 mod times;
 mod undistort;
 
+pub use auto::{Trial, trials_text};
 pub use beside::DEPTH_UNITS_PER_STEP;
 pub use calibration::{Sizes, read_bare};
 pub use error::{SceneError, Warning};

@@ -1,7 +1,7 @@
 //! Costs of depths: a photo compared with its neighbours over a sweep of planes.
 
 use super::small::SmallPhoto;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec4};
 
 /// Costs of a photo's pixels at a number of inverse depths, evenly spaced.
 pub(super) struct Costs {
@@ -15,6 +15,7 @@ pub(super) struct Costs {
 
 /// Half the side of the windows that are compared, in pixels.
 const RADIUS: usize = 2;
+const WINDOW: usize = 2 * RADIUS + 1;
 /// Depths tried.
 const LEAST_DEPTHS: f64 = 32.0;
 const MOST_DEPTHS: f64 = 128.0;
@@ -45,10 +46,10 @@ pub(super) fn costs(
 
     // 2. Plane after plane.
     let pixels = reference.width * reference.height;
-    let own = Moments::of(reference, &reference.grays);
+    let own = Moments::of(reference);
     let mut costs = vec![0_u8; pixels * count];
     let mut best = vec![[0.0_f32; 2]; pixels];
-    let mut scratch = Scratch::new(pixels);
+    let mut scratch = Scratch::new(reference);
     for plane in 0..count {
         let inverse_depth = nearest_to_zero + step * plane as f64;
         best.fill([UNSEEN; 2]);
@@ -79,38 +80,32 @@ struct Moments {
 }
 
 impl Moments {
-    fn of(photo: &SmallPhoto, grays: &[f32]) -> Self {
-        let mut row = Vec::new();
-        let mut mean = vec![0.0; grays.len()];
-        let mut square: Vec<f32> = grays.iter().map(|g| g * g).collect();
-        mean.copy_from_slice(grays);
-        box_mean(&mut mean, photo.width, &mut row);
-        box_mean(&mut square, photo.width, &mut row);
-        let variance = square.iter().zip(&mean).map(|(s, m)| s - m * m);
+    fn of(photo: &SmallPhoto) -> Self {
+        let mut grays: Vec<Vec4> = photo
+            .grays
+            .iter()
+            .map(|g| Vec4::new(*g, g * g, 0.0, 0.0))
+            .collect();
+        Rows::new(photo.width).box_mean(&mut grays);
         Self {
-            variance: variance.collect(),
-            mean,
+            mean: grays.iter().map(|g| g.x).collect(),
+            variance: grays.iter().map(|g| g.y - g.x * g.x).collect(),
         }
     }
 }
 
-/// What comparing needs room for.
+/// What comparing needs room for: per pixel the neighbour's gray, its square, its product
+/// with the reference's, and 1 where the neighbour shows it.
 struct Scratch {
-    warped: Vec<f32>,
-    squares: Vec<f32>,
-    products: Vec<f32>,
-    seen: Vec<bool>,
-    row: Vec<f32>,
+    warped: Vec<Vec4>,
+    rows: Rows,
 }
 
 impl Scratch {
-    fn new(pixels: usize) -> Self {
+    fn new(photo: &SmallPhoto) -> Self {
         Self {
-            warped: vec![0.0; pixels],
-            squares: vec![0.0; pixels],
-            products: vec![0.0; pixels],
-            seen: vec![false; pixels],
-            row: Vec::new(),
+            warped: vec![Vec4::ZERO; photo.width * photo.height],
+            rows: Rows::new(photo.width),
         }
     }
 
@@ -124,21 +119,15 @@ impl Scratch {
         best: &mut [[f32; 2]],
     ) {
         self.warp(reference, other, inverse_depth);
-        for (i, warped) in self.warped.iter().enumerate() {
-            self.squares[i] = warped * warped;
-            self.products[i] = warped * reference.grays[i];
-        }
-        let width = reference.width;
-        box_mean(&mut self.warped, width, &mut self.row);
-        box_mean(&mut self.squares, width, &mut self.row);
-        box_mean(&mut self.products, width, &mut self.row);
+        self.rows.box_mean(&mut self.warped);
         for (i, best) in best.iter_mut().enumerate() {
-            if !self.seen[i] {
+            let [mean, square, product, seen] = self.warped[i].to_array();
+            // The whole window, or what it shows means nothing.
+            if seen < 0.99 {
                 continue;
             }
-            let (mean, own_mean) = (self.warped[i], own.mean[i]);
-            let variance = self.squares[i] - mean * mean + NOISE;
-            let covariance = self.products[i] - mean * own_mean;
+            let variance = square - mean * mean + NOISE;
+            let covariance = product - mean * own.mean[i];
             let correlation = covariance / (variance * (own.variance[i] + NOISE)).sqrt();
             let cost = 0.5 * (1.0 - correlation);
             if cost < best[0] {
@@ -180,12 +169,15 @@ impl Scratch {
             for x in 0..reference.width {
                 let p = start + hx * x as f32;
                 let (u, v) = (p.x / p.z, p.y / p.z);
-                let inside = p.z > 0.0 && u >= 0.0 && v >= 0.0 && u <= right && v <= bottom;
-                if !inside {
-                    self.warped[row + x] = reference.grays[row + x];
-                    self.seen[row + x] = false;
+                // A little beyond its border the photo repeats itself, so that windows on it
+                // count.
+                let (near_u, near_v) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
+                let beyond = (u - near_u).abs().max((v - near_v).abs());
+                if !(p.z > 0.0 && beyond <= RADIUS as f32) {
+                    self.warped[row + x] = Vec4::ZERO;
                     continue;
                 }
+                let (u, v) = (near_u, near_v);
                 let (left, top) = (u as usize, v as usize);
                 let (fx, fy) = (u - left as f32, v - top as f32);
                 let at = top * other.width + left;
@@ -198,54 +190,74 @@ impl Scratch {
                 let g = &other.grays;
                 let upper = g[at] + fx * (g[at + over] - g[at]);
                 let lower = g[at + under] + fx * (g[at + under + over] - g[at + under]);
-                self.warped[row + x] = upper + fy * (lower - upper);
-                self.seen[row + x] = other.used[at];
+                let gray = upper + fy * (lower - upper);
+                let seen = f32::from(u8::from(other.used[at]));
+                let own = reference.grays[row + x];
+                self.warped[row + x] = Vec4::new(gray, gray * gray, gray * own, seen);
             }
         }
     }
 }
 
-/// The mean over the window around each pixel, which the image's border cuts.
-fn box_mean(values: &mut [f32], width: usize, sums: &mut Vec<f32>) {
-    let height = values.len() / width;
-    // 1. Along rows.
-    sums.clear();
-    sums.resize(width + 1, 0.0);
-    for row in values.chunks_exact_mut(width) {
-        for (x, value) in row.iter().enumerate() {
-            sums[x + 1] = sums[x] + value;
-        }
-        for (x, value) in row.iter_mut().enumerate() {
-            let (from, to) = (x.saturating_sub(RADIUS), (x + RADIUS + 1).min(width));
-            *value = (sums[to] - sums[from]) / (to - from) as f32;
+/// Room for means over windows.
+struct Rows {
+    width: usize,
+    /// Sums of a row up to each pixel.
+    sums: Vec<Vec4>,
+    /// Sums of the window's rows, by column, and the rows themselves.
+    column: Vec<Vec4>,
+    kept: Vec<Vec4>,
+}
+
+impl Rows {
+    fn new(width: usize) -> Self {
+        Self {
+            width,
+            sums: vec![Vec4::ZERO; width + 1],
+            column: vec![Vec4::ZERO; width],
+            kept: vec![Vec4::ZERO; width * WINDOW],
         }
     }
-    // 2. Down columns: the rows that the window still needs, kept aside.
-    let window = 2 * RADIUS + 1;
-    let mut kept = vec![0.0; window * width];
-    let mut sum = vec![0.0_f32; width];
-    let slot = |y: usize| (y % window) * width;
-    for y in 0..height + RADIUS {
-        if y < height {
-            if y >= window {
-                // Its row leaves the window, and the kept rows with it.
-                let old = &kept[slot(y)..][..width];
-                sum.iter_mut().zip(old).for_each(|(s, v)| *s -= v);
+
+    /// The mean over the window around each pixel, which the image's border cuts.
+    fn box_mean(&mut self, values: &mut [Vec4]) {
+        let width = self.width;
+        let height = values.len() / width;
+        self.column.fill(Vec4::ZERO);
+        for y in 0..height + RADIUS {
+            // 1. A row leaves the window, and the next one enters it, summed along.
+            let slot = (y % WINDOW) * width;
+            let kept = &mut self.kept[slot..][..width];
+            if y >= WINDOW {
+                self.column
+                    .iter_mut()
+                    .zip(kept.iter())
+                    .for_each(|(s, v)| *s -= *v);
             }
-            let row = &values[y * width..][..width];
-            kept[slot(y)..][..width].copy_from_slice(row);
-            sum.iter_mut().zip(row).for_each(|(s, v)| *s += v);
-        } else if y >= window {
-            let old = &kept[slot(y)..][..width];
-            sum.iter_mut().zip(old).for_each(|(s, v)| *s -= v);
-        }
-        if y >= RADIUS {
-            let middle = y - RADIUS;
-            let rows = (middle + RADIUS + 1).min(height) - middle.saturating_sub(RADIUS);
-            let out = &mut values[middle * width..][..width];
-            out.iter_mut()
-                .zip(&sum)
-                .for_each(|(o, s)| *o = s / rows as f32);
+            if y < height {
+                let row = &values[y * width..][..width];
+                for (x, value) in row.iter().enumerate() {
+                    self.sums[x + 1] = self.sums[x] + *value;
+                }
+                for (x, kept) in kept.iter_mut().enumerate() {
+                    let (from, to) = (x.saturating_sub(RADIUS), (x + RADIUS + 1).min(width));
+                    *kept = (self.sums[to] - self.sums[from]) / (to - from) as f32;
+                }
+                self.column
+                    .iter_mut()
+                    .zip(kept.iter())
+                    .for_each(|(s, v)| *s += *v);
+            }
+            // 2. The row in its middle.
+            if y >= RADIUS {
+                let middle = y - RADIUS;
+                let rows = (middle + RADIUS + 1).min(height) - middle.saturating_sub(RADIUS);
+                let out = &mut values[middle * width..][..width];
+                let share = 1.0 / rows as f32;
+                out.iter_mut()
+                    .zip(&self.column)
+                    .for_each(|(o, s)| *o = *s * share);
+            }
         }
     }
 }

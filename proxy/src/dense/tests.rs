@@ -1,1 +1,160 @@
 use super::*;
+use crate::{Mesh, MeshKind, Solid};
+use calibrate::{Lens, Pixel, Rigid3};
+use glam::{DVec2, DVec3};
+use image::Rgba;
+
+/// A wall at z = 6 with a slanted board before it.
+fn scene() -> Solid {
+    let quad = |corners: [[f64; 3]; 4]| Mesh {
+        positions: corners.map(DVec3::from_array).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let mut mesh = quad([
+        [-20.0, -20.0, 6.0],
+        [20.0, -20.0, 6.0],
+        [20.0, 20.0, 6.0],
+        [-20.0, 20.0, 6.0],
+    ]);
+    mesh.append(&quad([
+        [-0.8, -0.6, 4.0],
+        [0.6, -0.6, 4.6],
+        [0.6, 0.7, 4.6],
+        [-0.8, 0.7, 4.0],
+    ]));
+    Solid::new(MeshKind::Mesh, mesh)
+}
+
+fn view(i: usize) -> View {
+    let center = DVec3::new(0.4 * (i % 3) as f64 - 0.4, 0.4 * (i / 3) as f64 - 0.4, 0.0);
+    View {
+        lens: Lens::pinhole(DVec2::splat(170.0), DVec2::new(96.0, 72.0)),
+        width: 192,
+        height: 144,
+        camera_from_world: Rigid3::looking_at(center, DVec3::new(0.0, 0.0, 5.0), DVec3::Y),
+    }
+}
+
+/// Blotches that differ everywhere.
+fn gray(p: DVec3) -> f64 {
+    let wave = |a: f64, b: f64, c: f64| (a * p.x + b * p.y + c).sin();
+    let fine = wave(17.0, 5.0, p.z) * wave(-4.0, 19.0, 1.0) + wave(31.0, -23.0, 2.0);
+    128.0 + 30.0 * fine + 25.0 * wave(3.0, 7.0, 0.3) * wave(6.0, -2.0, 1.3)
+}
+
+fn photo(solid: &Solid, view: &View) -> RgbaImage {
+    let world_from_camera = view.camera_from_world.rotation.conjugate();
+    RgbaImage::from_fn(view.width, view.height, |x, y| {
+        let mut sum = 0.0;
+        for k in 0..4_u32 {
+            let at = |i: u32, k: u32| f64::from(i) + 0.25 + 0.5 * f64::from(k);
+            let ray = view.lens.unproject(Pixel::new(at(x, k % 2), at(y, k / 2)));
+            let ray = world_from_camera * ray.unwrap();
+            let hit = solid.first_hit(view.center(), ray).unwrap();
+            sum += gray(view.center() + ray * hit.along);
+        }
+        let gray = (sum / 4.0) as u8;
+        Rgba([gray, gray, gray, 255])
+    })
+}
+
+/// A few points on the surfaces, seen by all.
+fn sparse(solid: &Solid) -> Vec<SparsePoint> {
+    let point = |x: i32, y: i32| {
+        let ray = DVec3::new(0.09 * f64::from(x), 0.09 * f64::from(y), 1.0);
+        let hit = solid.first_hit(DVec3::ZERO, ray)?;
+        Some(SparsePoint {
+            position: ray * hit.along,
+            seen_by: (0..9).collect(),
+        })
+    };
+    let places = (-4..5).flat_map(|x| (-4..5).map(move |y| (x, y)));
+    places.filter_map(|(x, y)| point(x, y)).collect()
+}
+
+fn found(options: &DenseOptions) -> (Solid, Vec<SparsePoint>, usize) {
+    let solid = scene();
+    let views: Vec<View> = (0..9).map(view).collect();
+    let sparse = sparse(&solid);
+    let points = densify(&views, &sparse, |i| Some(photo(&solid, &views[i])), options);
+    (solid, points, sparse.len())
+}
+
+#[test]
+fn points_lie_on_the_surfaces_and_fill_the_views() {
+    let options = DenseOptions {
+        long_side: 192,
+        spacing: 4,
+    };
+    let (solid, points, sparse) = found(&options);
+    let new = &points[sparse..];
+    let mut errors: Vec<f64> = new
+        .iter()
+        .map(|p| {
+            let along = solid.first_hit(DVec3::ZERO, p.position).unwrap().along;
+            (along - 1.0).abs()
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    let share = |s: f64| errors[(s * errors.len() as f64) as usize];
+    let (median, most) = (share(0.5), share(0.95));
+    println!(
+        "{} points, depth off by {median:.4} (median), {most:.4} (95 %)",
+        new.len()
+    );
+    assert!(median < 0.003 && most < 0.03, "{median} {most}");
+    // The first view has 48 × 36 cells; it shares what it sees with the others.
+    assert!(new.len() > 1200, "{}", new.len());
+    for point in new {
+        assert!(point.seen_by.len() >= 3);
+        assert!(point.seen_by.is_sorted());
+    }
+}
+
+#[test]
+fn the_same_photos_give_the_same_points_on_any_number_of_threads() {
+    let options = DenseOptions {
+        long_side: 96,
+        spacing: 4,
+    };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| found(&options).1)
+    };
+    assert!(on(1) == on(3));
+}
+
+#[test]
+fn photos_that_tell_nothing_add_nothing() {
+    let views: Vec<View> = (0..4).map(view).collect();
+    let points = vec![SparsePoint {
+        position: DVec3::new(0.0, 0.0, 5.0),
+        seen_by: vec![0, 1, 2, 3],
+    }];
+    let options = DenseOptions {
+        long_side: 64,
+        spacing: 4,
+    };
+    let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
+    let clear = RgbaImage::new(192, 144);
+    // None to be had, transparent ones, one view alone, no points.
+    assert_eq!(densify(&views, &points, |_| None, &options), points);
+    assert_eq!(
+        densify(&views, &points, |_| Some(clear.clone()), &options),
+        points
+    );
+    assert_eq!(
+        densify(&views[..1], &[], |_| Some(blank.clone()), &options),
+        []
+    );
+    assert_eq!(densify(&views, &[], |_| Some(blank.clone()), &options), []);
+    assert_eq!(densify(&[], &[], |_| None, &options), []);
+    // Points at no place, or where the cameras are.
+    let odd = [DVec3::NAN, DVec3::INFINITY, views[0].center(), DVec3::NEG_Z];
+    let odd = odd.map(|position| SparsePoint {
+        position,
+        seen_by: vec![0, 1, 2, 3],
+    });
+    let points = densify(&views, &odd, |_| Some(blank.clone()), &options);
+    assert!(points[4..].iter().all(|p| p.position.is_finite()));
+}

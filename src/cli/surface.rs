@@ -1,0 +1,164 @@
+//! Options that choose a proxy, and what to say of one.
+
+use super::Usage;
+use super::output::say;
+use super::session::spinner;
+use anyhow::Context;
+use clap::Args;
+use glam::DVec3;
+use lumigraph::scene::{Fitted, Kind, Scene, Trial, trials_text};
+use proxy::Proxy;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Which surface.
+#[derive(Args)]
+pub(super) struct ProxyArgs {
+    /// plane, points, dense, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
+    /// auto]
+    #[arg(long, value_name = "KIND|FILE")]
+    pub(super) proxy: Option<String>,
+}
+
+/// A proxy and where it came from.
+pub(super) struct ChosenProxy {
+    pub(super) proxy: Proxy,
+    origin: String,
+    trials: Vec<Trial>,
+}
+
+/// Fits a proxy of a kind, or the best, and says on stderr what people should know of it.
+pub(super) fn fit(
+    scene: &Scene,
+    kind: Option<Kind>,
+    without: &BTreeSet<String>,
+) -> anyhow::Result<Fitted> {
+    let busy = spinner("fitting the proxy");
+    let fitted = match kind {
+        Some(kind) => scene.fit(kind, without),
+        None => scene.fit_best(without),
+    };
+    busy.finish_and_clear();
+    let fitted = fitted.context("no such proxy can be fitted to this scene")?;
+    if let Some(note) = &fitted.note {
+        say!("note: {note}; see `lumigraph proxy`");
+    }
+    if !fitted.trials.is_empty() {
+        let kind = fitted.proxy.kind();
+        say!(
+            "proxy: {kind}, by photos held out for it: {}",
+            trials_text(&fitted.trials)
+        );
+    }
+    Ok(fitted)
+}
+
+impl ProxyArgs {
+    /// The proxy asked for. A fitted one rests on none of the photos in `without`.
+    pub(super) fn choose(
+        &self,
+        scene: &Scene,
+        without: &BTreeSet<String>,
+    ) -> anyhow::Result<ChosenProxy> {
+        let fitted = |kind: Option<Kind>| {
+            let fitted = fit(scene, kind, without)?;
+            Ok(ChosenProxy {
+                proxy: fitted.proxy,
+                origin: fitted.how,
+                trials: fitted.trials,
+            })
+        };
+        match self.proxy.as_deref() {
+            Some("auto") => fitted(None),
+            Some(name) if let Some(kind) = Kind::from_name(name) => fitted(Some(kind)),
+            Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
+                proxy: proxy::read(Path::new(file))?,
+                origin: file.to_owned(),
+                trials: Vec::new(),
+            }),
+            Some(other) => Err(Usage(format!(
+                "--proxy {other}: expected plane, points, dense, auto, or a file ending in .json or \
+                 .glb"
+            ))
+            .into()),
+            None => match &scene.proxy {
+                Some(own) => {
+                    let saw = own
+                        .fitted_without
+                        .as_ref()
+                        .and_then(|unseen| without.iter().find(|name| !unseen.contains(name)));
+                    if let Some(name) = saw {
+                        say!(
+                            "note: the scene's own proxy was fitted with held-out {name}; \
+                             fitting another without"
+                        );
+                        return fitted(None);
+                    }
+                    Ok(ChosenProxy {
+                        proxy: own.proxy.clone(),
+                        origin: "the scene's own".to_owned(),
+                        trials: Vec::new(),
+                    })
+                }
+                None => fitted(None),
+            },
+        }
+    }
+}
+
+fn is_proxy_file(name: &str) -> bool {
+    let extension = Path::new(name).extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("json") || extension.eq_ignore_ascii_case("glb")
+}
+
+impl ChosenProxy {
+    pub(super) fn json(&self) -> Value {
+        let mut value = proxy_json(&self.proxy);
+        value["from"] = json!(self.origin);
+        if !self.trials.is_empty() {
+            let trial = |t: &Trial| match &t.score {
+                Ok(db) => json!({"kind": t.kind.name(), "psnr": db}),
+                Err(why) => json!({"kind": t.kind.name(), "not": why}),
+            };
+            value["trials"] = json!(self.trials.iter().map(trial).collect::<Vec<_>>());
+        }
+        value
+    }
+
+    pub(super) fn text(&self) -> String {
+        format!("{} ({})", proxy_text(&self.proxy), self.origin)
+    }
+}
+
+pub(super) fn proxy_json(proxy: &Proxy) -> Value {
+    let mut value = json!({"kind": proxy.kind()});
+    if let Proxy::Plane(plane) = proxy {
+        value["point"] = json!(plane.point().to_array());
+        value["normal"] = json!(plane.normal().to_array());
+    }
+    value
+}
+
+pub(super) fn proxy_text(proxy: &Proxy) -> String {
+    let plane = match proxy {
+        Proxy::Plane(plane) => plane,
+        Proxy::Points => {
+            return "the sparse points that views like the desired one observe".to_owned();
+        }
+        Proxy::Dense(dense) => {
+            let count = dense.points.len();
+            return format!("those of {count} dense points that views like the desired one see");
+        }
+        Proxy::Mesh(solid) => {
+            let count = solid.mesh().triangles.len();
+            return format!("{} of {count} triangles", solid.kind().name());
+        }
+    };
+    let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
+    format!(
+        "plane through {} across {}",
+        triple(plane.point()),
+        triple(plane.normal())
+    )
+}
