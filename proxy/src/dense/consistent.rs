@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 /// Relative difference of depths up to which two photos agree.
 const AGREE: f64 = 0.012;
+/// By how much nearer, relatively, a point must be than what a photo sees to be in its way.
+const BLOCKS: f64 = 0.03;
 /// How many others must agree, where there are so many.
 const OTHERS: usize = 2;
 
@@ -108,6 +110,19 @@ fn of_photo(
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
         alike(inverse, 1.0 / depth).then_some(())
     };
+    // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
+    let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
+        let (at, depth) = other.project(position)?;
+        let inverse = f64::from(map.inverse_depths[other.index(at)?]);
+        (inverse > 0.0 && inverse * depth < 1.0 - BLOCKS).then_some(())
+    };
+    let objections = |position: DVec3| {
+        let all = photos.iter().zip(maps);
+        let with_maps = all.filter_map(|(photo, map)| Some((photo.as_ref()?, map.as_ref()?)));
+        with_maps
+            .filter(|(other, map)| objects(position, other, map).is_some())
+            .count()
+    };
     let middle = spacing / 2;
     let mut order: Vec<(usize, usize)> = (0..spacing)
         .flat_map(|y| (0..spacing).map(move |x| (x, y)))
@@ -135,6 +150,9 @@ fn of_photo(
                 .map(|(j, ..)| *j as u32)
                 .collect();
             if seen_by.len() < needed || !position.is_finite() {
+                return None;
+            }
+            if objections(position) > seen_by.len() {
                 return None;
             }
             seen_by.push(i as u32);
