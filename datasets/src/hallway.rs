@@ -67,7 +67,11 @@ fn step(i: usize, count: usize) -> Rigid3 {
         1.5 + 0.03 * r(1),
         5.8 - 7.6 * part + 0.04 * r(2),
     );
-    let ahead = DVec3::new(0.06 * r(3) + 0.05 * (7.0 * part).cos(), -0.05 + 0.03 * r(4), -1.0);
+    let ahead = DVec3::new(
+        0.06 * r(3) + 0.05 * (7.0 * part).cos(),
+        -0.05 + 0.03 * r(4),
+        -1.0,
+    );
     let roll = Rigid3::new(DQuat::from_rotation_z(0.02 * r(5)), DVec3::ZERO);
     roll * Rigid3::looking_at(center, center + ahead, DVec3::Y)
 }
@@ -125,7 +129,13 @@ fn walls(objects: &mut Vec<Object>) {
         // A skirting board.
         let skirting = cuboid(DVec3::new(half.z, 0.05, 0.008));
         let at = DVec3::new(side * (half.x - 0.008), 0.05, 0.0);
-        objects.push(object(skirting, at, facing(side), mottled(0xe6e0d0, 0.1, 0.3, 13), MATTE));
+        objects.push(object(
+            skirting,
+            at,
+            facing(side),
+            mottled(0xe6e0d0, 0.1, 0.3, 13),
+            MATTE,
+        ));
     }
     // Planks along the way; their finish shines.
     let floor = Shape::Rectangle {
@@ -138,7 +148,13 @@ fn walls(objects: &mut Vec<Object>) {
         plank: 0.18,
         seed: 21,
     };
-    objects.push(object(floor.clone(), middle.with_y(min.y), lying, planks, SATIN));
+    objects.push(object(
+        floor.clone(),
+        middle.with_y(min.y),
+        lying,
+        planks,
+        SATIN,
+    ));
     let hanging = DQuat::from_rotation_y(FRAC_PI_2) * DQuat::from_rotation_x(FRAC_PI_2);
     let plaster = mottled(0xe4e2da, 0.25, 0.4, 22);
     objects.push(object(floor, middle.with_y(max.y), hanging, plaster, MATTE));
@@ -151,7 +167,13 @@ fn walls(objects: &mut Vec<Object>) {
         seed,
     };
     let still = DQuat::IDENTITY;
-    objects.push(object(end.clone(), middle.with_z(min.z), still, bricks(23), MATTE));
+    objects.push(object(
+        end.clone(),
+        middle.with_z(min.z),
+        still,
+        bricks(23),
+        MATTE,
+    ));
     let back = DQuat::from_rotation_y(PI);
     objects.push(object(end, middle.with_z(max.z), back, bricks(24), MATTE));
 }
@@ -277,7 +299,13 @@ fn furniture(objects: &mut Vec<Object>) {
     for (along, out) in [(-0.55, 0.05), (-0.55, 0.29), (0.55, 0.05), (0.55, 0.29)] {
         let leg = cuboid(DVec3::new(0.02, 0.2, 0.02));
         let at = DVec3::new(-right + out, 0.2, -1.4 + along);
-        objects.push(object(leg, at, DQuat::IDENTITY, mottled(0x4f3a22, 0.3, 0.05, 92), MATTE));
+        objects.push(object(
+            leg,
+            at,
+            DQuat::IDENTITY,
+            mottled(0x4f3a22, 0.3, 0.05, 92),
+            MATTE,
+        ));
     }
     objects.push(object(
         Shape::Cylinder {

@@ -103,7 +103,13 @@ fn room(lamp: DVec3, objects: &mut Vec<Object>) {
         period: 0.13,
         seed: 11,
     };
-    objects.push(object(wall, DVec3::new(0.0, 0.5, WALL), still, paper, MATTE));
+    objects.push(object(
+        wall,
+        DVec3::new(0.0, 0.5, WALL),
+        still,
+        paper,
+        MATTE,
+    ));
     let table = cuboid(DVec3::new(2.0, 0.02, 0.55));
     let boards = Texture::Wood {
         light: rgb(0xc79a62),
@@ -111,7 +117,13 @@ fn room(lamp: DVec3, objects: &mut Vec<Object>) {
         plank: 0.12,
         seed: 21,
     };
-    objects.push(object(table, DVec3::new(0.0, -0.02, 0.0), still, boards, SATIN));
+    objects.push(object(
+        table,
+        DVec3::new(0.0, -0.02, 0.0),
+        still,
+        boards,
+        SATIN,
+    ));
 }
 
 /// Chess pieces and marbles, the nearest things of all.
@@ -141,7 +153,13 @@ fn front_row(objects: &mut Vec<Object>) {
         let through: Vec<(f64, f64)> = pawn.iter().map(|&(r, y)| (size * r, size * y)).collect();
         let at = DVec3::new(x, 0.0, z);
         let texture = mottled(color, 0.35, 0.015, 31 + i as u32);
-        objects.push(object(turned(&through), at, DQuat::IDENTITY, texture, SATIN));
+        objects.push(object(
+            turned(&through),
+            at,
+            DQuat::IDENTITY,
+            texture,
+            SATIN,
+        ));
     }
     for (i, (x, z, radius, color)) in [
         (-0.16, 0.40, 0.016, 0x5b86b8),
@@ -169,16 +187,34 @@ fn bird_cage(foot: DVec3, objects: &mut Vec<Object>) {
         half_height,
     };
     let still = DQuat::IDENTITY;
-    objects.push(object(disc(0.095, 0.006), foot + 0.006 * DVec3::Y, still, brass(), SATIN));
+    objects.push(object(
+        disc(0.095, 0.006),
+        foot + 0.006 * DVec3::Y,
+        still,
+        brass(),
+        SATIN,
+    ));
     for i in 0..BARS {
         let (sin, cos) = (TAU * (i as f64 + 0.3) / BARS as f64).sin_cos();
         let out = radius * DVec3::new(cos, 0.0, sin);
         let (low, high) = (foot + out, foot + out + height * DVec3::Y);
         objects.push(rod(low, high, 0.0022, brass(), SATIN));
-        objects.push(rod(high, foot + (height + 0.07) * DVec3::Y, 0.0022, brass(), SATIN));
+        objects.push(rod(
+            high,
+            foot + (height + 0.07) * DVec3::Y,
+            0.0022,
+            brass(),
+            SATIN,
+        ));
     }
     let knob = Shape::Sphere { radius: 0.012 };
-    objects.push(object(knob, foot + (height + 0.08) * DVec3::Y, still, brass(), GLAZED));
+    objects.push(object(
+        knob,
+        foot + (height + 0.08) * DVec3::Y,
+        still,
+        brass(),
+        GLAZED,
+    ));
     let perch = foot + 0.07 * DVec3::Y;
     let across = (radius - 0.001) * DVec3::new(0.8, 0.0, 0.6);
     let twig = mottled(0x5a4026, 0.4, 0.02, 52);
@@ -192,12 +228,24 @@ fn bird_cage(foot: DVec3, objects: &mut Vec<Object>) {
         objects.push(object(ball, perch + at, still, plumage(color, 53), MATTE));
     }
     let beak = perch + DVec3::new(0.032, 0.070, 0.016);
-    objects.push(rod(beak, beak + DVec3::new(0.014, -0.003, 0.007), 0.003, plumage(0xc4561c, 54), MATTE));
+    objects.push(rod(
+        beak,
+        beak + DVec3::new(0.014, -0.003, 0.007),
+        0.003,
+        plumage(0xc4561c, 54),
+        MATTE,
+    ));
 }
 
 /// A mug of pencils that lean every way.
 fn pencils(foot: DVec3, objects: &mut Vec<Object>) {
-    let mug = [(0.034, 0.0), (0.040, 0.01), (0.042, 0.05), (0.040, 0.09), (0.041, 0.10)];
+    let mug = [
+        (0.034, 0.0),
+        (0.040, 0.01),
+        (0.042, 0.05),
+        (0.040, 0.09),
+        (0.041, 0.10),
+    ];
     let china = Texture::Porcelain {
         span: DVec2::new(0.0, 0.10),
         seed: 61,
@@ -240,7 +288,13 @@ fn arch(objects: &mut Vec<Object>) {
             block(at, turn, paint, letters, 71 + level as u32);
         }
     }
-    block(foot + DVec3::new(0.0, 4.0 * side + 0.001, 0.0), 0.3, 0xe0a020, "LAOXUG", 75);
+    block(
+        foot + DVec3::new(0.0, 4.0 * side + 0.001, 0.0),
+        0.3,
+        0xe0a020,
+        "LAOXUG",
+        75,
+    );
     let lintel = cuboid(DVec3::new(0.115, half, 0.03));
     let wood = Texture::Wood {
         light: rgb(0xd0a060),
@@ -276,10 +330,22 @@ fn back_row(objects: &mut Vec<Object>) {
             seed: 81 + i as u32,
         };
         x += thick;
-        objects.push(object(cuboid(half), DVec3::new(x, tall, -0.36), upright, book, MATTE));
+        objects.push(object(
+            cuboid(half),
+            DVec3::new(x, tall, -0.36),
+            upright,
+            book,
+            MATTE,
+        ));
         x += thick + 0.002;
     }
-    let stand = [(0.055, 0.0), (0.050, 0.010), (0.018, 0.022), (0.012, 0.045), (0.015, 0.055)];
+    let stand = [
+        (0.055, 0.0),
+        (0.050, 0.010),
+        (0.018, 0.022),
+        (0.012, 0.045),
+        (0.015, 0.055),
+    ];
     let foot = DVec3::new(0.10, 0.0, -0.30);
     let wood = mottled(0x9a6a34, 0.3, 0.03, 91);
     objects.push(object(turned(&stand), foot, still, wood, SATIN));
@@ -302,7 +368,13 @@ fn back_row(objects: &mut Vec<Object>) {
             radius,
             half_height,
         };
-        objects.push(object(tin, DVec3::new(x, half_height, z), still, label, SATIN));
+        objects.push(object(
+            tin,
+            DVec3::new(x, half_height, z),
+            still,
+            label,
+            SATIN,
+        ));
     }
     let half = DVec3::new(0.26, 0.19, 0.012);
     let painting = Texture::Painting {

@@ -22,7 +22,13 @@ pub(crate) const GLAZED: Finish = Finish::Glossy {
 };
 
 /// A shape somewhere; what is large casts no shadow.
-pub(crate) fn object(shape: Shape, at: DVec3, rotation: DQuat, texture: Texture, finish: Finish) -> Object {
+pub(crate) fn object(
+    shape: Shape,
+    at: DVec3,
+    rotation: DQuat,
+    texture: Texture,
+    finish: Finish,
+) -> Object {
     Object {
         // Walls, tables and rooms shade nothing else.
         casts_shadow: shape.ball().1 < 1.0,
@@ -56,13 +62,7 @@ pub(crate) fn turned(through: &[(f64, f64)]) -> Shape {
 }
 
 /// A cylinder between two places.
-pub(crate) fn rod(
-    from: DVec3,
-    to: DVec3,
-    radius: f64,
-    texture: Texture,
-    finish: Finish,
-) -> Object {
+pub(crate) fn rod(from: DVec3, to: DVec3, radius: f64, texture: Texture, finish: Finish) -> Object {
     let along = to - from;
     let shape = Shape::Cylinder {
         radius,

@@ -3,9 +3,9 @@
 //! RANSAC with local optimisation (Chum, Matas and Kittler 2003), always with the same
 //! random numbers.
 
-use crate::fit::direction_of_least_spread;
-use crate::cloud::median;
 use crate::Plane;
+use crate::cloud::median;
+use crate::fit::direction_of_least_spread;
 use glam::DVec3;
 
 /// A plane that holds many of the points.
@@ -150,8 +150,8 @@ pub fn dominant_plane(points_in_world: &[DVec3]) -> Result<DominantPlane, Domina
     if on_a_line(&inliers) {
         return Err(DominantPlaneError::Collinear);
     }
-    let plane = Plane::new(origin + flat.point, flat.normal)
-        .map_err(|_| DominantPlaneError::Collinear)?;
+    let plane =
+        Plane::new(origin + flat.point, flat.normal).map_err(|_| DominantPlaneError::Collinear)?;
     Ok(DominantPlane {
         plane,
         inliers: inliers.len(),

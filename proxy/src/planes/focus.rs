@@ -16,9 +16,7 @@ const ENOUGH: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FocusError {
     /// No such pixel.
-    #[error(
-        "the pixel {x}, {y} lies outside the photo of {width} × {height}; choose one inside"
-    )]
+    #[error("the pixel {x}, {y} lies outside the photo of {width} × {height}; choose one inside")]
     Outside {
         /// What was asked for, in pixels.
         x: f64,

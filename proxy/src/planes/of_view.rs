@@ -6,7 +6,6 @@
 //! smoothly as the view does.
 
 use crate::Plane;
-use crate::cloud::median;
 use crate::points::SparsePoint;
 use calibrate::{Pixel, View};
 use glam::{DMat3, DVec3};
@@ -211,5 +210,7 @@ fn border_rays(view: &View) -> impl Iterator<Item = DVec3> + '_ {
         let (x, y) = (share * width, share * height);
         [(x, 0.0), (x, height), (0.0, y), (width, y)]
     });
-    border.filter_map(|(x, y)| view.lens.unproject(Pixel::new(x, y))).filter(|ray| ray.z > 0.0)
+    border
+        .filter_map(|(x, y)| view.lens.unproject(Pixel::new(x, y)))
+        .filter(|ray| ray.z > 0.0)
 }

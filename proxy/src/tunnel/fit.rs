@@ -4,7 +4,7 @@
 use super::{ON_WALL, Tunnel, TunnelError};
 use crate::cloud::median;
 use calibrate::{Rigid3, View};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 
 /// Fewer points than this tell no six walls.
@@ -17,15 +17,24 @@ const SAMPLE: usize = 1200;
 const PLACES: usize = 40;
 /// What counts as near a wall, in shares of the tunnel's size, from coarse to fine.
 const TOLERANCES: [f64; 4] = [0.12, 0.06, 0.03, 0.02];
-/// A point far outside costs this much, one far inside 1: a wall would hide the one, while
-/// the other may be furniture.
-const OUTSIDE: f64 = 2.0;
+/// A point outside costs this much, one well inside 1: a wall would hide the one, while the
+/// other may be furniture.
+const OUTSIDE: f64 = 3.0;
+/// But farther outside than this share of the size it costs 1 again: it is a mirror image,
+/// as floors show them, or a mismatch.
+const MIRRORED: f64 = 0.25;
 /// Cameras count as misplaced, and need not be inside, where they are farther off the way
 /// than this many standard deviations and this share of the tunnel's size.
 const ASTRAY_SIGMAS: f64 = 4.0;
 const ASTRAY: f64 = 0.25;
 /// Turns about the vertical tried around each guess of the direction, in degrees.
 const TURNS: [f64; 7] = [0.0, -8.0, 8.0, -16.0, 16.0, -30.0, 30.0];
+/// Who walks through a tunnel walks along it, to within about this angle in radians. A tunnel
+/// that much off the path costs as much as this share of the points off its walls.
+const ASTRAY_ANGLE: f64 = 0.05;
+const ASTRAY_COST: f64 = 0.02;
+/// A path tells the direction when it is this long (standard deviation, shares of the size).
+const WALK: f64 = 0.5;
 /// Walls stay this far from the cameras, in shares of the tunnel's size.
 const CLEARANCE: f64 = 0.05;
 /// A wall with fewer of the points is not found.
@@ -55,7 +64,10 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
     let middle = |axis: usize| median(posed.iter().map(|v| v.center()[axis]).collect());
     let origin = DVec3::new(middle(0), middle(1), middle(2));
     let points = near(points_in_world, origin);
-    let centers = near(&posed.iter().map(|v| v.center()).collect::<Vec<_>>(), origin);
+    let centers = near(
+        &posed.iter().map(|v| v.center()).collect::<Vec<_>>(),
+        origin,
+    );
     if points.len() < LEAST_POINTS {
         return Err(TunnelError::TooFewPoints {
             found: points.len(),
@@ -74,15 +86,23 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
     // 3. The best box for each guess, roughly; then the best three in all detail.
     let stride = points.len().div_ceil(SAMPLE);
     let few: Vec<DVec3> = points.iter().step_by(stride).copied().collect();
+    let path = principal_direction(&centers)
+        .filter(|(_, spread)| *spread > WALK * size)
+        .map(|(path, _)| path);
     let rough = |axes: DMat3| {
         let mut fitting = Fitting::new(axes, &centers, &few, size);
+        fitting.path = path;
         fitting.tolerance = TOLERANCES[0];
         (0..2).for_each(|_| fitting.search());
         (fitting.cost(), fitting)
     };
     let mut fits: Vec<(f64, Fitting)> = guesses.into_iter().map(rough).collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut fits: Vec<(f64, Fitting)> = fits.into_iter().take(3).map(|(_, f)| f.in_detail()).collect();
+    let mut fits: Vec<(f64, Fitting)> = fits
+        .into_iter()
+        .take(3)
+        .map(|(_, f)| f.in_detail())
+        .collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best = Fitting {
         points: &points,
@@ -137,20 +157,38 @@ fn guesses(views: &[&View], centers: &[DVec3], points: &[DVec3]) -> Vec<DMat3> {
     guesses
 }
 
-/// The direction in which places spread most, and how far (standard deviation).
+/// The direction of the way through most of the places, and how far they spread along it
+/// (standard deviation).
 fn principal_direction(places: &[DVec3]) -> Option<(DVec3, f64)> {
-    let count = places.len() as f64;
-    let mean = places.iter().sum::<DVec3>() / count;
-    let mut covariance = nalgebra::Matrix3::<f64>::zeros();
-    for place in places {
-        let d = nalgebra::Vector3::from((*place - mean).to_array());
-        covariance += d * d.transpose() / count;
+    let mut kept = places.to_vec();
+    let mut found = None;
+    for _ in 0..5 {
+        let count = kept.len() as f64;
+        let mean = kept.iter().sum::<DVec3>() / count;
+        let mut covariance = nalgebra::Matrix3::<f64>::zeros();
+        for place in &kept {
+            let d = nalgebra::Vector3::from((*place - mean).to_array());
+            covariance += d * d.transpose() / count;
+        }
+        let eigen = nalgebra::SymmetricEigen::new(covariance);
+        let most = eigen.eigenvalues.imax();
+        let d = eigen.eigenvectors.column(most);
+        let direction = DVec3::new(d[0], d[1], d[2]).try_normalize()?;
+        found = Some((direction, eigen.eigenvalues[most].max(0.0).sqrt()));
+        // Without those off the way.
+        let aside = |p: &DVec3| (*p - mean).reject_from_normalized(direction).length();
+        let limit = 2.0 * ASTRAY_SIGMAS * median(places.iter().map(aside).collect());
+        let next: Vec<DVec3> = places
+            .iter()
+            .copied()
+            .filter(|p| aside(p) <= limit)
+            .collect();
+        if next == kept {
+            break;
+        }
+        kept = next;
     }
-    let eigen = nalgebra::SymmetricEigen::new(covariance);
-    let most = eigen.eigenvalues.imax();
-    let d = eigen.eigenvectors.column(most);
-    let direction = DVec3::new(d[0], d[1], d[2]).try_normalize()?;
-    Some((direction, eigen.eigenvalues[most].max(0.0).sqrt()))
+    found
 }
 
 /// Twice the median distance of the points from the cameras' middle, across the way.
@@ -169,6 +207,8 @@ struct Fitting<'a> {
     max: DVec3,
     centers: &'a [DVec3],
     points: &'a [DVec3],
+    /// Which way the cameras went, in the world, where they did.
+    path: Option<DVec3>,
     /// About as large as it is wide.
     size: f64,
     /// In shares of `size`.
@@ -183,6 +223,7 @@ impl<'a> Fitting<'a> {
             max: DVec3::ZERO,
             centers,
             points,
+            path: None,
             size,
             tolerance: TOLERANCES[0],
         };
@@ -235,7 +276,16 @@ impl<'a> Fitting<'a> {
     }
 
     fn cost(&self) -> f64 {
-        self.cost_of(&self.in_box(self.points), self.min, self.max)
+        let astray = self.off_path().map_or(0.0, |off| {
+            ASTRAY_COST * self.points.len() as f64 * off.length_squared()
+        });
+        self.cost_of(&self.in_box(self.points), self.min, self.max) + astray
+    }
+
+    /// How far off the path the box is, right and down, in units of [`ASTRAY_ANGLE`].
+    fn off_path(&self) -> Option<DVec2> {
+        let path = self.axes.transpose() * self.path?;
+        Some(path.truncate() * path.z.signum() / ASTRAY_ANGLE)
     }
 
     /// Geman and McClure's cost of all points' distances from their nearest wall.
@@ -256,7 +306,7 @@ impl<'a> Fitting<'a> {
                 let squared = inside.min(DVec3::ZERO).length_squared();
                 let saturated = squared / (1.0 + squared);
                 // Next to the wall as inside, or noise would push it outwards.
-                saturated * (1.0 + (OUTSIDE - 1.0) * saturated)
+                saturated * (1.0 + self.outside(squared) * saturated)
             }
         };
         points.iter().map(of_point).sum()
@@ -272,6 +322,12 @@ impl<'a> Fitting<'a> {
         (self.cost(), self)
     }
 
+    /// What a point outside costs more, by its squared distance in tolerances.
+    fn outside(&self, squared: f64) -> f64 {
+        let share = self.tolerance / MIRRORED;
+        (OUTSIDE - 1.0) / (1.0 + squared * share * share)
+    }
+
     /// Tries places for each wall in turn: where the points are.
     fn search(&mut self) {
         let points = self.in_box(self.points);
@@ -283,7 +339,11 @@ impl<'a> Fitting<'a> {
             let below = &along[..along.partition_point(|&x| x < low[axis])];
             let above = &along[along.partition_point(|&x| x <= high[axis])..];
             for (beyond, is_max) in [(below, false), (above, true)] {
-                let mut best = (self.cost_of(&points, self.min, self.max), self.min, self.max);
+                let mut best = (
+                    self.cost_of(&points, self.min, self.max),
+                    self.min,
+                    self.max,
+                );
                 for place in places(beyond) {
                     let (mut min, mut max) = (self.min, self.max);
                     if is_max {
@@ -348,7 +408,7 @@ impl<'a> Fitting<'a> {
             let squared = residual * residual;
             let inwards = if wall < 3 { residual } else { -residual };
             let steeper = if inwards < 0.0 {
-                1.0 + 2.0 * (OUTSIDE - 1.0) * squared / (1.0 + squared)
+                1.0 + 2.0 * self.outside(squared) * squared / (1.0 + squared)
             } else {
                 1.0
             };
@@ -362,6 +422,15 @@ impl<'a> Fitting<'a> {
             row[3 + wall] = -1.0 / tolerance;
             matrix += weight * row * row.transpose();
             right_side -= weight * residual * row;
+        }
+        if let Some(off) = self.off_path() {
+            // The path's x and y change by −ω.y and ω.x (its z is about 1).
+            let weight = ASTRAY_COST * self.points.len() as f64;
+            let slope = 1.0 / ASTRAY_ANGLE;
+            for (k, slope, residual) in [(1, -slope, off.x), (0, slope, off.y)] {
+                matrix[(k, k)] += weight * slope * slope;
+                right_side[k] -= weight * slope * residual;
+            }
         }
         // A little damping holds what no point decides.
         for k in 0..9 {
@@ -377,7 +446,10 @@ impl<'a> Fitting<'a> {
         let tolerance = DVec3::splat(self.tolerance * self.size);
         let mut on = [0; 6];
         for point in self.in_box(self.points) {
-            let (low, high) = ((point - self.min) / tolerance, (self.max - point) / tolerance);
+            let (low, high) = (
+                (point - self.min) / tolerance,
+                (self.max - point) / tolerance,
+            );
             if let Some(wall) = nearest_wall(low, high)
                 && low.min(high)[wall % 3].abs() <= 1.0
             {
@@ -432,7 +504,11 @@ fn nearest_wall(low: DVec3, high: DVec3) -> Option<usize> {
     }
     let nearest = |a: &usize, b: &usize| from[*a].total_cmp(&from[*b]);
     let axis = (0..3).min_by(nearest)?;
-    Some(if low[axis] <= high[axis] { axis } else { axis + 3 })
+    Some(if low[axis] <= high[axis] {
+        axis
+    } else {
+        axis + 3
+    })
 }
 
 /// So many of the sorted values, spread evenly among them.

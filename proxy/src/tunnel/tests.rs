@@ -31,10 +31,21 @@ fn views_and_points(whole: &Reconstruction) -> (Vec<View>, Vec<DVec3>) {
 #[test]
 fn show() {
     for name in [
-        "corridor", "fern", "sceaux-castle", "south-building", "temple-ring", "lego",
-        "office-walk", "desk-sweep", "can-orbit", "opencv-chessboard", "house-walk",
+        "corridor",
+        "fern",
+        "sceaux-castle",
+        "south-building",
+        "temple-ring",
+        "lego",
+        "office-walk",
+        "desk-sweep",
+        "can-orbit",
+        "opencv-chessboard",
+        "house-walk",
     ] {
-        let Some((views, points)) = capture(name) else { continue };
+        let Some((views, points)) = capture(name) else {
+            continue;
+        };
         let start = std::time::Instant::now();
         let tunnel = fit(&views, &points);
         println!("{name}: {:.2?}", start.elapsed());
@@ -42,11 +53,20 @@ fn show() {
             Ok(t) => {
                 println!(
                     "   {:.3} x {:.3} x {:.3} share {:.3} on {:?} of {} hallway {}",
-                    t.width(), t.height(), t.length(), t.share_on_walls, t.points_on, t.points, t.is_hallway()
+                    t.width(),
+                    t.height(),
+                    t.length(),
+                    t.share_on_walls,
+                    t.points_on,
+                    t.points,
+                    t.is_hallway()
                 );
                 if let Ok(folder) = std::env::var("DUMP") {
                     let mut text = String::new();
-                    text += &format!("{} {} {} {} {} {} 0\n", t.min.x, t.min.y, t.min.z, t.max.x, t.max.y, t.max.z);
+                    text += &format!(
+                        "{} {} {} {} {} {} 0\n",
+                        t.min.x, t.min.y, t.min.z, t.max.x, t.max.y, t.max.z
+                    );
                     for v in &views {
                         let c = t.tunnel_from_world * v.center();
                         text += &format!("1 {} {} {} 0 0 0\n", c.x, c.y, c.z);
