@@ -306,7 +306,7 @@ impl<'a> Fitting<'a> {
                 let squared = inside.min(DVec3::ZERO).length_squared();
                 let saturated = squared / (1.0 + squared);
                 // Next to the wall as inside, or noise would push it outwards.
-                saturated * (1.0 + self.outside(squared) * saturated)
+                saturated * (1.0 + self.outside(inside) * saturated)
             }
         };
         points.iter().map(of_point).sum()
@@ -322,10 +322,11 @@ impl<'a> Fitting<'a> {
         (self.cost(), self)
     }
 
-    /// What a point outside costs more, by its squared distance in tolerances.
-    fn outside(&self, squared: f64) -> f64 {
-        let share = self.tolerance / MIRRORED;
-        (OUTSIDE - 1.0) / (1.0 + squared * share * share)
+    /// What a point outside costs more, by how far `inside` of the nearest walls it is, in
+    /// tolerances. Beyond the ends nothing is mirrored.
+    fn outside(&self, inside: DVec3) -> f64 {
+        let across = inside.truncate().min(DVec2::ZERO) * self.tolerance / MIRRORED;
+        (OUTSIDE - 1.0) / (1.0 + across.length_squared())
     }
 
     /// Tries places for each wall in turn: where the points are.
@@ -395,8 +396,9 @@ impl<'a> Fitting<'a> {
         let mut matrix = SMatrix::<f64, 9, 9>::zeros();
         let mut right_side = SVector::<f64, 9>::zeros();
         for point in self.in_box(self.points) {
-            let Some(wall) = nearest_wall((point - self.min) / near, (self.max - point) / far)
-            else {
+            let (low, high) = ((point - self.min) / near, (self.max - point) / far);
+            let inside = low.min(high);
+            let Some(wall) = nearest_wall(low, high) else {
                 continue;
             };
             let axis = wall % 3;
@@ -408,7 +410,7 @@ impl<'a> Fitting<'a> {
             let squared = residual * residual;
             let inwards = if wall < 3 { residual } else { -residual };
             let steeper = if inwards < 0.0 {
-                1.0 + 2.0 * self.outside(squared) * squared / (1.0 + squared)
+                1.0 + 2.0 * self.outside(inside) * squared / (1.0 + squared)
             } else {
                 1.0
             };
@@ -483,6 +485,8 @@ impl<'a> Fitting<'a> {
     fn into_tunnel(self, origin: DVec3) -> Tunnel {
         let rotation = DQuat::from_mat3(&self.axes.transpose()).normalize();
         let (points_on, on_walls) = self.counts();
+        let (low, high) = self.camera_bounds();
+        let room = 2.0 * CLEARANCE * self.size;
         Tunnel {
             tunnel_from_world: Rigid3::new(rotation, -(rotation * origin)),
             min: self.min,
@@ -490,6 +494,7 @@ impl<'a> Fitting<'a> {
             points_on,
             points: self.points.len(),
             share_on_walls: on_walls as f64 / self.points.len() as f64,
+            walked: high.z - low.z - room,
         }
     }
 }

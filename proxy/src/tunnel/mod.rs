@@ -31,15 +31,19 @@ pub struct Tunnel {
     pub points: usize,
     /// The share of those within [`ON_WALL`] of the surface.
     pub share_on_walls: f64,
+    /// How far the cameras went along it, in world units.
+    pub walked: f64,
 }
 
 /// A point lies on a wall within this share of the mean of the tunnel's width and height.
 pub const ON_WALL: f64 = 0.03;
-/// A tunnel that is one has at least this share of its points on its walls. Of the captures
-/// at hand, a corridor has twice that, and what is no tunnel half.
-const LEAST_SHARE: f64 = 0.4;
+/// A tunnel that is one has at least this share of its points on its walls: of the captures at
+/// hand a corridor full of plants has a fifth.
+const LEAST_SHARE: f64 = 0.15;
 /// A wall that is one holds this share of the points.
-const LEAST_WALL: f64 = 0.02;
+const LEAST_WALL: f64 = 0.01;
+/// Who takes a hallway for one walks at least this far along it, in means of width and height.
+const LEAST_WALKED: f64 = 1.5;
 
 /// Why there is no tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -99,13 +103,15 @@ impl Tunnel {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
     }
 
-    /// Whether the scene is a hallway, for a choice that nobody looks at: enough points lie
-    /// on the walls, and both walls and floor or ceiling are among those found.
+    /// Whether the scene is a hallway, for a choice that nobody looks at: the cameras went
+    /// along it, enough points lie on its walls, and both walls and floor or ceiling are among
+    /// those found.
     pub fn is_hallway(&self) -> bool {
+        let walked = self.walked >= LEAST_WALKED * 0.5 * (self.width() + self.height());
         let least = LEAST_WALL * self.points as f64;
         let found = self.points_on.map(|count| count as f64 >= least);
         let [left, ceiling, _, right, floor, _] = found;
-        self.share_on_walls >= LEAST_SHARE && left && right && (ceiling || floor)
+        walked && self.share_on_walls >= LEAST_SHARE && left && right && (ceiling || floor)
     }
 
     /// The box as twelve triangles that face inwards. It is closed: every ray from inside
