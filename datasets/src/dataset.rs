@@ -1,5 +1,5 @@
 use crate::points::sparse_points;
-use crate::{Motion, Scene, helicopter, shelf, wall};
+use crate::{Motion, Scene, hallway, helicopter, knick_knacks, shelf, wall};
 use calibrate::{Camera, CameraId, Image, ImageId, Lens, ModelKind, Reconstruction, Rigid3, View};
 use glam::DQuat;
 use std::borrow::Cow;
@@ -114,7 +114,13 @@ pub enum DatasetError {
 
 type Build = fn(&Options) -> Result<Dataset, DatasetError>;
 
-const DATASETS: [(&str, Build); 3] = [("shelf", shelf), ("wall", wall), ("helicopter", helicopter)];
+const DATASETS: [(&str, Build); 5] = [
+    ("shelf", shelf),
+    ("wall", wall),
+    ("helicopter", helicopter),
+    ("knick-knacks", knick_knacks),
+    ("hallway", hallway),
+];
 
 /// The names that [`by_name`] knows.
 pub fn names() -> Vec<&'static str> {

@@ -1,10 +1,10 @@
 use crate::dataset::Plan;
 use crate::noise::{signed, unit};
+use crate::props::{GLAZED, MATTE, SATIN, cuboid, mottled, object};
 use crate::shape::smooth_profile;
 use crate::texture::rgb;
 use crate::{
-    Dataset, DatasetError, Finish, Lighting, Material, Motif, Object, Options, Scene, Shape,
-    Texture,
+    Dataset, DatasetError, Finish, Lighting, Motif, Object, Options, Scene, Shape, Texture,
 };
 use calibrate::{ModelKind, Rigid3};
 use glam::{DQuat, DVec2, DVec3};
@@ -87,41 +87,6 @@ fn scene(finest: f64) -> Scene {
         corner_reach: 0.13,
     };
     Scene::new(objects, lighting, finest)
-}
-
-const MATTE: Finish = Finish::Matte;
-const SATIN: Finish = Finish::Glossy {
-    highlight: 0.22,
-    exponent: 40.0,
-    mirror: 0.0,
-};
-const GLAZED: Finish = Finish::Glossy {
-    highlight: 0.9,
-    exponent: 350.0,
-    mirror: 0.09,
-};
-
-fn object(shape: Shape, at: DVec3, rotation: DQuat, texture: Texture, finish: Finish) -> Object {
-    Object {
-        // The wall, the sideboard and the room shade nothing else.
-        casts_shadow: shape.ball().1 < 1.0,
-        shape,
-        world_from_shape: Rigid3::new(rotation, at),
-        material: Material { texture, finish },
-    }
-}
-
-fn cuboid(half: DVec3) -> Shape {
-    Shape::Cuboid { half }
-}
-
-fn mottled(color: u32, contrast: f64, wavelength: f64, seed: u32) -> Texture {
-    Texture::Mottled {
-        color: rgb(color),
-        contrast,
-        wavelength,
-        seed,
-    }
 }
 
 /// The wall, the sideboard, a runner on it, and the rest of the room for reflections.

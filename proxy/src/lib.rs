@@ -13,8 +13,10 @@ mod fit;
 mod glb;
 mod mesh;
 mod plane;
+mod planes;
 pub mod points;
 mod solid;
+pub mod tunnel;
 
 use std::sync::Arc;
 
@@ -26,8 +28,13 @@ pub use file::{FileError, parse, read, write};
 pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use mesh::Mesh;
 pub use plane::{Plane, PlaneError};
+pub use planes::{
+    DominantPlane, DominantPlaneError, FocusError, dominant_plane, fit_plane_for_view,
+    plane_focused_on,
+};
 pub use points::SparsePoint;
 pub use solid::{Hit, MeshKind, Solid};
+pub use tunnel::{Tunnel, TunnelError};
 
 /// The approximate surface.
 #[derive(Clone, Debug, PartialEq)]

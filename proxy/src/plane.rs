@@ -19,7 +19,14 @@ pub enum PlaneError {
     /// The normal has no direction.
     #[error("the plane's normal is zero; give a direction such as 0,0,1")]
     ZeroNormal,
+    /// Three points on a line, or in one place.
+    #[error("the points {0}, {1} and {2} lie on a line; move one of them off it")]
+    Collinear(DVec3, DVec3, DVec3),
 }
+
+/// Three points whose height over their longest side is below this share of it lie on a
+/// line: the digits of coordinates far from the origin tell no more.
+const COLLINEAR: f64 = 1e-9;
 
 impl Plane {
     /// The plane through `point` across `normal` (any length but zero).
@@ -38,6 +45,26 @@ impl Plane {
             point,
             normal: (normal / largest).normalize(),
         })
+    }
+
+    /// The plane through three points. From the side to which its normal points they run
+    /// counter-clockwise.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; points on a line.
+    pub fn through(points_in_world: [DVec3; 3]) -> Result<Self, PlaneError> {
+        let [a, b, c] = points_in_world;
+        if let Some(odd) = points_in_world.into_iter().find(|p| !p.is_finite()) {
+            return Err(PlaneError::NotFinite(odd, (b - a).cross(c - a)));
+        }
+        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+        // Lengths relative to the longest side: squares of tiny ones vanish.
+        let sides = [(b - a) / longest, (c - a) / longest];
+        let unit = sides[0].cross(sides[1]);
+        if !(unit.length() > COLLINEAR) {
+            return Err(PlaneError::Collinear(a, b, c));
+        }
+        Self::new(a, unit)
     }
 
     /// A point on it, in the world.
@@ -119,6 +146,35 @@ mod tests {
         let q_near = near.inverse_distance_from(DVec3::ZERO).unwrap();
         let q_far = far.inverse_distance_from(shift).unwrap();
         assert!((q_near - q_far).length() < 1e-9);
+    }
+
+    #[test]
+    fn three_points_span_a_plane_unless_they_lie_on_a_line() {
+        let shift = DVec3::new(5e5, 5.4e6, 300.0);
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 2.0, 1.0)];
+        for scale in [1e-6, 1.0, 1e6] {
+            for shift in [DVec3::ZERO, shift * scale] {
+                let points = corners.map(|p| p * scale + shift);
+                let plane = Plane::through(points).unwrap();
+                for point in points {
+                    assert!(plane.signed_distance(point).abs() < 1e-8 * scale);
+                }
+                let normal = DVec3::new(0.0, -1.0, 2.0).normalize();
+                assert!((plane.normal() - normal).length() < 1e-8, "{plane:?}");
+            }
+        }
+        for on_a_line in [
+            [DVec3::ZERO, DVec3::X, 3.0 * DVec3::X],
+            [DVec3::ONE, DVec3::ONE, DVec3::X],
+            [DVec3::ONE; 3],
+        ] {
+            let [a, b, c] = on_a_line;
+            let error = Plane::through(on_a_line).unwrap_err();
+            assert_eq!(error, PlaneError::Collinear(a, b, c));
+        }
+        for odd in [DVec3::NAN, DVec3::INFINITY] {
+            assert!(Plane::through([DVec3::ZERO, DVec3::X, odd]).is_err());
+        }
     }
 
     #[test]

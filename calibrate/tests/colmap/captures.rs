@@ -86,6 +86,56 @@ fn every_capture_reads_and_reprojects_as_its_readme_states() {
     assert!(read >= 11, "only {read} captures");
 }
 
+/// Each capture's name and reprojection error in pixels, from the table of the captures'
+/// README: the first cell of a row, and the one under "reproj. error (px)".
+fn table(readme: &str) -> Vec<(String, f64)> {
+    let cells = |line: &str| -> Vec<String> {
+        let inner = line.trim().trim_matches('|');
+        inner.split('|').map(|c| c.trim().to_owned()).collect()
+    };
+    let mut rows = readme.lines().filter(|line| line.starts_with('|'));
+    let header = cells(rows.next().expect("a table"));
+    let column = header
+        .iter()
+        .position(|c| c == "reproj. error (px)")
+        .expect("a column of errors");
+    // After the header comes the ruling.
+    rows.skip(1)
+        .map(cells)
+        .map(|row| (row[0].clone(), row[column].parse().unwrap()))
+        .collect()
+}
+
+/// The table's figure is the mean over the *points* of each point's mean distance, as
+/// COLMAP's analyser reports it, and so the mean of the errors that the points carry. The
+/// mean over all *observations*, which weighs long tracks more, is another number: larger
+/// on most captures, since long tracks fit worse.
+#[test]
+fn every_capture_imports_at_the_error_of_the_captures_table() {
+    let Some(folder) = captures() else { return };
+    let rows = table(&fs::read_to_string(folder.join("README.md")).unwrap());
+    assert!(rows.len() >= 11, "{rows:?}");
+    let mut told_apart = 0;
+    for (name, stated_px) in rows {
+        let model = read_model(&folder.join(&name).join("sparse/0")).unwrap();
+        let of_points_px = mean_reprojection_error(&model);
+        let cameras = model.cameras.keys();
+        let observations_px: Vec<f64> = cameras
+            .flat_map(|id| model.reprojection_errors_px(*id).unwrap())
+            .collect();
+        let of_observations_px = observations_px.iter().sum::<f64>() / observations_px.len() as f64;
+        let kept = model.points.values().map(|p| p.error_px);
+        let kept_px = kept.sum::<f64>() / model.points.len() as f64;
+        println!(
+            "{name}: stated {stated_px}, points {of_points_px:.4}, observations \
+             {of_observations_px:.4}, stored with the points {kept_px:.4}"
+        );
+        assert!((of_points_px - stated_px).abs() <= 0.01, "{name}");
+        told_apart += usize::from((of_observations_px - stated_px).abs() > 0.01);
+    }
+    assert!(told_apart > 0, "either mean would do");
+}
+
 #[test]
 fn every_capture_is_written_byte_for_byte_as_it_was_read() {
     let Some(folder) = captures() else { return };
