@@ -10,6 +10,7 @@ mod facets;
 mod file;
 mod fit;
 mod glb;
+pub mod hull;
 mod mesh;
 mod plane;
 pub mod points;
