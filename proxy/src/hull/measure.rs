@@ -52,44 +52,51 @@ pub(super) fn compare(mesh: &Mesh, views: &[&View], silhouettes: &[&Silhouette])
 }
 
 /// The silhouette of a mesh: the pixels whose rays, through their centres, meet it.
+pub fn outline(mesh: &Mesh, view: &View) -> Silhouette {
+    let mut drawn = vec![false; view.width as usize * view.height as usize];
+    cover(mesh, &mesh.triangles, view, &Rays::of(view), |pixel| {
+        drawn[pixel] = true;
+    });
+    Silhouette::new(view.width, view.height, drawn).expect("a value a pixel")
+}
+
+/// Calls `hit` with every pixel of the view whose ray meets one of a mesh's triangles.
 ///
 /// A ray d meets the triangle (a, b, c), in the camera's frame, where d = αa + βb + γc with
 /// none of α, β, γ negative. These are the determinants |d b c|, |a d c|, |a b d| over
 /// |a b c|, which neighbouring triangles compute from the same cross products: no ray slips
 /// through between them, whatever the lens.
-pub fn outline(mesh: &Mesh, view: &View) -> Silhouette {
-    let (width, height) = (view.width as usize, view.height as usize);
-    let mut drawn = vec![false; width * height];
-    let points: Vec<DVec3> = mesh
-        .positions
-        .iter()
-        .map(|p| view.camera_from_world * *p)
-        .collect();
-    let pixels: Vec<Option<DVec2>> = points.iter().map(|p| project(view, *p)).collect();
-    let rays = Rays::of(view);
-    for triangle in &mesh.triangles {
-        let corners = triangle.map(|i| points[i as usize]);
-        let Some((low, high)) = reach(view, corners, triangle.map(|i| pixels[i as usize])) else {
+pub(super) fn cover(
+    mesh: &Mesh,
+    triangles: &[[u32; 3]],
+    view: &View,
+    rays: &Rays,
+    mut hit: impl FnMut(usize),
+) {
+    let width = view.width as usize;
+    for triangle in triangles {
+        let corners = triangle.map(|i| view.camera_from_world * mesh.positions[i as usize]);
+        let Some((low, high)) = reach(view, corners) else {
             continue;
         };
         let [a, b, c] = corners;
         let normals = [b.cross(c), c.cross(a), a.cross(b)];
         let volume = a.dot(normals[0]);
-        let sign = if volume < 0.0 { -1.0 } else { 1.0 };
+        if volume == 0.0 {
+            continue;
+        }
+        let sign = volume.signum();
         for row in low[1]..high[1] {
             for column in low[0]..high[0] {
-                let i = row * width + column;
-                if drawn[i] {
-                    continue;
-                }
                 let Some(ray) = rays.at(column, row, width) else {
                     continue;
                 };
-                drawn[i] = normals.iter().all(|n| sign * n.dot(ray) >= 0.0) && volume != 0.0;
+                if normals.iter().all(|n| sign * n.dot(ray) >= 0.0) {
+                    hit(row * width + column);
+                }
             }
         }
     }
-    Silhouette::new(view.width, view.height, drawn).expect("a value a pixel")
 }
 
 fn project(view: &View, point_in_camera: DVec3) -> Option<DVec2> {
@@ -99,11 +106,7 @@ fn project(view: &View, point_in_camera: DVec3) -> Option<DVec2> {
 
 /// The first column and row that a triangle may cover, and those after the last; `None`
 /// outside the image.
-fn reach(
-    view: &View,
-    corners: [DVec3; 3],
-    pixels: [Option<DVec2>; 3],
-) -> Option<([usize; 2], [usize; 2])> {
+fn reach(view: &View, corners: [DVec3; 3]) -> Option<([usize; 2], [usize; 2])> {
     let size = DVec2::new(f64::from(view.width), f64::from(view.height));
     let (mut low, mut high) = (DVec2::ZERO, size);
     let pinhole = view.lens.distortion() == Distortion::None;
@@ -111,7 +114,7 @@ fn reach(
         return None;
     }
     // A triangle partly behind the camera may reach any pixel.
-    if let [Some(a), Some(b), Some(c)] = pixels {
+    if let [Some(a), Some(b), Some(c)] = corners.map(|c| project(view, c)) {
         (low, high) = (a.min(b).min(c), a.max(b).max(c));
         if !pinhole {
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -138,7 +141,7 @@ fn reach(
 }
 
 /// The rays through the centres of a view's pixels, in its camera's frame.
-enum Rays {
+pub(super) enum Rays {
     /// (x, y, 1) = origin + column · step.x + row · step.y.
     Pinhole {
         origin: DVec2,
@@ -148,7 +151,7 @@ enum Rays {
 }
 
 impl Rays {
-    fn of(view: &View) -> Self {
+    pub(super) fn of(view: &View) -> Self {
         if view.lens.distortion() == Distortion::None {
             return Self::Pinhole {
                 origin: (0.5 - view.lens.principal) / view.lens.focal,

@@ -6,18 +6,23 @@
 //! silhouettes that met the hull still does. [`plain_background`] makes silhouettes of photos
 //! before a plain background, [`turntable`] cameras of silhouettes alone.
 
+mod background;
 mod bounds;
 mod closest;
 mod measure;
 mod octree;
+mod pieces;
 mod silhouette;
 mod simplify;
 mod surface;
+mod turntable;
 mod witness;
 
+pub use background::{BackgroundError, plain_background};
 pub use measure::{Measures, measure, outline};
 pub use silhouette::Silhouette;
 pub use simplify::simplify;
+pub use turntable::{Turntable, TurntableError, turntable};
 
 use crate::Mesh;
 use calibrate::View;
@@ -192,11 +197,12 @@ pub fn carve(
     let bounds = bounds::find(&small_views, &small, &witnesses, options.misses)?;
     let level = finest(&bounds, &used_views, &witnesses, options);
     // 3. The surface, and less of it.
-    let carved_mesh = surface::extract(&level, &witnesses);
-    if carved_mesh.triangles.is_empty() {
+    let surface = surface::extract(&level, &witnesses);
+    if surface.triangles.is_empty() {
         return Err(HullError::Contradiction { photos: used.len() });
     }
     let used_silhouettes: Vec<&Silhouette> = used.iter().map(|i| &silhouettes[*i]).collect();
+    let carved_mesh = pieces::needed(&surface, &used_views, &used_silhouettes);
     let carved = measure::compare(&carved_mesh, &used_views, &used_silhouettes);
     let (mesh, measures) = match options.faces {
         Some(faces) if faces < carved.faces => {

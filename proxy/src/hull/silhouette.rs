@@ -46,14 +46,6 @@ impl Silhouette {
         area > 0 && area < self.inside.len()
     }
 
-    /// Whether a pixel shows the object; outside the image none does.
-    pub(crate) fn at(&self, column: i64, row: i64) -> bool {
-        let (width, height) = (i64::from(self.width), i64::from(self.height));
-        (0..width).contains(&column)
-            && (0..height).contains(&row)
-            && self.inside[(row * width + column) as usize]
-    }
-
     /// Whether the object comes within so many pixels of the image's border, so that it may
     /// go on beyond it.
     pub(crate) fn reaches_border(&self, within_px: u32) -> bool {

@@ -4,7 +4,9 @@
 //! An edge collapses to a vertex v that lies on or beyond the planes of all faces f around
 //! its ends. The surface then changes by the boundary of the tetrahedra (v, f), none of which
 //! has a negative volume, so no point's winding number falls: what was inside stays inside,
-//! even where parts of the surface meet that are not neighbours.
+//! even where parts of the surface meet that are not neighbours. That holds for any closed
+//! surface and any two vertices, so the surface's topology may change: cavities, tunnels and
+//! slots that become flat are closed.
 
 use super::closest::{HalfSpace, closest_point};
 use crate::Mesh;
@@ -16,49 +18,25 @@ use std::collections::BinaryHeap;
 /// How strongly a new vertex is held at its edge's middle: by this part of the edge's length,
 /// as an area, times the square of how far it is away. Where faces are nearly flat, all
 /// places on their plane add as little volume as any.
-const HOLD: f64 = 0.05;
-/// A new face may turn by so much from the one it takes the place of (cosine).
-const MOST_TURNED: f64 = 0.2;
+const HOLD: f64 = 0.2;
+/// No collapse adds more than this part of the volume: few faces are worth less than the shape.
+const MOST_ADDED: f64 = 0.01;
+/// A new face may turn by so much from the one it takes the place of (cosine). Folds do no
+/// harm but to the mesh's looks: they come when nothing else is left.
+const MOST_TURNED: [f64; 3] = [0.2, -0.5, -2.0];
 
-/// Collapses edges, those first that add least volume, until so many faces are left or no
-/// edge can.
+/// Collapses edges, those first that add least volume, until so many faces are left, or until
+/// any more would add over a hundredth of the volume.
 ///
-/// The mesh must be closed, winding counter-clockwise from outside. The result is, too; it
-/// contains whatever the mesh contains. Deterministic.
+/// The mesh must be closed, winding counter-clockwise from outside. The result is, too, and
+/// contains whatever the mesh contains. Where it closed a hole, more than two faces may share
+/// an edge. Deterministic.
 pub fn simplify(mesh: &Mesh, faces: usize) -> Mesh {
     let mut surface = Surface::new(mesh);
-    let edges = surface.edges();
-    let costs: Vec<Option<f64>> = edges
-        .par_iter()
-        .map(|edge| Some(surface.collapse(*edge)?.cost))
-        .collect();
-    let mut heap: BinaryHeap<Candidate> = edges
-        .into_iter()
-        .zip(costs)
-        .filter_map(|(edge, cost)| Some(surface.candidate(edge, cost?)))
-        .collect();
-    while surface.alive_faces > faces {
-        let Some(candidate) = heap.pop() else {
-            break;
-        };
-        let edge = candidate.edge;
-        if !edge.iter().all(|v| surface.alive[*v as usize]) {
-            continue;
-        }
-        let fresh = candidate.stamps == edge.map(|v| surface.stamps[v as usize]);
-        let Some(collapse) = surface.collapse(edge) else {
-            continue;
-        };
-        if !fresh && heap.peek().is_some_and(|next| next.cost < collapse.cost) {
-            heap.push(surface.candidate(edge, collapse.cost));
-            continue;
-        }
-        surface.apply(edge, &collapse);
-        for neighbour in surface.neighbours(edge[0]) {
-            let edge = [edge[0].min(neighbour), edge[0].max(neighbour)];
-            if let Some(collapse) = surface.collapse(edge) {
-                heap.push(surface.candidate(edge, collapse.cost));
-            }
+    let most = MOST_ADDED * mesh.volume().abs();
+    for most_turned in MOST_TURNED {
+        if surface.alive_faces > faces {
+            surface.collapse_edges(faces, most, most_turned);
         }
     }
     surface.into_mesh()
@@ -67,8 +45,6 @@ pub fn simplify(mesh: &Mesh, faces: usize) -> Mesh {
 /// A closed mesh on its way to fewer faces.
 struct Surface {
     positions: Vec<DVec3>,
-    /// Whether a vertex is still used.
-    alive: Vec<bool>,
     /// Counts the changes around a vertex.
     stamps: Vec<u32>,
     triangles: Vec<Option<[u32; 3]>>,
@@ -103,7 +79,6 @@ impl Surface {
         }
         Self {
             positions: mesh.positions.clone(),
-            alive: around.iter().map(|faces| !faces.is_empty()).collect(),
             stamps: vec![0; mesh.positions.len()],
             triangles: mesh.triangles.iter().copied().map(Some).collect(),
             around,
@@ -111,11 +86,57 @@ impl Surface {
         }
     }
 
+    /// Collapses edges until so many faces are left or every collapse would cost more than
+    /// `most`.
+    fn collapse_edges(&mut self, faces: usize, most: f64, most_turned: f64) {
+        let edges = self.edges();
+        let costs: Vec<Option<f64>> = edges
+            .par_iter()
+            .map(|edge| Some(self.collapse(*edge, most_turned)?.cost))
+            .collect();
+        let mut heap: BinaryHeap<Candidate> = edges
+            .into_iter()
+            .zip(costs)
+            .filter_map(|(edge, cost)| Some(self.candidate(edge, cost?)))
+            .collect();
+        while self.alive_faces > faces {
+            let Some(Candidate { edge, stamps, .. }) = heap.pop() else {
+                break;
+            };
+            if !self.joined(edge) {
+                continue;
+            }
+            let Some(collapse) = self.collapse(edge, most_turned) else {
+                continue;
+            };
+            // Something around it may have changed since it was queued.
+            let stale = stamps != edge.map(|v| self.stamps[v as usize]);
+            if collapse.cost > most {
+                continue;
+            }
+            if stale && heap.peek().is_some_and(|next| next.cost < collapse.cost) {
+                heap.push(self.candidate(edge, collapse.cost));
+                continue;
+            }
+            for vertex in self.apply(edge, &collapse) {
+                for neighbour in self.neighbours(vertex) {
+                    let edge = [vertex.min(neighbour), vertex.max(neighbour)];
+                    if let Some(collapse) = self.collapse(edge, most_turned) {
+                        heap.push(self.candidate(edge, collapse.cost));
+                    }
+                }
+            }
+        }
+    }
+
     fn edges(&self) -> Vec<[u32; 2]> {
         let each = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
         let directed = self.triangles.iter().flatten().flat_map(each);
-        // In a closed mesh every edge runs both ways.
-        directed.filter(|[a, b]| a < b).collect()
+        // In a closed mesh every edge runs both ways, some more than once.
+        let mut edges: Vec<[u32; 2]> = directed.filter(|[a, b]| a < b).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges
     }
 
     fn candidate(&self, edge: [u32; 2], cost: f64) -> Candidate {
@@ -143,18 +164,9 @@ impl Surface {
     }
 
     /// Where an edge may go and what that costs; `None` where it cannot collapse.
-    fn collapse(&self, edge: [u32; 2]) -> Option<Collapse> {
+    fn collapse(&self, edge: [u32; 2], most_turned: f64) -> Option<Collapse> {
         let [a, b] = edge;
-        // 1. The surface must stay one: the ends share two neighbours, those across the
-        // edge, and these have other faces, too (the link condition; Dey et al. 1999).
-        let neighbours_of_b = self.neighbours(b);
-        let mut shared = self.neighbours(a);
-        shared.retain(|v| neighbours_of_b.binary_search(v).is_ok());
-        let apart = shared.iter().all(|v| self.around[*v as usize].len() > 3);
-        if shared.len() != 2 || !apart {
-            return None;
-        }
-        // 2. The planes to stay beyond, and the volume added beyond them:
+        // 1. The planes to stay beyond, and the volume added beyond them:
         // Σ area·(n·v − d)/3.
         let mut faces = self.around[a as usize].clone();
         faces.extend(
@@ -183,7 +195,7 @@ impl Surface {
                 offset: normal.dot(p),
             });
         }
-        // 3. Least volume + ½·hold·|v − middle|²: the point of the polyhedron that is nearest
+        // 2. Least volume + ½·hold·|v − middle|²: the point of the polyhedron that is nearest
         // to the one that is best without it.
         let hold = HOLD * length;
         let best = if hold > 0.0 {
@@ -196,7 +208,7 @@ impl Surface {
         if !position.is_finite() {
             return None;
         }
-        // 4. No face may turn over.
+        // 3. No face may turn over.
         for face in &faces {
             let triangle = self.triangle(*face);
             if triangle.contains(&a) && triangle.contains(&b) {
@@ -211,7 +223,7 @@ impl Surface {
                 }
             });
             let normal = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p).normalize_or_zero();
-            if !(normal(corners).dot(normal(new)) > MOST_TURNED) {
+            if !(normal(corners).dot(normal(new)) > most_turned) {
                 return None;
             }
         }
@@ -220,8 +232,15 @@ impl Surface {
         cost.is_finite().then_some(Collapse { position, cost })
     }
 
-    /// Moves the edge's first vertex to its new place and joins the other to it.
-    fn apply(&mut self, edge: [u32; 2], collapse: &Collapse) {
+    /// Whether two vertices are joined by an edge.
+    fn joined(&self, [a, b]: [u32; 2]) -> bool {
+        let faces = &self.around[a as usize];
+        faces.iter().any(|face| self.triangle(*face).contains(&b))
+    }
+
+    /// Moves the edge's first vertex to its new place and joins the other to it. Returns the
+    /// vertices whose edges are new.
+    fn apply(&mut self, edge: [u32; 2], collapse: &Collapse) -> Vec<u32> {
         let [a, b] = edge;
         let of_b = std::mem::take(&mut self.around[b as usize]);
         for face in of_b {
@@ -237,12 +256,94 @@ impl Surface {
                 self.around[a as usize].push(face);
             }
         }
-        self.alive[b as usize] = false;
         self.positions[a as usize] = collapse.position;
         self.stamps[a as usize] += 1;
         for vertex in self.neighbours(a) {
             self.stamps[vertex as usize] += 1;
         }
+        let mut changed = self.cancel(a);
+        changed.push(a);
+        changed.sort_unstable();
+        changed.dedup();
+        let mut new = vec![a];
+        for vertex in changed {
+            new.extend(self.split(vertex));
+        }
+        new
+    }
+
+    /// Takes out pairs of faces around a vertex that have the same corners and look opposite
+    /// ways: they bound nothing any more. So cavities, tunnels and slots close. Returns the
+    /// faces' corners.
+    fn cancel(&mut self, vertex: u32) -> Vec<u32> {
+        // Each face's corners in order, and whether it winds that way.
+        let mut faces: Vec<([u32; 3], bool, u32)> = self.around[vertex as usize]
+            .iter()
+            .map(|face| {
+                let [p, q, r] = self.triangle(*face);
+                let mut sorted = [p, q, r];
+                sorted.sort_unstable();
+                let even = [[p, q, r], [q, r, p], [r, p, q]].contains(&sorted);
+                (sorted, even, *face)
+            })
+            .collect();
+        faces.sort_unstable();
+        let mut corners = Vec::new();
+        for same in faces.chunk_by(|a, b| a.0 == b.0) {
+            let odd = same.partition_point(|face| !face.1);
+            let pairs = odd.min(same.len() - odd);
+            for (_, _, face) in same[..pairs].iter().chain(&same[same.len() - pairs..]) {
+                for corner in self.triangle(*face) {
+                    let around = &mut self.around[corner as usize];
+                    around.retain(|f| f != face);
+                    corners.push(corner);
+                }
+                self.triangles[*face as usize] = None;
+                self.alive_faces -= 1;
+            }
+        }
+        corners
+    }
+
+    /// Where the faces around a vertex fall into parts that share no edge there, gives each
+    /// part a vertex of its own, at the same place: they may go different ways from now on.
+    /// Returns the new vertices.
+    fn split(&mut self, vertex: u32) -> Vec<u32> {
+        let mut left = std::mem::take(&mut self.around[vertex as usize]);
+        let mut parts: Vec<Vec<u32>> = Vec::new();
+        while let Some(first) = left.pop() {
+            let mut part = vec![first];
+            let mut seen = 0;
+            while seen < part.len() {
+                let here = self.triangle(part[seen]);
+                seen += 1;
+                left.retain(|face| {
+                    let shared = self.triangle(*face);
+                    let apart = !shared.iter().any(|v| *v != vertex && here.contains(v));
+                    if !apart {
+                        part.push(*face);
+                    }
+                    apart
+                });
+            }
+            parts.push(part);
+        }
+        let mut parts = parts.into_iter();
+        self.around[vertex as usize] = parts.next().unwrap_or_default();
+        let mut new = Vec::new();
+        for part in parts {
+            let copy = self.positions.len() as u32;
+            for face in &part {
+                let triangle = self.triangle(*face);
+                let moved = triangle.map(|v| if v == vertex { copy } else { v });
+                self.triangles[*face as usize] = Some(moved);
+            }
+            self.positions.push(self.positions[vertex as usize]);
+            self.stamps.push(0);
+            self.around.push(part);
+            new.push(copy);
+        }
+        new
     }
 
     /// What is left, vertices that nothing uses left out.
@@ -250,7 +351,7 @@ impl Surface {
         let mut moved_to = vec![u32::MAX; self.positions.len()];
         let mut positions = Vec::new();
         for (i, position) in self.positions.iter().enumerate() {
-            if self.alive[i] {
+            if !self.around[i].is_empty() {
                 moved_to[i] = positions.len() as u32;
                 positions.push(*position);
             }
