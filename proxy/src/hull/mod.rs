@@ -206,7 +206,12 @@ pub fn carve(
     let carved = measure::compare(&carved_mesh, &used_views, &used_silhouettes);
     let (mesh, measures) = match options.faces {
         Some(faces) if faces < carved.faces => {
-            let mesh = simplify(&carved_mesh, faces);
+            // Specks that the rest has grown around go, so that what stays gets their faces.
+            let mut mesh = simplify(&carved_mesh, 3 * faces);
+            for _ in 0..2 {
+                mesh = pieces::needed(&mesh, &used_views, &used_silhouettes);
+                mesh = simplify(&mesh, faces);
+            }
             let measures = measure::compare(&mesh, &used_views, &used_silhouettes);
             (mesh, measures)
         }

@@ -21,6 +21,8 @@ use std::collections::BinaryHeap;
 const HOLD: f64 = 0.2;
 /// No collapse adds more than this part of the volume: few faces are worth less than the shape.
 const MOST_ADDED: f64 = 0.01;
+/// After so many of the faces have gone, edges that could not collapse are tried again.
+const ROUND: f64 = 0.6;
 /// A new face may turn by so much from the one it takes the place of (cosine). Folds do no
 /// harm but to the mesh's looks: they come when nothing else is left.
 const MOST_TURNED: [f64; 3] = [0.2, -0.5, -2.0];
@@ -35,8 +37,13 @@ pub fn simplify(mesh: &Mesh, faces: usize) -> Mesh {
     let mut surface = Surface::new(mesh);
     let most = MOST_ADDED * mesh.volume().abs();
     for most_turned in MOST_TURNED {
-        if surface.alive_faces > faces {
-            surface.collapse_edges(faces, most, most_turned);
+        while surface.alive_faces > faces {
+            let before = surface.alive_faces;
+            let round = faces.max((ROUND * before as f64) as usize);
+            surface.collapse_edges(round, most, most_turned);
+            if surface.alive_faces == before {
+                break;
+            }
         }
     }
     surface.into_mesh()
@@ -262,13 +269,18 @@ impl Surface {
             self.stamps[vertex as usize] += 1;
         }
         let mut changed = self.cancel(a);
-        changed.push(a);
+        let mut new = self.split(a);
+        if !new.is_empty() {
+            // Edges that many faces shared are shared by two now, so other vertices may part.
+            let around = new.iter().chain([&a]);
+            changed.extend(around.flat_map(|v| self.neighbours(*v)).collect::<Vec<_>>());
+        }
         changed.sort_unstable();
         changed.dedup();
-        let mut new = vec![a];
-        for vertex in changed {
+        for vertex in changed.into_iter().filter(|v| *v != a) {
             new.extend(self.split(vertex));
         }
+        new.push(a);
         new
     }
 
@@ -305,28 +317,26 @@ impl Surface {
         corners
     }
 
-    /// Where the faces around a vertex fall into parts that share no edge there, gives each
+    /// Where the faces around a vertex fall into parts that do not meet at an edge, gives each
     /// part a vertex of its own, at the same place: they may go different ways from now on.
     /// Returns the new vertices.
     fn split(&mut self, vertex: u32) -> Vec<u32> {
-        let mut left = std::mem::take(&mut self.around[vertex as usize]);
+        let faces = std::mem::take(&mut self.around[vertex as usize]);
+        let beside = self.beside(vertex, &faces);
+        let mut seen = vec![false; faces.len()];
         let mut parts: Vec<Vec<u32>> = Vec::new();
-        while let Some(first) = left.pop() {
-            let mut part = vec![first];
-            let mut seen = 0;
-            while seen < part.len() {
-                let here = self.triangle(part[seen]);
-                seen += 1;
-                left.retain(|face| {
-                    let shared = self.triangle(*face);
-                    let apart = !shared.iter().any(|v| *v != vertex && here.contains(v));
-                    if !apart {
-                        part.push(*face);
-                    }
-                    apart
-                });
+        for first in 0..faces.len() {
+            let mut part = Vec::new();
+            let mut next = vec![first];
+            while let Some(i) = next.pop() {
+                if !std::mem::replace(&mut seen[i], true) {
+                    part.push(faces[i]);
+                    next.extend(&beside[i]);
+                }
             }
-            parts.push(part);
+            if !part.is_empty() {
+                parts.push(part);
+            }
         }
         let mut parts = parts.into_iter();
         self.around[vertex as usize] = parts.next().unwrap_or_default();
@@ -344,6 +354,64 @@ impl Surface {
             new.push(copy);
         }
         new
+    }
+
+    /// For each of the faces around a vertex, which ones continue the surface there. Where more
+    /// than two share an edge these are the two with the same part of the outside between them.
+    fn beside(&self, vertex: u32, faces: &[u32]) -> Vec<Vec<usize>> {
+        // Each face has an edge that leaves the vertex and one that comes back: the other end,
+        // whether it leaves, the corner across.
+        let mut edges: Vec<(u32, bool, u32, usize)> = Vec::new();
+        for (i, face) in faces.iter().enumerate() {
+            let [p, q, r] = self.triangle(*face);
+            let (next, last) = match () {
+                () if p == vertex => (q, r),
+                () if q == vertex => (r, p),
+                () => (p, q),
+            };
+            edges.push((next, true, last, i));
+            edges.push((last, false, next, i));
+        }
+        edges.sort_unstable();
+        let mut beside = vec![Vec::new(); faces.len()];
+        for same in edges.chunk_by(|a, b| a.0 == b.0) {
+            let mut around: Vec<(f64, bool, usize)> = same
+                .iter()
+                .map(|(end, leaves, across, i)| {
+                    let angle = if same.len() > 2 {
+                        self.angle_around(vertex, *end, *across)
+                    } else {
+                        0.0
+                    };
+                    (angle, *leaves, *i)
+                })
+                .collect();
+            around.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // The outside follows a face whose edge leaves, in the sense of growing angles, up
+            // to one whose edge comes back.
+            while around.len() >= 2 {
+                let count = around.len();
+                let found = (0..count).find(|k| around[*k].1 && !around[(k + 1) % count].1);
+                let Some(k) = found else {
+                    break;
+                };
+                let (i, j) = (around[k].2, around[(k + 1) % count].2);
+                beside[i].push(j);
+                beside[j].push(i);
+                around.remove(k.max((k + 1) % count));
+                around.remove(k.min((k + 1) % count));
+            }
+        }
+        beside
+    }
+
+    /// The angle of a point around an edge, counter-clockwise where the edge comes towards one.
+    fn angle_around(&self, start: u32, end: u32, point: u32) -> f64 {
+        let [start, end, point] = [start, end, point].map(|v| self.positions[v as usize]);
+        let axis = (end - start).normalize_or(DVec3::Z);
+        let (x, y) = axis.any_orthonormal_pair();
+        let away = point - start;
+        away.dot(y).atan2(away.dot(x))
     }
 
     /// What is left, vertices that nothing uses left out.

@@ -3,6 +3,7 @@
 use super::Silhouette;
 use calibrate::{Distortion, Lens, Pixel, View};
 use glam::{DMat3, DVec2, DVec3};
+use std::f64::consts::PI;
 
 /// What a photo says of a place that it does not see though its object may go on there.
 const UNKNOWN_PX: f64 = 1e6;
@@ -28,6 +29,11 @@ pub(crate) struct Witness {
     camera: Camera,
     width: u32,
     height: u32,
+    /// The camera's axis and centre, in the world.
+    forward: DVec3,
+    center: DVec3,
+    /// All that the photo sees lies within this angle of the axis, in radians.
+    half_angle: f64,
     /// At pixel centres, row by row, tolerance included.
     distances_px: Vec<f32>,
     /// What it says of what it does not see.
@@ -77,6 +83,9 @@ impl Witness {
             camera,
             width: view.width,
             height: view.height,
+            forward: view.forward(),
+            center: view.center(),
+            half_angle: half_angle(view),
             distances_px,
             beyond_px: if cut_off { UNKNOWN_PX } else { ELSEWHERE_PX },
         }
@@ -146,6 +155,15 @@ impl Witness {
     }
 
     fn footprint(&self, center_in_world: DVec3, radius: f64) -> Footprint {
+        let to_center = center_in_world - self.center;
+        let distance = to_center.length();
+        if radius < distance {
+            let off_axis = to_center.cross(self.forward).length();
+            let angle = off_axis.atan2(to_center.dot(self.forward));
+            if angle - (radius / distance).asin() > self.half_angle {
+                return Footprint::Unseen;
+            }
+        }
         match &self.camera {
             Camera::Pinhole {
                 camera_from_world,
@@ -154,9 +172,6 @@ impl Witness {
                 principal,
             } => {
                 let center = *camera_from_world * center_in_world + *translation;
-                if center.z + radius <= 0.0 {
-                    return Footprint::Unseen;
-                }
                 let nearest = center.z - radius;
                 if !(nearest > 0.1 * radius) {
                     return Footprint::Anywhere;
@@ -169,17 +184,11 @@ impl Witness {
             }
             Camera::Lens(view) => {
                 let center = view.camera_from_world * center_in_world;
-                let distance = center.length();
                 if !(radius < TOO_NEAR * distance) {
                     return Footprint::Anywhere;
                 }
                 let Some(seen) = view.lens.project_with_gradients(center) else {
-                    // The border of what the lens sees may run through the ball.
-                    return if radius < 0.02 * distance {
-                        Footprint::Unseen
-                    } else {
-                        Footprint::Anywhere
-                    };
+                    return Footprint::Anywhere;
                 };
                 let [gx, gy] = seen.gradients;
                 let steepest = (gx.length_squared() + gy.length_squared()).sqrt();
@@ -214,6 +223,26 @@ impl Witness {
         let under = lerp(at(i + below), at(i + below + right), fx);
         lerp(above, under, fy)
     }
+}
+
+/// The largest angle from a view's axis at which its image shows anything: that of its border,
+/// or the lens' limit where the border lies beyond it.
+fn half_angle(view: &View) -> f64 {
+    let (width, height) = (view.width, view.height);
+    let across = (0..=width).flat_map(|x| [(x, 0), (x, height)]);
+    let down = (0..=height).flat_map(|y| [(0, y), (width, y)]);
+    let angle = |(x, y): (u32, u32)| {
+        let ray = view.lens.unproject(Pixel::new(f64::from(x), f64::from(y)));
+        ray.map_or(PI, |ray| ray.truncate().length().atan2(ray.z))
+    };
+    let border = across.chain(down).map(angle).fold(0.0, f64::max);
+    let limit = match view.lens.distortion() {
+        Distortion::None | Distortion::Rational { .. } | Distortion::Tilted { .. } => {
+            view.lens.limit().atan()
+        }
+        _ => view.lens.limit(),
+    };
+    border.min(limit) + 1e-9
 }
 
 /// The lens of a photo reduced by a whole number: each of its pixels takes the place of
