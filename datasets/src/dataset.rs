@@ -1,5 +1,5 @@
 use crate::points::sparse_points;
-use crate::{Motion, Scene, hallway, helicopter, knick_knacks, shelf, wall};
+use crate::{Motion, Scene, car, hallway, helicopter, knick_knacks, shelf, wall};
 use calibrate::{Camera, CameraId, Image, ImageId, Lens, ModelKind, Reconstruction, Rigid3, View};
 use glam::DQuat;
 use std::borrow::Cow;
@@ -18,6 +18,9 @@ pub struct Dataset {
     pub photos: Vec<Photo>,
     /// Rays for each side of a pixel.
     pub samples_per_side: u32,
+    /// Whether photos show an object before nothing: their alpha, the part of a pixel that
+    /// the object covers, is written, too.
+    pub matte: bool,
     /// Names of the photos kept aside for scoring: every 8th.
     pub held_out: Vec<String>,
     /// Cameras, poses and sparse points, all exact.
@@ -114,12 +117,13 @@ pub enum DatasetError {
 
 type Build = fn(&Options) -> Result<Dataset, DatasetError>;
 
-const DATASETS: [(&str, Build); 5] = [
+const DATASETS: [(&str, Build); 6] = [
     ("shelf", shelf),
     ("wall", wall),
     ("helicopter", helicopter),
     ("knick-knacks", knick_knacks),
     ("hallway", hallway),
+    ("car", car),
 ];
 
 /// The names that [`by_name`] knows.
@@ -204,6 +208,7 @@ pub(crate) struct Plan {
     pub(crate) times_s: Vec<f64>,
     pub(crate) motion: Option<Motion>,
     pub(crate) points: usize,
+    pub(crate) matte: bool,
     pub(crate) seed: u32,
 }
 
@@ -256,6 +261,7 @@ impl Plan {
             scene: self.scene,
             motion: self.motion,
             samples_per_side: chosen.samples_per_side,
+            matte: self.matte,
             held_out: photos.iter().step_by(8).map(|p| p.name.clone()).collect(),
             photos,
             reconstruction,

@@ -59,6 +59,7 @@ pub fn helicopter(options: &Options) -> Result<Dataset, DatasetError> {
             period_s: PERIOD_S,
         }),
         points: 2500,
+        matte: false,
         seed: SEED,
     };
     Ok(plan.into_dataset(&chosen))

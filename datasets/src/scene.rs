@@ -151,10 +151,18 @@ impl Scene {
             .map(|seen| seen.distance)
     }
 
+    /// How far a point is from the nearest surface, in world units; zero inside a solid
+    /// object (box, cylinder, prism).
+    pub fn distance_to(&self, point: DVec3) -> f64 {
+        (0..self.objects.len())
+            .map(|i| self.distance_to_object(i, point))
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// Every object with its distance from a viewpoint, the nearest first.
     pub(crate) fn by_distance(&self, viewpoint: DVec3) -> Vec<(f64, usize)> {
         let mut order: Vec<(f64, usize)> = (0..self.objects.len())
-            .map(|i| (self.distance_to(i, viewpoint), i))
+            .map(|i| (self.distance_to_object(i, viewpoint), i))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         order
@@ -208,7 +216,7 @@ impl Scene {
     }
 
     /// How far a point outside it is from one object.
-    pub(crate) fn distance_to(&self, i: usize, point: DVec3) -> f64 {
+    pub(crate) fn distance_to_object(&self, i: usize, point: DVec3) -> f64 {
         let it = &self.placed[i];
         self.objects[i]
             .shape

@@ -175,7 +175,7 @@ impl Scene {
             for (nearest, (part, _)) in nearest.iter_mut().zip(CORNER_TAPS) {
                 let above = seen.point + part * reach * seen.normal;
                 if self.placed[i].at_least(above) < *nearest {
-                    *nearest = nearest.min(self.distance_to(i, above));
+                    *nearest = nearest.min(self.distance_to_object(i, above));
                 }
             }
         }

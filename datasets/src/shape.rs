@@ -34,6 +34,14 @@ pub enum Shape {
         /// lines; shading smooths over the joints.
         profile: Vec<DVec2>,
     },
+    /// A polygon in the plane z = 0 that is drawn out to both sides along z: a wedge, a
+    /// car's body.
+    Prism {
+        /// The polygon's corners, counter-clockwise as seen from +z; its edges do not cross.
+        outline: Vec<DVec2>,
+        /// Half its extent along z.
+        half_depth: f64,
+    },
 }
 
 /// Where a ray meets a shape, in the shape's frame.
@@ -55,10 +63,12 @@ pub struct Surface {
     pub point: DVec3,
     /// Along the surface, in world units: (x, y) on a rectangle and on a box's front and
     /// back, (z, y) on its sides, (x, z) on its top and bottom and on a cylinder's ends,
-    /// (arc from the +z side towards +x, height) around spheres, cylinders and lathes.
+    /// (arc from the +z side towards +x, height) around spheres, cylinders and lathes,
+    /// (x, y) on a prism's ends and (z, x) on its walls.
     pub along: DVec2,
     /// A box's +x, −x, +y, −y, +z, −z side: 0 to 5; a cylinder's wall, top, bottom: 0 to
-    /// 2; otherwise 0.
+    /// 2; a prism's +z and −z end: 0 and 1, and its walls in their order: 2 and on;
+    /// otherwise 0.
     pub face: u8,
 }
 
@@ -82,6 +92,21 @@ impl Shape {
                     .map(|p| p.distance(center))
                     .fold(0.0, f64::max);
                 (DVec3::new(0.0, center.y, 0.0), radius)
+            }
+            Self::Prism {
+                outline,
+                half_depth,
+            } => {
+                let start = outline.first().copied().unwrap_or_default();
+                let (low, high) = outline
+                    .iter()
+                    .fold((start, start), |(low, high), p| (low.min(*p), high.max(*p)));
+                let center = 0.5 * (low + high);
+                let radius = outline
+                    .iter()
+                    .map(|p| p.distance(center))
+                    .fold(0.0, f64::max);
+                (center.extend(0.0), radius.hypot(*half_depth))
             }
         }
     }
@@ -119,6 +144,10 @@ impl Shape {
                 half_height,
             } => meet_cylinder(*radius, *half_height, origin, direction, nearest),
             Self::Lathe { profile } => meet_lathe(profile, origin, direction, nearest),
+            Self::Prism {
+                outline,
+                half_depth,
+            } => meet_prism(outline, *half_depth, origin, direction, nearest),
         }
     }
 
@@ -147,6 +176,21 @@ impl Shape {
                     .fold(f64::INFINITY, f64::min)
                     .sqrt()
             }
+            Self::Prism {
+                outline,
+                half_depth,
+            } => {
+                let p = point.truncate();
+                let across = if contains(outline, p) {
+                    0.0
+                } else {
+                    edges(outline)
+                        .map(|(a, b)| distance_squared_to_segment(p, a, b))
+                        .fold(f64::INFINITY, f64::min)
+                        .sqrt()
+                };
+                across.hypot((point.z.abs() - half_depth).max(0.0))
+            }
         }
     }
 
@@ -169,6 +213,10 @@ impl Shape {
                 _ => DVec2::new(point.x, point.z),
             },
             Self::Lathe { .. } => DVec2::new(arc(point.x.hypot(point.z)), point.y),
+            Self::Prism { .. } => match face {
+                0 | 1 => point.truncate(),
+                _ => DVec2::new(point.z, point.x),
+            },
         };
         Surface { point, along, face }
     }
@@ -309,6 +357,67 @@ fn meet_lathe(profile: &[DVec2], origin: DVec3, direction: DVec3, nearest: f64) 
     })
 }
 
+fn meet_prism(
+    outline: &[DVec2],
+    half_depth: f64,
+    origin: DVec3,
+    direction: DVec3,
+    nearest: f64,
+) -> Option<Touch> {
+    let mut best: Option<Touch> = None;
+    let mut consider = |touch: Touch| {
+        if touch.t > nearest && best.is_none_or(|found| touch.t < found.t) {
+            best = Some(touch);
+        }
+    };
+    // 1. The ends.
+    for (face, side) in [(0, 1.0), (1, -1.0)] {
+        let t = (side * half_depth - origin.z) / direction.z;
+        let point = (origin + direction * t).with_z(side * half_depth);
+        if t.is_finite() && contains(outline, point.truncate()) {
+            consider(Touch {
+                t,
+                point,
+                normal: DVec3::Z * side,
+                face,
+            });
+        }
+    }
+    // 2. The walls.
+    let (o, d) = (origin.truncate(), direction.truncate());
+    for (i, (a, b)) in edges(outline).enumerate() {
+        let along = b - a;
+        let facing = d.perp_dot(along);
+        let t = (a - o).perp_dot(along) / facing;
+        let s = (a - o).perp_dot(d) / facing;
+        let z = origin.z + direction.z * t;
+        if t.is_finite() && (0.0..=1.0).contains(&s) && z.abs() <= half_depth {
+            consider(Touch {
+                t,
+                point: (a + along * s).extend(z),
+                // Inside lies to the left of an edge.
+                normal: DVec2::new(along.y, -along.x).normalize().extend(0.0),
+                face: (2 + i).min(255) as u8,
+            });
+        }
+    }
+    best
+}
+
+/// A polygon's edges in order.
+fn edges(outline: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> {
+    let next = outline.iter().cycle().skip(1);
+    outline.iter().zip(next).map(|(a, b)| (*a, *b))
+}
+
+/// Whether a point lies inside a polygon: a ray from it crosses an odd number of edges.
+fn contains(outline: &[DVec2], p: DVec2) -> bool {
+    let crossed = edges(outline).filter(|(a, b)| {
+        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y)
+    });
+    crossed.count() % 2 == 1
+}
+
 fn distance_squared_to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
     let ab = b - a;
     let along = ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0);
@@ -373,6 +482,18 @@ mod tests {
                     ],
                     8,
                 ),
+            },
+            Shape::Prism {
+                outline: [
+                    [-0.6, -0.3],
+                    [0.6, -0.3],
+                    [0.5, 0.2],
+                    [0.1, 0.1],
+                    [-0.4, 0.5],
+                ]
+                .map(DVec2::from_array)
+                .to_vec(),
+                half_depth: 0.35,
             },
         ];
         for shape in &shapes {

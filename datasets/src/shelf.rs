@@ -46,6 +46,7 @@ pub fn shelf(options: &Options) -> Result<Dataset, DatasetError> {
         times_s: Vec::new(),
         motion: None,
         points: 2500,
+        matte: false,
         seed: SEED,
     };
     Ok(plan.into_dataset(&chosen))

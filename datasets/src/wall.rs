@@ -66,6 +66,7 @@ pub fn wall(options: &Options) -> Result<Dataset, DatasetError> {
         times_s: Vec::new(),
         motion: None,
         points: 1000,
+        matte: false,
         seed: SEED,
     };
     Ok(plan.into_dataset(&chosen))

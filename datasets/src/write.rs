@@ -79,10 +79,13 @@ fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
         };
         let scene = dataset.scene_of(photo);
         let picture = render_through(&scene, &photo.view, dataset.samples_per_side, &lens_rays);
-        save(
-            DynamicImage::from(DynamicImage::from(picture).into_rgb8()),
-            &images.join(&photo.name),
-        )?;
+        let picture = DynamicImage::from(picture);
+        let picture = if dataset.matte {
+            picture
+        } else {
+            DynamicImage::from(picture.into_rgb8())
+        };
+        save(picture, &images.join(&photo.name))?;
         let depth = DynamicImage::from(depth_steps(&scene, photo, &lens_rays));
         let name = Path::new(&photo.name).with_extension("png");
         save(depth, &depths.join(name))?;
@@ -152,7 +155,8 @@ fn readme(dataset: &Dataset) -> String {
          keypoints are exact.\n\
          - Calibration: poses, points and depth are exact by construction. depth/NAME.png is \
          16-bit along z at pixel centres, 1/{steps} of a world unit a step, 0 = no surface.\n\
-         - Photos: {samples}x{samples} rays a pixel, averaged in linear light, stored as sRGB.\n\
+         - Photos: {samples}x{samples} rays a pixel, averaged in linear light, stored as \
+         sRGB{alpha}.\n\
          - Stresses: {stresses}\n",
         name = dataset.name,
         kind = dataset.kind,
@@ -166,6 +170,11 @@ fn readme(dataset: &Dataset) -> String {
         track = observations as f64 / points.len().max(1) as f64,
         steps = DEPTH_STEPS_PER_UNIT,
         samples = dataset.samples_per_side,
+        alpha = if dataset.matte {
+            "; alpha is the part of them that met the object"
+        } else {
+            ""
+        },
         stresses = dataset.stresses,
     )
 }

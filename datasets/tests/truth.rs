@@ -63,7 +63,10 @@ fn depth_maps_agree_with_rays_and_with_points() {
                 let found = depth[(row * view.width + column) as usize];
                 let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
                 let direction = view.camera_from_world.rotation.conjugate() * ray;
-                let hit = scene.trace(view.center(), direction).unwrap();
+                let Some(hit) = scene.trace(view.center(), direction) else {
+                    assert!(dataset.matte && found.is_nan());
+                    continue;
+                };
                 let expected = (view.camera_from_world * hit.point).z;
                 assert!(
                     (found - expected).abs() < 1e-12,
@@ -94,8 +97,10 @@ fn depth_maps_agree_with_rays_and_with_points() {
             }
             near += usize::from((0.99 * least..1.01 * most).contains(&z));
         }
-        // All but those that something thinner than a pixel shows or hides.
-        assert!(near * 100 > image.keypoints.len() * 93, "{name}: {near}");
+        // All but those within half a pixel of a silhouette: the car has many.
+        let share = if dataset.matte { 88 } else { 93 };
+        let all = image.keypoints.len();
+        assert!(near * 100 > all * share, "{name}: {near} of {all}");
     }
 }
 
@@ -112,6 +117,9 @@ fn every_photo_is_full_and_shows_what_rays_find() {
         let (view, scene) = (&photo.view, dataset.scene_of(photo));
         let picture = render_view(&scene, view, 1);
         for (column, row, rgba) in picture.enumerate_pixels() {
+            if dataset.matte && rgba.0[3] == 0 {
+                continue;
+            }
             assert_eq!(rgba.0[3], 255, "{name} at {column}, {row}");
             if (column + row) % 5 != 0 {
                 continue;
@@ -195,13 +203,14 @@ fn what_is_written_reads_back_equal() {
         let photo = &dataset.photos[8];
         let picture = image::open(destination.join("images/0008.png")).unwrap();
         let rendered = render_view(&dataset.scene_of(photo), &photo.view, 2);
-        assert!(matches!(picture, image::DynamicImage::ImageRgb8(_)));
+        assert_eq!(picture.color().has_alpha(), dataset.matte);
         assert_eq!(picture.to_rgba8(), rendered);
 
         let steps = image::open(destination.join("depth/0008.png")).unwrap();
         let steps = steps.as_luma16().expect("16 bits").as_raw();
         let depth = render_depth(&dataset.scene_of(photo), &photo.view);
         for (&steps, depth) in steps.iter().zip(depth) {
+            let depth = if depth.is_nan() { 0.0 } else { depth };
             let error = f64::from(steps) / DEPTH_STEPS_PER_UNIT - depth;
             assert!(error.abs() <= 0.5001 / DEPTH_STEPS_PER_UNIT);
         }
@@ -246,7 +255,8 @@ fn mistakes_are_told() {
     let error = by_name("shelv", &Options::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "no dataset is called \"shelv\"; there are: shelf, wall, helicopter, knick-knacks, hallway"
+        "no dataset is called \"shelv\"; there are: shelf, wall, helicopter, knick-knacks, \
+         hallway, car"
     );
     let one_view = Options {
         views: Some(1),
@@ -290,6 +300,35 @@ fn what_moves_repeats_and_carries_no_points() {
         "{times}"
     );
     assert_eq!(times.lines().count(), 10);
+}
+
+/// The car's cameras lie on a perfect circle and look at one point of its axis; every photo
+/// shows the whole car, and its points lie on it.
+#[test]
+fn the_car_is_whole_in_every_photo_of_a_circle() {
+    let car = small("car", 12);
+    let centers: Vec<DVec3> = car.photos.iter().map(|p| p.view.center()).collect();
+    let mean = centers.iter().sum::<DVec3>() / centers.len() as f64;
+    for (photo, center) in car.photos.iter().zip(&centers) {
+        assert!((center.distance(mean) - centers[0].distance(mean)).abs() < 1e-12);
+        assert!((center.y - mean.y).abs() < 1e-12);
+        let to_axis = (mean.with_y(0.05) - center).normalize();
+        assert!((photo.view.forward() - to_axis).length() < 1e-12);
+        let picture = render_view(&car.scene, &photo.view, 2);
+        let (width, height) = picture.dimensions();
+        let covered = picture.pixels().filter(|p| p.0[3] > 127).count();
+        let share = covered as f64 / f64::from(width * height);
+        assert!((0.05..0.5).contains(&share), "{}: {share}", photo.name);
+        for (column, row, rgba) in picture.enumerate_pixels() {
+            let border = column == 0 || row == 0 || column + 1 == width || row + 1 == height;
+            assert!(!border || rgba.0[3] == 0, "{}", photo.name);
+        }
+    }
+    for point in car.reconstruction.points.values() {
+        assert!(car.scene.distance_to(point.position) < 1e-12);
+    }
+    assert!((car.scene.distance_to(DVec3::new(0.0, 1.113, 0.0)) - 1.0).abs() < 0.01);
+    assert_eq!(car.scene.distance_to(DVec3::new(0.0, 0.05, 0.0)), 0.0);
 }
 
 /// A plane proxy is exact on the wall, and fair on the shelf.

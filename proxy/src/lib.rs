@@ -11,6 +11,7 @@ mod facets;
 mod file;
 mod fit;
 mod glb;
+pub mod hull;
 mod mesh;
 mod plane;
 mod planes;

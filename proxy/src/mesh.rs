@@ -20,6 +20,18 @@ impl Mesh {
         self.triangles[triangle_idx].map(|i| self.positions[i as usize])
     }
 
+    /// What a closed mesh encloses, in cubed world units: positive where it winds
+    /// counter-clockwise from outside. Measured from a corner, so that it keeps its digits far
+    /// from the origin.
+    pub fn volume(&self) -> f64 {
+        let from = self.positions.first().copied().unwrap_or_default();
+        let tetrahedron = |i: usize| {
+            let [a, b, c] = self.corners(i).map(|p| p - from);
+            a.dot(b.cross(c)) / 6.0
+        };
+        (0..self.triangles.len()).map(tetrahedron).sum()
+    }
+
     /// Takes in another mesh as it is: nothing is joined.
     pub fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;

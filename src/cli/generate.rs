@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// Which: shelf, wall, helicopter, knick-knacks or hallway
+    /// Which: shelf, wall, helicopter, knick-knacks, hallway or car
     name: String,
     /// Size of the photos in pixels [default: the scene's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
