@@ -6,11 +6,12 @@
 
 mod axes;
 mod cloud;
+pub mod depth;
 mod facets;
 mod file;
 mod fit;
 mod glb;
-mod mesh;
+pub mod mesh;
 mod plane;
 pub mod points;
 

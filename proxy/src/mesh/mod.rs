@@ -1,5 +1,7 @@
 //! Triangle meshes.
 
+mod pieces;
+
 use glam::DVec3;
 
 /// A triangle mesh in the world, seen from both sides.
