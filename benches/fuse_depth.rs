@@ -3,7 +3,7 @@
 #[path = "../proxy/tests/common/mod.rs"]
 mod common;
 
-use common::{capture, decode, errors, find_capture};
+use common::{capture, decode, errors, find_capture, shown};
 use cpu_time::ProcessTime;
 use proxy::depth::{Options, fuse};
 use std::path::PathBuf;
@@ -37,6 +37,10 @@ fn main() {
     );
     for folder in folders {
         let capture = capture(&folder);
+        println!(
+            "the depth maps used show {:.4} of those held out",
+            shown(&capture, 0.05)
+        );
         let sized = |voxel_size, max_triangles| Options {
             voxel_size,
             max_triangles,

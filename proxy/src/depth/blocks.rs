@@ -1,6 +1,7 @@
 //! Which blocks of voxels depth maps need.
 
 use super::frame::Frame;
+use super::volume::Band;
 use glam::{DVec2, DVec3, IVec3};
 use rayon::prelude::*;
 
@@ -38,21 +39,21 @@ pub(super) fn add_touched(
     grid: &Grid,
     frame: &Frame,
     rays: &[DVec2],
-    truncation: f64,
+    band: &Band,
 ) {
     let world_from_camera = frame.view.camera_from_world.inverse();
     let row_keys = |row: usize| {
         let mut found: Vec<IVec3> = Vec::new();
         for (point, cos) in frame.surface(rays, row) {
-            // The band is as thick as the truncation across the surface.
-            let half = point.normalize() * (truncation / cos);
+            // The band is as thick as it should be across the surface.
+            let along = point.normalize() / cos;
             // What is nearer than the camera is behind it.
-            let front = if half.z < point.z {
-                point - half
-            } else {
-                DVec3::ZERO
+            let front = match along.z * band.before < point.z {
+                true => point - along * band.before,
+                false => DVec3::ZERO,
             };
-            let [from, to] = [front, point + half].map(|p| grid.in_blocks(world_from_camera * p));
+            let back = point + along * band.behind;
+            let [from, to] = [front, back].map(|p| grid.in_blocks(world_from_camera * p));
             walk(from, to, |key| {
                 if found.last() != Some(&key) {
                     found.push(key);

@@ -186,6 +186,13 @@ pub(super) struct Frame {
     pub(super) samples: Vec<Sample>,
     pub(super) tiles: Vec<Extremes>,
     pub(super) tiles_across: usize,
+    unit_depth: f64,
+}
+
+/// What a frontal pixel counts: errors of depth grow with its square.
+fn weight_at(depth: f64, unit_depth: f64) -> f64 {
+    let weight = (unit_depth / depth).powi(2);
+    weight.clamp(WEIGHT_RANGE.recip(), WEIGHT_RANGE)
 }
 
 impl Frame {
@@ -226,6 +233,7 @@ impl Frame {
             samples,
             tiles,
             tiles_across: across,
+            unit_depth: trust.unit_depth,
         }
     }
 }
@@ -288,15 +296,18 @@ fn sample(map: &Inverse, i: usize, trust: &Trust) -> Sample {
     if !(cos >= trust.max_slant.cos()) {
         return Sample::default();
     }
-    // Errors of depth grow with its square, and those of distance to a slanted plane...
-    let weight = (trust.unit_depth / depth).powi(2) * cos;
     Sample {
-        weight: weight.clamp(WEIGHT_RANGE.recip(), WEIGHT_RANGE) as f32,
+        weight: (weight_at(depth, trust.unit_depth) * cos) as f32,
         ..believed
     }
 }
 
 impl Frame {
+    /// What a frontal pixel counts at a depth.
+    pub(super) fn weight_at(&self, depth: f64) -> f64 {
+        weight_at(depth, self.unit_depth)
+    }
+
     /// The points that pixels believe to be on the surface, in the camera's frame, each with
     /// the cosine of its slant.
     pub(super) fn surface<'a>(

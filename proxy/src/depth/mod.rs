@@ -17,7 +17,7 @@ use crate::Mesh;
 use blocks::Grid;
 use calibrate::View;
 use frame::{Frame, Inverse, Rays, Statistics, Trust};
-use volume::{BLOCK_BYTES, Volume};
+use volume::{BLOCK_BYTES, Band, Volume};
 
 /// Depth at each pixel's centre, along the camera's z axis.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,8 +68,8 @@ pub struct Fusion {
     pub mesh: Mesh,
     /// The voxels' side, in world units.
     pub voxel_size: f64,
-    /// How far from a surface distances are kept, in world units.
-    pub truncation: f64,
+    /// How far in front of a surface distances are kept, in world units.
+    pub band: f64,
     /// Blocks of 8³ voxels.
     pub blocks: usize,
     /// Memory that they took.
@@ -157,10 +157,12 @@ const JUDGED: usize = 12;
 /// deviations of depth there. Finer voxels show nothing more.
 const VOXEL_PER_PIXEL: f64 = 1.5;
 const VOXEL_PER_NOISE: f64 = 2.0;
-/// The truncation in voxels, so that every cell which the surface crosses is whole, and in
-/// standard deviations of depth, so that depth maps which disagree still meet.
-const TRUNCATION_VOXELS: f64 = 3.5;
-const TRUNCATION_NOISE: f64 = 4.0;
+/// How far from a surface distances are kept, in voxels: all around a cell that it crosses,
+/// and so far before it that a silhouette cannot pass for a surface; and in standard
+/// deviations of depth, so that depth maps which disagree still meet.
+const VOXELS_BEFORE: f64 = 3.0;
+const VOXELS_BEHIND: f64 = 1.5;
+const BAND_NOISE: f64 = 4.0;
 /// Depths whose pixels are wider than so many voxels belong to no surface.
 const MAX_PIXEL_PER_VOXEL: f64 = 4.0;
 
@@ -215,15 +217,21 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
             noise: statistics.noise(),
             unit_depth,
         };
-        let truncation = (TRUNCATION_VOXELS * voxel_size).max(TRUNCATION_NOISE * noise);
+        let least = BAND_NOISE * noise;
+        let band = Band {
+            before: (VOXELS_BEFORE * voxel_size).max(least),
+            behind: (VOXELS_BEHIND * voxel_size).max(least),
+            least_cos: options.max_slant.cos(),
+        };
         let mut keys = Vec::new();
         let max_blocks = options.max_bytes / BLOCK_BYTES;
         each(1, &mut |map| {
             let origin = *origin.get_or_insert(map.view.center());
             let grid = Grid { origin, voxel_size };
-            if keys.len() <= max_blocks {
+            // Far too many need not be counted.
+            if keys.len() <= 64 * max_blocks {
                 let frame = Frame::new(&map, &trust);
-                blocks::add_touched(&mut keys, &grid, &frame, map.rays, truncation);
+                blocks::add_touched(&mut keys, &grid, &frame, map.rays, &band);
             }
         })?;
         // The number of blocks grows with the inverse square of their size.
@@ -241,7 +249,7 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
             (_, false) => voxel_size = fitting,
             (Some(origin), true) if !keys.is_empty() => {
                 let grid = Grid { origin, voxel_size };
-                break (Volume::new(grid, truncation, keys), trust);
+                break (Volume::new(grid, band, keys), trust);
             }
             _ => return Err(DepthError::NoDepth(count)),
         }
@@ -249,13 +257,13 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     // 3. What all say, in order, so that sums are always the same.
     let mut volume = volume;
     each(1, &mut |map| {
-        volume.integrate(&Frame::new(&map, &trust), options.max_slant.cos());
+        volume.integrate(&Frame::new(&map, &trust));
     })?;
     // 4. The surface.
     let mut fusion = Fusion {
         mesh: nets::surface(&volume),
         voxel_size,
-        truncation: volume.truncation,
+        band: volume.band.before,
         blocks: volume.keys.len(),
         bytes: volume.keys.len() * BLOCK_BYTES,
         noise,
@@ -266,6 +274,9 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     fusion.triangles_before = fusion.mesh.triangles.len();
     if fusion.mesh.triangles.is_empty() {
         return Err(DepthError::NoSurface(voxel_size));
+    }
+    if let Some(most) = options.max_triangles {
+        fusion.mesh = fusion.mesh.simplified(most);
     }
     Ok(fusion)
 }

@@ -40,7 +40,7 @@ struct Vertices {
 /// The zero of the distances.
 pub(super) fn surface(volume: &Volume) -> Mesh {
     let numbers = 0..volume.keys.len();
-    let max_change = (MAX_CHANGE * volume.grid.voxel_size / volume.truncation) as f32;
+    let max_change = (MAX_CHANGE * volume.grid.voxel_size / volume.band.before) as f32;
     let crossing = |a: f32, b: f32| {
         // NaN compares false.
         let is_crossed = (a < 0.0 && b >= 0.0) || (b < 0.0 && a >= 0.0);

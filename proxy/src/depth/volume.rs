@@ -13,7 +13,7 @@ pub(super) const VOXELS: usize = SIDE * SIDE * SIDE;
 /// A voxel: what the depth maps say of its centre.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Voxel {
-    /// The mean signed distance from the surface, in truncations, positive towards the
+    /// The mean signed distance from the surface, in bands before it, positive towards the
     /// cameras.
     distance: f32,
     /// The weight of those who say so.
@@ -23,7 +23,7 @@ pub(super) struct Voxel {
 }
 
 impl Voxel {
-    /// The distance in truncations; NaN where nobody saw this place.
+    /// The distance in bands; NaN where nobody saw this place.
     pub(super) fn value(&self) -> f32 {
         match *self {
             Self {
@@ -42,19 +42,31 @@ pub(super) const BLOCK_BYTES: usize = VOXELS * size_of::<Voxel>() + 64;
 
 /// What one who sees through a place counts, against one who sees a surface frontally at the
 /// median depth.
-const FREE_WEIGHT: f32 = 0.5;
+const FREE_WEIGHT: f64 = 0.5;
+
+/// How far from a surface distances are kept, in world units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Band {
+    /// In front of it.
+    pub(super) before: f64,
+    /// Behind it, where nothing was seen: no more than cells need that the surface crosses,
+    /// or the two sides of thin things would hide one another.
+    pub(super) behind: f64,
+    /// The least cosine of slant believed.
+    pub(super) least_cos: f64,
+}
 
 /// The blocks, sorted by key.
 pub(super) struct Volume {
     pub(super) grid: Grid,
-    pub(super) truncation: f64,
+    pub(super) band: Band,
     pub(super) keys: Vec<IVec3>,
     pub(super) blocks: Vec<Box<[Voxel; VOXELS]>>,
     index: HashMap<IVec3, u32>,
 }
 
 impl Volume {
-    pub(super) fn new(grid: Grid, truncation: f64, keys: Vec<IVec3>) -> Self {
+    pub(super) fn new(grid: Grid, band: Band, keys: Vec<IVec3>) -> Self {
         let empty = || Box::new([Voxel::default(); VOXELS]);
         let blocks = keys.iter().map(|_| empty()).collect();
         let index = keys
@@ -64,7 +76,7 @@ impl Volume {
             .collect();
         Self {
             grid,
-            truncation,
+            band,
             keys,
             blocks,
             index,
@@ -76,16 +88,19 @@ impl Volume {
         self.index.get(&key).map(|i| *i as usize)
     }
 
-    /// Takes in what a depth map says. `steepest` is the least cosine of slant believed.
-    pub(super) fn integrate(&mut self, frame: &Frame, steepest: f64) {
-        let (grid, truncation) = (&self.grid, self.truncation);
+    /// Takes in what a depth map says.
+    pub(super) fn integrate(&mut self, frame: &Frame) {
+        let (grid, band) = (&self.grid, &self.band);
         let blocks = self.keys.par_iter().zip(&mut self.blocks);
         blocks.with_min_len(16).for_each(|(key, block)| {
             let corner = grid.voxel_in_world(*key * SIDE as i32);
-            match reach(frame, corner, grid.voxel_size, truncation, steepest) {
+            match reach(frame, corner, grid.voxel_size, band) {
                 Reach::None => (),
-                Reach::Free => block.iter_mut().for_each(|v| v.free += FREE_WEIGHT),
-                Reach::Some => vote(frame, corner, grid.voxel_size, truncation, block),
+                Reach::Free(depth) => {
+                    let weight = free_weight(frame, depth);
+                    block.iter_mut().for_each(|v| v.free += weight);
+                }
+                Reach::Some => vote(frame, corner, grid.voxel_size, band, block),
             }
         });
     }
@@ -95,13 +110,13 @@ impl Volume {
 enum Reach {
     /// Nothing: it lies beside the image or behind the surface.
     None,
-    /// All of it is free.
-    Free,
+    /// All of it is free, at this depth.
+    Free(f64),
     /// Ask voxel by voxel.
     Some,
 }
 
-fn reach(frame: &Frame, corner: DVec3, voxel_size: f64, truncation: f64, steepest: f64) -> Reach {
+fn reach(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band) -> Reach {
     let view = &frame.view;
     let extent = voxel_size * (SIDE - 1) as f64;
     let corners = (0..8).map(|i| {
@@ -147,24 +162,23 @@ fn reach(frame: &Frame, corner: DVec3, voxel_size: f64, truncation: f64, steepes
         }
     }
     // Nearer or farther than this the distance to any believed surface is truncated.
-    let margin = truncation / steepest;
+    let margin = band.before.max(band.behind) / band.least_cos;
     if greatest == 0.0 || near > f64::from(least).recip() + margin {
         Reach::None
     } else if whole && far < f64::from(greatest).recip() - margin {
-        Reach::Free
+        Reach::Free(0.5 * (near + far))
     } else {
         Reach::Some
     }
 }
 
+/// Errors of depth grow with its square; so do those of poses, seen from far.
+fn free_weight(frame: &Frame, depth: f64) -> f32 {
+    (FREE_WEIGHT * frame.weight_at(depth)) as f32
+}
+
 /// Takes in a depth map voxel by voxel.
-fn vote(
-    frame: &Frame,
-    corner: DVec3,
-    voxel_size: f64,
-    truncation: f64,
-    block: &mut [Voxel; VOXELS],
-) {
+fn vote(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band, block: &mut [Voxel; VOXELS]) {
     let View {
         lens,
         width,
@@ -200,26 +214,25 @@ fn vote(
         let depth = inverse.clamp(0.5 * here, 2.0 * here).recip();
         let along_ray = (depth - point.z) * (point.length() / point.z);
         if sample.cos == 0.0 {
-            if along_ray > 0.1 * depth + truncation {
-                voxel.free += FREE_WEIGHT;
+            if along_ray > 0.1 * depth + band.before {
+                voxel.free += free_weight(frame, point.z);
             }
             continue;
         }
-        // 2. The distance from that plane, in truncations.
-        let distance = along_ray * f64::from(sample.cos) / truncation;
-        if distance > 1.0 {
-            voxel.free += FREE_WEIGHT;
-        } else if distance > -1.0 {
-            // 3. Behind the surface nothing was seen: from a voxel's size on, less and less
-            // is said.
-            let sure = -voxel_size / truncation;
-            let behind = ((1.0 + distance) / (1.0 + sure)).clamp(0.0, 1.0);
-            let weight = sample.weight * behind as f32;
-            if weight > 0.0 {
-                let sum = voxel.weight + weight;
-                voxel.distance += (distance as f32 - voxel.distance) * (weight / sum);
-                voxel.weight = sum;
-            }
+        // 2. The distance from that plane.
+        let distance = along_ray * f64::from(sample.cos);
+        if distance > band.before {
+            voxel.free += free_weight(frame, point.z);
+            continue;
+        }
+        // 3. Behind the surface, less and less is said.
+        let sure = ((distance + band.behind) / (0.67 * band.behind)).clamp(0.0, 1.0);
+        let weight = sample.weight * sure as f32;
+        if weight > 0.0 {
+            let sum = voxel.weight + weight;
+            let distance = (distance / band.before) as f32;
+            voxel.distance += (distance - voxel.distance) * (weight / sum);
+            voxel.weight = sum;
         }
     }
 }

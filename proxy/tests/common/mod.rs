@@ -116,6 +116,40 @@ pub fn depth_of(mesh: &Mesh, view: &View) -> Vec<f64> {
     depths
 }
 
+/// The share of depths held out that one of the depth maps used shows as well, within `near`:
+/// no surface can have more.
+pub fn shown(capture: &Capture, near: f64) -> f64 {
+    let used: Vec<_> = capture.used.iter().map(|f| decode(f).unwrap()).collect();
+    let (mut known, mut count) = (0, 0);
+    for frame in &capture.held_out {
+        let (view, depth) = decode(frame).unwrap();
+        let world_from_camera = view.camera_from_world.inverse();
+        for i in (0..depth.depths.len())
+            .step_by(7)
+            .filter(|i| depth.depths[*i] > 0.0)
+        {
+            let pixel = Pixel::center_of(i as u32 % view.width, i as u32 / view.width);
+            let ray = view.lens.unproject(pixel).unwrap();
+            let point = world_from_camera * (ray / ray.z * f64::from(depth.depths[i]));
+            let is_shown = |(view, depth): &(View, DepthImage)| {
+                let z = (view.camera_from_world * point).z;
+                let pixel = view.project(point).filter(|p| view.contains(*p));
+                pixel.is_some_and(|p| {
+                    let (column, row) = (p.x as usize, p.y as usize);
+                    let i = row * view.width as usize + column;
+                    depth
+                        .depths
+                        .get(i)
+                        .is_some_and(|d| (f64::from(*d) - z).abs() <= near)
+                })
+            };
+            known += 1;
+            count += usize::from(used.iter().any(is_shown));
+        }
+    }
+    count as f64 / known as f64
+}
+
 /// How a surface compares with depth maps.
 #[derive(Debug)]
 pub struct Errors {
