@@ -97,7 +97,16 @@ impl Corpus {
         let file = std::env::temp_dir().join(format!("lumigraph-fuzz-{}.glb", std::process::id()));
         proxy::write(&file, &proxy::Proxy::Plane(plane), &[]).map_err(io::Error::other)?;
         self.add("proxy_glb", "own", &fs::read(&file)?)?;
-        fs::remove_file(file)
+        fs::remove_file(file)?;
+        let square = proxy::Mesh {
+            positions: [(0, 0), (1, 0), (1, 1), (0, 1)]
+                .map(|(x, y)| glam::DVec3::new(x.into(), y.into(), 0.5))
+                .to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let glb = proxy::mesh::to_glb(&square, &[], None).map_err(io::Error::other)?;
+        self.add("mesh_glb", "own", &glb)?;
+        self.add("mesh_ply", "own", &proxy::mesh::to_ply(&square))
     }
 
     /// A model's three files, together and each alone.
@@ -166,7 +175,11 @@ impl Corpus {
         match extension.as_str() {
             // Not every photo: they are all alike.
             "jpg" | "png" if bytes.len() < 12_000 => self.add("photo", &name, &bytes),
-            "glb" => self.add("proxy_glb", &name, &bytes),
+            "glb" => {
+                self.add("mesh_glb", &name, &bytes)?;
+                self.add("proxy_glb", &name, &bytes)
+            }
+            "obj" | "ply" => self.add(&format!("mesh_{extension}"), &name, &bytes),
             "gz" => self.add("opencv_gzip", &name, bytes.get(2..).unwrap_or_default()),
             "yml" | "yaml" | "xml" | "json" if opencv::FileStorage::read(path).is_ok() => {
                 let target = format!("opencv_{}", extension.replace("yml", "yaml"));

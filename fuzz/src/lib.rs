@@ -129,3 +129,17 @@ pub fn size_of(name: &str) -> Option<(u32, u32)> {
     });
     (side % 4 != 0).then_some((1 + side % 5000, 1 + side / 5000 % 5000))
 }
+
+/// A mesh file of that name, read and checked.
+pub fn mesh(name: &str, data: &[u8]) {
+    let parse = || proxy::mesh::parse(Path::new(name), data);
+    match within_memory(data.len(), parse, |_| 0) {
+        Ok(mesh) => {
+            assert!(!mesh.triangles.is_empty());
+            assert!(mesh.positions.iter().all(|p| p.is_finite()));
+            let indices = mesh.triangles.as_flattened();
+            assert!(indices.iter().all(|i| (*i as usize) < mesh.positions.len()));
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}

@@ -139,13 +139,22 @@ pub fn write(path: &Path, proxy: &Proxy, shown_points_in_world: &[DVec3]) -> Res
         }
         _ => return Err(FileError::Extension(path.to_owned())),
     };
-    let io = |e| FileError::Io(path.to_owned(), e);
-    let temporary = path.with_extension("tmp");
-    std::fs::write(&temporary, bytes).map_err(io)?;
-    std::fs::rename(&temporary, path).map_err(io)
+    write_whole(path, &bytes).map_err(|e| FileError::Io(path.to_owned(), e))
 }
 
-fn extension(path: &Path) -> String {
+/// Writes a file that appears complete or not at all.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let temporary = path.with_extension("tmp");
+    let written =
+        std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written
+}
+
+/// In lower case.
+pub(crate) fn extension(path: &Path) -> String {
     path.extension()
         .unwrap_or_default()
         .to_string_lossy()

@@ -7,12 +7,13 @@
 mod axes;
 mod cloud;
 pub mod dense;
+pub mod depth;
 mod facets;
 mod file;
 mod fit;
 mod glb;
 pub mod hull;
-mod mesh;
+pub mod mesh;
 mod plane;
 mod planes;
 pub mod points;

@@ -1,6 +1,24 @@
-//! Triangle meshes.
+//! Triangle meshes, and the files that hold them.
 
-use glam::DVec3;
+mod error;
+mod file;
+mod glb;
+mod gltf;
+mod look;
+mod obj;
+mod pieces;
+mod ply;
+mod ply_header;
+mod quadric;
+mod simplify;
+
+pub use error::{ExportError, MeshFileError};
+pub use file::{parse, read, write};
+pub use glb::to_glb;
+pub use look::lies_where_cameras_look;
+pub use ply::to_ply;
+
+use glam::{DMat4, DVec3};
 
 /// A triangle mesh in the world, seen from both sides.
 ///
@@ -38,5 +56,23 @@ impl Mesh {
         self.positions.extend(&other.positions);
         let moved = |t: &[u32; 3]| t.map(|i| i + first);
         self.triangles.extend(other.triangles.iter().map(moved));
+    }
+
+    /// Moves it into another frame, as a file whose axes or units are not the scene's needs.
+    /// Triangles keep their outside where the map mirrors. Perspective is ignored.
+    pub fn transform(&mut self, there_from_here: &DMat4) {
+        for position in &mut self.positions {
+            *position = there_from_here.transform_point3(*position);
+        }
+        if there_from_here.determinant() < 0.0 {
+            self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+    }
+
+    /// The least and the greatest coordinates; `None` if it is empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let first = *self.positions.first()?;
+        let wider = |(low, high): (DVec3, DVec3), p: &DVec3| (low.min(*p), high.max(*p));
+        Some(self.positions.iter().fold((first, first), wider))
     }
 }

@@ -1,0 +1,61 @@
+//! Mesh files by their extension.
+
+use super::{ExportError, Mesh, MeshFileError, gltf, obj, ply, to_glb, to_ply};
+use calibrate::View;
+use std::path::Path;
+
+/// Reads a mesh from a .glb, .gltf, .ply or .obj file. Its coordinates are taken as the file
+/// states them, whatever way it calls up; see [`Mesh::transform`].
+///
+/// # Errors
+/// The file, the line or record, and what is wrong there.
+pub fn read(path: &Path) -> Result<Mesh, MeshFileError> {
+    if !["glb", "gltf", "ply", "obj"].contains(&extension(path).as_str()) {
+        return Err(MeshFileError::Extension(path.to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|e| MeshFileError::Io(path.to_owned(), e))?;
+    parse(path, &bytes)
+}
+
+/// Reads the content of a file by its name's extension; other files are opened only where a
+/// glTF file keeps its numbers in them.
+///
+/// # Errors
+/// As for [`read()`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let mesh = match extension(path).as_str() {
+        "glb" | "gltf" => gltf::parse(path, bytes)?,
+        "ply" => ply::parse(path, bytes)?,
+        "obj" => obj::parse(path, bytes)?,
+        _ => return Err(MeshFileError::Extension(path.to_owned())),
+    };
+    if mesh.triangles.is_empty() {
+        return Err(MeshFileError::NoTriangles(
+            path.to_owned(),
+            mesh.positions.len(),
+        ));
+    }
+    Ok(mesh)
+}
+
+/// Writes a mesh as .glb, for looking at, with cameras and extras, or as .ply, which keeps
+/// every digit and has neither. The file appears complete or not at all.
+///
+/// # Errors
+/// Another extension; what a GLB cannot hold; the file system's.
+pub fn write(
+    path: &Path,
+    mesh: &Mesh,
+    cameras: &[(String, View)],
+    extras: Option<String>,
+) -> Result<(), MeshFileError> {
+    let failed = |e: ExportError| MeshFileError::Export(path.to_owned(), e);
+    let bytes = match extension(path).as_str() {
+        "glb" => to_glb(mesh, cameras, extras).map_err(failed)?,
+        "ply" => to_ply(mesh),
+        _ => return Err(MeshFileError::Extension(path.to_owned())),
+    };
+    crate::file::write_whole(path, &bytes).map_err(|e| MeshFileError::Io(path.to_owned(), e))
+}
+
+use crate::file::extension;

@@ -1,0 +1,219 @@
+//! Numbers in a glTF file, every bound checked.
+
+use super::buffers::Buffers;
+use crate::mesh::MeshFileError;
+use glam::DVec3;
+use serde::Deserialize;
+use std::path::Path;
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    buffer_view: Option<usize>,
+    #[serde(default)]
+    byte_offset: usize,
+    component_type: u32,
+    #[serde(default)]
+    normalized: bool,
+    count: usize,
+    #[serde(rename = "type")]
+    kind: Kind,
+    sparse: Option<serde::de::IgnoredAny>,
+}
+
+#[derive(Deserialize, PartialEq)]
+#[serde(rename_all = "UPPERCASE")]
+enum Kind {
+    Scalar,
+    Vec3,
+    #[serde(other)]
+    Other,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    byte_length: usize,
+    byte_stride: Option<usize>,
+}
+
+pub(super) struct Accessors<'a> {
+    pub(super) path: &'a Path,
+    pub(super) accessors: &'a [Accessor],
+    pub(super) views: &'a [BufferView],
+    pub(super) buffers: Buffers<'a>,
+}
+
+/// Where the elements of an accessor lie.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    accessor: &'a Accessor,
+}
+
+impl Elements<'_> {
+    /// The bytes of one, from its beginning.
+    fn at(&self, i: usize) -> &[u8] {
+        self.bytes.get(i * self.stride..).unwrap_or_default()
+    }
+}
+
+impl Accessors<'_> {
+    fn failed(&self, number: usize, problem: impl Into<String>) -> MeshFileError {
+        MeshFileError::Record {
+            path: self.path.to_owned(),
+            record: format!("accessor {number}"),
+            problem: problem.into(),
+        }
+    }
+
+    /// How many elements an accessor has, all of them in the file.
+    pub(super) fn count(&mut self, number: usize) -> Result<usize, MeshFileError> {
+        self.elements(number)
+            .map(|elements| elements.accessor.count)
+    }
+
+    fn elements(&mut self, number: usize) -> Result<Elements<'_>, MeshFileError> {
+        let Some(accessor) = self.accessors.get(number) else {
+            return Err(self.failed(number, "there is no such accessor"));
+        };
+        if accessor.sparse.is_some() {
+            let problem = "it is sparse, which is not read; export the mesh again without \
+                           sparse accessors (or shape keys)";
+            return Err(self.failed(number, problem));
+        }
+        let view = accessor.buffer_view.and_then(|i| self.views.get(i));
+        let Some(view) = view else {
+            return Err(self.failed(number, "it has no numbers in the file (no buffer view)"));
+        };
+        let components = if accessor.kind == Kind::Vec3 { 3 } else { 1 };
+        let Some(size) = size(accessor.component_type).map(|size| components * size) else {
+            let problem = format!("unknown component type {}", accessor.component_type);
+            return Err(self.failed(number, problem));
+        };
+        let stride = view.byte_stride.unwrap_or(size);
+        if stride < size {
+            let problem = format!("elements of {size} bytes, {stride} bytes apart");
+            return Err(self.failed(number, problem));
+        }
+        // Of the accessor within the view, and of the view within the buffer.
+        let length = match accessor.count.checked_sub(1) {
+            None => Some(0),
+            Some(others) => others.checked_mul(stride).and_then(|n| n.checked_add(size)),
+        };
+        let end = length.and_then(|n| n.checked_add(accessor.byte_offset));
+        let from = view.byte_offset.checked_add(accessor.byte_offset);
+        let is_within = end.is_some_and(|end| end <= view.byte_length);
+        let (buffer, views) = (view.buffer, self.views.len());
+        let range = match (from, length, is_within) {
+            (Some(from), Some(length), true) => from..from.saturating_add(length),
+            _ => {
+                let problem = format!(
+                    "its {} elements do not fit into their buffer view (of {views}); is the \
+                     file cut off?",
+                    accessor.count
+                );
+                return Err(self.failed(number, problem));
+            }
+        };
+        let path = self.path;
+        let bytes = self.buffers.bytes(buffer)?;
+        match bytes.get(range) {
+            Some(bytes) => Ok(Elements {
+                bytes,
+                stride,
+                accessor,
+            }),
+            None => Err(MeshFileError::Record {
+                path: path.to_owned(),
+                record: format!("accessor {number}"),
+                problem: format!(
+                    "its elements lie beyond the {} bytes of buffer {buffer}; is the file cut \
+                     off?",
+                    bytes.len()
+                ),
+            }),
+        }
+    }
+
+    /// Three numbers each.
+    pub(super) fn positions(
+        &mut self,
+        number: usize,
+    ) -> Result<impl Iterator<Item = DVec3>, MeshFileError> {
+        if self
+            .accessors
+            .get(number)
+            .is_some_and(|a| a.kind != Kind::Vec3)
+        {
+            return Err(self.failed(number, "positions must be of type VEC3"));
+        }
+        let elements = self.elements(number)?;
+        let accessor = elements.accessor;
+        let (kind, is_normalized) = (accessor.component_type, accessor.normalized);
+        Ok((0..accessor.count).map(move |i| {
+            let component = |k: usize| real(elements.at(i), kind, is_normalized, k);
+            DVec3::new(component(0), component(1), component(2))
+        }))
+    }
+
+    /// Whole numbers.
+    pub(super) fn indices(
+        &mut self,
+        number: usize,
+    ) -> Result<impl Iterator<Item = u32>, MeshFileError> {
+        let fits =
+            |a: &Accessor| a.kind == Kind::Scalar && [5121, 5123, 5125].contains(&a.component_type);
+        if self.accessors.get(number).is_some_and(|a| !fits(a)) {
+            return Err(self.failed(number, "indices must be unsigned whole numbers"));
+        }
+        let elements = self.elements(number)?;
+        let kind = elements.accessor.component_type;
+        Ok((0..elements.accessor.count).map(move |i| real(elements.at(i), kind, false, 0) as u32))
+    }
+}
+
+/// Bytes of a component.
+fn size(component_type: u32) -> Option<usize> {
+    match component_type {
+        5120 | 5121 => Some(1),
+        5122 | 5123 => Some(2),
+        5125 | 5126 => Some(4),
+        _ => None,
+    }
+}
+
+/// Component `k` of an element; whole numbers in -1…1 or 0…1 where they are normalised. NaN
+/// where the element is short, which [`Accessors::elements`] excludes.
+fn real(element: &[u8], component_type: u32, is_normalized: bool, k: usize) -> f64 {
+    fn at<const N: usize>(bytes: &[u8], k: usize) -> Option<[u8; N]> {
+        bytes.get(k * N..)?.first_chunk().copied()
+    }
+    let (value, most) = match component_type {
+        5120 => (at(element, k).map(|b| i8::from_le_bytes(b).into()), 127.0),
+        5121 => (at(element, k).map(|b| u8::from_le_bytes(b).into()), 255.0),
+        5122 => (
+            at(element, k).map(|b| i16::from_le_bytes(b).into()),
+            32767.0,
+        ),
+        5123 => (
+            at(element, k).map(|b| u16::from_le_bytes(b).into()),
+            65535.0,
+        ),
+        5125 => (
+            at(element, k).map(|b| u32::from_le_bytes(b).into()),
+            f64::from(u32::MAX),
+        ),
+        _ => (at(element, k).map(|b| f32::from_le_bytes(b).into()), 1.0),
+    };
+    let value: f64 = value.unwrap_or(f64::NAN);
+    let is_whole = component_type != 5126;
+    if is_normalized && is_whole {
+        (value / most).max(-1.0)
+    } else {
+        value
+    }
+}

@@ -1,0 +1,121 @@
+//! The bytes behind a glTF file: in it, in its text, or beside it.
+
+use crate::mesh::MeshFileError;
+use base64::Engine;
+use serde::Deserialize;
+use std::borrow::Cow;
+use std::path::{Component, Path, PathBuf};
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    uri: Option<String>,
+}
+
+/// Buffers, each read when it is first needed.
+pub(super) struct Buffers<'a> {
+    path: &'a Path,
+    buffers: &'a [Buffer],
+    blob: Option<&'a [u8]>,
+    read: Vec<Option<Cow<'a, [u8]>>>,
+    external_size: usize,
+}
+
+impl<'a> Buffers<'a> {
+    pub(super) fn new(path: &'a Path, buffers: &'a [Buffer], blob: Option<&'a [u8]>) -> Self {
+        Self {
+            path,
+            buffers,
+            blob,
+            read: vec![None; buffers.len()],
+            external_size: 0,
+        }
+    }
+
+    /// Bytes read so far from files beside this one.
+    pub(super) fn external_size(&self) -> usize {
+        self.external_size
+    }
+
+    pub(super) fn bytes(&mut self, number: usize) -> Result<&[u8], MeshFileError> {
+        if self.read.get(number).is_some_and(Option::is_none) {
+            self.read[number] = Some(self.load(number)?);
+        }
+        match self.read.get(number) {
+            Some(Some(bytes)) => Ok(bytes),
+            _ => Err(self.failed(number, "there is no such buffer".to_owned())),
+        }
+    }
+
+    fn failed(&self, number: usize, problem: String) -> MeshFileError {
+        MeshFileError::Record {
+            path: self.path.to_owned(),
+            record: format!("buffer {number}"),
+            problem,
+        }
+    }
+
+    fn load(&mut self, number: usize) -> Result<Cow<'a, [u8]>, MeshFileError> {
+        let uri = match (&self.buffers[number].uri, self.blob) {
+            (Some(uri), _) => uri,
+            (None, Some(blob)) if number == 0 => return Ok(Cow::Borrowed(blob)),
+            (None, _) => {
+                let problem = "it has no bytes: neither a uri nor a binary chunk";
+                return Err(self.failed(number, problem.to_owned()));
+            }
+        };
+        if let Some(data) = uri.strip_prefix("data:") {
+            let text = data.split_once(";base64,").map(|(_, text)| text);
+            let decode = |text: &str| base64::engine::general_purpose::STANDARD.decode(text).ok();
+            return match text.and_then(decode) {
+                Some(bytes) => Ok(Cow::Owned(bytes)),
+                None => Err(self.failed(number, "its data: uri is not base64".to_owned())),
+            };
+        }
+        let Some(beside) = percent_decoded(uri).filter(|p| is_beside(p)) else {
+            return Err(self.failed(
+                number,
+                format!(
+                    "its bytes are at `{}`; put them into a file beside this one, or export \
+                     the mesh as .glb",
+                    super::super::obj::shown(uri)
+                ),
+            ));
+        };
+        let path = self.path.parent().unwrap_or(Path::new("")).join(beside);
+        // Nothing that has no end.
+        let is_file = std::fs::metadata(&path).map(|m| m.is_file());
+        let read = is_file.and_then(|is_file| match is_file {
+            true => std::fs::read(&path),
+            false => Err(std::io::Error::other("not a file")),
+        });
+        let bytes = read.map_err(|e| MeshFileError::Io(path, e))?;
+        self.external_size += bytes.len();
+        Ok(Cow::Owned(bytes))
+    }
+}
+
+/// Whether a path leads to a file in the same folder or below it.
+fn is_beside(path: &Path) -> bool {
+    let mut parts = path.components();
+    path.components().next().is_some()
+        && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+        && !path.to_string_lossy().contains(':')
+}
+
+fn percent_decoded(uri: &str) -> Option<PathBuf> {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.bytes();
+    while let Some(byte) = rest.next() {
+        bytes.push(match byte {
+            b'%' => {
+                let digit = |b: u8| char::from(b).to_digit(16);
+                (digit(rest.next()?)? * 16 + digit(rest.next()?)?) as u8
+            }
+            0 => return None,
+            byte => byte,
+        });
+    }
+    let text = String::from_utf8(bytes).ok()?;
+    (!text.contains('\0')).then(|| PathBuf::from(text))
+}

@@ -1,0 +1,337 @@
+//! glTF 2.0: the triangles of the default scene, nodes' transforms applied.
+//!
+//! The JSON is read into only what geometry needs. The `gltf` crate's own types round node
+//! transforms to f32 and take many times the file's size in memory, and its accessors panic
+//! where references lead nowhere.
+
+mod accessor;
+mod buffers;
+
+use super::{Mesh, MeshFileError};
+use accessor::Accessors;
+use buffers::Buffers;
+use glam::{DMat4, DQuat, DVec3};
+use serde::Deserialize;
+use std::path::Path;
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Root {
+    asset: Asset,
+    scene: Option<usize>,
+    #[serde(default)]
+    scenes: Vec<Scene>,
+    #[serde(default)]
+    nodes: Vec<Node>,
+    #[serde(default)]
+    meshes: Vec<MeshEntry>,
+    #[serde(default)]
+    accessors: Vec<accessor::Accessor>,
+    #[serde(default)]
+    buffer_views: Vec<accessor::BufferView>,
+    #[serde(default)]
+    buffers: Vec<buffers::Buffer>,
+    #[serde(default)]
+    extensions_required: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct Asset {
+    version: String,
+}
+
+#[derive(Deserialize)]
+struct Scene {
+    #[serde(default)]
+    nodes: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+struct Node {
+    children: Option<Box<[usize]>>,
+    mesh: Option<u32>,
+    matrix: Option<Box<[f64; 16]>>,
+    translation: Option<Box<[f64; 3]>>,
+    rotation: Option<Box<[f64; 4]>>,
+    scale: Option<Box<[f64; 3]>>,
+}
+
+#[derive(Deserialize)]
+struct MeshEntry {
+    #[serde(default)]
+    primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+struct Primitive {
+    attributes: Attributes,
+    indices: Option<usize>,
+    /// Triangles, if absent.
+    mode: Option<u32>,
+}
+
+#[derive(Deserialize)]
+struct Attributes {
+    #[serde(rename = "POSITION")]
+    position: Option<usize>,
+}
+
+/// Required extensions that change how a surface looks, not where it is, and the one that
+/// only allows positions of whole numbers.
+const HARMLESS: [&str; 5] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_",
+    "KHR_mesh_quantization",
+];
+
+/// Bytes of mesh for each byte of the file, where nodes repeat meshes.
+const MAX_GROWTH: usize = 64;
+
+/// Reads a .glb or a .gltf file.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let whole = |problem: String| MeshFileError::File(path.to_owned(), problem);
+    let (json, blob) = match bytes.starts_with(b"glTF") {
+        true => container(bytes).map_err(whole)?,
+        false => (bytes, None),
+    };
+    let root: Root =
+        serde_json::from_slice(json).map_err(|e| whole(format!("not a glTF file: {e}")))?;
+    if !root.asset.version.starts_with("2.") {
+        return Err(whole(format!(
+            "glTF version {}; this program reads version 2: export the mesh again as glTF 2.0",
+            super::obj::shown(&root.asset.version)
+        )));
+    }
+    let harmful = |e: &&String| !HARMLESS.iter().any(|harmless| e.starts_with(harmless));
+    if let Some(extension) = root.extensions_required.iter().find(harmful) {
+        return Err(whole(format!(
+            "it needs the extension {}, which is not read; export the mesh again without it \
+             (without compression, say)",
+            super::obj::shown(extension)
+        )));
+    }
+    let mut reader = Reader {
+        accessors: Accessors {
+            path,
+            accessors: &root.accessors,
+            views: &root.buffer_views,
+            buffers: Buffers::new(path, &root.buffers, blob),
+        },
+        mesh: Mesh::default(),
+        file_size: bytes.len(),
+    };
+    for (node, world_from_node) in world_from_nodes(path, &root)? {
+        if let Some(number) = root.nodes[node].mesh {
+            let record = |problem: String| MeshFileError::Record {
+                path: path.to_owned(),
+                record: format!("node {node}"),
+                problem,
+            };
+            let entry = root.meshes.get(number as usize);
+            let entry = entry.ok_or_else(|| record(format!("there is no mesh {number}")))?;
+            for (i, primitive) in entry.primitives.iter().enumerate() {
+                let name = format!("mesh {number}, primitive {i}");
+                reader.primitive(primitive, &name, &world_from_node)?;
+            }
+        }
+    }
+    Ok(reader.mesh)
+}
+
+/// The JSON and the binary chunk of a GLB.
+pub(crate) fn container(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
+    let not_glb = |what: &str| format!("not a glTF file: {what}");
+    let word = |at: usize| {
+        let bytes = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
+        bytes
+            .map(u32::from_le_bytes)
+            .ok_or_else(|| not_glb("it is cut off"))
+    };
+    if word(4)? != 2 {
+        return Err(format!(
+            "GLB version {}; this program reads version 2",
+            word(4)?
+        ));
+    }
+    let mut chunks = [None, None];
+    let mut at = 12;
+    for (chunk, kind) in chunks.iter_mut().zip([b"JSON", b"BIN\0"]) {
+        if at >= bytes.len() {
+            break;
+        }
+        let length = word(at)? as usize;
+        if word(at + 4)? != u32::from_le_bytes(*kind) {
+            break;
+        }
+        let end = (at + 8)
+            .checked_add(length)
+            .filter(|end| *end <= bytes.len());
+        let end = end.ok_or_else(|| not_glb("it is cut off"))?;
+        *chunk = Some(&bytes[at + 8..end]);
+        at = end.next_multiple_of(4);
+    }
+    let json = chunks[0].ok_or_else(|| not_glb("its first chunk is not JSON"))?;
+    Ok((json, chunks[1]))
+}
+
+/// The default scene's nodes in the order of the file's trees, with their transforms.
+fn world_from_nodes(path: &Path, root: &Root) -> Result<Vec<(usize, DMat4)>, MeshFileError> {
+    let record = |record: String, problem: String| MeshFileError::Record {
+        path: path.to_owned(),
+        record,
+        problem,
+    };
+    // Without scenes every tree is meant.
+    let number = root.scene.unwrap_or(0);
+    let roots: Vec<usize> = match root.scenes.get(number) {
+        Some(scene) => scene.nodes.clone(),
+        None if root.scenes.is_empty() => {
+            let children = root.nodes.iter().filter_map(|n| n.children.as_deref());
+            let mut is_root = vec![true; root.nodes.len()];
+            for child in children.flatten() {
+                is_root
+                    .get_mut(*child)
+                    .into_iter()
+                    .for_each(|is| *is = false);
+            }
+            (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
+        }
+        None => {
+            let problem = format!("there is no scene {number}");
+            return Err(MeshFileError::File(path.to_owned(), problem));
+        }
+    };
+    let mut found = Vec::new();
+    let mut is_found = vec![false; root.nodes.len()];
+    let mut open: Vec<(usize, DMat4)> = Vec::new();
+    open.extend(roots.iter().rev().map(|node| (*node, DMat4::IDENTITY)));
+    while let Some((number, world_from_parent)) = open.pop() {
+        let here = || format!("node {number}");
+        let Some(node) = root.nodes.get(number) else {
+            return Err(record(here(), "there is no such node".to_owned()));
+        };
+        if std::mem::replace(&mut is_found[number], true) {
+            let problem = "two nodes have it as their child; nodes must form trees";
+            return Err(record(here(), problem.to_owned()));
+        }
+        let world_from_node = world_from_parent * node.parent_from_node();
+        if !world_from_node.is_finite() {
+            return Err(record(here(), "its transform is not finite".to_owned()));
+        }
+        let children = node.children.as_deref().unwrap_or_default();
+        open.extend(children.iter().rev().map(|child| (*child, world_from_node)));
+        found.push((number, world_from_node));
+    }
+    Ok(found)
+}
+
+impl Node {
+    fn parent_from_node(&self) -> DMat4 {
+        if let Some(matrix) = &self.matrix {
+            return DMat4::from_cols_array(matrix);
+        }
+        let or = |v: &Option<Box<[f64; 3]>>, other: DVec3| {
+            v.as_ref().map_or(other, |v| DVec3::from_array(**v))
+        };
+        let rotation = self.rotation.as_ref().map(|r| DQuat::from_array(**r));
+        // f32 digits are not quite of length 1.
+        let rotation = rotation.filter(|r| r.length_squared() > 0.0);
+        let rotation = rotation.map_or(DQuat::IDENTITY, DQuat::normalize);
+        let (scale, translation) = (
+            or(&self.scale, DVec3::ONE),
+            or(&self.translation, DVec3::ZERO),
+        );
+        DMat4::from_scale_rotation_translation(scale, rotation, translation)
+    }
+}
+
+/// What is gathered while reading.
+struct Reader<'a> {
+    accessors: Accessors<'a>,
+    mesh: Mesh,
+    file_size: usize,
+}
+
+impl Reader<'_> {
+    /// Takes in a primitive if it is made of triangles.
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        name: &str,
+        world_from_node: &DMat4,
+    ) -> Result<(), MeshFileError> {
+        let failed = |problem: String| MeshFileError::Record {
+            path: self.accessors.path.to_owned(),
+            record: name.to_owned(),
+            problem,
+        };
+        let (4..=6, Some(positions)) = (primitive.mode.unwrap_or(4), primitive.attributes.position)
+        else {
+            return Ok(());
+        };
+        // 1. How much it will be, before any memory is taken.
+        let corners = self.accessors.count(positions)?;
+        let indices = primitive
+            .indices
+            .map(|i| self.accessors.count(i))
+            .transpose()?;
+        let indices = indices.unwrap_or(corners);
+        let bytes =
+            24 * (self.mesh.positions.len() + corners) + 12 * (self.mesh.triangles.len() + indices);
+        let allowed =
+            MAX_GROWTH * (self.file_size + self.accessors.buffers.external_size()) + 65536;
+        if bytes > allowed {
+            return Err(failed(format!(
+                "nodes repeat meshes until they take {bytes} bytes, {MAX_GROWTH} times the \
+                 file; join and simplify them before exporting"
+            )));
+        }
+        // 2. Corners.
+        let first = self.mesh.positions.len();
+        let positions = self.accessors.positions(positions)?;
+        for (i, position) in positions.enumerate() {
+            let position = world_from_node.transform_point3(position);
+            if !position.is_finite() {
+                return Err(failed(format!("the position of corner {i} is not finite")));
+            }
+            self.mesh.positions.push(position);
+        }
+        // 3. Triangles.
+        let corner = |i: u32| match (i as usize) < corners {
+            true => Ok(first as u32 + i),
+            false => Err(failed(format!(
+                "it uses corner {i}, but has only {corners}"
+            ))),
+        };
+        let indices: Vec<u32> = match primitive.indices {
+            Some(accessor) => self
+                .accessors
+                .indices(accessor)?
+                .map(corner)
+                .collect::<Result<_, _>>()?,
+            None => (0..corners as u32).map(|i| first as u32 + i).collect(),
+        };
+        let is_mirrored = world_from_node.determinant() < 0.0;
+        let triangles = &mut self.mesh.triangles;
+        let mut push =
+            |[a, b, c]: [u32; 3]| triangles.push(if is_mirrored { [a, c, b] } else { [a, b, c] });
+        match primitive.mode.unwrap_or(4) {
+            4 => indices.as_chunks::<3>().0.iter().for_each(|t| push(*t)),
+            // Every other triangle of a strip is turned.
+            5 => indices
+                .windows(3)
+                .enumerate()
+                .for_each(|(i, t)| match i % 2 {
+                    0 => push([t[0], t[1], t[2]]),
+                    _ => push([t[1], t[0], t[2]]),
+                }),
+            _ => indices
+                .windows(2)
+                .skip(1)
+                .for_each(|t| push([indices[0], t[0], t[1]])),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,123 @@
+//! Wavefront OBJ: the corners and faces.
+
+use super::{Mesh, MeshFileError};
+use glam::DVec3;
+use std::path::Path;
+
+/// Reads `v` and `f`; all else is for looks and left alone.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let mut mesh = Mesh::default();
+    // The greatest index so far and the line that has it: corners may follow their faces.
+    let mut greatest = (0, 0);
+    for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        let line_number = number + 1;
+        let failed = |problem: String| MeshFileError::Line {
+            path: path.to_owned(),
+            line: line_number,
+            problem,
+        };
+        // Comments and names may be in any encoding.
+        let line = line.split(|b| *b == b'#').next().unwrap_or_default();
+        let is_ours = |line: &[u8]| matches!(line, [b'v' | b'f', b' ' | b'\t', ..]);
+        let line = line.trim_ascii();
+        if !is_ours(line) {
+            continue;
+        }
+        let text = std::str::from_utf8(line)
+            .map_err(|_| failed("this is no text; is the file an OBJ?".to_owned()))?;
+        if text.ends_with('\\') {
+            return Err(failed(
+                "it goes on in the next line, which is not read; export the mesh again with \
+                 each face on a line"
+                    .to_owned(),
+            ));
+        }
+        let mut words = text.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => {
+                let mut coordinate = || {
+                    let word = words
+                        .next()
+                        .ok_or_else(|| failed("a corner needs three coordinates".to_owned()))?;
+                    let value: f64 = word.parse().map_err(|_| {
+                        failed(format!("expected a coordinate, found `{}`", shown(word)))
+                    })?;
+                    match value.is_finite() {
+                        true => Ok(value),
+                        false => Err(failed(format!(
+                            "the coordinate {} is not finite; remove the corner and its faces",
+                            shown(word)
+                        ))),
+                    }
+                };
+                mesh.positions
+                    .push(DVec3::new(coordinate()?, coordinate()?, coordinate()?));
+            }
+            _ => {
+                let mut polygon = Fan::default();
+                for word in words {
+                    let index = index(word, mesh.positions.len()).map_err(&failed)?;
+                    greatest = greatest.max((index, line_number));
+                    polygon.corner(index, &mut mesh.triangles);
+                }
+            }
+        }
+    }
+    let corners = mesh.positions.len();
+    if !mesh.triangles.is_empty() && greatest.0 as usize >= corners {
+        return Err(MeshFileError::Line {
+            path: path.to_owned(),
+            line: greatest.1,
+            problem: format!(
+                "a face uses corner {}, but the file has {corners}; is it cut off?",
+                u64::from(greatest.0) + 1
+            ),
+        });
+    }
+    Ok(mesh)
+}
+
+/// The corner that `7`, `7/1`, `7//3`, `7/1/3` or `-1` names, from 0.
+fn index(word: &str, corners: usize) -> Result<u32, String> {
+    let position = word.split('/').next().unwrap_or_default();
+    let number: i64 = position
+        .parse()
+        .map_err(|_| format!("expected a corner such as 7/1/3, found `{}`", shown(word)))?;
+    let index = match number {
+        1.. => number - 1,
+        0 => return Err("corners are counted from 1; this face uses 0".to_owned()),
+        _ => corners as i64 + number,
+    };
+    u32::try_from(index).map_err(|_| {
+        format!("a face uses corner {number}, but {corners} come before it; is the file cut off?")
+    })
+}
+
+/// A word as messages show it.
+pub(super) fn shown(word: &str) -> String {
+    match word.char_indices().nth(40) {
+        Some((end, _)) => format!("{}…", &word[..end]),
+        None => word.to_owned(),
+    }
+}
+
+/// A polygon cut into triangles that share its first corner.
+#[derive(Default)]
+pub(super) struct Fan {
+    first: Option<u32>,
+    last: Option<u32>,
+}
+
+impl Fan {
+    /// Takes in the next corner.
+    pub(super) fn corner(&mut self, index: u32, triangles: &mut Vec<[u32; 3]>) {
+        match (self.first, self.last) {
+            (None, _) => self.first = Some(index),
+            (Some(first), Some(last)) => {
+                triangles.push([first, last, index]);
+                self.last = Some(index);
+            }
+            (Some(_), None) => self.last = Some(index),
+        }
+    }
+}

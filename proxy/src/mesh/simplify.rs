@@ -1,0 +1,259 @@
+//! Fewer triangles, by contracting edges in the order of quadric errors (Garland and
+//! Heckbert 1997).
+//!
+//! Instead of one queue there are passes: in each, the cheapest edges of all are contracted,
+//! cheapest first, as long as none touches another's triangles. Costs are computed by all
+//! threads, and the result is the same for any number of them.
+
+use super::Mesh;
+use super::quadric::Quadric;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// The share of edges that a pass considers: with more, dear edges would go while cheap ones
+/// next to contracted ones wait.
+const SHARE: f64 = 0.3;
+/// The weight of planes that hold borders in place, in squares of the border's edges.
+const BORDER_WEIGHT: f64 = 4.0;
+/// Triangles may turn by up to the angle with this cosine.
+const MIN_COS: f64 = 0.3;
+
+impl Mesh {
+    /// The mesh with at most about `max_triangles`, as few as its shape allows; borders stay
+    /// where they are, and pieces and holes stay what they are. Corners far from one another
+    /// are never joined.
+    #[must_use]
+    pub fn simplified(&self, max_triangles: usize) -> Self {
+        // Near the origin quadrics keep their digits.
+        let origin = self
+            .bounds()
+            .map_or(DVec3::ZERO, |(low, high)| low.midpoint(high));
+        let mut mesh = self.clone();
+        mesh.positions.iter_mut().for_each(|p| *p -= origin);
+        mesh.triangles
+            .retain(|[a, b, c]| a != b && b != c && c != a);
+        let mut quadrics = quadrics(&mesh);
+        while mesh.triangles.len() > max_triangles {
+            let before = mesh.triangles.len();
+            pass(&mut mesh, &mut quadrics, max_triangles);
+            if mesh.triangles.len() == before {
+                break;
+            }
+        }
+        mesh.drop_unused();
+        mesh.positions.iter_mut().for_each(|p| *p += origin);
+        mesh
+    }
+}
+
+/// The edges, each once, ascending, and how many triangles each has.
+fn edges(mesh: &Mesh) -> Vec<([u32; 2], u32)> {
+    let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+    let ends = |(a, b): (u32, u32)| [a.min(b), a.max(b)];
+    let mut all: Vec<[u32; 2]> = mesh
+        .triangles
+        .par_iter()
+        .flat_map_iter(|t| sides(t).map(ends))
+        .collect();
+    all.par_sort_unstable();
+    let runs = all.chunk_by(|a, b| a == b);
+    runs.map(|run| (run[0], run.len() as u32)).collect()
+}
+
+fn quadrics(mesh: &Mesh) -> Vec<Quadric> {
+    let mut quadrics = vec![Quadric::default(); mesh.positions.len()];
+    for (i, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(i);
+        let across = (b - a).cross(c - a);
+        if let Some(normal) = across.try_normalize() {
+            let quadric = Quadric::plane(normal, a, 0.5 * across.length());
+            triangle
+                .iter()
+                .for_each(|i| quadrics[*i as usize] += quadric);
+        }
+    }
+    // Planes across the surface along its borders.
+    let border: Vec<[u32; 2]> = edges(mesh)
+        .into_iter()
+        .filter(|(_, n)| *n == 1)
+        .map(|(ends, _)| ends)
+        .collect();
+    for (i, triangle) in mesh.triangles.iter().enumerate() {
+        let corners = mesh.corners(i);
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            if border.binary_search(&[a.min(b), a.max(b)]).is_err() {
+                continue;
+            }
+            let (from, to) = (corners[k], corners[(k + 1) % 3]);
+            let normal = (to - from)
+                .cross(corners[(k + 2) % 3] - from)
+                .cross(to - from);
+            if let Some(normal) = normal.try_normalize() {
+                let weight = BORDER_WEIGHT * from.distance_squared(to);
+                let quadric = Quadric::plane(normal, from, weight);
+                quadrics[a as usize] += quadric;
+                quadrics[b as usize] += quadric;
+            }
+        }
+    }
+    quadrics
+}
+
+/// The triangles around each corner.
+struct Around {
+    first: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl Around {
+    fn new(mesh: &Mesh) -> Self {
+        let mut first = vec![0_u32; mesh.positions.len() + 1];
+        for i in mesh.triangles.as_flattened() {
+            first[*i as usize + 1] += 1;
+        }
+        for i in 1..first.len() {
+            first[i] += first[i - 1];
+        }
+        let mut next = first.clone();
+        let mut triangles = vec![0; 3 * mesh.triangles.len()];
+        for (t, i) in mesh
+            .triangles
+            .iter()
+            .enumerate()
+            .flat_map(|(t, c)| c.map(|i| (t, i)))
+        {
+            triangles[next[i as usize] as usize] = t as u32;
+            next[i as usize] += 1;
+        }
+        Self { first, triangles }
+    }
+
+    fn of(&self, corner: u32) -> &[u32] {
+        let [from, to] = [0, 1].map(|k| self.first[corner as usize + k] as usize);
+        &self.triangles[from..to]
+    }
+}
+
+/// An edge that may go.
+struct Candidate {
+    cost: f64,
+    ends: [u32; 2],
+    position: DVec3,
+}
+
+fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize) {
+    // 1. What each edge costs.
+    let edges = edges(mesh);
+    let mut is_border = vec![false; mesh.positions.len()];
+    for (ends, _) in edges.iter().filter(|(_, n)| *n != 2) {
+        ends.iter().for_each(|i| is_border[*i as usize] = true);
+    }
+    let candidate = |&(ends, triangles): &([u32; 2], u32)| {
+        let [on_a, on_b] = ends.map(|i| is_border[i as usize]);
+        // An edge across, from border to border, would pinch the surface.
+        if triangles > 2 || (on_a && on_b && triangles == 2) {
+            return None;
+        }
+        let [a, b] = ends.map(|i| mesh.positions[i as usize]);
+        let mut quadric = quadrics[ends[0] as usize];
+        quadric += quadrics[ends[1] as usize];
+        let position = match (on_a, on_b) {
+            (true, false) => a,
+            (false, true) => b,
+            _ => quadric.least_near(a.midpoint(b)),
+        };
+        // Where all is flat, short edges go first.
+        let cost = quadric.at(position) + 1e-9 * quadric.weight() * a.distance_squared(b);
+        cost.is_finite().then_some(Candidate {
+            cost,
+            ends,
+            position,
+        })
+    };
+    let mut candidates: Vec<Candidate> = edges.par_iter().filter_map(candidate).collect();
+    drop(edges);
+    let order = |a: &Candidate, b: &Candidate| a.cost.total_cmp(&b.cost).then(a.ends.cmp(&b.ends));
+    let considered = ((candidates.len() as f64 * SHARE) as usize).max(64);
+    if considered < candidates.len() {
+        candidates.select_nth_unstable_by(considered, order);
+        candidates.truncate(considered);
+    }
+    candidates.par_sort_unstable_by(order);
+    // 2. The cheapest of them, apart from one another.
+    let around = Around::new(mesh);
+    let mut is_touched = vec![false; mesh.positions.len()];
+    let mut left = mesh.triangles.len();
+    for Candidate { ends, position, .. } in candidates {
+        if left <= max_triangles {
+            break;
+        }
+        let [a, b] = ends;
+        if is_touched[a as usize] || is_touched[b as usize] {
+            continue;
+        }
+        let Some(ring) = contractible(mesh, &around, ends, position) else {
+            continue;
+        };
+        ring.iter().for_each(|i| is_touched[*i as usize] = true);
+        mesh.positions[a as usize] = position;
+        let other = quadrics[b as usize];
+        quadrics[a as usize] += other;
+        for t in around.of(b) {
+            let triangle = &mut mesh.triangles[*t as usize];
+            left -= usize::from(triangle.contains(&a));
+            triangle
+                .iter_mut()
+                .filter(|i| **i == b)
+                .for_each(|i| *i = a);
+        }
+    }
+    mesh.triangles
+        .retain(|[a, b, c]| a != b && b != c && c != a);
+}
+
+/// Both ends of an edge and all corners next to them, if the edge can go: the surface stays
+/// what it is (Dey et al. 1999, the link condition), and no triangle turns over.
+fn contractible(mesh: &Mesh, around: &Around, ends: [u32; 2], position: DVec3) -> Option<Vec<u32>> {
+    let mut next_to: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
+    let mut shared = 0;
+    for k in 0..2 {
+        let (here, there) = (ends[k], ends[1 - k]);
+        for t in around.of(here) {
+            let triangle = mesh.triangles[*t as usize];
+            next_to[k].extend(triangle.iter().filter(|i| !ends.contains(i)));
+            if triangle.contains(&there) {
+                shared += 1;
+                continue;
+            }
+            let corners = mesh.corners(*t as usize);
+            let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+            let mut moved = corners;
+            for (corner, i) in moved.iter_mut().zip(triangle) {
+                if i == here {
+                    *corner = position;
+                }
+            }
+            let (before, after) = (normal(corners), normal(moved));
+            let is_turned = before.dot(after) < MIN_COS * before.length() * after.length();
+            if is_turned || (after == DVec3::ZERO && before != DVec3::ZERO) {
+                return None;
+            }
+        }
+        next_to[k].sort_unstable();
+        next_to[k].dedup();
+    }
+    let [of_a, of_b] = &next_to;
+    let common = of_a
+        .iter()
+        .filter(|i| of_b.binary_search(i).is_ok())
+        .count();
+    // Each triangle of the edge has one corner apart from it; half of them were counted twice.
+    if common != shared / 2 {
+        return None;
+    }
+    let mut ring = ends.to_vec();
+    ring.extend(of_a);
+    ring.extend(of_b);
+    Some(ring)
+}
