@@ -5,6 +5,7 @@
 //! [`points`] themselves, triangulated anew for each desired view.
 
 mod axes;
+pub mod carve;
 mod cloud;
 mod facets;
 mod file;
