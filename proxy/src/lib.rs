@@ -14,6 +14,7 @@ mod glb;
 mod mesh;
 mod plane;
 pub mod points;
+pub mod shell;
 
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};

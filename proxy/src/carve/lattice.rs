@@ -26,9 +26,14 @@ impl Lattice {
         }
     }
 
+    /// A point in lattice steps, not rounded.
+    pub(super) fn steps(&self, point_in_world: DVec3) -> DVec3 {
+        (point_in_world - self.corner_in_world) / self.step
+    }
+
     /// The nearest place; what lies outside the cube goes to its border.
     pub(super) fn snap(&self, point_in_world: DVec3) -> Site {
-        let at = (point_in_world - self.corner_in_world) / self.step;
+        let at = self.steps(point_in_world);
         let last = f64::from((1 << BITS) - 1);
         at.to_array().map(|x| x.round().clamp(0.0, last) as i32)
     }
