@@ -14,7 +14,7 @@ mod glb;
 mod mesh;
 mod plane;
 pub mod points;
-pub mod shell;
+mod shell;
 
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
@@ -24,6 +24,7 @@ pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use mesh::Mesh;
 pub use plane::{Plane, PlaneError};
 pub use points::SparsePoint;
+pub use shell::shell;
 
 /// The approximate surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

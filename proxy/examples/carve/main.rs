@@ -92,6 +92,8 @@ fn one(capture: &Path, options: &carve::Options, pictures: bool, out: Option<&Pa
     let mesh = carve::surface(&sources, &used, options).unwrap();
     let took = start.elapsed();
     let bvh = Bvh::new(&mesh);
+    let shell = proxy::shell(&sources, &used);
+    let shell_bvh = Bvh::new(&shell);
 
     // 1. Withheld points: inverse depth of the mesh over that of the point.
     let mut errors: Vec<f64> = withheld
@@ -141,11 +143,14 @@ fn one(capture: &Path, options: &carve::Options, pictures: bool, out: Option<&Pa
     );
     if pictures {
         let photos = capture.join("images");
-        picture::score(&photos, &named, &held_out, &bvh, &all, &sources);
+        picture::score(&photos, &named, &held_out, &bvh, &shell_bvh, &all, &sources);
     }
     if let Some(out) = out {
         std::fs::create_dir_all(out).unwrap();
         std::fs::write(out.join(format!("{name}.ply")), ply(&mesh)).unwrap();
+        for (i, (_, view)) in held_out.iter().enumerate() {
+            picture::depth(view, &bvh, &mesh, &out.join(format!("{name}-h{i}.png")));
+        }
         for i in [0, sources.len() / 2] {
             picture::depth(&sources[i], &bvh, &mesh, &out.join(format!("{name}-{i}.png")));
         }

@@ -39,6 +39,7 @@ pub(crate) fn depth(view: &View, bvh: &Bvh<'_>, mesh: &Mesh, file: &Path) {
         .collect();
     let mut sorted: Vec<f64> = hits.iter().flatten().map(|h| h.0).collect();
     sorted.sort_by(f64::total_cmp);
+    println!("inverse depths {:.3?}", [0, 1, 2, 5, 10, 25, 50, 75, 90, 99].map(|p| sorted[sorted.len() * p / 100]));
     let top = sorted[sorted.len() * 98 / 100];
     let picture = RgbImage::from_fn(view.width, view.height, |x, y| {
         match hits[(y * view.width + x) as usize] {
@@ -64,6 +65,7 @@ pub(crate) fn score(
     named: &[(String, View)],
     held_out: &[(String, View)],
     bvh: &Bvh<'_>,
+    shell: &Bvh<'_>,
     points: &[SparsePoint],
     sources: &[View],
 ) {
@@ -75,7 +77,7 @@ pub(crate) fn score(
     };
     let photos: Vec<(View, RgbImage)> = named.par_iter().map(load).collect();
     let wanted: Vec<(View, RgbImage)> = held_out.par_iter().map(load).collect();
-    let (mut carved, mut sparse) = (Vec::new(), Vec::new());
+    let (mut carved, mut sparse, mut shelled) = (Vec::new(), Vec::new(), Vec::new());
     for (view, truth) in &wanted {
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let center = view.center();
@@ -83,7 +85,12 @@ pub(crate) fn score(
             let ray = world_from_camera * ray;
             bvh.hit(center, ray).map(|(along, _)| center + ray * along)
         };
-        carved.push(psnr(view, truth, &photos, over_mesh));
+        carved.push(psnr(view, truth, &photos, over_mesh, &format!("/tmp/carve-out/p{}-carved.png", carved.len()), Some(bvh)));
+        let over_shell = |ray: DVec3| {
+            let ray = world_from_camera * ray;
+            shell.hit(center, ray).map(|(along, _)| center + ray * along)
+        };
+        shelled.push(psnr(view, truth, &photos, over_shell, "/tmp/carve-out/shell.png", Some(shell)));
         let facets = proxy::points::facets(view, sources, points);
         if let Some(facets) = facets {
             let over_points = |ray: DVec3| {
@@ -91,11 +98,11 @@ pub(crate) fn score(
                 let s = q.dot(ray);
                 (s > 0.0).then(|| center + world_from_camera * ray / s)
             };
-            sparse.push(psnr(view, truth, &photos, over_points));
+            sparse.push(psnr(view, truth, &photos, over_points, &format!("/tmp/carve-out/p{}-points.png", sparse.len()), None));
         }
     }
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    println!("{:18} PSNR: carved {:.2} dB, points {:.2} dB", "", mean(&carved), mean(&sparse));
+    let mean = |v: &[[f64; 3]]| [0, 1, 2].map(|k| v.iter().map(|r| r[k]).sum::<f64>() / v.len() as f64);
+    println!("{:18} PSNR, of covered, coverage: carved {:.2?}, points {:.2?}, shell {:.2?}", "", mean(&carved), mean(&sparse), mean(&shelled));
 }
 
 fn psnr(
@@ -103,24 +110,36 @@ fn psnr(
     truth: &RgbImage,
     photos: &[(View, RgbImage)],
     surface: impl Fn(DVec3) -> Option<DVec3> + Sync,
-) -> f64 {
-    let colours: Vec<[f64; 3]> = rays(view)
+    file: &str,
+    mesh: Option<&Bvh<'_>>,
+) -> [f64; 3] {
+    let blended: Vec<Option<[f64; 3]>> = rays(view)
         .into_par_iter()
-        .map(|ray| {
-            let place = ray.and_then(&surface);
-            place.map_or([0.0; 3], |p| blend(p, view.center(), photos))
-        })
+        .map(|ray| blend(ray.and_then(&surface)?, view.center(), photos, mesh))
         .collect();
-    let squares: f64 = colours
-        .iter()
-        .zip(truth.pixels())
-        .map(|(c, t)| (0..3).map(|k| (c[k] - f64::from(t.0[k])).powi(2)).sum::<f64>())
-        .sum();
-    10.0 * (255.0 * 255.0 * 3.0 * colours.len() as f64 / squares).log10()
+    let covered = blended.iter().flatten().count() as f64;
+    let colours: Vec<[f64; 3]> = blended.iter().map(|c| c.unwrap_or_default()).collect();
+    let drawn = RgbImage::from_fn(view.width, view.height, |x, y| {
+        Rgb(colours[(y * view.width + x) as usize].map(|c| c as u8))
+    });
+    drawn.save(file).unwrap();
+    let square = |(c, t): (&[f64; 3], &Rgb<u8>)| {
+        (0..3).map(|k| (c[k] - f64::from(t.0[k])).powi(2)).sum::<f64>()
+    };
+    let squares = colours.iter().zip(truth.pixels()).map(square);
+    let inside = blended.iter().zip(truth.pixels()).filter_map(|(c, t)| Some(square((c.as_ref()?, t))));
+    let db = |squares: f64, count: f64| 10.0 * (255.0 * 255.0 * 3.0 * count / squares).log10();
+    let count = colours.len() as f64;
+    [db(squares.sum(), count), db(inside.sum(), covered), covered / count]
 }
 
-/// Buehler's blend of the five photos with the smallest angles.
-fn blend(place: DVec3, desired: DVec3, photos: &[(View, RgbImage)]) -> [f64; 3] {
+/// Buehler's blend of the five photos with the smallest angles that see a place.
+fn blend(
+    place: DVec3,
+    desired: DVec3,
+    photos: &[(View, RgbImage)],
+    mesh: Option<&Bvh<'_>>,
+) -> Option<[f64; 3]> {
     let here = place - desired;
     let mut best: Vec<(f64, usize, Pixel)> = photos
         .iter()
@@ -132,7 +151,11 @@ fn blend(place: DVec3, desired: DVec3, photos: &[(View, RgbImage)]) -> [f64; 3] 
         })
         .collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
-    best.truncate(6);
+    let sees = |(_, i, _): &(f64, usize, Pixel)| {
+        let center = photos[*i].0.center();
+        mesh.and_then(|m| m.hit(center, place - center)).is_none_or(|(along, _)| along > 0.98)
+    };
+    let best: Vec<_> = best.into_iter().filter(sees).take(6).collect();
     let limit = if best.len() > 5 { best[5].0 } else { f64::INFINITY };
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (angle, i, pixel) in best {
@@ -150,5 +173,5 @@ fn blend(place: DVec3, desired: DVec3, photos: &[(View, RgbImage)]) -> [f64; 3] 
             total += share;
         }
     }
-    if total > 0.0 { sum.map(|c| c / total) } else { [0.0; 3] }
+    (total > 0.0).then(|| sum.map(|c| c / total))
 }

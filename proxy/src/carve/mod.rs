@@ -194,7 +194,7 @@ impl Scene {
 
         // 3. The dome, of which no vertex is a point's.
         let points = sites.len();
-        for position in around.dome() {
+        for position in around.vertices() {
             sites.push(lattice.snap(position));
             positions.push(position);
         }
@@ -267,7 +267,7 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         for k in 0..4 {
             let code = delaunay.across[t][k] as usize;
             if delaunay.is_ghost(code as u32 >> 2) {
-                terminal[t] -= most as i64;
+                terminal[t] -= (env("HULL", 0.0) * most) as i64;
                 continue;
             }
             let least = cosines[t][k].min(cosines[code >> 2][code & 3]);
@@ -276,6 +276,14 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         }
     }
 
+    // weak priors
+    let above = (env("ABOVE", 0.0) * f64::from(UNIT)) as i64;
+    if above != 0 {
+        for t in 0..delaunay.finite {
+            let n = delaunay.tetrahedra[t].iter().filter(|v| !is_point(**v)).count() as i64;
+            if n > 0 { terminal[t] += above; }
+        }
+    }
     // 3. Cameras are free.
     let mut near = 0;
     for &site in &scene.camera_sites {
@@ -314,4 +322,8 @@ fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh 
         }
     }
     mesh
+}
+
+fn env(name: &str, default: f64) -> f64 {
+    std::env::var(name).map_or(default, |v| v.parse().unwrap())
 }
