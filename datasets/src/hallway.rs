@@ -51,6 +51,7 @@ pub fn hallway(options: &Options) -> Result<Dataset, DatasetError> {
         params: vec![focal, 0.5 * width, 0.5 * height],
         poses: (0..chosen.views).map(|i| step(i, chosen.views)).collect(),
         times_s: Vec::new(),
+        matte: false,
         motion: None,
         points: 2500,
         seed: SEED,

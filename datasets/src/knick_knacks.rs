@@ -42,6 +42,7 @@ pub fn knick_knacks(options: &Options) -> Result<Dataset, DatasetError> {
             .map(|i| hand_held(i, chosen.views))
             .collect(),
         times_s: Vec::new(),
+        matte: false,
         motion: None,
         points: 3000,
         seed: SEED,

@@ -5,6 +5,7 @@
 //! themselves, triangulated anew for each desired view, and meshes ([`Solid`]).
 
 mod axes;
+pub mod carve;
 mod cloud;
 pub mod dense;
 pub mod depth;
@@ -17,6 +18,7 @@ pub mod mesh;
 mod plane;
 mod planes;
 pub mod points;
+mod shell;
 mod solid;
 pub mod tunnel;
 
@@ -35,6 +37,7 @@ pub use planes::{
     plane_focused_on,
 };
 pub use points::SparsePoint;
+pub use shell::shell;
 pub use solid::{Hit, MeshKind, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 

@@ -1,0 +1,346 @@
+//! A closed surface carved out of space by the photos' lines of sight.
+//!
+//! The sparse points and a far dome around everything are tetrahedralised (Delaunay), and
+//! each tetrahedron is free or solid, whichever costs least by the energy of Labatut, Pons and
+//! Keriven (2007, "Efficient multi-view reconstruction of large-scale scenes using interest
+//! points, Delaunay triangulation and graph cuts"; 2009, "Robust and efficient surface
+//! reconstruction from range data"): a minimum s-t cut, found exactly. The surface is all
+//! facets between free and solid. Cameras are always in free space and everything beyond the
+//! dome is solid, so the surface is closed and every ray from a camera meets it.
+
+mod delaunay;
+mod flow;
+mod lattice;
+mod quality;
+mod sight;
+
+use crate::shell::Surroundings;
+use crate::{Mesh, SparsePoint};
+use calibrate::View;
+use delaunay::{Delaunay, hilbert};
+use flow::Graph;
+use glam::DVec3;
+use lattice::{Lattice, Site};
+use sight::{OTHERS, Sighting, Softness, UNIT};
+
+/// What can be chosen about carving.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// At most this many lines of sight of a point count, spread over its photos.
+    pub lines_per_point: usize,
+    /// A surface this many σ in front of a point costs a line of sight in earnest; σ is a
+    /// multiple of the distance from the point to its neighbours.
+    pub softness: f64,
+    /// How many σ behind a point solid is expected.
+    pub behind: f64,
+    /// What the least surface-like facet costs, in lines of sight.
+    pub quality: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            lines_per_point: 32,
+            softness: 0.5,
+            behind: 0.0,
+            quality: 1.0,
+        }
+    }
+}
+
+/// Lines of sight at most: more points have fewer each. Their weights must fit 31 bits.
+const MOST_LINES: usize = 4_000_000;
+/// Of each point, whatever the number of points.
+const FEWEST_LINES_PER_POINT: usize = 2;
+/// Costs more than all else together.
+const CERTAIN: i64 = 1 << 60;
+
+/// Why nothing could be carved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CarveError {
+    /// There are no photos.
+    #[error("there are no photos, so no lines of sight to carve with")]
+    NoPhotos,
+    /// A camera's centre is not a place.
+    #[error("photo {view} (counting from 0) is at {center}, which is not finite; leave it out")]
+    Camera {
+        /// Its index.
+        view: usize,
+        /// Where it claims to be.
+        center: DVec3,
+    },
+    /// A point names a photo that isn't there.
+    #[error(
+        "point {point} is seen by photo {view} (both counting from 0), but there are {photos} photos"
+    )]
+    UnknownPhoto {
+        /// The point's index.
+        point: usize,
+        /// What it names.
+        view: u32,
+        /// How many there are.
+        photos: usize,
+    },
+    /// Nothing to carve around.
+    #[error(
+        "of {given} sparse points none is finite and in front of a photo that sees it; try \
+         another proxy, such as a plane"
+    )]
+    NoPoints {
+        /// How many there were.
+        given: usize,
+    },
+    /// More than indices can count.
+    #[error("there are {given} sparse points; at most {most} can be carved, so thin them out")]
+    TooManyPoints {
+        /// How many there were.
+        given: usize,
+        /// How many there may be.
+        most: usize,
+    },
+}
+
+/// Points at most: each makes about seven tetrahedra, whose facets have 32-bit names.
+const MOST_POINTS: usize = 100_000_000;
+
+/// The surface between the space that the photos look through and what they see.
+///
+/// Closed, its triangles counter-clockwise where they are looked at from free space. Its
+/// vertices are sparse points where they lie on it, and the dome's.
+///
+/// # Errors
+/// See [`CarveError`].
+pub fn surface(
+    sources: &[View],
+    points: &[SparsePoint],
+    options: &Options,
+) -> Result<Mesh, CarveError> {
+    // 1. The points that photos see, on the lattice, with the dome around them.
+    let scene = Scene::new(sources, points, options)?;
+    // 2. Tetrahedra. The dome spans space whatever the points do.
+    let delaunay = Delaunay::new(scene.sites.clone()).expect("a dome is not flat");
+    // 3. What each label costs.
+    let graph = energy(&delaunay, &scene, options);
+    // 4. The cheapest labelling, and the facets between free and solid.
+    let is_free = flow::source_side(graph);
+    Ok(boundary(&delaunay, &is_free, &scene.positions))
+}
+
+/// What is carved, on the lattice.
+struct Scene {
+    sites: Vec<Site>,
+    /// Of the sites, in the world.
+    positions: Vec<DVec3>,
+    /// How many sites come from points; the others are the dome's.
+    points: usize,
+    sightings: Vec<Sighting>,
+    /// The cameras' centres, in lattice steps.
+    cameras: Vec<DVec3>,
+    /// Where they are on the lattice.
+    camera_sites: Vec<Site>,
+}
+
+impl Scene {
+    fn new(
+        sources: &[View],
+        points: &[SparsePoint],
+        options: &Options,
+    ) -> Result<Self, CarveError> {
+        check(sources, points)?;
+        // 1. Only what lies in front of the photos that see it.
+        let usable = |point: &SparsePoint| {
+            let position = point.position;
+            let sees = |&&i: &&u32| sources[i as usize].project(position).is_some();
+            let mut seen_by: Vec<u32> = point.seen_by.iter().filter(sees).copied().collect();
+            seen_by.sort_unstable();
+            seen_by.dedup();
+            (position.is_finite() && !seen_by.is_empty()).then_some((position, seen_by))
+        };
+        let mut used: Vec<(DVec3, Vec<u32>)> = points.iter().filter_map(usable).collect();
+        if used.is_empty() {
+            return Err(CarveError::NoPoints {
+                given: points.len(),
+            });
+        }
+
+        // 2. Snapped. Along a curve through space what is near in the world is near in memory.
+        let around = Surroundings::of(sources, used.iter().map(|(p, _)| *p));
+        let lattice = Lattice::around(around.center, around.radius);
+        for (position, _) in &mut used {
+            *position = around.within(*position);
+        }
+        let mut snapped: Vec<(u64, Site, usize)> = used
+            .iter()
+            .enumerate()
+            .map(|(i, (position, _))| {
+                let site = lattice.snap(*position);
+                (hilbert(site), site, i)
+            })
+            .collect();
+        snapped.sort_unstable();
+        let lines = MOST_LINES / used.len().max(1);
+        let lines = lines.clamp(FEWEST_LINES_PER_POINT, options.lines_per_point.max(1));
+        let (mut sites, mut positions, mut sightings) = (Vec::new(), Vec::new(), Vec::new());
+        for same in snapped.chunk_by(|a, b| a.1 == b.1) {
+            let mut cameras: Vec<u32> = same
+                .iter()
+                .flat_map(|(_, _, i)| std::mem::take(&mut used[*i].1))
+                .collect();
+            cameras.sort_unstable();
+            cameras.dedup();
+            sightings.push(Sighting {
+                vertex: sites.len() as u32,
+                cameras: spread(cameras, lines),
+            });
+            sites.push(same[0].1);
+            positions.push(used[same[0].2].0);
+        }
+
+        // 3. The dome, of which no vertex is a point's.
+        let points = sites.len();
+        for position in around.vertices() {
+            sites.push(lattice.snap(position));
+            positions.push(position);
+        }
+        let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
+        Ok(Self {
+            sites,
+            positions,
+            points,
+            sightings,
+            cameras: centers.iter().map(|c| lattice.steps(*c)).collect(),
+            camera_sites: centers.iter().map(|c| lattice.snap(*c)).collect(),
+        })
+    }
+}
+
+fn check(sources: &[View], points: &[SparsePoint]) -> Result<(), CarveError> {
+    if sources.is_empty() {
+        return Err(CarveError::NoPhotos);
+    }
+    if points.len() > MOST_POINTS {
+        return Err(CarveError::TooManyPoints {
+            given: points.len(),
+            most: MOST_POINTS,
+        });
+    }
+    let centers = sources.iter().map(View::center).enumerate();
+    if let Some((view, center)) = centers.into_iter().find(|(_, c)| !c.is_finite()) {
+        return Err(CarveError::Camera { view, center });
+    }
+    for (point, sparse) in points.iter().enumerate() {
+        let unknown = |v: &&u32| **v as usize >= sources.len();
+        if let Some(&view) = sparse.seen_by.iter().find(unknown) {
+            return Err(CarveError::UnknownPhoto {
+                point,
+                view,
+                photos: sources.len(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// At most `most` of them, evenly spread.
+fn spread(all: Vec<u32>, most: usize) -> Vec<u32> {
+    if all.len() <= most {
+        return all;
+    }
+    (0..most)
+        .map(|i| all[(2 * i + 1) * all.len() / (2 * most)])
+        .collect()
+}
+
+/// The energy as a graph whose minimum cut it is: the source's side is free.
+fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph<'a> {
+    let softness = Softness {
+        sigma: options.softness,
+        behind: options.behind,
+    };
+    let is_point = |v: u32| (v as usize) < scene.points;
+    // 1. Lines of sight.
+    let votes = sight::votes(
+        delaunay,
+        &scene.sightings,
+        &scene.cameras,
+        is_point,
+        softness,
+    );
+    let mut capacity: Vec<u32> = votes.arcs.into_iter().map(|a| a.into_inner()).collect();
+    let terminals = votes.free.into_iter().zip(votes.solid);
+    let mut terminal: Vec<i64> = terminals
+        .map(|(free, solid)| i64::from(free.into_inner()) - i64::from(solid.into_inner()))
+        .collect();
+
+    // 2. The facets' quality, the same both ways; beyond the dome all is solid.
+    let cosines = quality::cosines(delaunay);
+    let most = f64::from(UNIT) * options.quality.clamp(0.0, 1e4);
+    for t in 0..delaunay.finite {
+        for k in 0..4 {
+            let code = delaunay.across[t][k] as usize;
+            if delaunay.is_ghost(code as u32 >> 2) {
+                terminal[t] -= (env("HULL", 0.0) * most) as i64;
+                continue;
+            }
+            let least = cosines[t][k].min(cosines[code >> 2][code & 3]);
+            let cost = (most * (1.0 - f64::from(least)) * 0.5).round();
+            capacity[4 * t + k] += cost as u32;
+        }
+    }
+
+    // weak priors
+    let above = (env("ABOVE", 0.0) * f64::from(UNIT)) as i64;
+    if above != 0 {
+        for t in 0..delaunay.finite {
+            let n = delaunay.tetrahedra[t]
+                .iter()
+                .filter(|v| !is_point(**v))
+                .count() as i64;
+            if n > 0 {
+                terminal[t] += above;
+            }
+        }
+    }
+    // 3. Cameras are free.
+    let mut near = 0;
+    for &site in &scene.camera_sites {
+        near = delaunay.locate(site, near);
+        if !delaunay.is_ghost(near) {
+            terminal[near as usize] = CERTAIN;
+        }
+    }
+    Graph {
+        across: &delaunay.across,
+        nodes: delaunay.finite,
+        capacity,
+        terminal,
+    }
+}
+
+/// The facets between free and solid, counter-clockwise from the free side.
+fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut index = vec![u32::MAX; positions.len()];
+    for t in (0..delaunay.finite).filter(|&t| is_free[t]) {
+        for k in 0..4 {
+            let next = delaunay.across[t][k] >> 2;
+            if !delaunay.is_ghost(next) && is_free[next as usize] {
+                continue;
+            }
+            let [a, b, c] = OTHERS[k].map(|i| delaunay.tetrahedra[t][i]);
+            mesh.triangles.push([a, c, b].map(|v| {
+                let index = &mut index[v as usize];
+                if *index == u32::MAX {
+                    *index = mesh.positions.len() as u32;
+                    mesh.positions.push(positions[v as usize]);
+                }
+                *index
+            }));
+        }
+    }
+    mesh
+}
+
+fn env(name: &str, default: f64) -> f64 {
+    std::env::var(name).map_or(default, |v| v.parse().unwrap())
+}

@@ -1,0 +1,172 @@
+//! A closed shell around a capture: a distant dome, and the ground where there is one.
+
+mod ground;
+
+use crate::cloud::{isolated_points, median};
+use crate::{Mesh, Plane, SparsePoint};
+use calibrate::View;
+use glam::DVec3;
+
+/// The dome's radius as a multiple of how far nearly all points are from the cameras'
+/// middle: what lies there moves against the horizon by 6° at most between any two of them.
+const DOME: f64 = 10.0;
+/// The share of points that are nearly all.
+const NEARLY_ALL: f64 = 0.95;
+/// Points are brought within this share of the dome's radius: its flat facets lie within.
+const WITHIN: f64 = 0.8;
+/// How often an icosahedron's sides are split in half: 10 242 vertices, 2° apart.
+const SPLITS: u32 = 5;
+
+/// A closed mesh around everything, for what no other surface covers: as seen from the
+/// cameras' middle, the ground plane as far as a dome and the dome beyond. Without a ground
+/// (a plane that many points lie on, few below, and all cameras above) it is the whole dome.
+///
+/// Counter-clockwise from within. Every ray from a camera meets it. Cameras and points that
+/// are not finite do not count; with nothing left it is a dome of radius 10 around the world's
+/// origin.
+pub fn shell(views: &[View], points: &[SparsePoint]) -> Mesh {
+    let around = Surroundings::of(views, points.iter().map(|p| p.position));
+    let (directions, triangles) = icosphere(SPLITS);
+    Mesh {
+        positions: directions.into_iter().map(|d| around.shell(d)).collect(),
+        triangles,
+    }
+}
+
+/// How far a capture reaches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surroundings {
+    /// The cameras' middle.
+    pub(crate) center: DVec3,
+    /// The dome's.
+    pub(crate) radius: f64,
+    /// Its normal upwards; below the middle.
+    pub(crate) ground: Option<Plane>,
+}
+
+impl Surroundings {
+    /// Of what is finite among cameras and points.
+    pub(crate) fn of(views: &[View], points: impl Iterator<Item = DVec3>) -> Self {
+        // 1. The cameras' middle and reach.
+        let finite = |v: &&View| v.center().is_finite();
+        let views: Vec<View> = views.iter().filter(finite).cloned().collect();
+        let points: Vec<DVec3> = points.filter(|p| p.is_finite()).collect();
+        let isolated = isolated_points(&points);
+        let kept = points.iter().zip(&isolated).filter(|(_, alone)| !**alone);
+        let points: Vec<DVec3> = kept.map(|(p, _)| *p).collect();
+        let centers: Vec<DVec3> = views.iter().map(View::center).collect();
+        let of = if centers.is_empty() {
+            &points
+        } else {
+            &centers
+        };
+        let center = middle(of).unwrap_or(DVec3::ZERO);
+        let farthest = centers
+            .iter()
+            .map(|c| c.distance(center))
+            .fold(0.0, f64::max);
+
+        // 2. The dome beyond both cameras and points.
+        let mut distances: Vec<f64> = points.iter().map(|p| p.distance(center)).collect();
+        let mut reach = 2.0 * farthest;
+        if !distances.is_empty() {
+            let nearly_all = ((distances.len() - 1) as f64 * NEARLY_ALL) as usize;
+            let (_, far, _) = distances.select_nth_unstable_by(nearly_all, f64::total_cmp);
+            reach = reach.max(*far);
+        }
+        let is_length = reach > 0.0 && (DOME * reach).is_finite();
+        Self {
+            center,
+            radius: DOME * if is_length { reach } else { 1.0 },
+            ground: if std::env::var("NOGROUND").is_ok() {
+                None
+            } else {
+                let g = ground::ground(&views, &points, center);
+                eprintln!("ground {:?}", g.map(|g| g.signed_distance(center) / reach));
+                g
+            },
+        }
+    }
+
+    /// A point, or where the line from the middle to it comes close to the dome.
+    pub(crate) fn within(&self, point_in_world: DVec3) -> DVec3 {
+        let offset = point_in_world - self.center;
+        let farthest = WITHIN * self.radius;
+        // Divided first: offsets may be too long to square.
+        let direction = (offset / offset.abs().max_element()).normalize_or_zero();
+        if offset.abs().max_element() > farthest || offset.length() > farthest {
+            return self.center + direction * farthest;
+        }
+        point_in_world
+    }
+
+    /// Where the shell lies in a direction (a unit vector) from the middle.
+    fn shell(&self, direction: DVec3) -> DVec3 {
+        let sinks = |ground: Plane| ground.inverse_distance_from(self.center);
+        let inverse = self
+            .ground
+            .and_then(sinks)
+            .map_or(0.0, |q| q.dot(direction));
+        self.center + direction / inverse.max(1.0 / self.radius)
+    }
+
+    /// Vertices spread over the shell, about 9° apart.
+    pub(crate) fn vertices(&self) -> Vec<DVec3> {
+        let (directions, _) = icosphere(3);
+        directions.into_iter().map(|d| self.shell(d)).collect()
+    }
+}
+
+/// The median of each coordinate.
+fn middle(points: &[DVec3]) -> Option<DVec3> {
+    let axis = |k: usize| median(points.iter().map(|p| p[k]).collect());
+    (!points.is_empty()).then(|| DVec3::new(axis(0), axis(1), axis(2)))
+}
+
+/// Unit vectors and triangles, counter-clockwise from within; each split takes every side in
+/// half.
+fn icosphere(splits: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    let mut directions = Vec::new();
+    for (one, phi) in [
+        (1.0, golden),
+        (-1.0, golden),
+        (1.0, -golden),
+        (-1.0, -golden),
+    ] {
+        directions.push(DVec3::new(0.0, one, phi));
+        directions.push(DVec3::new(one, phi, 0.0));
+        directions.push(DVec3::new(phi, 0.0, one));
+    }
+    let mut triangles = Vec::new();
+    let near = |a: DVec3, b: DVec3| (a.distance(b) - 2.0).abs() < 1e-9;
+    for a in 0..12u32 {
+        for b in 0..a {
+            for c in 0..b {
+                let [p, q, r] = [a, b, c].map(|i| directions[i as usize]);
+                if near(p, q) && near(q, r) && near(r, p) {
+                    let inwards = p.cross(q).dot(r) < 0.0;
+                    triangles.push(if inwards { [a, b, c] } else { [a, c, b] });
+                }
+            }
+        }
+    }
+    directions.iter_mut().for_each(|d| *d = d.normalize());
+    for _ in 0..splits {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                let sum = directions[a as usize] + directions[b as usize];
+                directions.push(sum.normalize());
+                directions.len() as u32 - 1
+            })
+        };
+        let mut split = Vec::new();
+        for [a, b, c] in triangles {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            split.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = split;
+    }
+    (directions, triangles)
+}
