@@ -1,10 +1,14 @@
-//! Proxy files: JSON holds the surface exactly; GLB is for looking at it elsewhere, and
-//! carries the same JSON in its `extras`.
+//! Proxy files: JSON and PLY hold the surface exactly; GLB is for looking at it elsewhere, and
+//! says in its `extras` what it shows. Meshes from elsewhere are proxies, too.
 
-use crate::{Plane, PlaneError, Proxy, glb};
+use crate::dense::DensePoints;
+use crate::mesh::{self, MeshFileError};
+use crate::{MeshKind, Plane, PlaneError, Proxy, Solid, SparsePoint, glb};
+use calibrate::View;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What is wrong with a proxy file.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +28,15 @@ pub enum FileError {
     /// A GLB that this program did not write, or no GLB at all.
     #[error("{path}: {reason}", path = .0.display(), reason = .1)]
     Glb(PathBuf, String),
+    /// Its mesh cannot be read or written.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    /// Its dense points contradict themselves.
+    #[error("{path}: {reason}; find the points anew with `lumigraph proxy … dense`", path = .0.display(), reason = .1)]
+    Dense(PathBuf, String),
+    /// JSON is no place for a mesh.
+    #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
+    NoMesh(PathBuf),
     /// What has no surface apart from a desired view cannot be looked at.
     #[error(
         "{path}: the {kind} proxy is made anew for every view and has no surface of its own \
@@ -31,14 +44,18 @@ pub enum FileError {
         path = .0.display(), kind = .1
     )]
     NoSurface(PathBuf, &'static str),
-    /// Neither .json nor .glb.
-    #[error("{path}: proxies are read and written as .json (exact) or .glb", path = .0.display())]
+    /// None of the formats known.
+    #[error(
+        "{path}: proxies are read from .json, .glb, .gltf, .ply and .obj, and written as .json or \
+         .ply (exact) or .glb",
+        path = .0.display()
+    )]
     Extension(PathBuf),
 }
 
 /// What the files say. Unknown keys are kept out of the way, not refused.
 #[derive(Serialize, Deserialize)]
-pub(crate) struct Stored {
+struct Stored {
     version: u32,
     #[serde(flatten)]
     surface: StoredSurface,
@@ -47,96 +64,198 @@ pub(crate) struct Stored {
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum StoredSurface {
-    Plane { point: [f64; 3], normal: [f64; 3] },
+    Plane {
+        point: [f64; 3],
+        normal: [f64; 3],
+    },
+    #[serde(rename = "view-plane")]
+    ViewPlane,
     Points,
+    Dense {
+        views: Vec<String>,
+        points: Vec<[f64; 3]>,
+        seen_by: Vec<Vec<u32>>,
+    },
+    // Of a GLB, whose geometry says the rest.
+    Tunnel,
+    Hull,
+    Carved,
+    Depth,
+    Mesh,
 }
 
 impl Stored {
-    /// `None` for a mesh, which JSON is no place for.
-    fn of(proxy: &Proxy) -> Option<Self> {
+    fn of(proxy: &Proxy) -> Self {
         let surface = match proxy {
             Proxy::Plane(plane) => StoredSurface::Plane {
                 point: plane.point().to_array(),
                 normal: plane.normal().to_array(),
             },
+            Proxy::ViewPlane => StoredSurface::ViewPlane,
             Proxy::Points => StoredSurface::Points,
-            Proxy::Dense(_) | Proxy::Mesh(_) => return None,
+            Proxy::Dense(dense) => {
+                let points = dense.points.iter();
+                StoredSurface::Dense {
+                    views: dense.names.clone(),
+                    points: points.clone().map(|p| p.position.to_array()).collect(),
+                    seen_by: points.map(|p| p.seen_by.clone()).collect(),
+                }
+            }
+            Proxy::Mesh(solid) => match solid.kind() {
+                MeshKind::Tunnel => StoredSurface::Tunnel,
+                MeshKind::Hull => StoredSurface::Hull,
+                MeshKind::Carved => StoredSurface::Carved,
+                MeshKind::Depth => StoredSurface::Depth,
+                MeshKind::Mesh => StoredSurface::Mesh,
+            },
         };
-        Some(Self {
+        Self {
             version: 1,
             surface,
-        })
+        }
     }
 
-    fn proxy(&self, path: &Path) -> Result<Proxy, FileError> {
+    /// The proxy, its geometry from `mesh` where the file has one.
+    fn proxy(
+        self,
+        path: &Path,
+        mesh: impl FnOnce() -> Result<mesh::Mesh, FileError>,
+    ) -> Result<Proxy, FileError> {
         if self.version != 1 {
             return Err(FileError::Version(path.to_owned(), self.version));
         }
-        match self.surface {
+        let kind = match self.surface {
             StoredSurface::Plane { point, normal } => {
-                Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
+                return Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
                     .map(Proxy::Plane)
-                    .map_err(|e| FileError::Plane(path.to_owned(), e))
+                    .map_err(|e| FileError::Plane(path.to_owned(), e));
             }
-            StoredSurface::Points => Ok(Proxy::Points),
-        }
+            StoredSurface::ViewPlane => return Ok(Proxy::ViewPlane),
+            StoredSurface::Points => return Ok(Proxy::Points),
+            StoredSurface::Dense {
+                views,
+                points,
+                seen_by,
+            } => {
+                return dense(views, &points, seen_by)
+                    .map_err(|reason| FileError::Dense(path.to_owned(), reason));
+            }
+            StoredSurface::Tunnel => MeshKind::Tunnel,
+            StoredSurface::Hull => MeshKind::Hull,
+            StoredSurface::Carved => MeshKind::Carved,
+            StoredSurface::Depth => MeshKind::Depth,
+            StoredSurface::Mesh => MeshKind::Mesh,
+        };
+        Ok(Proxy::Mesh(Arc::new(Solid::new(kind, mesh()?))))
     }
 }
 
-/// Reads a proxy that [`write()`] wrote.
+fn dense(names: Vec<String>, points: &[[f64; 3]], seen_by: Vec<Vec<u32>>) -> Result<Proxy, String> {
+    if points.len() != seen_by.len() {
+        let (points, seen) = (points.len(), seen_by.len());
+        return Err(format!("{points} points, and who sees {seen} of them"));
+    }
+    let point = |(i, (position, seen_by)): (usize, (&[f64; 3], Vec<u32>))| {
+        if let Some(view) = seen_by.iter().find(|&&view| view as usize >= names.len()) {
+            let views = names.len();
+            return Err(format!("point {i} is seen by view {view} of {views}"));
+        }
+        let position = DVec3::from_array(*position);
+        Ok(SparsePoint { position, seen_by })
+    };
+    let points = points.iter().zip(seen_by).enumerate().map(point);
+    let points = points.collect::<Result<_, String>>()?;
+    Ok(Proxy::Dense(Arc::new(DensePoints { names, points })))
+}
+
+/// Reads a proxy that [`write()`] wrote, or a mesh from elsewhere: .glb, .gltf, .ply or .obj.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn read(path: &Path) -> Result<Proxy, FileError> {
-    if !["json", "glb"].contains(&extension(path).as_str()) {
+    if !["json", "glb", "gltf", "ply", "obj"].contains(&extension(path).as_str()) {
         return Err(FileError::Extension(path.to_owned()));
     }
     let bytes = std::fs::read(path).map_err(|e| FileError::Io(path.to_owned(), e))?;
     parse(path, &bytes)
 }
 
-/// Reads the content of a file, whose name ends in .json or .glb.
+/// Reads the content of a file by its name's extension.
 ///
 /// # Errors
 /// As for [`read()`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
-    let stored: Stored = match extension(path).as_str() {
-        "json" => serde_json::from_slice(bytes).map_err(|e| FileError::Json(path.to_owned(), e))?,
+    let json = |e| FileError::Json(path.to_owned(), e);
+    let mesh = || Ok(mesh::parse(path, bytes)?);
+    let solid = |kind| Ok(Proxy::Mesh(Arc::new(Solid::new(kind, mesh()?))));
+    match extension(path).as_str() {
+        "json" => {
+            let stored: Stored = serde_json::from_slice(bytes).map_err(json)?;
+            stored.proxy(path, || Err(FileError::NoMesh(path.to_owned())))
+        }
         "glb" => {
             let extras = glb::extras(bytes).map_err(|e| FileError::Glb(path.to_owned(), e))?;
-            serde_json::from_str(&extras).map_err(|e| FileError::Json(path.to_owned(), e))?
+            // Extras of somebody else's are none of ours.
+            match extras.and_then(|text| serde_json::from_str::<Stored>(&text).ok()) {
+                Some(stored) => stored.proxy(path, mesh),
+                None => solid(MeshKind::Mesh),
+            }
         }
-        _ => return Err(FileError::Extension(path.to_owned())),
-    };
-    stored.proxy(path)
+        "ply" => solid(kind_of_ply(bytes)),
+        "gltf" | "obj" => solid(MeshKind::Mesh),
+        _ => Err(FileError::Extension(path.to_owned())),
+    }
 }
 
-/// Writes a proxy as `.json` or `.glb`. A GLB shows an infinite surface only around
-/// `shown_points_in_world` (the sparse points, say).
+/// What the comment in a PLY's header says of its kind, before it.
+const KIND_COMMENT: &str = "lumigraph proxy ";
+
+fn kind_of_ply(bytes: &[u8]) -> MeshKind {
+    // Within the first few lines, or nowhere.
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
+    let mut lines = header.lines();
+    let name = lines.find_map(|line| line.strip_prefix("comment ")?.strip_prefix(KIND_COMMENT));
+    let kind = MeshKind::ALL.into_iter().find(|k| Some(k.name()) == name);
+    kind.unwrap_or(MeshKind::Mesh)
+}
+
+/// Writes a proxy as `.json`, a mesh as `.ply`, or what can be shown as `.glb`, with cameras.
+/// A GLB shows an infinite plane only around `shown_points_in_world` (the sparse points, say).
 ///
 /// The file appears complete or not at all.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub fn write(path: &Path, proxy: &Proxy, shown_points_in_world: &[DVec3]) -> Result<(), FileError> {
-    let json = |pretty: bool| {
-        let stored = Stored::of(proxy);
-        let stored = stored.ok_or(FileError::NoSurface(path.to_owned(), proxy.kind()))?;
-        let text = if pretty {
-            serde_json::to_string_pretty(&stored)
-        } else {
-            serde_json::to_string(&stored)
-        };
-        text.map_err(|e| FileError::Json(path.to_owned(), e))
-    };
-    let bytes = match extension(path).as_str() {
-        "json" => (json(true)? + "\n").into_bytes(),
-        "glb" => {
-            let plane = proxy.plane();
-            let plane = plane.ok_or(FileError::NoSurface(path.to_owned(), proxy.kind()))?;
-            glb::quad(&plane, shown_points_in_world, json(false)?)
-                .map_err(|e| FileError::Glb(path.to_owned(), e))?
+pub fn write(
+    path: &Path,
+    proxy: &Proxy,
+    shown_points_in_world: &[DVec3],
+    cameras: &[(String, View)],
+) -> Result<(), FileError> {
+    let json = |e| FileError::Json(path.to_owned(), e);
+    let no_surface = || FileError::NoSurface(path.to_owned(), proxy.kind());
+    let bytes = match (extension(path).as_str(), proxy) {
+        ("json", Proxy::Mesh(_)) => return Err(FileError::NoMesh(path.to_owned())),
+        ("json", Proxy::Dense(_)) => serde_json::to_vec(&Stored::of(proxy)).map_err(json)?,
+        ("json", _) => {
+            let text = serde_json::to_string_pretty(&Stored::of(proxy)).map_err(json)?;
+            (text + "\n").into_bytes()
         }
+        ("ply", Proxy::Mesh(solid)) => mesh::to_ply(
+            solid.mesh(),
+            &format!("{KIND_COMMENT}{}", solid.kind().name()),
+        ),
+        ("glb", Proxy::Mesh(_) | Proxy::Plane(_)) => {
+            let extras = serde_json::to_string(&Stored::of(proxy)).map_err(json)?;
+            let shown = match proxy {
+                Proxy::Plane(plane) => &glb::quad(plane, shown_points_in_world),
+                Proxy::Mesh(solid) => solid.mesh(),
+                _ => return Err(no_surface()),
+            };
+            mesh::to_glb(shown, cameras, Some(extras))
+                .map_err(|e| FileError::Glb(path.to_owned(), e.to_string()))?
+        }
+        ("glb" | "ply", _) => return Err(no_surface()),
         _ => return Err(FileError::Extension(path.to_owned())),
     };
     write_whole(path, &bytes).map_err(|e| FileError::Io(path.to_owned(), e))

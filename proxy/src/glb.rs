@@ -1,11 +1,11 @@
-//! Proxies that are no mesh as glTF 2.0 binary.
+//! Proxies in glTF 2.0 binary: what a file says of itself, and a plane to look at.
 
 use crate::Plane;
-use crate::mesh::{self, Mesh};
+use crate::mesh::Mesh;
 use glam::DVec3;
 
-/// The extras of the first node, as JSON text.
-pub(crate) fn extras(bytes: &[u8]) -> Result<String, String> {
+/// The extras of the first node, as JSON text, if it has any.
+pub(crate) fn extras(bytes: &[u8]) -> Result<Option<String>, String> {
     // gltf 1.4 takes the header's 12 bytes off the length that it states, however short.
     if let Some([b'g', b'l', b'T', b'F', _, _, _, _, length @ ..]) = bytes.first_chunk::<12>()
         && (u32::from_le_bytes(*length) as usize) < 12
@@ -16,17 +16,13 @@ pub(crate) fn extras(bytes: &[u8]) -> Result<String, String> {
     let gltf = gltf::Gltf::from_slice_without_validation(bytes)
         .map_err(|e| format!("not a glTF file: {e}"))?;
     let extras = gltf.nodes().next().and_then(|node| node.extras().clone());
-    extras.map(|raw| raw.get().to_owned()).ok_or_else(|| {
-        "this mesh does not say which lumigraph proxy it shows; \
-         export the proxy again with `lumigraph proxy … -o FILE.json`"
-            .to_owned()
-    })
+    Ok(extras.map(|raw| raw.get().to_owned()))
 }
 
 /// The part of a plane around the given points, as a square of two triangles.
 ///
-/// The exact plane travels in the node's `extras`: glTF has no doubles.
-pub(crate) fn quad(plane: &Plane, shown: &[DVec3], extras: String) -> Result<Vec<u8>, String> {
+/// The exact plane travels in the file's `extras`: glTF has no doubles.
+pub(crate) fn quad(plane: &Plane, shown: &[DVec3]) -> Mesh {
     // A square large enough for the points' feet on the plane, leaving out the farthest
     // few per cent, which may be anywhere.
     let across = plane.normal().any_orthonormal_vector();
@@ -44,9 +40,8 @@ pub(crate) fn quad(plane: &Plane, shown: &[DVec3], extras: String) -> Result<Vec
     };
     let corner = |x: f64, y: f64| plane.point() + across * (x * half) + along * (y * half);
     let positions = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let mesh = Mesh {
+    Mesh {
         positions: positions.map(|(x, y)| corner(x, y)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
-    mesh::to_glb(&mesh, &[], Some(extras)).map_err(|e| e.to_string())
+    }
 }

@@ -46,6 +46,9 @@ pub use tunnel::{Tunnel, TunnelError};
 pub enum Proxy {
     /// An infinite plane, seen from both sides.
     Plane(Plane),
+    /// A plane through what each desired view sees of the sparse points, fitted anew for each:
+    /// nearer to the scene than one plane for all, but equal rays no longer meet equal points.
+    ViewPlane,
     /// The sparse points that views like the desired one observe; see [`points`].
     Points,
     /// As [`Self::Points`], with more points than the capture's own; see [`dense`].
@@ -59,7 +62,7 @@ impl Proxy {
     pub fn plane(&self) -> Option<Plane> {
         match self {
             Self::Plane(plane) => Some(*plane),
-            Self::Points | Self::Dense(_) | Self::Mesh(_) => None,
+            Self::ViewPlane | Self::Points | Self::Dense(_) | Self::Mesh(_) => None,
         }
     }
 
@@ -67,6 +70,7 @@ impl Proxy {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Plane(_) => "plane",
+            Self::ViewPlane => "view-plane",
             Self::Points => "points",
             Self::Dense(_) => "dense",
             Self::Mesh(solid) => solid.kind().name(),

@@ -11,10 +11,7 @@ use std::fmt;
 use std::time::Duration;
 
 /// Where a mesh came from.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshKind {
     /// A box around the way through a hallway.
     Tunnel,
@@ -29,6 +26,15 @@ pub enum MeshKind {
 }
 
 impl MeshKind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Tunnel,
+        Self::Hull,
+        Self::Carved,
+        Self::Depth,
+        Self::Mesh,
+    ];
+
     /// As the command line and files spell it.
     pub fn name(self) -> &'static str {
         match self {

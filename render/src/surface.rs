@@ -3,7 +3,7 @@
 use crate::lumigraph::Lumigraph;
 use calibrate::{Pixel, View};
 use glam::DVec3;
-use proxy::{Facets, Proxy, Solid, points};
+use proxy::{Facets, Plane, Proxy, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
 
 /// What each pixel of the desired view looks at: a plane, by its vector q (a ray v meets
@@ -34,14 +34,21 @@ pub struct FacetMap {
 impl Surface {
     /// The surface of a lumigraph's proxy from a desired view.
     pub(crate) fn of(lumigraph: &Lumigraph, desired: &View) -> Self {
+        let views = || -> Vec<View> { lumigraph.sources.iter().map(|s| s.view.clone()).collect() };
+        let of_plane = |plane: Plane| {
+            let q = plane.inverse_distance_from(desired.center());
+            q.map_or(Self::Nothing, |q| {
+                Self::Plane(desired.camera_from_world.rotation * q)
+            })
+        };
         match &lumigraph.proxy {
-            Proxy::Plane(plane) => plane
-                .inverse_distance_from(desired.center())
-                .map_or(Self::Nothing, |q| {
-                    Self::Plane(desired.camera_from_world.rotation * q)
-                }),
+            Proxy::Plane(plane) => of_plane(*plane),
+            Proxy::ViewPlane => {
+                let plane = fit_plane_for_view(desired, &views(), &lumigraph.points);
+                plane.map_or(Self::Nothing, of_plane)
+            }
             Proxy::Points | Proxy::Dense(_) => {
-                let views: Vec<View> = lumigraph.sources.iter().map(|s| s.view.clone()).collect();
+                let views = views();
                 points::facets(desired, &views, &lumigraph.points).map_or(Self::Nothing, |facets| {
                     Self::Facets(FacetMap::of_facets(facets, desired))
                 })

@@ -295,9 +295,10 @@ impl Numbers<'_> {
 }
 
 /// A mesh as binary PLY (little-endian), its positions in double precision: every digit.
-pub fn to_ply(mesh: &Mesh) -> Vec<u8> {
+/// `comment` goes into its header, and should be one line.
+pub fn to_ply(mesh: &Mesh, comment: &str) -> Vec<u8> {
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment written by lumigraph\n\
+        "ply\nformat binary_little_endian 1.0\ncomment {comment}\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.positions.len(),
