@@ -45,8 +45,8 @@ pub struct Options {
     pub most_cells: usize,
     /// Silhouettes are reduced by whole numbers until no side is longer.
     pub longest_side_px: u32,
-    /// The simplified mesh's triangles at most, where that can be reached; `None` leaves the
-    /// mesh as it was carved.
+    /// The simplified mesh's triangles at most, where that does not cost the shape (see
+    /// [`simplify`]); `None` leaves the mesh as it was carved.
     pub faces: Option<usize>,
 }
 
@@ -55,7 +55,7 @@ impl Default for Options {
         Self {
             tolerance_px: 1.0,
             misses: 0,
-            cell_px: 2.0,
+            cell_px: 3.5,
             most_cells: 4_000_000,
             longest_side_px: 1600,
             faces: Some(500),
