@@ -2,7 +2,8 @@
 //!
 //! A desired ray meets the proxy at a point, and that point is looked up in the photos.
 //! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond), the sparse [`points`]
-//! themselves, triangulated anew for each desired view, and meshes ([`Solid`]).
+//! themselves, triangulated anew for each desired view, and meshes ([`Solid`]), of which the
+//! [`tunnel`] is one.
 
 mod axes;
 pub mod carve;

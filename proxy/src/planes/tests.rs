@@ -2,6 +2,7 @@ use super::*;
 use crate::{PlaneError, SparsePoint};
 use calibrate::{Lens, Pixel, Rigid3, View};
 use glam::{DQuat, DVec2, DVec3};
+use proptest::prelude::*;
 
 fn view(center: DVec3, target: DVec3) -> View {
     View {
@@ -268,4 +269,52 @@ fn few_points_still_give_a_plane_that_all_of_the_image_sees() {
         plane_focused_on(&lost, Pixel::new(1.0, 1.0), &[DVec3::Z]),
         Err(FocusError::NoPoints { .. } | FocusError::Plane(PlaneError::NotFinite(..)))
     ));
+}
+
+/// Of these captures a facade and a sheet of squares are planes.
+#[test]
+fn a_facade_and_a_chessboard_have_a_dominant_plane() {
+    for (name, least_share) in [("sceaux-castle", 0.2), ("opencv-chessboard", 0.9)] {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/captures");
+        let model = std::path::Path::new(folder).join(name).join("sparse/0");
+        if !model.is_dir() {
+            eprintln!("SKIPPED: {} is absent", model.display());
+            continue;
+        }
+        let whole = calibrate::colmap::read_model(&model).unwrap();
+        let points: Vec<DVec3> = whole.points.values().map(|p| p.position).collect();
+        let found = dominant_plane(&points).unwrap();
+        println!("{name}: {found:?}");
+        let share = found.inliers as f64 / found.points as f64;
+        assert!(share > least_share, "{name}: {found:?}");
+    }
+}
+
+proptest! {
+    /// Whatever the points and wherever the view, all of its image sees its plane.
+    #[test]
+    fn any_points_in_front_give_a_plane_in_front(
+        positions in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f64), 1..40),
+        size in -6..6_i32,
+    ) {
+        let positions: Vec<DVec3> = positions.into_iter().map(DVec3::from).collect();
+        let scale = 10.0_f64.powi(size);
+        let desired = ahead(DVec3::NEG_Z * scale);
+        let points = seen(positions.iter().map(|p| *p * scale));
+        let in_front = positions.iter().any(|p| p.z > -1.0);
+        let plane = fit_plane_for_view(&desired, &sources(), &points);
+        prop_assert_eq!(plane.is_some(), in_front);
+        if let Some(plane) = plane {
+            for (x, y) in [(0.0, 0.0), (160.0, 0.0), (0.0, 120.0), (160.0, 120.0)] {
+                let s = inverse_distance(&plane, &desired, x, y);
+                prop_assert!(s > 0.0 && s.is_finite(), "{:?} {}", plane, s);
+            }
+        }
+        // Neither panics.
+        let world: Vec<DVec3> = positions.iter().map(|p| *p * scale).collect();
+        if let Ok(found) = dominant_plane(&world) {
+            prop_assert!(found.inliers <= found.points && found.tolerance.is_finite());
+        }
+        let _ = plane_focused_on(&desired, Pixel::new(80.0, 60.0), &world);
+    }
 }

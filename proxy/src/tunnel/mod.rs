@@ -1,10 +1,13 @@
-//! The box around the way through a hallway (Buehler et al. 2001, §5, Hallway: "the proxy is
-//! a rectangular tunnel").
+//! The box around the way through a hallway (Buehler et al. 2001, §5, Hallway): "a six sided
+//! rectangular tunnel that is roughly aligned with the hallway walls".
 //!
 //! Fitted to the sparse points and the cameras with nothing to click: the direction comes
-//! from the path and from where cameras look, six walls from where the points are.
+//! from the path and from where cameras look, six walls from where the points are. Furniture
+//! inside is left standing before the walls.
 
+mod direction;
 mod fit;
+mod fitting;
 
 use crate::Mesh;
 use calibrate::Rigid3;
@@ -12,7 +15,8 @@ use glam::DVec3;
 
 pub use fit::fit;
 
-/// A box with the cameras inside.
+/// A box with the cameras inside, but for those far off the way of the others, which are taken
+/// to be misplaced.
 ///
 /// Its frame has x right, y down and z along the way, as a camera that walks through it.
 #[derive(Clone, Copy, Debug, PartialEq)]

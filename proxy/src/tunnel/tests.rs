@@ -1,6 +1,7 @@
 use super::*;
 use calibrate::colmap::read_model;
 use calibrate::{Reconstruction, View};
+use proptest::prelude::*;
 use std::path::PathBuf;
 
 /// Views and points of a capture, or a loud `None`.
@@ -245,4 +246,39 @@ fn degenerate_input_is_an_error_or_a_box() {
         assert_eq!(fit(views, points), Ok(tunnel), "twice the same");
     }
     assert!(!fit(&on_top, &points).unwrap().is_hallway());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    /// Whatever the points and the cameras, the box is finite and its shares are shares.
+    #[test]
+    fn any_points_and_cameras_give_a_box_or_an_error(
+        positions in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f64), 0..60),
+        centers in prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64), 1..9),
+        flat in 0..8_usize,
+    ) {
+        let keep = |p: [f64; 3]| {
+            let flattened = DVec3::new(f64::from(flat & 1 == 0), f64::from(flat & 2 == 0), f64::from(flat & 4 == 0));
+            DVec3::from(p) * flattened
+        };
+        let points: Vec<DVec3> = positions.into_iter().map(keep).collect();
+        let view = View {
+            lens: calibrate::Lens::pinhole(glam::DVec2::splat(100.0), glam::DVec2::splat(50.0)),
+            width: 100,
+            height: 100,
+            camera_from_world: Rigid3::IDENTITY,
+        };
+        let views: Vec<View> = centers
+            .into_iter()
+            .map(|c| View {
+                camera_from_world: Rigid3::looking_at(DVec3::from(c), DVec3::Z, DVec3::Y),
+                ..view.clone()
+            })
+            .collect();
+        if let Ok(tunnel) = fit(&views, &points) {
+            prop_assert!(tunnel.min.is_finite() && tunnel.max.is_finite());
+            prop_assert!((tunnel.max - tunnel.min).min_element() > 0.0, "{:?}", tunnel);
+            prop_assert!((0.0..=1.0).contains(&tunnel.share_on_walls));
+        }
+    }
 }
