@@ -57,7 +57,12 @@ impl<'a> Bvh<'a> {
             2
         };
         let mesh = self.mesh;
-        let key = |t: &u32| mesh.corners(*t as usize).iter().map(|p| p[axis]).sum::<f64>();
+        let key = |t: &u32| {
+            mesh.corners(*t as usize)
+                .iter()
+                .map(|p| p[axis])
+                .sum::<f64>()
+        };
         self.order[first..first + count]
             .select_nth_unstable_by(count / 2, |a, b| key(a).total_cmp(&key(b)));
         self.nodes[at].count = 0;

@@ -75,7 +75,11 @@ impl<'a> Flow<'a> {
         for node in 0..n {
             let terminal = flow.graph.terminal[node];
             if terminal != 0 {
-                flow.tree[node] = if terminal > 0 { Tree::Source } else { Tree::Sink };
+                flow.tree[node] = if terminal > 0 {
+                    Tree::Source
+                } else {
+                    Tree::Sink
+                };
                 flow.parent[node] = TERMINAL;
                 flow.distance[node] = 1;
                 flow.activate(node as u32);

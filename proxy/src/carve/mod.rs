@@ -1,12 +1,17 @@
 //! A closed surface carved out of space by the photos' lines of sight.
 //!
-//! The sparse points and a far dome around everything are tetrahedralised (Delaunay), and
+//! The sparse points and the vertices of the [`shell`](crate::shell()) around everything (a far
+//! dome, and the ground where there is one) are tetrahedralised (Delaunay), and
 //! each tetrahedron is free or solid, whichever costs least by the energy of Labatut, Pons and
 //! Keriven (2007, "Efficient multi-view reconstruction of large-scale scenes using interest
 //! points, Delaunay triangulation and graph cuts"; 2009, "Robust and efficient surface
 //! reconstruction from range data"): a minimum s-t cut, found exactly. The surface is all
 //! facets between free and solid. Cameras are always in free space and everything beyond the
-//! dome is solid, so the surface is closed and every ray from a camera meets it.
+//! shell is solid, so the surface is closed and every ray from a camera meets it.
+//!
+//! Nothing is smoothed: vertices moved a tenth of the way to their neighbours' mean raise the
+//! median error at points left out from 0.278 to 0.284 % of the inverse depth (geometric mean
+//! over ten captures), three tenths to 0.313 %.
 
 mod delaunay;
 mod flow;
@@ -20,10 +25,14 @@ use calibrate::View;
 use delaunay::{Delaunay, hilbert};
 use flow::Graph;
 use glam::DVec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use lattice::{Lattice, Site};
 use sight::{OTHERS, Sighting, Softness, UNIT};
+use std::num::NonZero;
 
-/// What can be chosen about carving.
+/// What can be chosen about carving. The defaults are the best of those tried on ten captures,
+/// by the mesh's inverse depth at points left out; halving or doubling any number changes the
+/// median by 6 % at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// At most this many lines of sight of a point count, spread over its photos.
@@ -49,9 +58,12 @@ impl Default for Options {
 }
 
 /// Lines of sight at most: more points have fewer each. Their weights must fit 31 bits.
-const MOST_LINES: usize = 4_000_000;
+const MOST_LINES: usize = 2_000_000;
 /// Of each point, whatever the number of points.
 const FEWEST_LINES_PER_POINT: usize = 2;
+/// Points nearer to a camera than this share of the dome's radius are left out; it is a
+/// hundred lattice steps.
+const TOO_NEAR: f64 = 1e-5;
 /// Costs more than all else together.
 const CERTAIN: i64 = 1 << 60;
 
@@ -70,7 +82,9 @@ pub enum CarveError {
         center: DVec3,
     },
     /// A point names a photo that isn't there.
-    #[error("point {point} is seen by photo {view} (both counting from 0), but there are {photos} photos")]
+    #[error(
+        "point {point} is seen by photo {view} (both counting from 0), but there are {photos} photos"
+    )]
     UnknownPhoto {
         /// The point's index.
         point: usize,
@@ -104,7 +118,7 @@ const MOST_POINTS: usize = 100_000_000;
 /// The surface between the space that the photos look through and what they see.
 ///
 /// Closed, its triangles counter-clockwise where they are looked at from free space. Its
-/// vertices are sparse points where they lie on it, and the dome's.
+/// vertices are sparse points where they lie on it, and the shell's.
 ///
 /// # Errors
 /// See [`CarveError`].
@@ -113,10 +127,10 @@ pub fn surface(
     points: &[SparsePoint],
     options: &Options,
 ) -> Result<Mesh, CarveError> {
-    // 1. The points that photos see, on the lattice, with the dome around them.
+    // 1. The points that photos see, on the lattice, with the shell around them.
     let scene = Scene::new(sources, points, options)?;
-    // 2. Tetrahedra. The dome spans space whatever the points do.
-    let delaunay = Delaunay::new(scene.sites.clone()).expect("a dome is not flat");
+    // 2. Tetrahedra. The shell spans space whatever the points do.
+    let delaunay = Delaunay::new(scene.sites.clone()).expect("a shell is not flat");
     // 3. What each label costs.
     let graph = energy(&delaunay, &scene, options);
     // 4. The cheapest labelling, and the facets between free and solid.
@@ -129,7 +143,7 @@ struct Scene {
     sites: Vec<Site>,
     /// Of the sites, in the world.
     positions: Vec<DVec3>,
-    /// How many sites come from points; the others are the dome's.
+    /// How many sites come from points; the others are the shell's.
     points: usize,
     sightings: Vec<Sighting>,
     /// The cameras' centres, in lattice steps.
@@ -161,12 +175,16 @@ impl Scene {
             });
         }
 
-        // 2. Snapped. Along a curve through space what is near in the world is near in memory.
         let around = Surroundings::of(sources, used.iter().map(|(p, _)| *p));
-        let lattice = Lattice::around(around.center, around.radius);
         for (position, _) in &mut used {
             *position = around.within(*position);
         }
+        // A camera on the surface would be neither here nor there.
+        let clear = clearance(sources, TOO_NEAR * around.radius);
+        used.retain(|(position, _)| clear(*position));
+
+        // 2. Snapped. Along a curve through space what is near in the world is near in memory.
+        let lattice = Lattice::around(around.center, around.radius);
         let mut snapped: Vec<(u64, Site, usize)> = used
             .iter()
             .enumerate()
@@ -180,8 +198,10 @@ impl Scene {
         let lines = lines.clamp(FEWEST_LINES_PER_POINT, options.lines_per_point.max(1));
         let (mut sites, mut positions, mut sightings) = (Vec::new(), Vec::new(), Vec::new());
         for same in snapped.chunk_by(|a, b| a.1 == b.1) {
-            let mut cameras: Vec<u32> =
-                same.iter().flat_map(|(_, _, i)| std::mem::take(&mut used[*i].1)).collect();
+            let mut cameras: Vec<u32> = same
+                .iter()
+                .flat_map(|(_, _, i)| std::mem::take(&mut used[*i].1))
+                .collect();
             cameras.sort_unstable();
             cameras.dedup();
             sightings.push(Sighting {
@@ -192,7 +212,7 @@ impl Scene {
             positions.push(used[same[0].2].0);
         }
 
-        // 3. The dome, of which no vertex is a point's.
+        // 3. The shell, of which no vertex is a point's.
         let points = sites.len();
         for position in around.vertices() {
             sites.push(lattice.snap(position));
@@ -237,12 +257,33 @@ fn check(sources: &[View], points: &[SparsePoint]) -> Result<(), CarveError> {
     Ok(())
 }
 
+/// Tells places that are farther than `distance` from all cameras.
+fn clearance(sources: &[View], distance: f64) -> impl Fn(DVec3) -> bool {
+    let centers: Vec<[f64; 3]> = sources.iter().map(|v| v.center().to_array()).collect();
+    let tree: Option<ImmutableKdTree<f64, 3>> = ImmutableKdTree::new_from_slice(&centers).ok();
+    move |place| {
+        let Some(tree) = &tree else {
+            return true;
+        };
+        let place = place.to_array();
+        let nearest = tree
+            .query(&place)
+            .nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN)
+            .execute();
+        nearest
+            .iter()
+            .all(|found| found.distance > distance * distance)
+    }
+}
+
 /// At most `most` of them, evenly spread.
 fn spread(all: Vec<u32>, most: usize) -> Vec<u32> {
     if all.len() <= most {
         return all;
     }
-    (0..most).map(|i| all[(2 * i + 1) * all.len() / (2 * most)]).collect()
+    (0..most)
+        .map(|i| all[(2 * i + 1) * all.len() / (2 * most)])
+        .collect()
 }
 
 /// The energy as a graph whose minimum cut it is: the source's side is free.
@@ -253,21 +294,27 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
     };
     let is_point = |v: u32| (v as usize) < scene.points;
     // 1. Lines of sight.
-    let votes = sight::votes(delaunay, &scene.sightings, &scene.cameras, is_point, softness);
+    let votes = sight::votes(
+        delaunay,
+        &scene.sightings,
+        &scene.cameras,
+        is_point,
+        softness,
+    );
     let mut capacity: Vec<u32> = votes.arcs.into_iter().map(|a| a.into_inner()).collect();
     let terminals = votes.free.into_iter().zip(votes.solid);
     let mut terminal: Vec<i64> = terminals
         .map(|(free, solid)| i64::from(free.into_inner()) - i64::from(solid.into_inner()))
         .collect();
 
-    // 2. The facets' quality, the same both ways; beyond the dome all is solid.
+    // 2. The facets' quality, the same both ways. The shell's own facets cost nothing: where
+    // nothing is known, space is free as far as the shell.
     let cosines = quality::cosines(delaunay);
     let most = f64::from(UNIT) * options.quality.clamp(0.0, 1e4);
     for t in 0..delaunay.finite {
         for k in 0..4 {
             let code = delaunay.across[t][k] as usize;
             if delaunay.is_ghost(code as u32 >> 2) {
-                terminal[t] -= (env("HULL", 0.0) * most) as i64;
                 continue;
             }
             let least = cosines[t][k].min(cosines[code >> 2][code & 3]);
@@ -276,14 +323,6 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         }
     }
 
-    // weak priors
-    let above = (env("ABOVE", 0.0) * f64::from(UNIT)) as i64;
-    if above != 0 {
-        for t in 0..delaunay.finite {
-            let n = delaunay.tetrahedra[t].iter().filter(|v| !is_point(**v)).count() as i64;
-            if n > 0 { terminal[t] += above; }
-        }
-    }
     // 3. Cameras are free.
     let mut near = 0;
     for &site in &scene.camera_sites {
@@ -322,8 +361,4 @@ fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh 
         }
     }
     mesh
-}
-
-fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).map_or(default, |v| v.parse().unwrap())
 }

@@ -22,7 +22,11 @@ pub(super) fn cosines(delaunay: &Delaunay) -> Vec<[f32; 4]> {
                 // Away from corner k.
                 let normal = (b - a).cross(c - a);
                 let cosine = normal.dot(a - center) / (normal.length() * radius);
-                if cosine.is_finite() { cosine as f32 } else { -1.0 }
+                if cosine.is_finite() {
+                    cosine as f32
+                } else {
+                    -1.0
+                }
             })
         })
         .collect()
@@ -48,7 +52,12 @@ mod tests {
         found.sort_by(f32::total_cmp);
         // The centre is (5, 5, 5): beyond the long facet by 5/√3, 5 from the others.
         let radius = 75f32.sqrt();
-        let expected = [-5.0 / 3f32.sqrt() / radius, 5.0 / radius, 5.0 / radius, 5.0 / radius];
+        let expected = [
+            -5.0 / 3f32.sqrt() / radius,
+            5.0 / radius,
+            5.0 / radius,
+            5.0 / radius,
+        ];
         for (a, b) in found.iter().zip(expected) {
             assert!((a - b).abs() < 1e-6, "{found:?}");
         }

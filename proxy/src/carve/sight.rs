@@ -29,7 +29,7 @@ const CHUNKS: usize = 64;
 pub(super) struct Sighting {
     /// The vertex of the observed point.
     pub(super) vertex: u32,
-    /// The cameras' centres, in lattice steps.
+    /// Indices of the cameras that see it.
     pub(super) cameras: Vec<u32>,
 }
 
@@ -108,7 +108,12 @@ fn in_front(star: &Star<'_>, towards: DVec3, sigma: f64, votes: &Votes) {
         let along = walk.exit_along();
         // Where the line leaves beyond the camera, the camera is in here.
         let ends = !(along < 1.0) || walk.leaves_hull();
-        let cost = if ends { UNIT } else { soft(along * length, sigma) }.max(before);
+        let cost = if ends {
+            UNIT
+        } else {
+            soft(along * length, sigma)
+        }
+        .max(before);
         votes.free[walk.at as usize].fetch_add(cost - before, Relaxed);
         if ends {
             return;
@@ -185,7 +190,10 @@ impl<'a> Star<'a> {
 
     /// The median length of the edges to other points; of all edges where there is none.
     fn spacing(&self, is_point: impl Fn(u32) -> bool) -> f64 {
-        let corners = self.tetrahedra.iter().flat_map(|&t| self.delaunay.tetrahedra[t as usize]);
+        let corners = self
+            .tetrahedra
+            .iter()
+            .flat_map(|&t| self.delaunay.tetrahedra[t as usize]);
         let mut ends: Vec<u32> = corners.filter(|&v| v != self.vertex).collect();
         ends.sort_unstable();
         ends.dedup();
@@ -228,7 +236,8 @@ impl<'a> Walk<'a> {
             let facet = OTHERS[exit].map(|k| all[k]);
             let corners = facet.map(|v| vector(delaunay.sites[v as usize]) - star.center);
             let [a, b, c] = corners;
-            let through = side(a, b, ray) >= 0.0 && side(b, c, ray) >= 0.0 && side(c, a, ray) >= 0.0;
+            let through =
+                side(a, b, ray) >= 0.0 && side(b, c, ray) >= 0.0 && side(c, a, ray) >= 0.0;
             through.then_some(Self {
                 delaunay,
                 origin: star.center,
@@ -253,7 +262,8 @@ impl<'a> Walk<'a> {
     }
 
     fn leaves_hull(&self) -> bool {
-        self.delaunay.is_ghost(self.delaunay.across[self.at as usize][self.exit] >> 2)
+        self.delaunay
+            .is_ghost(self.delaunay.across[self.at as usize][self.exit] >> 2)
     }
 
     /// Goes on to the next tetrahedron, which must not be a ghost; `false` where rounding

@@ -60,7 +60,9 @@ pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<
     // 2. The plane of least squares through those.
     let (_, mut plane) = best?;
     for _ in 0..3 {
-        let on = points.iter().filter(|p| plane.signed_distance(**p).abs() <= thickness);
+        let on = points
+            .iter()
+            .filter(|p| plane.signed_distance(**p).abs() <= thickness);
         let on: Vec<DVec3> = on.copied().collect();
         let middle = on.iter().map(|p| *p - center).sum::<DVec3>() / on.len() as f64;
         let normal = direction_of_least_spread(on.iter().copied())?;
@@ -73,13 +75,27 @@ pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<
 }
 
 fn upwards(normal: DVec3, up: DVec3) -> DVec3 {
-    if normal.dot(up) < 0.0 { -normal } else { normal }
+    if normal.dot(up) < 0.0 {
+        -normal
+    } else {
+        normal
+    }
 }
 
 /// How many points lie on a plane; `None` where it cannot be the ground.
-fn judge(plane: &Plane, up: DVec3, views: &[View], points: &[DVec3], thickness: f64) -> Option<usize> {
+fn judge(
+    plane: &Plane,
+    up: DVec3,
+    views: &[View],
+    points: &[DVec3],
+    thickness: f64,
+) -> Option<usize> {
     let level = plane.normal().dot(up) >= NEAR_UP;
-    if !level || views.iter().any(|v| plane.signed_distance(v.center()) <= thickness) {
+    if !level
+        || views
+            .iter()
+            .any(|v| plane.signed_distance(v.center()) <= thickness)
+    {
         return None;
     }
     let (mut on, mut below) = (0, 0);
@@ -102,7 +118,10 @@ fn is_wide(points: &[DVec3], middle: DVec3, normal: DVec3) -> bool {
         let (a, b) = (offset.dot(x), offset.dot(y));
         (xx, xy, yy) = (xx + a * a, xy + a * b, yy + b * b);
     }
-    let (mean, apart) = ((xx + yy) / 2.0, (((xx - yy) / 2.0).powi(2) + xy * xy).sqrt());
+    let (mean, apart) = (
+        (xx + yy) / 2.0,
+        (((xx - yy) / 2.0).powi(2) + xy * xy).sqrt(),
+    );
     mean - apart >= WIDTH * WIDTH * (mean + apart) && mean > 0.0
 }
 

@@ -55,9 +55,16 @@ impl Surroundings {
         let kept = points.iter().zip(&isolated).filter(|(_, alone)| !**alone);
         let points: Vec<DVec3> = kept.map(|(p, _)| *p).collect();
         let centers: Vec<DVec3> = views.iter().map(View::center).collect();
-        let of = if centers.is_empty() { &points } else { &centers };
+        let of = if centers.is_empty() {
+            &points
+        } else {
+            &centers
+        };
         let center = middle(of).unwrap_or(DVec3::ZERO);
-        let farthest = centers.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
+        let farthest = centers
+            .iter()
+            .map(|c| c.distance(center))
+            .fold(0.0, f64::max);
 
         // 2. The dome beyond both cameras and points.
         let mut distances: Vec<f64> = points.iter().map(|p| p.distance(center)).collect();
@@ -71,7 +78,7 @@ impl Surroundings {
         Self {
             center,
             radius: DOME * if is_length { reach } else { 1.0 },
-            ground: if std::env::var("NOGROUND").is_ok() { None } else { let g = ground::ground(&views, &points, center); eprintln!("ground {:?}", g.map(|g| g.signed_distance(center) / reach)); g },
+            ground: ground::ground(&views, &points, center),
         }
     }
 
@@ -90,7 +97,10 @@ impl Surroundings {
     /// Where the shell lies in a direction (a unit vector) from the middle.
     fn shell(&self, direction: DVec3) -> DVec3 {
         let sinks = |ground: Plane| ground.inverse_distance_from(self.center);
-        let inverse = self.ground.and_then(sinks).map_or(0.0, |q| q.dot(direction));
+        let inverse = self
+            .ground
+            .and_then(sinks)
+            .map_or(0.0, |q| q.dot(direction));
         self.center + direction / inverse.max(1.0 / self.radius)
     }
 
@@ -112,7 +122,12 @@ fn middle(points: &[DVec3]) -> Option<DVec3> {
 fn icosphere(splits: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let mut directions = Vec::new();
-    for (one, phi) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+    for (one, phi) in [
+        (1.0, golden),
+        (-1.0, golden),
+        (1.0, -golden),
+        (-1.0, -golden),
+    ] {
         directions.push(DVec3::new(0.0, one, phi));
         directions.push(DVec3::new(one, phi, 0.0));
         directions.push(DVec3::new(phi, 0.0, one));

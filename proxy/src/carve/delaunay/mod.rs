@@ -14,7 +14,7 @@ mod predicates;
 use super::lattice::Site;
 pub(super) use order::hilbert;
 use order::insertion_order;
-use predicates::{in_sphere, orientation, volume6};
+use predicates::{in_sphere, orientation};
 use std::cmp::Ordering;
 
 /// The vertex at infinity.
@@ -286,7 +286,10 @@ impl Builder {
     fn around_edge(&self, inside: u32, facet: usize, k: usize, kept: u32) -> (u32, u32) {
         let index_of = |t: u32, v: u32| {
             let corners = self.tetrahedra[t as usize];
-            corners.iter().position(|&c| c == v).expect("a shared corner")
+            corners
+                .iter()
+                .position(|&c| c == v)
+                .expect("a shared corner")
         };
         // `third` is the corner beside the edge in the facet that is crossed.
         let (mut at, mut through) = (inside, k);
@@ -351,7 +354,10 @@ impl Builder {
             sites,
             finite,
             tetrahedra: kept.iter().map(|&t| tetrahedra[t as usize]).collect(),
-            across: kept.iter().map(|&t| across[t as usize].map(renamed)).collect(),
+            across: kept
+                .iter()
+                .map(|&t| across[t as usize].map(renamed))
+                .collect(),
         }
     }
 }

@@ -103,7 +103,10 @@ mod tests {
         let four = [corner(0), corner(1), corner(2), corner(4)];
         assert_eq!(in_sphere(four, corner(7)), Ordering::Equal);
         assert_eq!(in_sphere(four, [LAST, LAST, LAST - 1]), Ordering::Greater);
-        assert_eq!(orientation([corner(0), corner(1), corner(2), corner(3)]), Ordering::Equal);
+        assert_eq!(
+            orientation([corner(0), corner(1), corner(2), corner(3)]),
+            Ordering::Equal
+        );
     }
 
     fn site(range: i32) -> impl Strategy<Value = Site> {

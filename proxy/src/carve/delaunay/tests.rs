@@ -1,3 +1,4 @@
+use super::predicates::volume6;
 use super::*;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -19,7 +20,9 @@ fn check(delaunay: &Delaunay) {
             assert_eq!(across[code >> 2][code & 3] as usize, 4 * t + k);
             let facet = |t: usize, k: usize| {
                 let all = tetrahedra[t].iter().enumerate();
-                all.filter(|(i, _)| *i != k).map(|(_, v)| *v).collect::<BTreeSet<_>>()
+                all.filter(|(i, _)| *i != k)
+                    .map(|(_, v)| *v)
+                    .collect::<BTreeSet<_>>()
             };
             assert_eq!(facet(t, k), facet(code >> 2, code & 3));
         }
@@ -61,7 +64,11 @@ fn check(delaunay: &Delaunay) {
 }
 
 fn distinct(sites: Vec<Site>) -> Vec<Site> {
-    sites.into_iter().collect::<BTreeSet<_>>().into_iter().collect()
+    sites
+        .into_iter()
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect()
 }
 
 #[test]
