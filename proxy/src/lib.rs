@@ -1,8 +1,9 @@
 //! The approximate surface that carries rays to the photos.
 //!
 //! A desired ray meets the proxy at a point, and that point is looked up in the photos.
-//! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond) and the sparse
-//! [`points`] themselves, triangulated anew for each desired view.
+//! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond), the sparse [`points`]
+//! themselves, triangulated anew for each desired view, and closed meshes: what the lines of
+//! sight [`carve`], and a distant [`shell()`].
 
 mod axes;
 pub mod carve;
