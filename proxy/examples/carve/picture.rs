@@ -47,10 +47,13 @@ pub(crate) fn depth(view: &View, bvh: &Bvh<'_>, mesh: &Mesh, file: &Path) {
         .collect();
     let mut sorted: Vec<f64> = hits.iter().flatten().map(|h| h.0).collect();
     sorted.sort_by(f64::total_cmp);
+<<<<<<< HEAD
     println!(
         "inverse depths {:.3?}",
         [0, 1, 2, 5, 10, 25, 50, 75, 90, 99].map(|p| sorted[sorted.len() * p / 100])
     );
+=======
+>>>>>>> carve
     let top = sorted[sorted.len() * 98 / 100];
     let picture = RgbImage::from_fn(view.width, view.height, |x, y| {
         match hits[(y * view.width + x) as usize] {
@@ -76,11 +79,10 @@ pub(crate) fn score(
     folder: &Path,
     named: &[(String, View)],
     held_out: &[(String, View)],
-    bvh: &Bvh<'_>,
-    shell: &Bvh<'_>,
+    [bvh, shell]: [&Bvh<'_>; 2],
     points: &[SparsePoint],
-    sources: &[View],
 ) {
+    let sources: Vec<View> = named.iter().map(|(_, view)| view.clone()).collect();
     let load = |(name, view): &(String, View)| {
         let view = small(view);
         let photo = image::open(folder.join(name)).unwrap().to_rgb8();
@@ -102,6 +104,7 @@ pub(crate) fn score(
             let ray = world_from_camera * ray;
             bvh.hit(center, ray).map(|(along, _)| center + ray * along)
         };
+<<<<<<< HEAD
         carved.push(psnr(
             view,
             truth,
@@ -110,12 +113,16 @@ pub(crate) fn score(
             &format!("/tmp/carve-out/p{}-carved.png", carved.len()),
             Some(bvh),
         ));
+=======
+        carved.push(psnr(view, truth, &photos, over_mesh, Some(bvh)));
+>>>>>>> carve
         let over_shell = |ray: DVec3| {
             let ray = world_from_camera * ray;
             shell
                 .hit(center, ray)
                 .map(|(along, _)| center + ray * along)
         };
+<<<<<<< HEAD
         shelled.push(psnr(
             view,
             truth,
@@ -125,12 +132,17 @@ pub(crate) fn score(
             Some(shell),
         ));
         let facets = proxy::points::facets(view, sources, points);
+=======
+        shelled.push(psnr(view, truth, &photos, over_shell, Some(shell)));
+        let facets = proxy::points::facets(view, &sources, points);
+>>>>>>> carve
         if let Some(facets) = facets {
             let over_points = |ray: DVec3| {
                 let q = facets.planes[facets.locate(ray, 0) as usize];
                 let s = q.dot(ray);
                 (s > 0.0).then(|| center + world_from_camera * ray / s)
             };
+<<<<<<< HEAD
             sparse.push(psnr(
                 view,
                 truth,
@@ -139,6 +151,9 @@ pub(crate) fn score(
                 &format!("/tmp/carve-out/p{}-points.png", sparse.len()),
                 None,
             ));
+=======
+            sparse.push(psnr(view, truth, &photos, over_points, None));
+>>>>>>> carve
         }
     }
     let mean =
@@ -157,7 +172,6 @@ fn psnr(
     truth: &RgbImage,
     photos: &[(View, RgbImage)],
     surface: impl Fn(DVec3) -> Option<DVec3> + Sync,
-    file: &str,
     mesh: Option<&Bvh<'_>>,
 ) -> [f64; 3] {
     let blended: Vec<Option<[f64; 3]>> = rays(view)
@@ -166,10 +180,6 @@ fn psnr(
         .collect();
     let covered = blended.iter().flatten().count() as f64;
     let colours: Vec<[f64; 3]> = blended.iter().map(|c| c.unwrap_or_default()).collect();
-    let drawn = RgbImage::from_fn(view.width, view.height, |x, y| {
-        Rgb(colours[(y * view.width + x) as usize].map(|c| c as u8))
-    });
-    drawn.save(file).unwrap();
     let square = |(c, t): (&[f64; 3], &Rgb<u8>)| {
         (0..3)
             .map(|k| (c[k] - f64::from(t.0[k])).powi(2))

@@ -1,12 +1,17 @@
 //! A closed surface carved out of space by the photos' lines of sight.
 //!
-//! The sparse points and a far dome around everything are tetrahedralised (Delaunay), and
+//! The sparse points and the vertices of the [`shell`](crate::shell()) around everything (a far
+//! dome, and the ground where there is one) are tetrahedralised (Delaunay), and
 //! each tetrahedron is free or solid, whichever costs least by the energy of Labatut, Pons and
 //! Keriven (2007, "Efficient multi-view reconstruction of large-scale scenes using interest
 //! points, Delaunay triangulation and graph cuts"; 2009, "Robust and efficient surface
 //! reconstruction from range data"): a minimum s-t cut, found exactly. The surface is all
 //! facets between free and solid. Cameras are always in free space and everything beyond the
-//! dome is solid, so the surface is closed and every ray from a camera meets it.
+//! shell is solid, so the surface is closed and every ray from a camera meets it.
+//!
+//! Nothing is smoothed: vertices moved a tenth of the way to their neighbours' mean raise the
+//! median error at points left out from 0.278 to 0.284 % of the inverse depth (geometric mean
+//! over ten captures), three tenths to 0.313 %.
 
 mod delaunay;
 mod flow;
@@ -20,10 +25,14 @@ use calibrate::View;
 use delaunay::{Delaunay, hilbert};
 use flow::Graph;
 use glam::DVec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use lattice::{Lattice, Site};
 use sight::{OTHERS, Sighting, Softness, UNIT};
+use std::num::NonZero;
 
-/// What can be chosen about carving.
+/// What can be chosen about carving. The defaults were chosen on ten captures, by the surface's
+/// inverse depth at points left out: a softness of 0.25 or 1, a quality of 0.3 or 3, four lines
+/// a point, or solid expected 1 σ behind change the median by −2 to +6 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// At most this many lines of sight of a point count, spread over its photos.
@@ -49,9 +58,12 @@ impl Default for Options {
 }
 
 /// Lines of sight at most: more points have fewer each. Their weights must fit 31 bits.
-const MOST_LINES: usize = 4_000_000;
+const MOST_LINES: usize = 2_000_000;
 /// Of each point, whatever the number of points.
 const FEWEST_LINES_PER_POINT: usize = 2;
+/// Points nearer to a camera than this share of the dome's radius are left out; it is a
+/// hundred lattice steps.
+const TOO_NEAR: f64 = 1e-5;
 /// Costs more than all else together.
 const CERTAIN: i64 = 1 << 60;
 
@@ -106,7 +118,7 @@ const MOST_POINTS: usize = 100_000_000;
 /// The surface between the space that the photos look through and what they see.
 ///
 /// Closed, its triangles counter-clockwise where they are looked at from free space. Its
-/// vertices are sparse points where they lie on it, and the dome's.
+/// vertices are sparse points where they lie on it, and the shell's.
 ///
 /// # Errors
 /// See [`CarveError`].
@@ -115,10 +127,10 @@ pub fn surface(
     points: &[SparsePoint],
     options: &Options,
 ) -> Result<Mesh, CarveError> {
-    // 1. The points that photos see, on the lattice, with the dome around them.
+    // 1. The points that photos see, on the lattice, with the shell around them.
     let scene = Scene::new(sources, points, options)?;
-    // 2. Tetrahedra. The dome spans space whatever the points do.
-    let delaunay = Delaunay::new(scene.sites.clone()).expect("a dome is not flat");
+    // 2. Tetrahedra. The shell spans space whatever the points do.
+    let delaunay = Delaunay::new(scene.sites.clone()).expect("a shell is not flat");
     // 3. What each label costs.
     let graph = energy(&delaunay, &scene, options);
     // 4. The cheapest labelling, and the facets between free and solid.
@@ -131,7 +143,7 @@ struct Scene {
     sites: Vec<Site>,
     /// Of the sites, in the world.
     positions: Vec<DVec3>,
-    /// How many sites come from points; the others are the dome's.
+    /// How many sites come from points; the others are the shell's.
     points: usize,
     sightings: Vec<Sighting>,
     /// The cameras' centres, in lattice steps.
@@ -163,12 +175,16 @@ impl Scene {
             });
         }
 
-        // 2. Snapped. Along a curve through space what is near in the world is near in memory.
         let around = Surroundings::of(sources, used.iter().map(|(p, _)| *p));
-        let lattice = Lattice::around(around.center, around.radius);
         for (position, _) in &mut used {
             *position = around.within(*position);
         }
+        // A camera on the surface would be neither here nor there.
+        let clear = clearance(sources, TOO_NEAR * around.radius);
+        used.retain(|(position, _)| clear(*position));
+
+        // 2. Snapped. Along a curve through space what is near in the world is near in memory.
+        let lattice = Lattice::around(around.center, around.radius);
         let mut snapped: Vec<(u64, Site, usize)> = used
             .iter()
             .enumerate()
@@ -196,7 +212,7 @@ impl Scene {
             positions.push(used[same[0].2].0);
         }
 
-        // 3. The dome, of which no vertex is a point's.
+        // 3. The shell, of which no vertex is a point's.
         let points = sites.len();
         for position in around.vertices() {
             sites.push(lattice.snap(position));
@@ -241,6 +257,25 @@ fn check(sources: &[View], points: &[SparsePoint]) -> Result<(), CarveError> {
     Ok(())
 }
 
+/// Tells places that are farther than `distance` from all cameras.
+fn clearance(sources: &[View], distance: f64) -> impl Fn(DVec3) -> bool {
+    let centers: Vec<[f64; 3]> = sources.iter().map(|v| v.center().to_array()).collect();
+    let tree: Option<ImmutableKdTree<f64, 3>> = ImmutableKdTree::new_from_slice(&centers).ok();
+    move |place| {
+        let Some(tree) = &tree else {
+            return true;
+        };
+        let place = place.to_array();
+        let nearest = tree
+            .query(&place)
+            .nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN)
+            .execute();
+        nearest
+            .iter()
+            .all(|found| found.distance > distance * distance)
+    }
+}
+
 /// At most `most` of them, evenly spread.
 fn spread(all: Vec<u32>, most: usize) -> Vec<u32> {
     if all.len() <= most {
@@ -272,14 +307,14 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         .map(|(free, solid)| i64::from(free.into_inner()) - i64::from(solid.into_inner()))
         .collect();
 
-    // 2. The facets' quality, the same both ways; beyond the dome all is solid.
+    // 2. The facets' quality, the same both ways. The shell's own facets cost nothing: where
+    // nothing is known, space is free as far as the shell.
     let cosines = quality::cosines(delaunay);
     let most = f64::from(UNIT) * options.quality.clamp(0.0, 1e4);
     for t in 0..delaunay.finite {
         for k in 0..4 {
             let code = delaunay.across[t][k] as usize;
             if delaunay.is_ghost(code as u32 >> 2) {
-                terminal[t] -= (env("HULL", 0.0) * most) as i64;
                 continue;
             }
             let least = cosines[t][k].min(cosines[code >> 2][code & 3]);
@@ -288,6 +323,7 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         }
     }
 
+<<<<<<< HEAD
     // weak priors
     let above = (env("ABOVE", 0.0) * f64::from(UNIT)) as i64;
     if above != 0 {
@@ -301,6 +337,8 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
             }
         }
     }
+=======
+>>>>>>> carve
     // 3. Cameras are free.
     let mut near = 0;
     for &site in &scene.camera_sites {
@@ -339,8 +377,4 @@ fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh 
         }
     }
     mesh
-}
-
-fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).map_or(default, |v| v.parse().unwrap())
 }

@@ -29,7 +29,7 @@ const CHUNKS: usize = 64;
 pub(super) struct Sighting {
     /// The vertex of the observed point.
     pub(super) vertex: u32,
-    /// The cameras' centres, in lattice steps.
+    /// Indices of the cameras that see it.
     pub(super) cameras: Vec<u32>,
 }
 

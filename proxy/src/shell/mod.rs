@@ -78,6 +78,7 @@ impl Surroundings {
         Self {
             center,
             radius: DOME * if is_length { reach } else { 1.0 },
+<<<<<<< HEAD
             ground: if std::env::var("NOGROUND").is_ok() {
                 None
             } else {
@@ -85,6 +86,9 @@ impl Surroundings {
                 eprintln!("ground {:?}", g.map(|g| g.signed_distance(center) / reach));
                 g
             },
+=======
+            ground: ground::ground(&views, &points, center),
+>>>>>>> carve
         }
     }
 

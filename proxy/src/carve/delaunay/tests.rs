@@ -1,3 +1,4 @@
+use super::predicates::volume6;
 use super::*;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
