@@ -47,13 +47,6 @@ pub(crate) fn depth(view: &View, bvh: &Bvh<'_>, mesh: &Mesh, file: &Path) {
         .collect();
     let mut sorted: Vec<f64> = hits.iter().flatten().map(|h| h.0).collect();
     sorted.sort_by(f64::total_cmp);
-<<<<<<< HEAD
-    println!(
-        "inverse depths {:.3?}",
-        [0, 1, 2, 5, 10, 25, 50, 75, 90, 99].map(|p| sorted[sorted.len() * p / 100])
-    );
-=======
->>>>>>> carve
     let top = sorted[sorted.len() * 98 / 100];
     let picture = RgbImage::from_fn(view.width, view.height, |x, y| {
         match hits[(y * view.width + x) as usize] {
@@ -104,56 +97,22 @@ pub(crate) fn score(
             let ray = world_from_camera * ray;
             bvh.hit(center, ray).map(|(along, _)| center + ray * along)
         };
-<<<<<<< HEAD
-        carved.push(psnr(
-            view,
-            truth,
-            &photos,
-            over_mesh,
-            &format!("/tmp/carve-out/p{}-carved.png", carved.len()),
-            Some(bvh),
-        ));
-=======
         carved.push(psnr(view, truth, &photos, over_mesh, Some(bvh)));
->>>>>>> carve
         let over_shell = |ray: DVec3| {
             let ray = world_from_camera * ray;
             shell
                 .hit(center, ray)
                 .map(|(along, _)| center + ray * along)
         };
-<<<<<<< HEAD
-        shelled.push(psnr(
-            view,
-            truth,
-            &photos,
-            over_shell,
-            "/tmp/carve-out/shell.png",
-            Some(shell),
-        ));
-        let facets = proxy::points::facets(view, sources, points);
-=======
         shelled.push(psnr(view, truth, &photos, over_shell, Some(shell)));
         let facets = proxy::points::facets(view, &sources, points);
->>>>>>> carve
         if let Some(facets) = facets {
             let over_points = |ray: DVec3| {
                 let q = facets.planes[facets.locate(ray, 0) as usize];
                 let s = q.dot(ray);
                 (s > 0.0).then(|| center + world_from_camera * ray / s)
             };
-<<<<<<< HEAD
-            sparse.push(psnr(
-                view,
-                truth,
-                &photos,
-                over_points,
-                &format!("/tmp/carve-out/p{}-points.png", sparse.len()),
-                None,
-            ));
-=======
             sparse.push(psnr(view, truth, &photos, over_points, None));
->>>>>>> carve
         }
     }
     let mean =

@@ -323,22 +323,6 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
         }
     }
 
-<<<<<<< HEAD
-    // weak priors
-    let above = (env("ABOVE", 0.0) * f64::from(UNIT)) as i64;
-    if above != 0 {
-        for t in 0..delaunay.finite {
-            let n = delaunay.tetrahedra[t]
-                .iter()
-                .filter(|v| !is_point(**v))
-                .count() as i64;
-            if n > 0 {
-                terminal[t] += above;
-            }
-        }
-    }
-=======
->>>>>>> carve
     // 3. Cameras are free.
     let mut near = 0;
     for &site in &scene.camera_sites {

@@ -78,17 +78,7 @@ impl Surroundings {
         Self {
             center,
             radius: DOME * if is_length { reach } else { 1.0 },
-<<<<<<< HEAD
-            ground: if std::env::var("NOGROUND").is_ok() {
-                None
-            } else {
-                let g = ground::ground(&views, &points, center);
-                eprintln!("ground {:?}", g.map(|g| g.signed_distance(center) / reach));
-                g
-            },
-=======
             ground: ground::ground(&views, &points, center),
->>>>>>> carve
         }
     }
 
