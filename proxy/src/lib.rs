@@ -2,7 +2,8 @@
 //!
 //! A desired ray meets the proxy at a point, and that point is looked up in the photos.
 //! The surfaces are the [`Plane`] of Buehler et al. 2001 (§5, Pond) and the sparse
-//! [`points`] themselves, triangulated anew for each desired view.
+//! [`points`] themselves, triangulated anew for each desired view. A [`Mesh`] comes from
+//! [`depth`] maps, or from a file ([`mesh::read`]).
 
 mod axes;
 mod cloud;

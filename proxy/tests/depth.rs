@@ -469,7 +469,7 @@ fn what_cannot_be_fused_is_said() {
         "the camera of depth map 0 has no finite pose; leave it out"
     );
     assert_eq!(
-        error(&[good.clone()], &voxels(f64::NAN)),
+        error(std::slice::from_ref(&good), &voxels(f64::NAN)),
         "the voxels' size is NaN; it must be positive, in world units"
     );
     let lost = fuse(1, |_| Err("no such file"), &standard).unwrap_err();
