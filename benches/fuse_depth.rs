@@ -20,7 +20,7 @@ fn main() {
         false => given,
     };
     println!(
-        "{:16} {:>8} {:>9} {:>8} {:>7} {:>7} {:>7} | {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "{:16} {:>8} {:>9} {:>8} {:>7} {:>7} {:>7} | {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
         "capture",
         "voxel",
         "triangles",
@@ -29,6 +29,7 @@ fn main() {
         "CPU s",
         "MB",
         "mean",
+        "of near",
         "median",
         "95 %",
         "complete",
@@ -69,7 +70,7 @@ fn main() {
             };
             let errors = errors(&fusion.mesh, &capture.held_out, 0.05);
             println!(
-                "{:16} {:8.4} {:9} {:8} {:7.2} {:7.2} {:7.0} | {:8.4} {:8.4} {:8.4} {:8.4} {:8.4} {:8.4}",
+                "{:16} {:8.4} {:9} {:8} {:7.2} {:7.2} {:7.0} | {:8.4} {:8.4} {:8.4} {:8.4} {:8.4} {:8.4} {:8.4}",
                 folder.file_name().unwrap_or_default().to_string_lossy(),
                 fusion.voxel_size,
                 fusion.mesh.triangles.len(),
@@ -78,6 +79,7 @@ fn main() {
                 cpu.as_secs_f64(),
                 held / 1e6,
                 errors.mean,
+                errors.mean_near,
                 errors.median,
                 errors.percentile_95,
                 errors.complete,

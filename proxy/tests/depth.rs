@@ -207,14 +207,6 @@ fn a_room_is_flat_and_turned_inwards() {
     };
     let count = (0..mesh.triangles.len()).filter(inwards).count();
     let share = count as f64 / mesh.triangles.len() as f64;
-    if share < 0.999 {
-        for i in (0..mesh.triangles.len())
-            .filter(|i| !inwards(i))
-            .step_by(50)
-        {
-            eprintln!("{:?}", mesh.corners(i));
-        }
-    }
     assert!(share > 0.999, "{share}");
 }
 
@@ -477,7 +469,7 @@ fn what_cannot_be_fused_is_said() {
         "the camera of depth map 0 has no finite pose; leave it out"
     );
     assert_eq!(
-        error(&[good.clone()], &voxels(f64::NAN)),
+        error(std::slice::from_ref(&good), &voxels(f64::NAN)),
         "the voxels' size is NaN; it must be positive, in world units"
     );
     let lost = fuse(1, |_| Err("no such file"), &standard).unwrap_err();
@@ -529,15 +521,16 @@ fn a_walk_through_a_house_is_met_by_depth_maps_held_out() {
     };
     let capture = common::capture(&folder);
     let used = &capture.used;
-    let fusion = fuse(used.len(), |i| common::decode(&used[i]), &voxels(0.05)).unwrap();
-    let errors = common::errors(&fusion.mesh, &capture.held_out[..3], 0.05);
+    let fusion = fuse(used.len(), |i| common::decode(&used[i]), &voxels(0.04)).unwrap();
+    let errors = common::errors(&fusion.mesh, &capture.held_out, 0.05);
     eprintln!("{errors:?}");
     assert!(
-        errors.median < 0.002 && errors.percentile_95 < 0.05,
+        errors.median < 0.001 && errors.percentile_95 < 0.03,
         "{errors:?}"
     );
+    // The depth maps used show 95 % of those held out.
     assert!(
-        errors.complete > 0.8 && errors.in_front < 0.005,
+        errors.complete > 0.88 && errors.in_front < 0.005,
         "{errors:?}"
     );
 }

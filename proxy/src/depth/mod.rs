@@ -154,8 +154,9 @@ pub enum DepthError {
 /// Depth maps of which the noise is estimated, spread over all.
 const JUDGED: usize = 12;
 /// The voxels' side in pixels as wide as a depth map's at the median depth, and in standard
-/// deviations of depth there. Finer voxels show nothing more.
-const VOXEL_PER_PIXEL: f64 = 1.5;
+/// deviations of depth there. Of house-walk, voxels of 1.5 pixels have a 95 % error of 4.2 mm
+/// instead of 6.1, and three quarters more triangles.
+const VOXEL_PER_PIXEL: f64 = 2.0;
 const VOXEL_PER_NOISE: f64 = 2.0;
 /// How far from a surface distances are kept, in voxels: all around a cell that it crosses,
 /// and so far before it that a silhouette cannot pass for a surface; and in standard

@@ -13,6 +13,9 @@ const WIDE: usize = SIDE + 1;
 /// Distances change by no more than a voxel's side from one voxel to the next; where they do
 /// by more than so many, free space meets what lies behind a silhouette.
 const MAX_CHANGE: f64 = 2.0;
+/// The surface lies so many voxels behind the distances' zero, so that where a wall passes
+/// exactly through voxels rounding does not decide which of them are outside.
+const BEHIND_ZERO: f64 = 1e-4;
 
 /// The eight corners of a cell, and the edges between them: pairs that differ in one bit.
 const EDGES: [(usize, usize); 12] = [
@@ -162,6 +165,7 @@ pub(super) fn surface(volume: &Volume) -> Mesh {
 fn values(volume: &Volume, block_idx: usize) -> Box<[f32; WIDE * WIDE * WIDE]> {
     let mut values = Box::new([f32::NAN; WIDE * WIDE * WIDE]);
     let side = SIDE as i32;
+    let behind_zero = (BEHIND_ZERO * volume.grid.voxel_size / volume.band.before) as f32;
     for i in 0..8 {
         let Some(block) = (match i {
             0 => Some(block_idx),
@@ -174,7 +178,8 @@ fn values(volume: &Volume, block_idx: usize) -> Box<[f32; WIDE * WIDE * WIDE]> {
             for y in 0..extent.y {
                 for x in 0..extent.x {
                     let at = IVec3::new(x, y, z);
-                    values[wide(at + bits(i) * side)] = volume.blocks[block][pack(at)].value();
+                    values[wide(at + bits(i) * side)] =
+                        volume.blocks[block][pack(at)].value() + behind_zero;
                 }
             }
         }

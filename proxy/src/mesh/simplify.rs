@@ -11,8 +11,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// The share of edges that a pass considers: with more, dear edges would go while cheap ones
-/// next to contracted ones wait.
+/// next to contracted ones wait. It grows where few of the cheapest can go.
 const SHARE: f64 = 0.3;
+/// A pass that removes less than this share of the triangles achieved little.
+const LITTLE: f64 = 0.02;
 /// The weight of planes that hold borders in place, in squares of the border's edges.
 const BORDER_WEIGHT: f64 = 4.0;
 /// Triangles may turn by up to the angle with this cosine.
@@ -33,11 +35,16 @@ impl Mesh {
         mesh.triangles
             .retain(|[a, b, c]| a != b && b != c && c != a);
         let mut quadrics = quadrics(&mesh);
+        let mut share = SHARE;
         while mesh.triangles.len() > max_triangles {
             let before = mesh.triangles.len();
-            pass(&mut mesh, &mut quadrics, max_triangles);
-            if mesh.triangles.len() == before {
-                break;
+            pass(&mut mesh, &mut quadrics, max_triangles, share);
+            let removed = (before - mesh.triangles.len()) as f64 / before as f64;
+            if removed < LITTLE {
+                if share >= 1.0 {
+                    break;
+                }
+                share *= 2.0;
             }
         }
         mesh.drop_unused();
@@ -142,7 +149,7 @@ struct Candidate {
     position: DVec3,
 }
 
-fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize) {
+fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize, share: f64) {
     // 1. What each edge costs.
     let edges = edges(mesh);
     let mut is_border = vec![false; mesh.positions.len()];
@@ -174,7 +181,7 @@ fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize) {
     let mut candidates: Vec<Candidate> = edges.par_iter().filter_map(candidate).collect();
     drop(edges);
     let order = |a: &Candidate, b: &Candidate| a.cost.total_cmp(&b.cost).then(a.ends.cmp(&b.ends));
-    let considered = ((candidates.len() as f64 * SHARE) as usize).max(64);
+    let considered = ((candidates.len() as f64 * share) as usize).max(64);
     if considered < candidates.len() {
         candidates.select_nth_unstable_by(considered, order);
         candidates.truncate(considered);

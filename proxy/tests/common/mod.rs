@@ -153,8 +153,10 @@ pub fn shown(capture: &Capture, near: f64) -> f64 {
 /// How a surface compares with depth maps.
 #[derive(Debug)]
 pub struct Errors {
-    /// Of depths where both have one.
+    /// Of depths where both have one: what is seen through holes included.
     pub mean: f64,
+    /// Of those within `near`.
+    pub mean_near: f64,
     pub median: f64,
     pub percentile_95: f64,
     /// The share of known depths that the surface meets within `near`.
@@ -187,6 +189,7 @@ pub fn errors(mesh: &Mesh, truth: &[(View, PathBuf)], near: f64) -> Errors {
     let share = |n: usize| n as f64 / known as f64;
     Errors {
         mean: errors.iter().sum::<f64>() / errors.len() as f64,
+        mean_near: errors[..complete].iter().sum::<f64>() / complete as f64,
         median: errors[errors.len() / 2],
         percentile_95: errors[errors.len() * 95 / 100],
         complete: share(complete),

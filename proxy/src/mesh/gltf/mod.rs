@@ -141,7 +141,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
 }
 
 /// The JSON and the binary chunk of a GLB.
-pub(crate) fn container(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
+fn container(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let not_glb = |what: &str| format!("not a glTF file: {what}");
     let word = |at: usize| {
         let bytes = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
