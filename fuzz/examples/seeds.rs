@@ -95,7 +95,7 @@ impl Corpus {
         }
         let plane = proxy::Plane::new(glam::DVec3::Z, glam::DVec3::Z).map_err(io::Error::other)?;
         let file = std::env::temp_dir().join(format!("lumigraph-fuzz-{}.glb", std::process::id()));
-        proxy::write(&file, &proxy::Proxy::Plane(plane), &[]).map_err(io::Error::other)?;
+        proxy::write(&file, &proxy::Proxy::Plane(plane), &[], &[]).map_err(io::Error::other)?;
         self.add("proxy_glb", "own", &fs::read(&file)?)?;
         fs::remove_file(file)?;
         let square = proxy::Mesh {

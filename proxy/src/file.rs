@@ -295,7 +295,7 @@ mod tests {
         ];
         for name in ["p.json", "p.glb"] {
             let path = folder.path().join(name);
-            write(&path, &Proxy::Plane(plane), &shown).unwrap();
+            write(&path, &Proxy::Plane(plane), &shown, &[]).unwrap();
             let back = read(&path).unwrap().plane().unwrap();
             assert_eq!(back.point(), plane.point());
             assert!((back.normal() - plane.normal()).length() < 1e-15);
@@ -341,13 +341,74 @@ mod tests {
         let nothing = r#"{"asset": {"version": "2.0"},
             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"#;
         let error = message("a.glb", nothing);
-        assert!(
-            error.starts_with("DIR/a.glb: this mesh does not say"),
-            "{error}"
-        );
+        assert!(error.starts_with("DIR/a.glb"), "{error}");
         assert_eq!(
             message("a.stl", ""),
-            "DIR/a.stl: proxies are read and written as .json (exact) or .glb"
+            "DIR/a.stl: proxies are read from .json, .glb, .gltf, .ply and .obj, and written as \
+             .json or .ply (exact) or .glb"
+        );
+    }
+
+    #[test]
+    fn every_kind_comes_back_from_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let corner = |x: f64, y: f64| DVec3::new(5e5 + x / 3.0, 5e6 - y / 7.0, 0.1 * x * y);
+        let mesh = mesh::Mesh {
+            positions: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        let dense = DensePoints {
+            names: vec!["a b.jpg".to_owned(), "ü.jpg".to_owned()],
+            points: vec![SparsePoint {
+                position: corner(1.0, 2.0),
+                seen_by: vec![0, 1],
+            }],
+        };
+        let mut proxies = vec![
+            ("json", Proxy::ViewPlane),
+            ("json", Proxy::Points),
+            ("json", Proxy::Dense(Arc::new(dense))),
+        ];
+        for kind in MeshKind::ALL {
+            let solid = Proxy::Mesh(Arc::new(Solid::new(kind, mesh.clone())));
+            proxies.push(("ply", solid.clone()));
+            proxies.push(("glb", solid));
+        }
+        for (extension, proxy) in proxies {
+            let path = folder.path().join(format!("p.{extension}"));
+            write(&path, &proxy, &[], &[]).unwrap();
+            let back = read(&path).unwrap();
+            assert_eq!(back.kind(), proxy.kind());
+            if extension != "glb" {
+                assert_eq!(back, proxy);
+            }
+        }
+        // What a format cannot hold is told.
+        let path = folder.path().join("p.json");
+        let solid = Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh)));
+        let error = write(&path, &solid, &[], &[]).unwrap_err().to_string();
+        assert!(error.contains(".ply"), "{error}");
+        let path = folder.path().join("p.ply");
+        assert!(write(&path, &Proxy::Points, &[], &[]).is_err());
+    }
+
+    #[test]
+    fn dense_points_that_contradict_themselves_are_told() {
+        let told = |text: &str| {
+            parse(Path::new("d.json"), text.as_bytes())
+                .unwrap_err()
+                .to_string()
+        };
+        let error = told(
+            r#"{"version": 1, "kind": "dense", "views": ["a"], "points": [[0,0,1]], "seen_by": [[1]]}"#,
+        );
+        assert!(error.contains("point 0 is seen by view 1 of 1"), "{error}");
+        let error = told(
+            r#"{"version": 1, "kind": "dense", "views": ["a"], "points": [[0,0,1]], "seen_by": []}"#,
+        );
+        assert!(
+            error.contains("1 points, and who sees 0 of them"),
+            "{error}"
         );
     }
 }

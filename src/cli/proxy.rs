@@ -2,20 +2,29 @@
 
 use super::Usage;
 use super::options::{HoldOutArgs, SceneArgs, triple};
-use super::output::{make_parent, print};
+use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
-use ::proxy::{Plane, Proxy};
+use ::proxy::{MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
+use anyhow::Context;
+use calibrate::{Pixel, View};
 use clap::ValueEnum;
-use glam::DVec3;
+use glam::{DMat4, DVec3};
+use lumigraph::scene::{Kind as Fit, Scene};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Fit the surface that carries rays to the photos, or give it by hand
 ///
-/// Without -o it becomes the scene's own. A .json file holds it exactly; a .glb can be
-/// looked at elsewhere, and read back.
+/// Without -o it becomes the scene's own. A .json file (.ply for meshes) holds it exactly; a
+/// .glb can be looked at elsewhere, with the cameras, and read back.
 ///
-///     lumigraph proxy my-scene plane
-///     lumigraph proxy my-scene plane --point 0,0,4 --normal 0,-0.1,1 -o plane.glb
+///     lumigraph proxy my-scene auto
+///     lumigraph proxy my-scene carved -o carved.glb
+///     lumigraph proxy my-scene plane --point 0,0,4 --normal 0,-0.1,1
+///     lumigraph proxy my-scene plane --through 0,0,4 --through 1,0,4 --through 0,1,5
+///     lumigraph proxy my-scene plane --focus a.jpg:320,240
+///     lumigraph proxy my-scene mesh house.obj
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -24,6 +33,11 @@ pub(super) struct Args {
     /// What kind of surface
     #[arg(value_enum)]
     kind: Kind,
+    /// For `mesh`: the file, .glb, .gltf, .ply or .obj
+    mesh: Option<PathBuf>,
+    /// For `mesh`: what takes its coordinates to the scene's, 16 numbers row by row
+    #[arg(long, value_name = "M11,M12,…", value_parser = matrix, allow_hyphen_values = true)]
+    transform: Option<DMat4>,
     /// A point on the plane, in the world
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, requires = "normal",
         allow_hyphen_values = true)]
@@ -32,50 +46,68 @@ pub(super) struct Args {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, requires = "point",
         allow_hyphen_values = true)]
     normal: Option<DVec3>,
+    /// One of three points on the plane, in the world
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true,
+        conflicts_with = "point")]
+    through: Vec<DVec3>,
+    /// A photo and a pixel of it: the plane parallel to the photo through what shows there
+    #[arg(long, value_name = "PHOTO:X,Y", conflicts_with_all = ["point", "through"])]
+    focus: Option<String>,
     #[command(flatten)]
     hold_out: HoldOutArgs,
-    /// A file to write it to, .json or .glb
+    /// A file to write it to, .json, .ply or .glb
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Kind {
+    /// The one of those below that shows best what photos left out for it show
+    Auto,
     /// Parallel to the image planes, at the points' mean inverse depth
     Plane,
+    /// The plane that most sparse points lie on
+    DominantPlane,
+    /// A plane through what each view sees of the points, fitted anew for each; equal rays
+    /// no longer meet equal points
+    ViewPlane,
+    /// A box around the way through a hallway
+    Tunnel,
+    /// What the photos' silhouettes leave of space
+    Hull,
     /// The sparse points that views like the desired one observe, triangulated anew for
     /// every view
     Points,
-    /// These points, and those that photos agree on between them
+    /// A closed mesh of the sparse points, free space carved away
+    Carved,
+    /// The photos' depth maps, fused
+    Depth,
+    /// The sparse points, and those that photos agree on between them
     Dense,
-    /// The one of them that shows best what photos left out for it show
-    Auto,
+    /// A mesh from elsewhere
+    Mesh,
 }
 
 impl Kind {
-    /// `None` for the best.
-    fn fitted(self) -> Option<lumigraph::scene::Kind> {
-        use lumigraph::scene::Kind as Of;
+    /// `None` for what is not fitted, or chosen.
+    fn fitted(self) -> Option<Fit> {
         match self {
-            Self::Auto => None,
-            Self::Plane => Some(Of::Plane),
-            Self::Points => Some(Of::Points),
-            Self::Dense => Some(Of::Dense),
+            Self::Auto | Self::Mesh => None,
+            Self::Plane => Some(Fit::Plane),
+            Self::DominantPlane => Some(Fit::DominantPlane),
+            Self::ViewPlane => Some(Fit::ViewPlane),
+            Self::Tunnel => Some(Fit::Tunnel),
+            Self::Hull => Some(Fit::Hull),
+            Self::Points => Some(Fit::Points),
+            Self::Carved => Some(Fit::Carved),
+            Self::Depth => Some(Fit::Depth),
+            Self::Dense => Some(Fit::Dense),
         }
     }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let by_hand = match (args.point, args.normal) {
-        (Some(_), Some(_)) if args.kind != Kind::Plane => {
-            let message = "--point and --normal describe a plane; write `plane`";
-            return Err(Usage(message.to_owned()).into());
-        }
-        (Some(point), Some(normal)) => {
-            Some(Plane::new(point, normal).map_err(|e| Usage(e.to_string()))?)
-        }
-        _ => None,
-    };
+    check(args)?;
     let mut scene = args.scene.open()?;
     if args.output.is_none() && scene.folder.is_none() {
         return Err(Usage(format!(
@@ -86,9 +118,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .into());
     }
     let without = args.hold_out.names(&scene)?;
-
-    let (proxy, how, fitted_without) = match by_hand {
-        Some(plane) => (Proxy::Plane(plane), "given by hand".to_owned(), None),
+    let (proxy, how, fitted_without) = match by_hand(args, &scene, &without)? {
+        Some((proxy, how)) => (proxy, how, None),
         None => {
             let fitted = fit(&scene, args.kind.fitted(), &without)?;
             (fitted.proxy, fitted.how, Some(&without))
@@ -96,14 +127,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let file = match &args.output {
         Some(file) => {
-            let shown: Vec<DVec3> = scene
-                .reconstruction
-                .points
-                .values()
-                .map(|p| p.position)
-                .collect();
+            let points = scene.reconstruction.points.values();
+            let shown: Vec<DVec3> = points.map(|p| p.position).collect();
             make_parent(file)?;
-            ::proxy::write(file, &proxy, &shown)?;
+            ::proxy::write(file, &proxy, &shown, &cameras(&scene)?)?;
             file.clone()
         }
         None => scene.set_proxy(proxy.clone(), fitted_without)?,
@@ -113,4 +140,118 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         file.display(),
         proxy_text(&proxy)
     ))
+}
+
+/// Options that belong to other kinds of surface.
+fn check(args: &Args) -> Result<(), Usage> {
+    let plane = args.point.is_some() || !args.through.is_empty() || args.focus.is_some();
+    let message = if plane && args.kind != Kind::Plane {
+        "--point, --normal, --through and --focus describe a plane; write `plane`"
+    } else if args.kind == Kind::Mesh && args.mesh.is_none() {
+        "give the mesh's file: `lumigraph proxy SCENE mesh FILE`"
+    } else if args.kind != Kind::Mesh && (args.mesh.is_some() || args.transform.is_some()) {
+        "a file and --transform belong to the kind `mesh`"
+    } else if !args.through.is_empty() && args.through.len() != 3 {
+        "--through takes three points: write it three times"
+    } else {
+        return Ok(());
+    };
+    Err(Usage(message.to_owned()))
+}
+
+/// What is given rather than fitted, and how.
+fn by_hand(
+    args: &Args,
+    scene: &Scene,
+    without: &BTreeSet<String>,
+) -> anyhow::Result<Option<(Proxy, String)>> {
+    let given = |plane| Some((Proxy::Plane(plane), "given by hand".to_owned()));
+    if let (Some(point), Some(normal)) = (args.point, args.normal) {
+        return Ok(given(
+            Plane::new(point, normal).map_err(|e| Usage(e.to_string()))?,
+        ));
+    }
+    if let [a, b, c] = args.through[..] {
+        return Ok(given(
+            Plane::through([a, b, c]).map_err(|e| Usage(e.to_string()))?,
+        ));
+    }
+    if let Some(focus) = &args.focus {
+        let (name, pixel) = focused(focus)?;
+        let view = scene.view(name)?;
+        let rest = scene.reconstruction.without_images(without);
+        let id = rest.images.iter().find(|(_, image)| image.name == name);
+        let seen = rest.points.values().filter(|p| {
+            let mut track = p.track.iter();
+            id.is_some_and(|(id, _)| track.any(|(image, _)| image == id))
+        });
+        let seen: Vec<DVec3> = seen.map(|p| p.position).collect();
+        let plane = plane_focused_on(&view, pixel, &seen)
+            .with_context(|| format!("cannot focus on {focus}"))?;
+        return Ok(Some((Proxy::Plane(plane), format!("focused on {focus}"))));
+    }
+    if let Some(file) = &args.mesh {
+        let mut mesh = mesh::read(file)?;
+        if let Some(transform) = &args.transform {
+            mesh.transform(transform);
+        }
+        let views: Vec<View> = cameras(scene)?.into_iter().map(|(_, view)| view).collect();
+        let share = mesh::lies_where_cameras_look(&mesh, &views);
+        if share < LEAST_SEEN {
+            say!(
+                "warning: only {:.1} % of what the photos look at meets the mesh; give \
+                 --transform if its axes or units are not the scene's",
+                100.0 * share
+            );
+        }
+        let how = format!(
+            "from {}; {:.1} % of what the photos look at meets it",
+            file.display(),
+            100.0 * share
+        );
+        let solid = Solid::new(MeshKind::Mesh, mesh);
+        return Ok(Some((Proxy::Mesh(Arc::new(solid)), how)));
+    }
+    Ok(None)
+}
+
+/// A mesh that fewer rays than this share meet probably lies elsewhere.
+const LEAST_SEEN: f64 = 0.2;
+
+/// The photos' cameras, by name.
+fn cameras(scene: &Scene) -> anyhow::Result<Vec<(String, View)>> {
+    let photos = scene.photos.iter();
+    photos
+        .map(|photo| Ok((photo.name.clone(), scene.view(&photo.name)?)))
+        .collect()
+}
+
+/// A photo's name and a pixel of it.
+fn focused(text: &str) -> Result<(&str, Pixel), Usage> {
+    let parsed = || {
+        let (name, at) = text.rsplit_once(':')?;
+        let (x, y) = at.split_once(',')?;
+        Some((
+            name,
+            Pixel::new(x.trim().parse().ok()?, y.trim().parse().ok()?),
+        ))
+    };
+    parsed().ok_or_else(|| {
+        Usage(format!(
+            "--focus {text}: expected PHOTO:X,Y, as a.jpg:320,240"
+        ))
+    })
+}
+
+fn matrix(text: &str) -> Result<DMat4, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let numbers = numbers.map_err(|e| format!("{e}; expected 16 numbers, row by row"))?;
+    let rows: [f64; 16] = numbers
+        .try_into()
+        .map_err(|n: Vec<f64>| format!("{} numbers; expected 16, row by row", n.len()))?;
+    let matrix = DMat4::from_cols_array(&rows).transpose();
+    if !matrix.is_finite() || matrix.determinant() == 0.0 {
+        return Err("it flattens space; expected an invertible matrix".to_owned());
+    }
+    Ok(matrix)
 }

@@ -15,7 +15,8 @@ use std::path::Path;
 /// Which surface.
 #[derive(Args)]
 pub(super) struct ProxyArgs {
-    /// plane, points, dense, auto, or a proxy's file (.json or .glb) [default: the scene's own, else
+    /// plane, dominant-plane, view-plane, tunnel, hull, points, carved, depth, dense, auto, or
+    /// a file: a proxy's (.json, .ply, .glb) or a mesh (.gltf, .obj) [default: the scene's own, else
     /// auto]
     #[arg(long, value_name = "KIND|FILE")]
     pub(super) proxy: Option<String>,
@@ -78,8 +79,9 @@ impl ProxyArgs {
                 trials: Vec::new(),
             }),
             Some(other) => Err(Usage(format!(
-                "--proxy {other}: expected plane, points, dense, auto, or a file ending in .json or \
-                 .glb"
+                "--proxy {other}: expected {}, auto, or a file ending in {}",
+                Kind::ALL.map(Kind::name).join(", "),
+                FILES.map(|e| format!(".{e}")).join(", ")
             ))
             .into()),
             None => match &scene.proxy {
@@ -107,9 +109,12 @@ impl ProxyArgs {
     }
 }
 
+/// What proxies' files end in.
+const FILES: [&str; 5] = ["json", "glb", "gltf", "ply", "obj"];
+
 fn is_proxy_file(name: &str) -> bool {
     let extension = Path::new(name).extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("json") || extension.eq_ignore_ascii_case("glb")
+    FILES.iter().any(|e| extension.eq_ignore_ascii_case(e))
 }
 
 impl ChosenProxy {
@@ -143,6 +148,7 @@ pub(super) fn proxy_json(proxy: &Proxy) -> Value {
 pub(super) fn proxy_text(proxy: &Proxy) -> String {
     let plane = match proxy {
         Proxy::Plane(plane) => plane,
+        Proxy::ViewPlane => return "a plane for every view".to_owned(),
         Proxy::Points => {
             return "the sparse points that views like the desired one observe".to_owned();
         }

@@ -85,7 +85,14 @@ impl Scene {
     fn may_have(&self, kind: Kind) -> bool {
         match kind {
             Kind::Plane => true,
-            Kind::Points | Kind::Dense => self.reconstruction.points.len() >= 3,
+            Kind::DominantPlane
+            | Kind::ViewPlane
+            | Kind::Tunnel
+            | Kind::Points
+            | Kind::Carved
+            | Kind::Dense => self.reconstruction.points.len() >= 3,
+            Kind::Hull => self.photos.iter().all(|p| p.object_matte.is_some()),
+            Kind::Depth => self.photos.iter().any(|p| p.depth_map.is_some()),
         }
     }
 

@@ -52,6 +52,9 @@ pub enum SceneError {
     /// A proxy could not be tried out.
     #[error("{0}")]
     Trial(String),
+    /// A kind of proxy does not suit the scene.
+    #[error("{0}")]
+    Unfit(String),
     /// The list of times cannot be read.
     #[error(transparent)]
     Times(#[from] capture::TimeListError),

@@ -3,9 +3,14 @@
 use super::auto::Trial;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
+use glam::DVec3;
 use image::RgbaImage;
 use proxy::dense::{DenseOptions, DensePoints, densify};
-use proxy::{FitBasis, FitError, PlaneFit, Proxy};
+use proxy::depth::{self, DepthImage};
+use proxy::hull::{self, Silhouette};
+use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint};
+use proxy::{carve, tunnel};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -14,21 +19,49 @@ use std::sync::Arc;
 pub enum Kind {
     /// Parallel to the image planes.
     Plane,
+    /// The plane that most sparse points lie on.
+    DominantPlane,
+    /// A plane for every view.
+    ViewPlane,
+    /// A box around a hallway.
+    Tunnel,
+    /// What the silhouettes leave of space.
+    Hull,
     /// The sparse points that views like the desired one observe.
     Points,
-    /// These, and those that photos agree on between them.
+    /// A closed mesh of the sparse points.
+    Carved,
+    /// Depth maps, fused.
+    Depth,
+    /// The sparse points, and those that photos agree on between them.
     Dense,
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Plane, Self::Points, Self::Dense];
+    /// All of them, what is fitted fastest first.
+    pub const ALL: [Self; 9] = [
+        Self::Plane,
+        Self::DominantPlane,
+        Self::ViewPlane,
+        Self::Points,
+        Self::Tunnel,
+        Self::Carved,
+        Self::Hull,
+        Self::Depth,
+        Self::Dense,
+    ];
 
     /// As the command line spells it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Plane => "plane",
+            Self::DominantPlane => "dominant-plane",
+            Self::ViewPlane => "view-plane",
+            Self::Tunnel => "tunnel",
+            Self::Hull => "hull",
             Self::Points => "points",
+            Self::Carved => "carved",
+            Self::Depth => "depth",
             Self::Dense => "dense",
         }
     }
@@ -78,28 +111,146 @@ impl Scene {
         without: &BTreeSet<String>,
         dense: &DenseOptions,
     ) -> Result<Fitted, SceneError> {
+        let sparse = || self.sparse(without);
         match kind {
             Kind::Plane => {
                 let fit = self.fit_plane(without)?;
-                let note = match fit.basis {
-                    FitBasis::Points { .. } => None,
-                    basis => Some(format!("the proxy is a plane fitted to {basis}")),
-                };
-                Ok(Fitted {
-                    how: format!("fitted at distance {:.4} to {}", fit.distance, fit.basis),
-                    proxy: Proxy::Plane(fit.plane),
-                    note,
-                    trials: Vec::new(),
-                })
+                let how = format!("fitted at distance {:.4} to {}", fit.distance, fit.basis);
+                let mut fitted = Fitted::new(Proxy::Plane(fit.plane), how);
+                if !matches!(fit.basis, FitBasis::Points { .. }) {
+                    let basis = fit.basis;
+                    fitted.note = Some(format!("the proxy is a plane fitted to {basis}"));
+                }
+                Ok(fitted)
             }
-            Kind::Points => Ok(Fitted {
-                proxy: Proxy::Points,
-                how: "made for every view".to_owned(),
-                note: None,
-                trials: Vec::new(),
-            }),
+            Kind::DominantPlane => {
+                let (_, points) = sparse()?;
+                let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
+                let found = proxy::dominant_plane(&positions).map_err(unfit)?;
+                let how = format!("{} of {} points lie on it", found.inliers, found.points);
+                Ok(Fitted::new(Proxy::Plane(found.plane), how))
+            }
+            Kind::ViewPlane => {
+                self.needs_points(kind)?;
+                Ok(Fitted::new(Proxy::ViewPlane, "made for every view"))
+            }
+            Kind::Points => {
+                self.needs_points(kind)?;
+                Ok(Fitted::new(Proxy::Points, "made for every view"))
+            }
+            Kind::Tunnel => {
+                let (views, points) = sparse()?;
+                let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
+                let tunnel = tunnel::fit(&views, &positions).map_err(unfit)?;
+                let how = format!(
+                    "{:.3} wide, {:.3} high, {:.3} long, {:.0} % of the points on its walls",
+                    tunnel.width(),
+                    tunnel.height(),
+                    tunnel.length(),
+                    100.0 * tunnel.share_on_walls
+                );
+                Ok(Fitted::mesh(MeshKind::Tunnel, tunnel.mesh(), how))
+            }
+            Kind::Carved => {
+                let (views, points) = sparse()?;
+                let mesh = carve::surface(&views, &points, &carve::Options::default());
+                let how = format!("carved out of {} points", points.len());
+                Ok(Fitted::mesh(MeshKind::Carved, mesh.map_err(unfit)?, how))
+            }
+            Kind::Hull => self.fit_hull(without),
+            Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without, dense),
         }
+    }
+
+    fn needs_points(&self, kind: Kind) -> Result<(), SceneError> {
+        if self.reconstruction.points.is_empty() {
+            return Err(unfit(format!(
+                "the scene has no sparse points, which the {} proxy is made of; try plane",
+                kind.name()
+            )));
+        }
+        Ok(())
+    }
+
+    /// The views but those of the given names, and the sparse points they see.
+    fn sparse(
+        &self,
+        without: &BTreeSet<String>,
+    ) -> Result<(Vec<View>, Vec<SparsePoint>), SceneError> {
+        let sources = self.sources(without)?;
+        let names: Vec<String> = sources.iter().map(|(p, _)| p.name.clone()).collect();
+        let views = sources.into_iter().map(|(_, view)| view).collect();
+        Ok((views, self.sparse_points(without, &names)))
+    }
+
+    /// The hull of the photos' mattes or alpha; where they have neither, of what stands before
+    /// a plain background.
+    fn fit_hull(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        let sources = self.sources(without)?;
+        let silhouette = |(photo, view): &(&Photo, View)| -> Result<Silhouette, SceneError> {
+            let pixels = photo.decode((view.width, view.height))?;
+            let (width, height) = pixels.dimensions();
+            let alpha: Vec<u8> = pixels.pixels().map(|p| p.0[3]).collect();
+            if alpha.iter().any(|a| *a < OPAQUE) {
+                return Silhouette::from_values(width, height, &alpha)
+                    .ok_or_else(|| unfit(format!("photo {}: it has no pixels", photo.name)));
+            }
+            let rgb: Vec<u8> = pixels.pixels().flat_map(|p| p.0[..3].to_vec()).collect();
+            hull::plain_background(width, height, &rgb).map_err(|e| {
+                unfit(format!(
+                    "photo {} has no matte, and its background does not show one: {e}; give \
+                     mattes with `import --mattes DIR`",
+                    photo.name
+                ))
+            })
+        };
+        let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
+        let silhouettes = sources
+            .par_iter()
+            .map(silhouette)
+            .collect::<Result<Vec<_>, _>>()?;
+        let hull = hull::carve(&views, &silhouettes, &hull::Options::default()).map_err(unfit)?;
+        let how = format!(
+            "covers {:.2} % of the silhouettes, {:.2} of intersection over union",
+            100.0 * hull.measures.coverage,
+            hull.measures.iou
+        );
+        Ok(Fitted::mesh(MeshKind::Hull, hull.mesh, how))
+    }
+
+    /// The surface of the photos' depth maps, with a shell behind it.
+    fn fit_depth(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        let sources = self.sources(without)?;
+        let with_maps: Vec<&(&Photo, View)> = sources
+            .iter()
+            .filter(|(photo, _)| photo.depth_map.is_some())
+            .collect();
+        let frame = |i: usize| -> Result<(View, DepthImage), SceneError> {
+            let (photo, view) = with_maps[i];
+            let map = photo.decode_depth((view.width, view.height))?;
+            let map = map.ok_or_else(|| unfit(format!("{}: no depth map", photo.name)))?;
+            let image = DepthImage {
+                width: map.width,
+                height: map.height,
+                depths: map.depths,
+            };
+            Ok((view.clone(), image))
+        };
+        let options = depth::Options {
+            max_triangles: Some(MOST_TRIANGLES),
+            ..depth::Options::default()
+        };
+        let fusion = depth::fuse(with_maps.len(), frame, &options).map_err(unfit)?;
+        let how = format!(
+            "{} depth maps fused in voxels of {:.4}",
+            with_maps.len(),
+            fusion.voxel_size
+        );
+        let (views, points) = self.sparse(without)?;
+        let mut mesh = fusion.mesh;
+        mesh.append(&proxy::shell(&views, &points));
+        Ok(Fitted::mesh(MeshKind::Depth, mesh, how))
     }
 
     /// The plane that fits the sparse points when the photos of the given names were never
@@ -126,6 +277,7 @@ impl Scene {
         without: &BTreeSet<String>,
         options: &DenseOptions,
     ) -> Result<Fitted, SceneError> {
+        self.needs_points(Kind::Dense)?;
         let sources = self.sources(without)?;
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
         let names: Vec<String> = sources.iter().map(|(p, _)| p.name.clone()).collect();
@@ -137,13 +289,35 @@ impl Scene {
             points.len(),
             points.len() - sparse.len()
         );
-        Ok(Fitted {
-            proxy: Proxy::Dense(Arc::new(DensePoints { names, points })),
-            how,
+        let dense = DensePoints { names, points };
+        Ok(Fitted::new(Proxy::Dense(Arc::new(dense)), how))
+    }
+}
+
+impl Fitted {
+    fn new(proxy: Proxy, how: impl Into<String>) -> Self {
+        Self {
+            proxy,
+            how: how.into(),
             note: None,
             trials: Vec::new(),
-        })
+        }
     }
+
+    fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {
+        Self::new(Proxy::Mesh(Arc::new(Solid::new(kind, mesh))), how)
+    }
+}
+
+/// Alpha from which on a pixel belongs to the object.
+const OPAQUE: u8 = 128;
+/// Fused depth maps are simplified to about so many triangles: finer ones show no difference,
+/// and rays through them take longer.
+const MOST_TRIANGLES: usize = 200_000;
+
+/// Why a kind of proxy does not suit a scene.
+fn unfit(reason: impl ToString) -> SceneError {
+    SceneError::Unfit(reason.to_string())
 }
 
 /// A photo, transparent where its mask ignores it; `None` where it cannot be decoded, which

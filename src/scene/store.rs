@@ -14,14 +14,17 @@ use std::path::{Path, PathBuf};
 const SCENE_FILE: &str = "scene.json";
 const MODEL_FOLDER: &str = "model";
 const PROXY_FILE: &str = "proxy.json";
+/// The same of one that is a mesh.
+const PROXY_MESH: &str = "proxy.ply";
 /// In the order in which they take their places: a folder without the last is no scene.
-const PARTS: [&str; 7] = [
+const PARTS: [&str; 8] = [
     IMAGES_FOLDER,
     MASKS_FOLDER,
     MATTES_FOLDER,
     DEPTH_FOLDER,
     MODEL_FOLDER,
     PROXY_FILE,
+    PROXY_MESH,
     SCENE_FILE,
 ];
 /// COLMAP's work, for photos without a calibration. Like the frames it stays when the scene
@@ -175,6 +178,7 @@ impl Scene {
             SCENE_FILE,
             MODEL_FOLDER,
             PROXY_FILE,
+            PROXY_MESH,
             COLMAP_FOLDER,
             FRAMES_FOLDER,
             PARTIAL_FRAMES,
@@ -235,8 +239,8 @@ impl Scene {
         fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
-            own.file = PROXY_FILE.to_owned();
-            proxy::write(&new.join(PROXY_FILE), &own.proxy, &[])?;
+            own.file = proxy_file(&own.proxy).to_owned();
+            proxy::write(&new.join(&own.file), &own.proxy, &[], &[])?;
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
@@ -274,11 +278,12 @@ impl Scene {
             let capture = self.capture.clone().unwrap_or_default();
             return Err(SceneError::NoFolder(capture.join(SCENE_FILE)));
         };
-        let path = folder.join(PROXY_FILE);
-        proxy::write(&path, &proxy, &[])?;
+        let name = proxy_file(&proxy);
+        let path = folder.join(name);
+        proxy::write(&path, &proxy, &[], &[])?;
         let own = SceneProxy {
             proxy,
-            file: PROXY_FILE.to_owned(),
+            file: name.to_owned(),
             fitted_without: fitted_without.map(|names| names.iter().cloned().collect()),
             other: self.proxy.take().map(|own| own.other).unwrap_or_default(),
         };
@@ -327,6 +332,14 @@ impl Scene {
             other: self.other.clone(),
         };
         write_json(path, &file)
+    }
+}
+
+/// The name of the file that holds a proxy.
+fn proxy_file(proxy: &Proxy) -> &'static str {
+    match proxy {
+        Proxy::Mesh(_) => PROXY_MESH,
+        _ => PROXY_FILE,
     }
 }
 
