@@ -8,6 +8,9 @@ use rayon::prelude::*;
 
 /// Relative difference of depths up to which two photos agree.
 const AGREE: f64 = 0.012;
+/// The same in steps between the depths tried, which tell more where photos lie close together.
+const AGREE_STEPS: f64 = 1.0;
+const BLOCKS_STEPS: f64 = 4.0;
 /// By how much nearer, relatively, a point must be than what a photo sees to be in its way.
 const BLOCKS: f64 = 0.03;
 /// How many others must agree, where there are so many.
@@ -108,13 +111,16 @@ fn of_photo(
     let agrees = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
         let (at, depth) = other.project(position)?;
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
-        alike(inverse, 1.0 / depth).then_some(())
+        let off = (inverse - 1.0 / depth).abs();
+        (off <= (AGREE * inverse).max(AGREE_STEPS * map.step)).then_some(())
     };
     // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
     let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
         let (at, depth) = other.project(position)?;
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
-        (inverse > 0.0 && inverse * depth < 1.0 - BLOCKS).then_some(())
+        let behind = 1.0 / depth - inverse;
+        let clear = (BLOCKS / depth).max(BLOCKS_STEPS * map.step);
+        (inverse > 0.0 && behind > clear).then_some(())
     };
     let objections = |position: DVec3| {
         let all = photos.iter().zip(maps);

@@ -51,6 +51,8 @@ impl Default for DenseOptions {
 #[derive(Clone, Debug, PartialEq)]
 struct DepthMap {
     inverse_depths: Vec<f32>,
+    /// From one depth tried to the next: what a pixel's shift tells apart.
+    step: f64,
 }
 
 /// The sparse points, and the points that photos agree on between them.

@@ -44,6 +44,7 @@ pub(super) fn depths(photo: &SmallPhoto, costs: &Costs) -> DepthMap {
         (costs.first + costs.step * (best as f64 + shift.clamp(-0.5, 0.5))) as f32
     };
     DepthMap {
+        step: costs.step,
         inverse_depths: (0..width * height).map(inverse_depth).collect(),
     }
 }
