@@ -11,6 +11,8 @@ const HELD_OUT: usize = 4;
 const FEWEST: usize = 6;
 /// Pixels along the longer side of the pictures that decide.
 const LONG_SIDE: u32 = 240;
+/// Differences that mean nothing: the kind that is fitted and drawn faster is taken.
+const TIED_DB: f64 = 0.1;
 /// Comparing so many photos with one another takes longer than anyone waits unasked.
 const MOST_COMPARED: usize = 400;
 
@@ -71,11 +73,10 @@ impl Scene {
             trials.push(Trial { kind, score });
         }
 
-        // 3. The best, from all.
+        // 3. The first that is as good as the best, from all.
         let score = |trial: &Trial| trial.score.as_ref().copied().unwrap_or(f64::NEG_INFINITY);
-        let best = trials
-            .iter()
-            .reduce(|best, t| if score(t) > score(best) { t } else { best });
+        let most = trials.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
+        let best = trials.iter().find(|trial| score(trial) >= most - TIED_DB);
         let mut fitted = self.fit(best.map_or(Kind::Plane, |t| t.kind), without)?;
         fitted.trials = trials;
         Ok(fitted)

@@ -20,7 +20,7 @@ fn usage_errors_exit_with_2() {
         ("render wall --path orbit --frames 0 -o out", "--frames"),
         ("evaluate wall --k 17", "1..=16"),
         ("evaluate wall --beta -1", "zero or more"),
-        ("evaluate wall --proxy tunnel", "plane, points, auto"),
+        ("evaluate wall --proxy sphere", "plane, dominant-plane"),
         ("evaluate wall --every 1", "--every"),
         ("proxy wall plane", "-o"),
         ("proxy wall plane --point 1,2,3", "--normal"),
@@ -28,7 +28,22 @@ fn usage_errors_exit_with_2() {
             "proxy wall plane --point 1,2,3 --normal 0,0,0 -o p.json",
             "the plane's normal is zero",
         ),
-        ("proxy wall tunnel", "plane, points, auto"),
+        ("proxy wall sphere", "plane, dominant-plane"),
+        ("proxy wall mesh -o m.ply", "mesh FILE"),
+        (
+            "proxy wall tunnel house.obj -o m.ply",
+            "belong to the kind `mesh`",
+        ),
+        (
+            "proxy wall tunnel --through 1,2,3 -o m.ply",
+            "write `plane`",
+        ),
+        ("proxy wall plane --through 1,2,3 -o m.ply", "three points"),
+        ("proxy wall plane --focus a.jpg -o p.json", "PHOTO:X,Y"),
+        (
+            "proxy wall mesh a.obj --transform 1,2 -o m.ply",
+            "expected 16",
+        ),
         ("generate moon -o moon", "shelf, wall, helicopter"),
     ] {
         let ran = lumigraph(folder.path(), line);

@@ -13,6 +13,8 @@ const AGREE_STEPS: f64 = 1.0;
 const BLOCKS_STEPS: f64 = 4.0;
 /// By how much nearer, relatively, a point must be than what a photo sees to be in its way.
 const BLOCKS: f64 = 0.03;
+/// So many times as many photos must find a point in their way as agree on it before it goes.
+const OUTVOTED: usize = 3;
 /// How many others must agree, where there are so many.
 const OTHERS: usize = 2;
 
@@ -158,7 +160,7 @@ fn of_photo(
             if seen_by.len() < needed || !position.is_finite() {
                 return None;
             }
-            if objections(position) > seen_by.len() {
+            if objections(position) > OUTVOTED * seen_by.len() {
                 return None;
             }
             seen_by.push(i as u32);
