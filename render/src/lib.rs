@@ -23,6 +23,7 @@ pub mod reference;
 pub mod score;
 mod seams;
 mod sensor;
+mod sight;
 mod snapshot;
 mod surface;
 mod time;

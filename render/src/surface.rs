@@ -1,6 +1,7 @@
 //! The proxy as one desired view sees it.
 
 use crate::lumigraph::Lumigraph;
+use crate::sight::within_sight;
 use calibrate::{Pixel, View};
 use glam::DVec3;
 use proxy::{Facets, Plane, Proxy, Solid, fit_plane_for_view, points};
@@ -28,7 +29,7 @@ pub struct FacetMap {
     pub planes: Vec<DVec3>,
     /// Row by row, the facet at each pixel's centre; [`NO_FACET`] where the lens has no ray.
     pub facet_of: Vec<u32>,
-    size: [u32; 2],
+    pub(crate) size: [u32; 2],
 }
 
 impl Surface {
@@ -50,10 +51,14 @@ impl Surface {
             Proxy::Points | Proxy::Dense(_) => {
                 let views = views();
                 points::facets(desired, &views, &lumigraph.points).map_or(Self::Nothing, |facets| {
-                    Self::Facets(FacetMap::of_facets(facets, desired))
+                    let map = FacetMap::of_facets(facets, desired);
+                    Self::Facets(within_sight(map, desired, &views))
                 })
             }
-            Proxy::Mesh(solid) => Self::Facets(FacetMap::of_mesh(solid, desired)),
+            Proxy::Mesh(solid) => {
+                let map = FacetMap::of_mesh(solid, desired);
+                Self::Facets(within_sight(map, desired, &views()))
+            }
         }
     }
 

@@ -1,0 +1,108 @@
+//! The proxy moved to where photos can see it.
+
+use crate::surface::{FacetMap, NO_FACET};
+use calibrate::{Lens, Pixel, View};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// The factor between inverse distances that are tried, and how many on either side.
+const STEP: f64 = 1.15;
+const STEPS: i32 = 24;
+/// Halvings of a step in the end.
+const HALVINGS: u32 = 6;
+
+/// A source view relative to the desired one.
+struct Source {
+    rotation: DMat3,
+    translation: DVec3,
+    lens: Lens,
+    size: [f64; 2],
+}
+
+impl Source {
+    /// Whether the point at ray / s lies in its image.
+    fn sees(&self, ray: DVec3, s: f64) -> bool {
+        let pixel = self
+            .lens
+            .project(self.rotation * ray + self.translation * s);
+        let [width, height] = self.size;
+        pixel.is_some_and(|p| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height)
+    }
+}
+
+/// Moves what no source view has in its image along its ray, to the nearest inverse distance at
+/// which one has.
+///
+/// Where no photo shows the proxy, its depth is a guess anyway: beside the points that it is
+/// made of, or on a dome. A guess that photos can answer paints what they show there, and
+/// not nothing. (Of house-walk's held-out pixels that are 2 %, black before.)
+pub(crate) fn within_sight(mut map: FacetMap, desired: &View, sources: &[View]) -> FacetMap {
+    let desired_rotation = desired.camera_from_world.matrix();
+    let sources: Vec<Source> = sources
+        .iter()
+        .map(|view| Source {
+            rotation: view.camera_from_world.matrix() * desired_rotation.transpose(),
+            translation: view.camera_from_world.rotation * (desired.center() - view.center()),
+            lens: view.lens,
+            size: [f64::from(view.width), f64::from(view.height)],
+        })
+        .collect();
+    let [width, height] = map.size.map(|side| side as usize);
+    let moved_in_row = |y: usize| {
+        // The view that saw the last pixel mostly sees the next.
+        let mut last = 0;
+        let mut moved = Vec::new();
+        for x in 0..width {
+            let facet = map.facet_of[y * width + x];
+            let center = Pixel::center_of(x as u32, y as u32);
+            let Some(ray) = desired.lens.unproject(center).filter(|_| facet != NO_FACET) else {
+                continue;
+            };
+            let s = map.planes[facet as usize].dot(ray);
+            let mut seen = |s: f64| {
+                let hint = sources.get(last).filter(|source| source.sees(ray, s));
+                let found = match hint {
+                    Some(_) => Some(last),
+                    None => sources.iter().position(|source| source.sees(ray, s)),
+                };
+                last = found.unwrap_or(last);
+                found.is_some()
+            };
+            if !(s >= 0.0) || seen(s) {
+                continue;
+            }
+            if let Some(s) = nearest_seen(s, &mut seen) {
+                moved.push((x, ray * (s / ray.length_squared())));
+            }
+        }
+        moved
+    };
+    let moved: Vec<Vec<(usize, DVec3)>> = (0..height).into_par_iter().map(moved_in_row).collect();
+    for (y, row) in moved.into_iter().enumerate() {
+        for (x, plane) in row {
+            map.facet_of[y * width + x] = map.planes.len() as u32;
+            map.planes.push(plane);
+        }
+    }
+    map
+}
+
+/// The inverse distance nearest to `s`, by its ratio, that is seen; `None` if none tried is.
+fn nearest_seen(s: f64, seen: &mut impl FnMut(f64) -> bool) -> Option<f64> {
+    let sides = (1..=STEPS).flat_map(|k| [k, -k]);
+    let mut found = sides.into_iter().map(|k| (k, s * STEP.powi(k)));
+    let Some((k, mut near)) = found.find(|(_, s)| seen(*s)) else {
+        return seen(0.0).then_some(0.0);
+    };
+    // Between it and the one before, so that neighbouring pixels move alike.
+    let mut beyond = s * STEP.powi(k - k.signum());
+    for _ in 0..HALVINGS {
+        let middle = (near * beyond).sqrt();
+        if seen(middle) {
+            near = middle;
+        } else {
+            beyond = middle;
+        }
+    }
+    Some(near)
+}
