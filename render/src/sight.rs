@@ -106,3 +106,73 @@ fn nearest_seen(s: f64, seen: &mut impl FnMut(f64) -> bool) -> Option<f64> {
     }
     Some(near)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::Rigid3;
+    use glam::DVec2;
+
+    /// Looks along z from a place on the x axis, 45° to either side.
+    fn view(x: f64) -> View {
+        let center = DVec3::X * x;
+        View {
+            lens: Lens::pinhole(DVec2::splat(20.0), DVec2::splat(20.0)),
+            width: 40,
+            height: 40,
+            camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, DVec3::Y),
+        }
+    }
+
+    /// Every pixel sees the plane at a depth of 2.
+    fn flat() -> FacetMap {
+        FacetMap {
+            planes: vec![DVec3::Z / 2.0],
+            facet_of: vec![0; 1600],
+            size: [40, 40],
+        }
+    }
+
+    #[test]
+    fn what_a_photo_sees_stays_and_the_rest_moves_just_into_its_image() {
+        let (desired, source) = (view(0.0), view(1.0));
+        let map = within_sight(flat(), &desired, std::slice::from_ref(&source));
+        let mut moved = 0;
+        for y in 0..40 {
+            for x in 0..40 {
+                let ray = desired.lens.unproject(Pixel::center_of(x, y)).unwrap();
+                let q = map.planes[map.facet_of[(y * 40 + x) as usize] as usize];
+                let s = q.dot(ray);
+                let ray_in_world = desired.camera_from_world.rotation.conjugate() * ray;
+                let at = |s: f64| source.project(ray_in_world / s);
+                let seen = |p: Option<Pixel>| p.is_some_and(|p| source.contains(p));
+                let before = at(0.5);
+                if seen(before) {
+                    assert_eq!(s, 0.5);
+                } else {
+                    // The cameras stand side by side: only farther away does it see more.
+                    moved += 1;
+                    assert!(s < 0.5 && seen(at(s)), "{x} {y}: {s}");
+                    let p = at(s * 1.01).unwrap();
+                    assert!(!source.contains(p), "{x} {y}: {p:?} is well inside");
+                }
+            }
+        }
+        // The plane is 4 wide, and the camera stands 1 aside.
+        assert_eq!(moved, 10 * 40);
+    }
+
+    #[test]
+    fn what_nobody_ever_sees_stays_where_it_is() {
+        let desired = view(0.0);
+        let away = View {
+            camera_from_world: Rigid3::looking_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y),
+            ..view(0.0)
+        };
+        assert_eq!(within_sight(flat(), &desired, &[away]), flat());
+        assert_eq!(within_sight(flat(), &desired, &[]), flat());
+        let mut none = flat();
+        none.facet_of.fill(NO_FACET);
+        assert_eq!(within_sight(none.clone(), &desired, &[view(0.5)]), none);
+    }
+}

@@ -241,7 +241,7 @@ fn a_scene_without_points_says_how_to_go_on() {
     fs::remove_dir_all(wall.join("sparse")).unwrap();
     calibrate::colmap::write_text(&model, &wall.join("sparse/0")).unwrap();
     // The cameras look at something.
-    let ran = lumigraph(folder.path(), "evaluate wall").ok();
+    let ran = lumigraph(folder.path(), "evaluate wall --proxy plane").ok();
     assert!(
         ran.stderr.contains("the optical axes of 7 photos"),
         "{}",
@@ -252,7 +252,7 @@ fn a_scene_without_points_says_how_to_go_on() {
         image.camera_from_world.rotation = glam::DQuat::IDENTITY;
     }
     calibrate::colmap::write_text(&model, &wall.join("sparse/0")).unwrap();
-    let error = lumigraph(folder.path(), "evaluate wall").error(1);
+    let error = lumigraph(folder.path(), "evaluate wall --proxy plane").error(1);
     assert!(error.contains("proxy SCENE plane --point"), "{error}");
     let by_hand = "proxy wall plane --point 0,0,2 --normal 0,0,1 -o p.json";
     lumigraph(folder.path(), by_hand).ok();

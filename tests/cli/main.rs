@@ -15,6 +15,7 @@ mod render;
 mod repeat;
 mod run;
 mod scene;
+mod surface;
 mod time;
 mod uncalibrated;
 mod undistort;

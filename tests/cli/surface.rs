@@ -1,0 +1,127 @@
+//! Kinds of surface, and the choice between them.
+
+use crate::run::{files, lumigraph};
+use serde_json::Value;
+
+/// A folder with a small capture of the given scene.
+fn with(name: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("generate {name} --size 96x72 -o {name}");
+    lumigraph(folder.path(), &line).ok();
+    folder
+}
+
+#[test]
+fn the_best_kind_is_chosen_by_photos_held_out_for_it() {
+    let folder = with("shelf");
+    let line = "evaluate shelf --every 4 --json";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(
+        ran.stderr.contains("by photos held out for it: plane "),
+        "{}",
+        ran.stderr
+    );
+    let proxy = ran.json()["proxy"].clone();
+    let trials = proxy["trials"].as_array().unwrap().clone();
+    let score = |t: &Value| t["psnr"].as_f64().unwrap_or(f64::NEG_INFINITY);
+    let best = trials.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
+    let chosen = trials.iter().find(|t| t["kind"] == proxy["kind"]).unwrap();
+    assert!(score(chosen) >= best - 0.1, "{proxy}");
+    // What the scene has no means for is not tried.
+    assert!(
+        trials
+            .iter()
+            .all(|t| t["kind"] != "hull" && t["kind"] != "depth"),
+        "{proxy}"
+    );
+    // The same again.
+    assert_eq!(lumigraph(folder.path(), line).ok().json()["proxy"], proxy);
+}
+
+#[test]
+fn a_scene_keeps_any_kind_and_draws_from_it() {
+    let folder = with("shelf");
+    lumigraph(folder.path(), "import shelf -o scene").ok();
+    for (kind, file) in [
+        ("dominant-plane", "proxy.json"),
+        ("view-plane", "proxy.json"),
+        ("carved", "proxy.ply"),
+        ("dense", "proxy.json"),
+    ] {
+        let ran = lumigraph(folder.path(), &format!("proxy scene {kind}")).ok();
+        assert!(ran.stdout.contains(file), "{kind}: {}", ran.stdout);
+        let result = lumigraph(
+            folder.path(),
+            "evaluate scene --every 3 --json --proxy scene/FILE"
+                .replace("FILE", file)
+                .as_str(),
+        )
+        .ok()
+        .json();
+        let of_plane = if kind == "dominant-plane" {
+            "plane"
+        } else {
+            kind
+        };
+        assert_eq!(result["proxy"]["kind"], of_plane);
+        assert!(
+            result["mean"]["coverage"].as_f64().unwrap() > 0.95,
+            "{kind}: {result}"
+        );
+        let info = lumigraph(folder.path(), "info scene --json").ok().json();
+        assert_eq!(info["proxy"]["kind"], of_plane);
+    }
+    let left: Vec<_> = files(&folder.path().join("scene")).into_keys().collect();
+    assert!(
+        !left.iter().any(|f| f.to_string_lossy().ends_with(".tmp")),
+        "{left:?}"
+    );
+}
+
+#[test]
+fn meshes_go_out_and_come_in() {
+    let folder = with("shelf");
+    lumigraph(folder.path(), "proxy shelf carved -o carved.glb").ok();
+    lumigraph(folder.path(), "proxy shelf carved -o carved.ply").ok();
+    let score = |line: &str| {
+        let ran = lumigraph(
+            folder.path(),
+            &format!("evaluate shelf --every 3 --json {line}"),
+        )
+        .ok();
+        let result = ran.json();
+        (
+            result["proxy"]["kind"].clone(),
+            result["mean"]["psnr"].as_f64().unwrap(),
+        )
+    };
+    let (kind, exact) = score("--proxy carved.ply");
+    assert_eq!(kind, "carved");
+    let (kind, rounded) = score("--proxy carved.glb");
+    assert_eq!(kind, "carved");
+    assert!((exact - rounded).abs() < 0.05, "{exact} {rounded}");
+
+    // As if it came from elsewhere, its axes and units changed.
+    let line = "proxy shelf mesh carved.ply --transform 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1 -o m.ply";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(
+        ran.stdout.contains("meets it") && !ran.stderr.contains("warning"),
+        "{}",
+        ran.stderr
+    );
+    let obj = "v 900 900 900\nv 901 900 900\nv 900 901 900\nf 1 2 3\n";
+    std::fs::write(folder.path().join("far.obj"), obj).unwrap();
+    let ran = lumigraph(folder.path(), "proxy shelf mesh far.obj -o far.ply").ok();
+    assert!(ran.stderr.contains("--transform"), "{}", ran.stderr);
+}
+
+#[test]
+fn what_a_scene_has_no_means_for_is_told() {
+    let folder = with("wall");
+    for (kind, said) in [("hull", "--mattes"), ("depth", "--depth")] {
+        let ran = lumigraph(folder.path(), &format!("proxy wall {kind} -o p.ply"));
+        assert_eq!(ran.code, 1, "{kind}");
+        assert!(ran.stderr.contains(said), "{kind}: {}", ran.stderr);
+        assert!(!folder.path().join("p.ply").exists());
+    }
+}
