@@ -178,7 +178,7 @@ fn text(scene: &Scene, info: &Value) -> String {
     }
     text += &match &scene.proxy {
         Some(own) => format!("\nproxy    {}\n", proxy_text(&own.proxy)),
-        None => "\nproxy    none of its own; a plane is fitted when needed\n".to_owned(),
+        None => "\nproxy    none of its own; one is chosen when needed\n".to_owned(),
     };
     let bytes = info["memory_bytes"].as_u64().unwrap_or_default();
     text += &format!(
