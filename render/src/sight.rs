@@ -130,6 +130,7 @@ mod tests {
             planes: vec![DVec3::Z / 2.0],
             facet_of: vec![0; 1600],
             size: [40, 40],
+            moved_from: 1,
         }
     }
 

@@ -30,6 +30,8 @@ pub struct FacetMap {
     /// Row by row, the facet at each pixel's centre; [`NO_FACET`] where the lens has no ray.
     pub facet_of: Vec<u32>,
     pub(crate) size: [u32; 2],
+    /// From this facet on they are pixels' own, moved to where a photo has them.
+    pub(crate) moved_from: u32,
 }
 
 impl Surface {
@@ -62,6 +64,19 @@ impl Surface {
         }
     }
 
+    /// Whether the pixel around a position looks at something that was moved to where a photo
+    /// has it; see `sight.rs`.
+    pub(crate) fn is_moved_at(&self, pixel: Pixel) -> bool {
+        let Self::Facets(map) = self else {
+            return false;
+        };
+        let [width, height] = map.size;
+        let column = pixel.x.clamp(0.0, f64::from(width - 1)) as usize;
+        let row = pixel.y.clamp(0.0, f64::from(height - 1)) as usize;
+        let facet = map.facet_of[row * width as usize + column];
+        facet != NO_FACET && facet >= map.moved_from
+    }
+
     /// q at a position in the desired image, of the pixel around it.
     pub fn plane_at(&self, pixel: Pixel) -> Option<DVec3> {
         match self {
@@ -88,6 +103,13 @@ impl Surface {
 }
 
 impl FacetMap {
+    /// For every pixel, row by row, whether it looks at something that was moved along its
+    /// ray to where a photo has it: there the proxy is a guess.
+    pub fn moved(&self) -> impl Iterator<Item = bool> {
+        let is_moved = |&facet: &u32| facet != NO_FACET && facet >= self.moved_from;
+        self.facet_of.iter().map(is_moved)
+    }
+
     /// q at every pixel's centre, row by row.
     pub(crate) fn planes(&self) -> impl Iterator<Item = Option<DVec3>> {
         self.facet_of.iter().map(|&facet| self.plane_of(facet))
@@ -142,6 +164,7 @@ impl FacetMap {
         };
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
         Self {
+            moved_from: planes.len() as u32,
             planes,
             facet_of: rows.concat(),
             size: [desired.width, desired.height],

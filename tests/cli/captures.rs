@@ -18,7 +18,10 @@ fn the_plane_scores_on_real_captures() {
     ] {
         let capture = captures.join(name);
         let size = "320x240";
-        let line = format!("evaluate {} --proxy plane --size {size} --json", capture.display());
+        let line = format!(
+            "evaluate {} --proxy plane --size {size} --json",
+            capture.display()
+        );
         let result = lumigraph(here.path(), &line).ok().json();
         let photos = result["photos"].as_array().unwrap();
         assert_eq!(photos.len(), held_out, "{name}");

@@ -3,6 +3,8 @@
 use super::vertex::{Vertex, candidates, point_at, sources_at};
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::Frame;
+use calibrate::Pixel;
+use glam::DVec2;
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
@@ -30,9 +32,14 @@ impl List {
             // other corners say counts.
             return Self::of_weights(corners);
         }
-        let sees: Vec<Sees> = (0..frame.sources.len())
+        let mut sees: Vec<Sees> = (0..frame.sources.len())
             .map(|i| how_it_sees(frame, i, corners))
             .collect();
+        // Where pixels look at what was moved into some photo, corners don't tell which.
+        let somewhere = seen_where_moved(frame, corners);
+        for &i in &somewhere {
+            sees[i] = Sees::Part;
+        }
         if !sees.contains(&Sees::Part) {
             return Self::of_weights(corners);
         }
@@ -46,7 +53,9 @@ impl List {
         };
         let bounds = corners.map(bound);
         let within = |&i: &usize| {
-            sees[i] != Sees::Nothing && (0..3).any(|c| corners[c].sources[i].diff <= bounds[c])
+            somewhere.binary_search(&i).is_ok()
+                || sees[i] != Sees::Nothing
+                    && (0..3).any(|c| corners[c].sources[i].diff <= bounds[c])
         };
         let mut listed: Vec<(f64, usize)> = (0..sees.len())
             .filter(within)
@@ -115,16 +124,37 @@ impl List {
     }
 }
 
-/// For each source view the best rank, by difference, that it has among the views that see
-/// a point, for points spread over a triangle.
-fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
+/// Points spread over a triangle.
+fn spread_over(corners: [&Vertex; 3]) -> impl Iterator<Item = DVec2> {
     // Steps between points, along each side.
     const STEPS: u32 = 4;
     let [a, b, c] = corners.map(|corner| corner.at);
     let step = |i: u32| f64::from(i) / f64::from(STEPS);
+    let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
+    steps.map(move |(i, j)| a + step(i) * (b - a) + step(j) * (c - a))
+}
+
+/// The source views that see any point of a triangle in which some were moved; none where none
+/// were. In order.
+fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
+    let pixel = |at: DVec2| Pixel::new(at.x, at.y);
+    if !spread_over(corners).any(|at| frame.surface.is_moved_at(pixel(at))) {
+        return Vec::new();
+    }
+    let mut seen = vec![false; frame.sources.len()];
+    for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
+        let sources = sources_at(frame, &point);
+        candidates(frame, &point, &sources).for_each(|c| seen[c.source_idx] = true);
+    }
+    (0..seen.len()).filter(|&i| seen[i]).collect()
+}
+
+/// For each source view the best rank, by difference, that it has among the views that see
+/// a point, for points spread over a triangle.
+fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
     let mut ranks = vec![usize::MAX; frame.sources.len()];
-    for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))) {
-        let Some(point) = point_at(frame, a + step(i) * (b - a) + step(j) * (c - a)) else {
+    for at in spread_over(corners) {
+        let Some(point) = point_at(frame, at) else {
             continue;
         };
         let sources = sources_at(frame, &point);

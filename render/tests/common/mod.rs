@@ -258,3 +258,22 @@ pub(crate) fn assert_close(a: &RgbaImage, b: &RgbaImage, what: &str) {
         b.get_pixel(differing[0].0, differing[0].1),
     );
 }
+
+/// A picture without what lies within a few pixels of anything that was moved to where a photo
+/// has it: there the surface jumps, and the triangulated field follows no jumps.
+pub(crate) fn unmoved(frame: &Frame<'_>, picture: &RgbaImage) -> RgbaImage {
+    const AROUND: u32 = 8;
+    let mut picture = picture.clone();
+    let (width, height) = picture.dimensions();
+    if let render::Surface::Facets(map) = &frame.surface {
+        for (i, _) in map.moved().enumerate().filter(|(_, moved)| *moved) {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            for y in y.saturating_sub(AROUND)..(y + AROUND).min(height) {
+                for x in x.saturating_sub(AROUND)..(x + AROUND).min(width) {
+                    picture.put_pixel(x, y, image::Rgba([0; 4]));
+                }
+            }
+        }
+    }
+    picture
+}
