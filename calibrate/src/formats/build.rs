@@ -71,6 +71,13 @@ impl<'a> Builder<'a> {
             )
             .at(self.path, record));
         }
+        // Finite rotations and centres may still overflow together.
+        if !camera_from_world.is_finite() {
+            return Err(Problem::broken(
+                "the camera's centre is too far away for its pose to be finite",
+            )
+            .at(self.path, record));
+        }
         let image = Image {
             name: name.to_owned(),
             camera_id,

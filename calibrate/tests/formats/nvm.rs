@@ -117,6 +117,16 @@ fn a_fixed_calibration_is_shared() {
     assert_eq!((keypoint.x, keypoint.y), (40.5, 41.0));
 }
 
+// Found by fuzzing: turning a finite centre overflows.
+#[test]
+fn a_centre_too_far_away_for_a_pose_is_told() {
+    let error = error("1 0 0 0 1 2 3", "0 1 0 0 1e308 0 0");
+    assert!(
+        error.starts_with("line 4 (image 0, a b.jpg): the camera's centre is too far away"),
+        "{error}"
+    );
+}
+
 #[test]
 fn errors_name_the_line_and_a_remedy() {
     let again = "copy the file again, or export it again from the program it is from";
