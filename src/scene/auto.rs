@@ -65,6 +65,9 @@ impl Scene {
         for kind in candidates {
             let score = if kind == Kind::Dense && rest.len() > MOST_COMPARED {
                 Err(format!("{} photos take long to compare", rest.len()))
+            } else if kind == Kind::Tunnel && !self.is_hallway(&fewer) {
+                // A box may happen to suit a few photos of anything.
+                Err("the scene is no hallway".to_owned())
             } else {
                 self.fit_coarsely(kind, &fewer, LONG_SIDE)
                     .and_then(|fitted| self.judge(fitted.proxy, &fewer, &judges))

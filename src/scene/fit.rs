@@ -163,6 +163,15 @@ impl Scene {
         }
     }
 
+    /// Whether the photos but those of the given names were taken along a hallway.
+    pub(super) fn is_hallway(&self, without: &BTreeSet<String>) -> bool {
+        let Ok((views, points)) = self.sparse(without) else {
+            return false;
+        };
+        let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
+        tunnel::fit(&views, &positions).is_ok_and(|tunnel| tunnel.is_hallway())
+    }
+
     fn needs_points(&self, kind: Kind) -> Result<(), SceneError> {
         if self.reconstruction.points.is_empty() {
             return Err(unfit(format!(
