@@ -26,6 +26,7 @@
 mod car;
 mod dataset;
 mod hallway;
+mod hand_held;
 mod helicopter;
 mod knick_knacks;
 mod motion;

@@ -1,5 +1,6 @@
 use crate::dataset::Plan;
-use crate::noise::{signed, unit};
+use crate::hand_held::HandHeldGrid;
+use crate::noise::unit;
 use crate::props::{GLAZED, MATTE, SATIN, cuboid, mottled, object};
 use crate::shape::smooth_profile;
 use crate::texture::rgb;
@@ -54,19 +55,17 @@ pub fn shelf(options: &Options) -> Result<Dataset, DatasetError> {
 
 /// Camera `i` of `count`: on a grid, with an unsteady hand.
 fn hand_held(i: usize, count: usize) -> Rigid3 {
-    let columns = ((count as f64 * 1.25).sqrt().round() as usize).max(1);
-    let rows = count.div_ceil(columns);
-    let spacing = 0.05 * DISTANCE;
-    let column = (i % columns) as f64 - 0.5 * (columns as f64 - 1.0);
-    let row = 0.5 * (rows as f64 - 1.0) - (i / columns) as f64;
-    let r = |k: i32| signed(SEED, i as i32, k, 4);
-    let shake = spacing * DVec3::new(0.15 * r(0), 0.15 * r(1), 0.3 * r(2));
-    // Looking down on the still life by a sixth of the distance.
-    let middle = TARGET + DISTANCE * DVec3::new(0.02, 0.22, 1.0).normalize();
-    let center = middle + spacing * DVec3::new(column, row, 0.0) + shake;
-    let target = TARGET + 0.03 * DVec3::new(r(3), r(4), r(5));
-    let roll = Rigid3::new(DQuat::from_rotation_z(0.02 * r(6)), DVec3::ZERO);
-    roll * Rigid3::looking_at(center, target, DVec3::Y)
+    let grid = HandHeldGrid {
+        target: TARGET,
+        distance: DISTANCE,
+        // Looking down on the still life by a sixth of the distance.
+        towards: DVec3::new(0.02, 0.22, 1.0),
+        columns_per_row: 1.25,
+        spacing: 0.05,
+        aim: 0.03,
+        seed: SEED,
+    };
+    grid.camera_from_world(i, count)
 }
 
 fn scene(finest: f64) -> Scene {

@@ -3,10 +3,11 @@
 mod common;
 
 use calibrate::{Lens, Pixel, Rigid3, View};
+use capture::DepthMap;
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::Mesh;
-use proxy::depth::{DepthError, DepthImage, Fusion, Options, fuse};
+use proxy::depth::{DepthError, Fusion, Options, fuse};
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -24,7 +25,7 @@ fn view(center: DVec3, target: DVec3) -> View {
 }
 
 /// What a view sees of a shape: the distance along a unit ray to its nearest point.
-fn seen(view: &View, distance: impl Fn(DVec3, DVec3) -> Option<f64>) -> (View, DepthImage) {
+fn seen(view: &View, distance: impl Fn(DVec3, DVec3) -> Option<f64>) -> (View, DepthMap) {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let mut depths = Vec::new();
     for row in 0..view.height {
@@ -37,7 +38,7 @@ fn seen(view: &View, distance: impl Fn(DVec3, DVec3) -> Option<f64>) -> (View, D
     let (width, height) = (view.width, view.height);
     (
         view.clone(),
-        DepthImage {
+        DepthMap {
             width,
             height,
             depths,
@@ -88,7 +89,7 @@ fn square(z: f64, half: f64) -> impl Fn(DVec3, DVec3) -> Option<f64> {
     }
 }
 
-fn fused(frames: &[(View, DepthImage)], options: &Options) -> Result<Fusion, DepthError> {
+fn fused(frames: &[(View, DepthMap)], options: &Options) -> Result<Fusion, DepthError> {
     fuse(
         frames.len(),
         |i| Ok::<_, Infallible>(frames[i].clone()),
@@ -119,7 +120,7 @@ fn around(distance: f64) -> Vec<View> {
     views
 }
 
-fn sphere_frames() -> Vec<(View, DepthImage)> {
+fn sphere_frames() -> Vec<(View, DepthMap)> {
     around(3.0)
         .iter()
         .map(|v| seen(v, sphere(DVec3::ZERO, 1.0)))
@@ -211,7 +212,7 @@ fn a_room_is_flat_and_turned_inwards() {
 }
 
 /// A square before a wall, seen from a few places; `spoil` changes depth maps.
-fn square_before_wall(spoil: impl Fn(&mut DepthImage)) -> Vec<(View, DepthImage)> {
+fn square_before_wall(spoil: impl Fn(&mut DepthMap)) -> Vec<(View, DepthMap)> {
     let views = [-0.3, 0.0, 0.3].map(|x| view(DVec3::new(x, 0.1, -2.0), DVec3::new(0.0, 0.0, 1.0)));
     let frames = views.iter().map(|v| {
         let (view, mut depth) = seen(v, nearer(square(0.0, 0.4), square(1.0, 10.0)));
@@ -431,7 +432,7 @@ fn coarser_voxels_are_taken_where_memory_is_short() {
 
 #[test]
 fn what_cannot_be_fused_is_said() {
-    let error = |frames: &[(View, DepthImage)], options: &Options| {
+    let error = |frames: &[(View, DepthMap)], options: &Options| {
         fused(frames, options).unwrap_err().to_string()
     };
     let good = seen(&view(DVec3::ZERO, DVec3::X), room(DVec3::splat(2.0)));
@@ -505,7 +506,7 @@ proptest! {
         view = view.resized(width, height);
         // Runs of one depth, or nothing would be believed.
         let depths = (0..depths.len()).map(|i| depths[i / runs]).collect();
-        let frame = (view, DepthImage { width, height, depths });
+        let frame = (view, DepthMap { width, height, depths });
         if let Ok(fusion) = fused(&[frame.clone(), frame], &Options { min_piece: 1, max_bytes: 16 << 20, ..Options::default() }) {
             let corners = fusion.mesh.positions.len() as u32;
             prop_assert!(fusion.mesh.positions.iter().all(|p| p.is_finite()));

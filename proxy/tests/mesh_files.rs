@@ -7,6 +7,7 @@ use calibrate::{Lens, Rigid3, View};
 use glam::{DMat4, DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::mesh::{self, Mesh};
+use proxy::{MeshKind, Solid};
 use std::path::Path;
 
 fn parse(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, String> {
@@ -15,6 +16,10 @@ fn parse(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, String> {
 
 fn message(name: &str, bytes: impl AsRef<[u8]>) -> String {
     parse(name, bytes).unwrap_err()
+}
+
+fn solid(mesh: &Mesh) -> Solid {
+    Solid::new(MeshKind::Mesh, mesh.clone())
 }
 
 fn triangle() -> Mesh {
@@ -487,19 +492,19 @@ fn what_a_glb_cannot_hold_is_refused() {
 fn a_mesh_elsewhere_is_not_where_cameras_look() {
     let mesh = far_mesh();
     let views = [camera()];
-    let here = mesh::lies_where_cameras_look(&mesh, &views);
+    let here = mesh::lies_where_cameras_look(&solid(&mesh), &views);
     assert!(here > 0.03, "{here}");
     let mut y_up = mesh.clone();
     y_up.transform(&DMat4::from_rotation_x(-std::f64::consts::FRAC_PI_2));
-    assert_eq!(mesh::lies_where_cameras_look(&y_up, &views), 0.0);
-    assert_eq!(mesh::lies_where_cameras_look(&mesh, &[]), 0.0);
+    assert_eq!(mesh::lies_where_cameras_look(&solid(&y_up), &views), 0.0);
+    assert_eq!(mesh::lies_where_cameras_look(&solid(&mesh), &[]), 0.0);
     // A wall that reaches behind the camera.
     let behind = |x: f64, y: f64| {
         views[0].center() + views[0].forward() * 0.01 + DVec3::new(x, y, 0.0) * 1e6
     };
     let mut wall = triangle();
     wall.positions = vec![behind(-1.0, -1.0), behind(1.0, -1.0), behind(0.0, 1.0)];
-    let met = mesh::lies_where_cameras_look(&wall, &views);
+    let met = mesh::lies_where_cameras_look(&solid(&wall), &views);
     assert!(met > 0.9, "{met}");
 }
 
@@ -516,7 +521,7 @@ fn a_house_is_imported_and_lies_around_its_cameras() {
         .iter()
         .map(|(view, _)| view.clone())
         .collect();
-    let met = mesh::lies_where_cameras_look(&mesh, &views);
+    let met = mesh::lies_where_cameras_look(&solid(&mesh), &views);
     // The rest of the rays leave through the windows.
     let depths: Vec<f32> = capture
         .held_out

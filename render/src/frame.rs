@@ -78,6 +78,33 @@ pub struct FrameSource {
     pub time_penalty: f64,
 }
 
+impl FrameSource {
+    /// A source view as a desired one has it, without feather and alike in footprint.
+    pub(crate) fn of(view: &View, desired: &View) -> Self {
+        let View {
+            lens,
+            width,
+            height,
+            camera_from_world,
+        } = *view;
+        let desired_rotation = desired.camera_from_world.matrix();
+        // Centres are subtracted in the world before anything else: there the digits are,
+        // however far away the origin is.
+        let offset_in_world = camera_from_world.center() - desired.center();
+        Self {
+            rotation: camera_from_world.matrix() * desired_rotation.transpose(),
+            translation: camera_from_world.rotation * -offset_in_world,
+            center: desired.camera_from_world.rotation * offset_in_world,
+            lens,
+            size: [f64::from(width), f64::from(height)],
+            footprint_ratio: 1.0,
+            feather_px: 0.0,
+            exposure: [1.0; 3],
+            time_penalty: 0.0,
+        }
+    }
+}
+
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
 #[derive(Debug)]
 pub struct Frame<'a> {
@@ -100,10 +127,6 @@ impl<'a> Frame<'a> {
     /// If the options fail [`FieldOptions::check`]: check them where they come in.
     pub fn new(lumigraph: &'a Lumigraph, desired: View, options: FieldOptions) -> Self {
         assert_eq!(options.check(), Ok(()));
-        let desired_center = desired.center();
-        let desired_from_world = desired.camera_from_world.rotation;
-        let desired_rotation = desired.camera_from_world.matrix();
-
         // A desired view finer than every photo undersamples all of them alike; that is no
         // reason to prefer any. So its focal length counts only up to the longest there is.
         let longest = lumigraph
@@ -117,32 +140,18 @@ impl<'a> Frame<'a> {
             .sources
             .iter()
             .map(|source| {
-                let View {
-                    lens,
-                    width,
-                    height,
-                    camera_from_world,
-                } = source.view;
-                // Centres are subtracted in the world before anything else: there the
-                // digits are, however far away the origin is.
-                let offset_in_world = camera_from_world.center() - desired_center;
+                let View { width, height, .. } = source.view;
                 FrameSource {
-                    rotation: camera_from_world.matrix() * desired_rotation.transpose(),
-                    translation: camera_from_world.rotation * -offset_in_world,
-                    center: desired_from_world * offset_in_world,
-                    lens,
-                    size: [f64::from(width), f64::from(height)],
                     footprint_ratio: match options.resolution {
-                        Resolution::Footprint => desired_focal / lens.mean_focal(),
+                        Resolution::Footprint => desired_focal / source.view.lens.mean_focal(),
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
-                    exposure: [1.0; 3],
-                    time_penalty: 0.0,
+                    ..FrameSource::of(&source.view, &desired)
                 }
             })
-            .collect();
-        let surface = Surface::of(lumigraph, &desired);
+            .collect::<Vec<FrameSource>>();
+        let surface = Surface::of(lumigraph, &desired, &sources);
         let mut frame = Self {
             lumigraph,
             desired,

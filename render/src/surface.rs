@@ -1,5 +1,6 @@
 //! The proxy as one desired view sees it.
 
+use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
 use crate::sight::within_sight;
 use calibrate::{Pixel, View};
@@ -36,7 +37,7 @@ pub struct FacetMap {
 
 impl Surface {
     /// The surface of a lumigraph's proxy from a desired view.
-    pub(crate) fn of(lumigraph: &Lumigraph, desired: &View) -> Self {
+    pub(crate) fn of(lumigraph: &Lumigraph, desired: &View, sources: &[FrameSource]) -> Self {
         let views = || -> Vec<View> { lumigraph.sources.iter().map(|s| s.view.clone()).collect() };
         let of_plane = |plane: Plane| {
             let q = plane.inverse_distance_from(desired.center());
@@ -51,15 +52,15 @@ impl Surface {
                 plane.map_or(Self::Nothing, of_plane)
             }
             Proxy::Points | Proxy::Dense(_) => {
-                let views = views();
-                points::facets(desired, &views, &lumigraph.points).map_or(Self::Nothing, |facets| {
+                let facets = points::facets(desired, &views(), &lumigraph.points);
+                facets.map_or(Self::Nothing, |facets| {
                     let map = FacetMap::of_facets(facets, desired);
-                    Self::Facets(within_sight(map, desired, &views))
+                    Self::Facets(within_sight(map, desired, sources))
                 })
             }
             Proxy::Mesh(solid) => {
                 let map = FacetMap::of_mesh(solid, desired);
-                Self::Facets(within_sight(map, desired, &views()))
+                Self::Facets(within_sight(map, desired, sources))
             }
         }
     }
@@ -67,14 +68,10 @@ impl Surface {
     /// Whether the pixel around a position looks at something that was moved to where a photo
     /// has it; see `sight.rs`.
     pub(crate) fn is_moved_at(&self, pixel: Pixel) -> bool {
-        let Self::Facets(map) = self else {
-            return false;
-        };
-        let [width, height] = map.size;
-        let column = pixel.x.clamp(0.0, f64::from(width - 1)) as usize;
-        let row = pixel.y.clamp(0.0, f64::from(height - 1)) as usize;
-        let facet = map.facet_of[row * width as usize + column];
-        facet != NO_FACET && facet >= map.moved_from
+        match self {
+            Self::Facets(map) => map.is_moved(map.facet_at(pixel)),
+            Self::Nothing | Self::Plane(_) => false,
+        }
     }
 
     /// q at a position in the desired image, of the pixel around it.
@@ -82,12 +79,7 @@ impl Surface {
         match self {
             Self::Nothing => None,
             Self::Plane(q) => Some(*q),
-            Self::Facets(map) => {
-                let [width, height] = map.size;
-                let column = pixel.x.clamp(0.0, f64::from(width - 1)) as usize;
-                let row = pixel.y.clamp(0.0, f64::from(height - 1)) as usize;
-                self.plane_of(column, row)
-            }
+            Self::Facets(map) => map.plane_of(map.facet_at(pixel)),
         }
     }
 
@@ -106,8 +98,19 @@ impl FacetMap {
     /// For every pixel, row by row, whether it looks at something that was moved along its
     /// ray to where a photo has it: there the proxy is a guess.
     pub fn moved(&self) -> impl Iterator<Item = bool> {
-        let is_moved = |&facet: &u32| facet != NO_FACET && facet >= self.moved_from;
-        self.facet_of.iter().map(is_moved)
+        self.facet_of.iter().map(|&facet| self.is_moved(facet))
+    }
+
+    fn is_moved(&self, facet: u32) -> bool {
+        facet != NO_FACET && facet >= self.moved_from
+    }
+
+    /// The facet at the pixel around a position.
+    fn facet_at(&self, pixel: Pixel) -> u32 {
+        let [width, height] = self.size;
+        let column = pixel.x.clamp(0.0, f64::from(width - 1)) as usize;
+        let row = pixel.y.clamp(0.0, f64::from(height - 1)) as usize;
+        self.facet_of[row * width as usize + column]
     }
 
     /// q at every pixel's centre, row by row.
@@ -119,8 +122,8 @@ impl FacetMap {
         (facet != NO_FACET).then(|| self.planes[facet as usize])
     }
 
-    fn of_facets(facets: Facets, desired: &View) -> Self {
-        let planes = facets.planes.clone();
+    fn of_facets(mut facets: Facets, desired: &View) -> Self {
+        let planes = std::mem::take(&mut facets.planes);
         Self::new(desired, planes, |ray, last| {
             facets.locate(ray, if last == NO_FACET { 0 } else { last })
         })

@@ -8,6 +8,7 @@ use ::proxy::{MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::Context;
 use calibrate::{Pixel, View};
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use glam::{DMat4, DVec3};
 use lumigraph::scene::{Kind as Fit, Scene};
 use std::collections::BTreeSet;
@@ -60,49 +61,59 @@ pub(super) struct Args {
     output: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+/// What the command line calls kinds: those that are fitted, a choice of them, and a file.
+#[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    /// The one of those below that shows best what photos left out for it show
     Auto,
-    /// Parallel to the image planes, at the points' mean inverse depth
-    Plane,
-    /// The plane that most sparse points lie on
-    DominantPlane,
-    /// A plane through what each view sees of the points, fitted anew for each; equal rays
-    /// no longer meet equal points
-    ViewPlane,
-    /// A box around the way through a hallway
-    Tunnel,
-    /// What the photos' silhouettes leave of space
-    Hull,
-    /// The sparse points that views like the desired one observe, triangulated anew for
-    /// every view
-    Points,
-    /// A closed mesh of the sparse points, free space carved away
-    Carved,
-    /// The photos' depth maps, fused
-    Depth,
-    /// The sparse points, and those that photos agree on between them
-    Dense,
-    /// A mesh from elsewhere
+    Fitted(Fit),
     Mesh,
 }
 
-impl Kind {
-    /// `None` for what is not fitted, or chosen.
-    fn fitted(self) -> Option<Fit> {
-        match self {
-            Self::Auto | Self::Mesh => None,
-            Self::Plane => Some(Fit::Plane),
-            Self::DominantPlane => Some(Fit::DominantPlane),
-            Self::ViewPlane => Some(Fit::ViewPlane),
-            Self::Tunnel => Some(Fit::Tunnel),
-            Self::Hull => Some(Fit::Hull),
-            Self::Points => Some(Fit::Points),
-            Self::Carved => Some(Fit::Carved),
-            Self::Depth => Some(Fit::Depth),
-            Self::Dense => Some(Fit::Dense),
+impl ValueEnum for Kind {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [Kind; Fit::ALL.len() + 2] = {
+            let mut all = [Kind::Auto; Fit::ALL.len() + 2];
+            let mut i = 0;
+            while i < Fit::ALL.len() {
+                all[i + 1] = Kind::Fitted(Fit::ALL[i]);
+                i += 1;
+            }
+            all[i + 1] = Kind::Mesh;
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Auto => (
+                "auto",
+                "The one of those below that shows best what photos left out for it show",
+            ),
+            Self::Mesh => ("mesh", "A mesh from elsewhere"),
+            Self::Fitted(fit) => (fit.name(), about(*fit)),
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
+}
+
+fn about(fit: Fit) -> &'static str {
+    match fit {
+        Fit::Plane => "Parallel to the image planes, at the points' mean inverse depth",
+        Fit::DominantPlane => "The plane that most sparse points lie on",
+        Fit::ViewPlane => {
+            "A plane through what each view sees of the points, fitted anew for each; equal rays \
+             no longer meet equal points"
         }
+        Fit::Tunnel => "A box around the way through a hallway",
+        Fit::Hull => "What the photos' silhouettes leave of space",
+        Fit::Points => {
+            "The sparse points that views like the desired one observe, triangulated anew for \
+             every view"
+        }
+        Fit::Carved => "A closed mesh of the sparse points, free space carved away",
+        Fit::Depth => "The photos' depth maps, fused",
+        Fit::Dense => "The sparse points, and those that photos agree on between them",
     }
 }
 
@@ -121,7 +132,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let (proxy, how, fitted_without) = match by_hand(args, &scene, &without)? {
         Some((proxy, how)) => (proxy, how, None),
         None => {
-            let fitted = fit(&scene, args.kind.fitted(), &without)?;
+            let kind = match args.kind {
+                Kind::Fitted(kind) => Some(kind),
+                Kind::Auto | Kind::Mesh => None,
+            };
+            let fitted = fit(&scene, kind, &without)?;
             (fitted.proxy, fitted.how, Some(&without))
         }
     };
@@ -145,7 +160,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 /// Options that belong to other kinds of surface.
 fn check(args: &Args) -> Result<(), Usage> {
     let plane = args.point.is_some() || !args.through.is_empty() || args.focus.is_some();
-    let message = if plane && args.kind != Kind::Plane {
+    let message = if plane && args.kind != Kind::Fitted(Fit::Plane) {
         "--point, --normal, --through and --focus describe a plane; write `plane`"
     } else if args.kind == Kind::Mesh && args.mesh.is_none() {
         "give the mesh's file: `lumigraph proxy SCENE mesh FILE`"
@@ -196,7 +211,8 @@ fn by_hand(
             mesh.transform(transform);
         }
         let views: Vec<View> = cameras(scene)?.into_iter().map(|(_, view)| view).collect();
-        let share = mesh::lies_where_cameras_look(&mesh, &views);
+        let solid = Solid::new(MeshKind::Mesh, mesh);
+        let share = mesh::lies_where_cameras_look(&solid, &views);
         if share < LEAST_SEEN {
             say!(
                 "warning: only {:.1} % of what the photos look at meets the mesh; give \
@@ -209,7 +225,6 @@ fn by_hand(
             file.display(),
             100.0 * share
         );
-        let solid = Solid::new(MeshKind::Mesh, mesh);
         return Ok(Some((Proxy::Mesh(Arc::new(solid)), how)));
     }
     Ok(None)

@@ -1,6 +1,6 @@
 //! Which proxy suits a scene: decided by photos held out for it.
 
-use super::fit::{Fitted, Kind};
+use super::fit::{Fitted, Kind, unfit};
 use super::{Scene, SceneError};
 use proxy::Proxy;
 use render::{FieldOptions, Frame, Method, cpu, score};
@@ -65,11 +65,13 @@ impl Scene {
         for kind in candidates {
             let score = if kind == Kind::Dense && rest.len() > MOST_COMPARED {
                 Err(format!("{} photos take long to compare", rest.len()))
-            } else if kind == Kind::Tunnel && !self.is_hallway(&fewer) {
-                // A box may happen to suit a few photos of anything.
-                Err("the scene is no hallway".to_owned())
             } else {
-                self.fit_coarsely(kind, &fewer, LONG_SIDE)
+                // A box may happen to suit a few photos of anything.
+                let fitted = match kind {
+                    Kind::Tunnel => self.fit_hallway(&fewer),
+                    _ => self.fit_coarsely(kind, &fewer, LONG_SIDE),
+                };
+                fitted
                     .and_then(|fitted| self.judge(fitted.proxy, &fewer, &judges))
                     .map_err(|error| error.to_string())
             };
@@ -123,12 +125,12 @@ impl Scene {
                 FieldOptions::default(),
             );
             let picture = cpu::render(&frame, Method::Exact);
-            let picture = picture.map_err(|e| SceneError::Trial(e.to_string()))?;
+            let picture = picture.map_err(unfit)?;
             let score = score::score(&picture, &truth);
-            scores.push(score.map_err(|e| SceneError::Trial(e.to_string()))?.psnr);
+            scores.push(score.map_err(unfit)?.psnr);
         }
         if scores.is_empty() {
-            return Err(SceneError::Trial("no photo to judge by".to_owned()));
+            return Err(unfit("no photo to judge by"));
         }
         Ok(scores.iter().sum::<f64>() / scores.len() as f64)
     }

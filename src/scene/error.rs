@@ -49,9 +49,6 @@ pub enum SceneError {
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),
-    /// A proxy could not be tried out.
-    #[error("{0}")]
-    Trial(String),
     /// A kind of proxy does not suit the scene.
     #[error("{0}")]
     Unfit(String),

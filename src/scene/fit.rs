@@ -6,9 +6,9 @@ use calibrate::View;
 use glam::DVec3;
 use image::RgbaImage;
 use proxy::dense::{DenseOptions, DensePoints, densify};
-use proxy::depth::{self, DepthImage};
+use proxy::depth;
 use proxy::hull::{self, Silhouette};
-use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint};
+use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint, Tunnel};
 use proxy::{carve, tunnel};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -138,19 +138,7 @@ impl Scene {
                 self.needs_points(kind)?;
                 Ok(Fitted::new(Proxy::Points, "made for every view"))
             }
-            Kind::Tunnel => {
-                let (views, points) = sparse()?;
-                let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
-                let tunnel = tunnel::fit(&views, &positions).map_err(unfit)?;
-                let how = format!(
-                    "{:.3} wide, {:.3} high, {:.3} long, {:.0} % of the points on its walls",
-                    tunnel.width(),
-                    tunnel.height(),
-                    tunnel.length(),
-                    100.0 * tunnel.share_on_walls
-                );
-                Ok(Fitted::mesh(MeshKind::Tunnel, tunnel.mesh(), how))
-            }
+            Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
             Kind::Carved => {
                 let (views, points) = sparse()?;
                 let mesh = carve::surface(&views, &points, &carve::Options::default());
@@ -163,13 +151,20 @@ impl Scene {
         }
     }
 
-    /// Whether the photos but those of the given names were taken along a hallway.
-    pub(super) fn is_hallway(&self, without: &BTreeSet<String>) -> bool {
-        let Ok((views, points)) = self.sparse(without) else {
-            return false;
-        };
+    /// The tunnel, where the photos but those of the given names were taken along a hallway.
+    pub(super) fn fit_hallway(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        let tunnel = self.tunnel(without)?;
+        if tunnel.is_hallway() {
+            Ok(Fitted::tunnel(&tunnel))
+        } else {
+            Err(unfit("the scene is no hallway"))
+        }
+    }
+
+    fn tunnel(&self, without: &BTreeSet<String>) -> Result<Tunnel, SceneError> {
+        let (views, points) = self.sparse(without)?;
         let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
-        tunnel::fit(&views, &positions).is_ok_and(|tunnel| tunnel.is_hallway())
+        tunnel::fit(&views, &positions).map_err(unfit)
     }
 
     fn needs_points(&self, kind: Kind) -> Result<(), SceneError> {
@@ -235,16 +230,11 @@ impl Scene {
             .iter()
             .filter(|(photo, _)| photo.depth_map.is_some())
             .collect();
-        let frame = |i: usize| -> Result<(View, DepthImage), SceneError> {
+        let frame = |i: usize| -> Result<(View, capture::DepthMap), SceneError> {
             let (photo, view) = with_maps[i];
             let map = photo.decode_depth((view.width, view.height))?;
             let map = map.ok_or_else(|| unfit(format!("{}: no depth map", photo.name)))?;
-            let image = DepthImage {
-                width: map.width,
-                height: map.height,
-                depths: map.depths,
-            };
-            Ok((view.clone(), image))
+            Ok((view.clone(), map))
         };
         let options = depth::Options {
             max_triangles: Some(MOST_TRIANGLES),
@@ -288,9 +278,8 @@ impl Scene {
     ) -> Result<Fitted, SceneError> {
         self.needs_points(Kind::Dense)?;
         let sources = self.sources(without)?;
-        let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
-        let names: Vec<String> = sources.iter().map(|(p, _)| p.name.clone()).collect();
-        let sparse = self.sparse_points(without, &names);
+        let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
+        let (views, sparse) = self.sparse(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
         let points = densify(&views, &sparse, photo, options);
         let how = format!(
@@ -313,6 +302,17 @@ impl Fitted {
         }
     }
 
+    fn tunnel(tunnel: &Tunnel) -> Self {
+        let how = format!(
+            "{:.3} wide, {:.3} high, {:.3} long, {:.0} % of the points on its walls",
+            tunnel.width(),
+            tunnel.height(),
+            tunnel.length(),
+            100.0 * tunnel.share_on_walls
+        );
+        Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how)
+    }
+
     fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {
         Self::new(Proxy::Mesh(Arc::new(Solid::new(kind, mesh))), how)
     }
@@ -325,7 +325,7 @@ const OPAQUE: u8 = 128;
 const MOST_TRIANGLES: usize = 200_000;
 
 /// Why a kind of proxy does not suit a scene.
-fn unfit(reason: impl ToString) -> SceneError {
+pub(super) fn unfit(reason: impl ToString) -> SceneError {
     SceneError::Unfit(reason.to_string())
 }
 

@@ -1,7 +1,7 @@
 //! A depth map made ready: inverse depths, their slopes, and how far each is believed.
 
-use super::DepthImage;
 use calibrate::{Lens, Pixel, View};
+use capture::DepthMap;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ pub(super) struct Inverse<'a> {
 
 impl<'a> Inverse<'a> {
     /// The depth map must be as large as the view and have all its values.
-    pub(super) fn new(view: View, depth: &DepthImage, rays: &'a [DVec2]) -> Self {
+    pub(super) fn new(view: View, depth: &DepthMap, rays: &'a [DVec2]) -> Self {
         let inverse = |(&depth, ray): (&f32, &DVec2)| {
             let inverse = f64::from(depth).recip();
             let is_known = depth > 0.0 && depth.is_finite() && ray.is_finite();

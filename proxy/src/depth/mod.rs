@@ -16,19 +16,9 @@ mod volume;
 use crate::Mesh;
 use blocks::Grid;
 use calibrate::View;
+use capture::DepthMap;
 use frame::{Frame, Inverse, Rays, Statistics, Trust};
 use volume::{BLOCK_BYTES, Band, Volume};
-
-/// Depth at each pixel's centre, along the camera's z axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DepthImage {
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// World units, row by row; what is not positive and finite is unknown.
-    pub depths: Vec<f32>,
-}
 
 /// How depth maps are fused.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,7 +168,7 @@ const MAX_PIXEL_PER_VOXEL: f64 = 4.0;
 /// of range.
 pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     count: usize,
-    mut frame: impl FnMut(usize) -> Result<(View, DepthImage), E>,
+    mut frame: impl FnMut(usize) -> Result<(View, DepthMap), E>,
     options: &Options,
 ) -> Result<Fusion, DepthError> {
     check(options)?;
@@ -312,7 +302,7 @@ fn check(options: &Options) -> Result<(), DepthError> {
     }
 }
 
-fn check_frame(number: usize, view: &View, depth: &DepthImage) -> Result<(), DepthError> {
+fn check_frame(number: usize, view: &View, depth: &DepthMap) -> Result<(), DepthError> {
     let size = (depth.width, depth.height);
     let values = u64::from(depth.width) * u64::from(depth.height);
     if size != (view.width, view.height) || depth.depths.len() as u64 != values {

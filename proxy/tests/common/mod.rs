@@ -3,9 +3,8 @@
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
 use calibrate::{Pixel, View, colmap};
-use glam::DVec3;
-use proxy::Mesh;
-use proxy::depth::DepthImage;
+use capture::DepthMap;
+use proxy::{Mesh, MeshKind, Solid};
 use std::path::{Path, PathBuf};
 
 /// A capture with depth maps.
@@ -52,68 +51,23 @@ pub fn capture(folder: &Path) -> Capture {
     capture
 }
 
-pub fn decode((view, path): &(View, PathBuf)) -> Result<(View, DepthImage), capture::CaptureError> {
+pub fn decode((view, path): &(View, PathBuf)) -> Result<(View, DepthMap), capture::CaptureError> {
     let map = capture::decode_depth(path, "", (view.width, view.height), 0.001)?;
-    let depth = DepthImage {
-        width: map.width,
-        height: map.height,
-        depths: map.depths,
-    };
-    Ok((view.clone(), depth))
+    Ok((view.clone(), map))
 }
 
 /// The depth of the nearest triangle at each pixel's centre, infinite where there is none.
-/// Triangles that reach behind the camera are clipped.
 pub fn depth_of(mesh: &Mesh, view: &View) -> Vec<f64> {
-    let mut depths = vec![f64::INFINITY; view.width as usize * view.height as usize];
-    let (lens, near) = (&view.lens, 1e-3);
-    let rays: Vec<DVec3> = (0..view.height)
-        .flat_map(|row| (0..view.width).map(move |column| (column, row)))
-        .map(|(column, row)| lens.unproject(Pixel::center_of(column, row)).unwrap())
-        .map(|ray| ray / ray.z)
-        .collect();
-    for triangle in 0..mesh.triangles.len() {
-        let corners = mesh.corners(triangle).map(|p| view.camera_from_world * p);
-        // 1. What is in front of the camera.
-        let mut polygon = Vec::new();
-        for i in 0..3 {
-            let (a, b) = (corners[i], corners[(i + 1) % 3]);
-            if a.z >= near {
-                polygon.push(a);
-            }
-            if (a.z >= near) != (b.z >= near) {
-                polygon.push(a.lerp(b, (near - a.z) / (b.z - a.z)));
-            }
-        }
-        // 2. The pixels around it, each asked whether its ray passes through.
-        let pixels: Vec<Pixel> = polygon.iter().filter_map(|p| lens.project(*p)).collect();
-        if pixels.is_empty() {
-            continue;
-        }
-        let bound = |pick: fn(f64, f64) -> f64, of: fn(&Pixel) -> f64, end: u32| {
-            let found = pixels.iter().map(of).reduce(pick).unwrap();
-            found.clamp(0.0, f64::from(end)) as u32
-        };
-        let columns = bound(f64::min, |p| p.x, view.width)
-            ..(bound(f64::max, |p| p.x, view.width) + 1).min(view.width);
-        let rows = bound(f64::min, |p| p.y, view.height)
-            ..(bound(f64::max, |p| p.y, view.height) + 1).min(view.height);
-        let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a);
-        for row in rows {
-            for column in columns.clone() {
-                let i = (row * view.width + column) as usize;
-                let ray = rays[i];
-                let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|side| side.dot(ray));
-                let is_through = sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0);
-                let depth = normal.dot(a) / normal.dot(ray);
-                if is_through && depth >= near && depth < depths[i] {
-                    depths[i] = depth;
-                }
-            }
-        }
-    }
-    depths
+    let solid = Solid::new(MeshKind::Mesh, mesh.clone());
+    let center = view.center();
+    let world_from_camera = view.camera_from_world.rotation.conjugate();
+    let pixels = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+    let depth = |(x, y): (u32, u32)| {
+        let ray = view.lens.unproject(Pixel::center_of(x, y)).unwrap();
+        let hit = solid.first_hit(center, world_from_camera * (ray / ray.z));
+        hit.map_or(f64::INFINITY, |hit| hit.along)
+    };
+    pixels.map(depth).collect()
 }
 
 /// The share of depths held out that one of the depth maps used shows as well, within `near`:
@@ -131,7 +85,7 @@ pub fn shown(capture: &Capture, near: f64) -> f64 {
             let pixel = Pixel::center_of(i as u32 % view.width, i as u32 / view.width);
             let ray = view.lens.unproject(pixel).unwrap();
             let point = world_from_camera * (ray / ray.z * f64::from(depth.depths[i]));
-            let is_shown = |(view, depth): &(View, DepthImage)| {
+            let is_shown = |(view, depth): &(View, DepthMap)| {
                 let z = (view.camera_from_world * point).z;
                 let pixel = view.project(point).filter(|p| view.contains(*p));
                 pixel.is_some_and(|p| {

@@ -288,11 +288,15 @@ impl<'a> Engine<'a> {
             }
             let photo = self.frame.lumigraph.photos.get(i)?;
             let exposure = self.sources[i].exposure;
+            let as_it_is = exposure == glam::Vec4::ONE;
             for k in 0..count {
                 let w = weight[k];
                 if w > 0.0 {
-                    let sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
-                    color[k] += shade::exposed(sample, exposure) * w;
+                    let mut sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
+                    if !as_it_is {
+                        sample = shade::exposed(sample, exposure);
+                    }
+                    color[k] += sample * w;
                     sum[k] += w;
                 }
             }
