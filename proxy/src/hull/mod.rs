@@ -8,6 +8,7 @@
 
 mod background;
 mod bounds;
+mod carving;
 mod closest;
 mod measure;
 mod octree;
@@ -22,13 +23,11 @@ pub use background::{BackgroundError, plain_background};
 pub use measure::{Measures, measure, outline};
 pub use silhouette::Silhouette;
 pub use simplify::simplify;
-pub use turntable::{Turntable, TurntableError, turntable};
+pub use turntable::{TURNTABLE_STEPS, Turntable, TurntableError, turntable};
 
 use crate::Mesh;
 use calibrate::View;
-use octree::Level;
-use rayon::prelude::*;
-use witness::Witness;
+use carving::Carving;
 
 /// How [`carve`] goes about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +38,10 @@ pub struct Options {
     /// So many photos may see a point outside their silhouettes and it stays in the hull
     /// nevertheless. Covers silhouettes that are wrong here and there.
     pub misses: u16,
+    /// Silhouettes contradict one another where the hull covers less than this part of their
+    /// pixels: then more pixels of tolerance and more misses (one of ten photos at most) are
+    /// allowed, as few as will do. 0 allows none but those above.
+    pub least_coverage: f64,
     /// The side of the smallest cells, in pixels of a typical photo; more than 0.
     pub cell_px: f64,
     /// Cells are divided no further where this many would be left.
@@ -55,6 +58,7 @@ impl Default for Options {
         Self {
             tolerance_px: 1.0,
             misses: 0,
+            least_coverage: 0.985,
             cell_px: 3.5,
             most_cells: 4_000_000,
             longest_side_px: 1600,
@@ -74,6 +78,10 @@ pub struct Hull {
     pub carved: Measures,
     /// The side of the cells it was carved in, in world units.
     pub cell: f64,
+    /// By so many pixels silhouettes grew before they carved.
+    pub tolerance_px: f64,
+    /// So many photos were allowed to miss.
+    pub misses: u16,
     /// Indices of the photos that took no part: their masks are all object or all not.
     pub left_out: Vec<usize>,
 }
@@ -180,48 +188,26 @@ pub fn carve(
     options: &Options,
 ) -> Result<Hull, HullError> {
     check(views, silhouettes, options)?;
-    // 1. The photos that say something, as functions of space.
+    // 1. The photos that say something.
     let (used, left_out) = choose(silhouettes)?;
-    let used_views: Vec<&View> = used.iter().map(|i| &views[*i]).collect();
-    let reduced: Vec<(View, Silhouette)> = used
-        .par_iter()
-        .map(|i| reduce(&views[*i], &silhouettes[*i], options.longest_side_px))
-        .collect();
-    let witnesses: Vec<Witness> = reduced
-        .par_iter()
-        .map(|(view, silhouette)| Witness::new(view, silhouette, options.tolerance_px))
-        .collect();
-    // 2. Where the object is, and the cells around its surface.
-    let (small_views, small): (Vec<&View>, Vec<&Silhouette>) =
-        reduced.iter().map(|(view, s)| (view, s)).unzip();
-    let bounds = bounds::find(&small_views, &small, &witnesses, options.misses)?;
-    let level = finest(&bounds, &used_views, &witnesses, options);
-    // 3. The surface, and less of it.
-    let surface = surface::extract(&level, &witnesses);
-    if surface.triangles.is_empty() {
-        return Err(HullError::Contradiction { photos: used.len() });
-    }
-    let used_silhouettes: Vec<&Silhouette> = used.iter().map(|i| &silhouettes[*i]).collect();
-    let carved_mesh = pieces::needed(&surface, &used_views, &used_silhouettes);
-    let carved = measure::compare(&carved_mesh, &used_views, &used_silhouettes);
+    let carving = Carving::new(
+        used.iter().map(|i| &views[*i]).collect(),
+        used.iter().map(|i| &silhouettes[*i]).collect(),
+        options,
+    );
+    // 2. The surface, and less of it.
+    let carved = carving.consistent()?;
     let (mesh, measures) = match options.faces {
-        Some(faces) if faces < carved.faces => {
-            // Specks that the rest has grown around go, so that what stays gets their faces.
-            let mut mesh = simplify(&carved_mesh, 3 * faces);
-            for _ in 0..2 {
-                mesh = pieces::needed(&mesh, &used_views, &used_silhouettes);
-                mesh = simplify(&mesh, faces);
-            }
-            let measures = measure::compare(&mesh, &used_views, &used_silhouettes);
-            (mesh, measures)
-        }
-        _ => (carved_mesh, carved),
+        Some(faces) if faces < carved.measures.faces => carving.simplified(&carved, faces),
+        _ => (carved.mesh, carved.measures),
     };
     Ok(Hull {
         mesh,
         measures,
-        carved,
-        cell: level.side,
+        carved: carved.measures,
+        cell: carved.cell,
+        tolerance_px: carved.tolerance_px,
+        misses: carved.misses,
         left_out,
     })
 }
@@ -256,6 +242,10 @@ fn check(views: &[View], silhouettes: &[Silhouette], options: &Options) -> Resul
     if !(0.0..=1000.0).contains(&options.tolerance_px) {
         return refuse("the tolerance", options.tolerance_px, "0 to 1000 pixels");
     }
+    if !(0.0..=1.0).contains(&options.least_coverage) {
+        let found = options.least_coverage;
+        return refuse("the least coverage", found, "0 to 1");
+    }
     if !(0.01..=1000.0).contains(&options.cell_px) {
         return refuse("a cell's side", options.cell_px, "0.01 to 1000 pixels");
     }
@@ -285,50 +275,3 @@ fn choose(silhouettes: &[Silhouette]) -> Result<(Vec<usize>, Vec<usize>), HullEr
     }
     Ok((used, left_out))
 }
-
-/// A photo at a whole fraction of its size; as it is where that leaves no silhouette.
-fn reduce(view: &View, silhouette: &Silhouette, longest_side_px: u32) -> (View, Silhouette) {
-    let factor = view.width.max(view.height).div_ceil(longest_side_px);
-    let smaller = silhouette.reduced(factor);
-    if factor > 1 && smaller.has_border() {
-        return (witness::reduced(view, factor), smaller);
-    }
-    (view.clone(), silhouette.clone())
-}
-
-/// The level of cells that are as small as asked for.
-fn finest(
-    bounds: &bounds::Bounds,
-    views: &[&View],
-    witnesses: &[Witness],
-    options: &Options,
-) -> Level {
-    let extent = bounds.high - bounds.low;
-    let middle = bounds.low + 0.5 * extent;
-    let mut pixels: Vec<f64> = views
-        .iter()
-        .zip(witnesses)
-        .map(|(view, witness)| view.center().distance(middle) * witness.pixel_angle())
-        .collect();
-    pixels.sort_by(f64::total_cmp);
-    let wanted = options.cell_px * pixels[pixels.len() / 2];
-    let across = (1.02 * extent.max_element() / wanted).max(f64::from(FEWEST_CELLS_ACROSS));
-    let levels = (across.log2().ceil() as i32).clamp(1, MOST_LEVELS);
-    let cell = 1.02 * extent.max_element() / across;
-    let side = cell.max(1.02 * extent.max_element() / 2.0_f64.powi(levels)) * 2.0_f64.powi(levels);
-    let origin = middle - 0.5 * side;
-    let mut level = Level::root(origin, side, witnesses.len(), options.misses);
-    for _ in 0..levels {
-        let next = level.divided(witnesses).level;
-        if next.cells.len() > options.most_cells {
-            break;
-        }
-        level = next;
-    }
-    level
-}
-
-/// Small objects are carved in no fewer cells than this.
-const FEWEST_CELLS_ACROSS: u32 = 24;
-/// Coordinates of cells must fit 20 bits, corners beyond the last included.
-const MOST_LEVELS: i32 = 18;

@@ -19,12 +19,13 @@ use std::collections::BinaryHeap;
 /// as an area, times the square of how far it is away. Where faces are nearly flat, all
 /// places on their plane add as little volume as any.
 const HOLD: f64 = 0.2;
-/// No collapse adds more than this part of the volume: few faces are worth less than the shape.
-const MOST_ADDED: f64 = 0.01;
+/// What a collapse may add at most, as parts of the volume: cheap folds come before costly
+/// collapses without, and few faces are worth less than the shape.
+const MOST_ADDED: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
 /// After so many of the faces have gone, edges that could not collapse are tried again.
 const ROUND: f64 = 0.6;
 /// A new face may turn by so much from the one it takes the place of (cosine). Folds do no
-/// harm but to the mesh's looks: they come when nothing else is left.
+/// harm but to the mesh's looks: they come when nothing else is left at the price.
 const MOST_TURNED: [f64; 3] = [0.2, -0.5, -2.0];
 
 /// Collapses edges, those first that add least volume, until so many faces are left, or until
@@ -35,12 +36,15 @@ const MOST_TURNED: [f64; 3] = [0.2, -0.5, -2.0];
 /// an edge. Deterministic.
 pub fn simplify(mesh: &Mesh, faces: usize) -> Mesh {
     let mut surface = Surface::new(mesh);
-    let most = MOST_ADDED * mesh.volume().abs();
-    for most_turned in MOST_TURNED {
+    let volume = mesh.volume().abs();
+    let stages = MOST_ADDED
+        .iter()
+        .flat_map(|part| MOST_TURNED.map(|turned| (part, turned)));
+    for (part, most_turned) in stages {
         while surface.alive_faces > faces {
             let before = surface.alive_faces;
             let round = faces.max((ROUND * before as f64) as usize);
-            surface.collapse_edges(round, most, most_turned);
+            surface.collapse_edges(round, part * volume, most_turned);
             if surface.alive_faces == before {
                 break;
             }

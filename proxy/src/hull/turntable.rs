@@ -17,6 +17,10 @@ use calibrate::{Lens, Rigid3, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
+/// Degrees from photo to photo, either way round.
+pub const TURNTABLE_STEPS: RangeInclusive<f64> = 0.1..=120.0;
 
 /// Angles between the photos that are compared, in radians, at most. Beyond it the epipoles
 /// come close to the silhouettes.
@@ -108,7 +112,7 @@ pub fn turntable(
     silhouettes: &[Silhouette],
     step_degrees: f64,
 ) -> Result<Turntable, TurntableError> {
-    if !(0.1..=120.0).contains(&step_degrees.abs()) {
+    if !TURNTABLE_STEPS.contains(&step_degrees.abs()) {
         return Err(TurntableError::Step {
             found: step_degrees,
         });
