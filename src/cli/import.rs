@@ -4,11 +4,13 @@ use super::Usage;
 use super::exposure::ExposureArgs;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
-use super::session::progress;
+use super::session::{progress, spinner};
 use super::uncalibrated::UncalibratedArgs;
+use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
-    DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, TimeSource, Warning,
+    DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
 };
+use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -32,6 +34,7 @@ use std::path::PathBuf;
 ///     lumigraph import photos --calibration out_camera_data.yml -o my-scene
 ///     lumigraph import my-capture --undistort -o my-scene
 ///     lumigraph import sweep.mp4 --frames 60 -o my-scene
+///     lumigraph import car-photos --turntable 10 -o my-scene
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -81,6 +84,17 @@ pub(super) struct Args {
     frame_rate: Option<f64>,
     #[command(flatten)]
     uncalibrated: UncalibratedArgs,
+    /// The photos are of an object on a turntable, DEGREES apart in the order of their names;
+    /// cameras are found from its silhouettes
+    ///
+    /// For a perfect circle of cameras that look at its axis, upright. Degrees are positive where
+    /// the camera moves counter-clockwise around the object as seen from above: the object turns
+    /// clockwise. Silhouettes come from --mattes, the photos' alpha or a plain background. The
+    /// scene has their hull as its proxy.
+    #[arg(long, value_name = "DEGREES", value_parser = turntable_step,
+        allow_negative_numbers = true, conflicts_with_all = ["calibration", "camera_matrix",
+        "distortion", "fisheye", "matching", "frames", "fps", "undistort", "depth"])]
+    turntable: Option<f64>,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -100,6 +114,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let is_video = args.photos.is_file();
     if !is_video && args.uncalibrated.asks_for_frames() {
         let message = "--frames and --fps are for a video's file, and PHOTOS is none";
+        return Err(Usage(message.to_owned()).into());
+    }
+    if is_video && args.turntable.is_some() {
+        let message = "--turntable takes a folder of photos in even steps, and PHOTOS is a file";
         return Err(Usage(message.to_owned()).into());
     }
     let (capture, frames) = if is_video {
@@ -126,7 +144,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         depth: args.depth.clone(),
         depth_scale: args.depth_scale,
     };
-    let imported = match Scene::import(&capture, &options) {
+    let first = match args.turntable {
+        Some(step_degrees) => Scene::import_turntable(&capture, step_degrees, &options),
+        None => Scene::import(&capture, &options),
+    };
+    let imported = match first {
         Err(SceneError::Uncalibrated { .. }) => {
             let work = Scene::colmap_folder(&args.output);
             let uncalibrated = &args.uncalibrated;
@@ -152,7 +174,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
     say!("exposure: {}", exposure.text());
-    if args.undistort {
+    if args.turntable.is_some() {
+        keep_hull(&mut scene);
+        scene.save_with_silhouettes(&args.output, args.force)?;
+    } else if args.undistort {
         let bar = progress(scene.photos.len(), "undistorting photos");
         let step = || bar.inc(1);
         let warnings = scene.save_undistorted(&args.output, args.force, args.strict, &step);
@@ -168,4 +193,34 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         scene.reconstruction.points.len(),
         beside_text(&scene)
     ))
+}
+
+/// Makes the hull of its silhouettes a scene's own proxy.
+fn keep_hull(scene: &mut Scene) {
+    let bar = spinner("carving the hull");
+    let fitted = scene.fit(Kind::Hull, &BTreeSet::new());
+    bar.finish_and_clear();
+    match fitted {
+        Ok(fitted) => {
+            say!("proxy: hull, {}", fitted.how);
+            scene.proxy = Some(SceneProxy {
+                proxy: fitted.proxy,
+                file: String::new(),
+                fitted_without: Some(Vec::new()),
+                other: Extra::new(),
+            });
+        }
+        Err(error) => say!("note: the scene has no proxy of its own yet: {error}"),
+    }
+}
+
+/// Degrees from photo to photo.
+fn turntable_step(text: &str) -> Result<f64, String> {
+    let (least, most) = (TURNTABLE_STEPS.start(), TURNTABLE_STEPS.end());
+    match text.parse::<f64>() {
+        Ok(step) if TURNTABLE_STEPS.contains(&step.abs()) => Ok(step),
+        _ => Err(format!(
+            "expected {least} to {most} degrees, or as many the other way (-10)"
+        )),
+    }
 }

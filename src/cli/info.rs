@@ -106,11 +106,13 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
         value["fitted_without"] = json!(own.fitted_without);
         value
     });
-    let [ignore_masks, object_mattes, depth_maps] = beside_counts(scene).map(|(_, n)| n);
+    let [ignore_masks, object_mattes, silhouettes, depth_maps] =
+        beside_counts(scene).map(|(_, n)| n);
     Ok(json!({
         "photos": scene.photos.len(),
         "ignore_masks": ignore_masks,
         "object_mattes": object_mattes,
+        "silhouettes": silhouettes,
         "depth_maps": depth_maps,
         "left_out": scene.left_out,
         "weakly_tied": reconstruction.weakly_tied(TRUSTED_TIE).iter().map(|group| json!({

@@ -40,12 +40,13 @@ impl SceneArgs {
     }
 }
 
-/// How many photos have an ignore mask, an object matte and a depth map.
-pub(super) fn beside_counts(scene: &Scene) -> [(&'static str, usize); 3] {
+/// How many photos have an ignore mask, an object matte, a silhouette and a depth map.
+pub(super) fn beside_counts(scene: &Scene) -> [(&'static str, usize); 4] {
     let count = |has: fn(&Photo) -> bool| scene.photos.iter().filter(|p| has(p)).count();
     [
         ("ignore masks", count(|p| p.ignore_mask.is_some())),
         ("object mattes", count(|p| p.object_matte.is_some())),
+        ("silhouettes", count(|p| p.silhouette.is_some())),
         ("depth maps", count(|p| p.depth_map.is_some())),
     ]
 }

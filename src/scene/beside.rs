@@ -63,6 +63,7 @@ impl Photo {
         let files = [
             (Beside::IgnoreMask, &self.ignore_mask),
             (Beside::ObjectMatte, &self.object_matte),
+            (Beside::ObjectMatte, &self.silhouette),
             (Beside::DepthMap, &self.depth_map),
         ];
         files
@@ -179,15 +180,15 @@ impl Scene {
         Ok(())
     }
 
-    /// Says so where ignore masks are an object's silhouettes, and leaves them out unless
-    /// they were `asked` for: as ignore masks they would take the background away, and with
-    /// it most of the picture.
+    /// Says so where ignore masks are an object's silhouettes, and unless they were `asked`
+    /// for, keeps them as that only: as ignore masks they would take the background away, and
+    /// with it most of the picture.
     pub(super) fn judge_masks(&mut self, asked: bool, warnings: &mut Vec<Warning>) {
         let note = if let Some(name) = self.repeated_alpha() {
             let remedy = if asked {
                 "--no-masks leaves them out"
             } else {
-                "they are left out"
+                "they ignore nothing"
             };
             format!(
                 "the ignore masks repeat the photos' alpha ({name}, for one), which is an object \
@@ -196,15 +197,17 @@ impl Scene {
         } else if !asked && self.masks_keep_little() {
             format!(
                 "the masks in {MASKS_FOLDER} keep less than half of each photo, as an object's \
-                 silhouettes do, and are left out; --mattes {MASKS_FOLDER} cuts the photos out \
-                 along them, --masks {MASKS_FOLDER} ignores all else"
+                 silhouettes do, and serve the hull only; --mattes {MASKS_FOLDER} cuts the photos \
+                 out along them, --masks {MASKS_FOLDER} ignores all else"
             )
         } else {
             return;
         };
         warnings.push(Warning::Note(note));
         if !asked {
-            self.photos.iter_mut().for_each(|p| p.ignore_mask = None);
+            for photo in &mut self.photos {
+                photo.silhouette = photo.ignore_mask.take();
+            }
         }
     }
 

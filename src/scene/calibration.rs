@@ -22,7 +22,7 @@ pub(super) enum Source {
 
 impl Source {
     /// For messages.
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         match self {
             Self::Colmap(model) => format!("the COLMAP model in {}", model.display()),
             Self::OpenCv(file) | Self::Other(_, file) => file.display().to_string(),

@@ -49,6 +49,29 @@ pub enum SceneError {
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),
+    /// A turntable's photos are not all of one size.
+    #[error(
+        "{}: the photo has {} × {} pixels and {other} {} × {}; a turntable's photos come from one \
+         camera: leave out those of another size", path.display(), found.0, found.1, expected.0, expected.1
+    )]
+    TurntableSizes {
+        /// The photo's file.
+        path: PathBuf,
+        /// Its width and height in pixels.
+        found: (u32, u32),
+        /// The name of another photo.
+        other: String,
+        /// The other's width and height in pixels.
+        expected: (u32, u32),
+    },
+    /// The photos' silhouettes fit no turntable.
+    #[error("{}: no turntable's cameras: {source}", folder.display())]
+    Turntable {
+        /// The folder of the photos.
+        folder: PathBuf,
+        /// What does not fit.
+        source: proxy::hull::TurntableError,
+    },
     /// A kind of proxy does not suit the scene.
     #[error("{0}")]
     Unfit(String),

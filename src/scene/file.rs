@@ -83,6 +83,9 @@ pub struct PhotoEntry {
     /// The file of an object's silhouette.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object_matte: Option<String>,
+    /// The file of a mask that only says where the object is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub silhouette: Option<String>,
     /// The file of a depth map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_map: Option<String>,
@@ -151,6 +154,9 @@ pub struct Settings {
     /// Whether the photos were undistorted: the scene's folder holds them.
     #[serde(default, skip_serializing_if = "is_false")]
     pub undistorted: bool,
+    /// Where the cameras were found from a turntable's silhouettes: degrees from photo to photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turntable_degrees: Option<f64>,
     /// Whether a missing or corrupt photo was an error.
     #[serde(default)]
     pub strict: bool,

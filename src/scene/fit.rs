@@ -7,7 +7,7 @@ use glam::DVec3;
 use image::RgbaImage;
 use proxy::dense::{DenseOptions, DensePoints, densify};
 use proxy::depth;
-use proxy::hull::{self, Silhouette};
+use proxy::hull;
 use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint, Tunnel};
 use proxy::{carve, tunnel};
 use rayon::prelude::*;
@@ -188,39 +188,37 @@ impl Scene {
         Ok((views, self.sparse_points(without, &names)))
     }
 
-    /// The hull of the photos' mattes or alpha; where they have neither, of what stands before
-    /// a plain background.
+    /// The hull of the photos' silhouettes.
     fn fit_hull(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         let sources = self.sources(without)?;
-        let silhouette = |(photo, view): &(&Photo, View)| -> Result<Silhouette, SceneError> {
-            let pixels = photo.decode((view.width, view.height))?;
-            let (width, height) = pixels.dimensions();
-            let alpha: Vec<u8> = pixels.pixels().map(|p| p.0[3]).collect();
-            if alpha.iter().any(|a| *a < OPAQUE) {
-                return Silhouette::from_values(width, height, &alpha)
-                    .ok_or_else(|| unfit(format!("photo {}: it has no pixels", photo.name)));
-            }
-            let rgb: Vec<u8> = pixels.pixels().flat_map(|p| p.0[..3].to_vec()).collect();
-            hull::plain_background(width, height, &rgb).map_err(|e| {
-                unfit(format!(
-                    "photo {} has no matte, and its background does not show one: {e}; give \
-                     mattes with `import --mattes DIR`",
-                    photo.name
-                ))
-            })
-        };
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
         let silhouettes = sources
             .par_iter()
-            .map(silhouette)
+            .map(|(photo, view)| photo.decode_silhouette((view.width, view.height)))
             .collect::<Result<Vec<_>, _>>()?;
         let hull = hull::carve(&views, &silhouettes, &hull::Options::default()).map_err(unfit)?;
-        let how = format!(
+        let mut how = format!(
             "covers {:.2} % of the silhouettes, {:.2} of intersection over union",
             100.0 * hull.measures.coverage,
             hull.measures.iou
         );
-        Ok(Fitted::mesh(MeshKind::Hull, hull.mesh, how))
+        if hull.misses > 0 || hull.tolerance_px > hull::Options::default().tolerance_px {
+            how += &format!(
+                "; they contradict one another: {} may miss, by {} px all",
+                hull.misses, hull.tolerance_px
+            );
+        }
+        let mut fitted = Fitted::mesh(MeshKind::Hull, hull.mesh, how);
+        if let Some(first) = hull.left_out.first() {
+            fitted.note = Some(format!(
+                "{} of {} masks are all object or all background and say nothing (that of {}, \
+                 for one)",
+                hull.left_out.len(),
+                sources.len(),
+                sources[*first].0.name
+            ));
+        }
+        Ok(fitted)
     }
 
     /// The surface of the photos' depth maps, with a shell behind it.
@@ -318,8 +316,6 @@ impl Fitted {
     }
 }
 
-/// Alpha from which on a pixel belongs to the object.
-const OPAQUE: u8 = 128;
 /// Fused depth maps are simplified to about so many triangles: finer ones show no difference,
 /// and rays through them take longer.
 const MOST_TRIANGLES: usize = 200_000;

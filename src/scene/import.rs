@@ -5,9 +5,9 @@ use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
 use super::times::{TimeSource, set_times};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
-use calibrate::colmap;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
+use calibrate::{Reconstruction, colmap};
 use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -76,21 +76,15 @@ impl Scene {
         capture: &Path,
         options: &ImportOptions,
     ) -> Result<(Self, Vec<Warning>), SceneError> {
+        // 1. The calibration.
+        let mut warnings = Vec::new();
         if !capture.is_dir() {
             return Err(SceneError::NoFolder(capture.to_owned()));
         }
-        // 1. The calibration.
-        let mut warnings = Vec::new();
         let source = calibration::find(capture, options, &mut warnings)?;
 
         // 2. The photos, matched by name.
-        let folder =
-            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
-        let mut found = PhotoSet::open(&folder)?;
-        if folder == capture {
-            // Photos that lie in the capture itself have their masks within.
-            found.photos.retain(|photo| !beside::is_beside(&photo.name));
-        }
+        let found = Self::photos_of(capture)?;
         let reconstruction = match &source {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
@@ -101,22 +95,9 @@ impl Scene {
             Source::Other(Format::Llff, file) => calibration::depth_bounds(file, &found)?,
             _ => BTreeMap::new(),
         };
-        let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
-        names.sort();
-        let photos = names.iter().map(|name| Photo {
-            name: (*name).clone(),
-            path: folder.join(name),
-            original: None,
-            ignore_mask: None,
-            object_matte: None,
-            depth_map: None,
-            depth_scale: None,
-            time_s: None,
-            gain: None,
-            depth_bounds: bounds.get(name.as_str()).copied(),
-            other: Extra::new(),
-        });
-        let unused = |photo: &&capture::PhotoFile| names.binary_search(&&photo.name).is_err();
+        let mut scene = Self::of(reconstruction, capture, &found, &bounds, options);
+        let names: BTreeSet<&str> = scene.photos.iter().map(|p| p.name.as_str()).collect();
+        let unused = |photo: &&capture::PhotoFile| !names.contains(photo.name.as_str());
         if let Some(example) = found.photos.iter().find(unused) {
             warnings.push(Warning::Uncalibrated {
                 count: found.photos.iter().filter(unused).count(),
@@ -124,12 +105,59 @@ impl Scene {
                 example: example.name.clone(),
             });
         }
+        set_times(&mut scene.photos, capture, &options.times, &found)?;
 
-        let mut photos: Vec<Photo> = photos.collect();
-        set_times(&mut photos, capture, &options.times, &found)?;
+        // 3. Are they what was calibrated?
+        warnings.extend(scene.leave_out_unusable(options.strict)?);
 
-        let mut scene = Self {
-            photos,
+        // 4. What lies beside them.
+        scene.find_beside(capture, options, &mut warnings)?;
+        scene.check_beside()?;
+        scene.judge_masks(options.masks.is_some(), &mut warnings);
+        Ok((scene, warnings))
+    }
+
+    /// The photos of a capture.
+    pub(super) fn photos_of(capture: &Path) -> Result<PhotoSet, SceneError> {
+        if !capture.is_dir() {
+            return Err(SceneError::NoFolder(capture.to_owned()));
+        }
+        let folder =
+            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
+        let mut found = PhotoSet::open(&folder)?;
+        if folder == capture {
+            // Photos that lie in the capture itself have their masks within.
+            found.photos.retain(|photo| !beside::is_beside(&photo.name));
+        }
+        Ok(found)
+    }
+
+    /// A scene of a reconstruction's photos and nothing beside them yet.
+    pub(super) fn of(
+        reconstruction: Reconstruction,
+        capture: &Path,
+        found: &PhotoSet,
+        bounds: &BTreeMap<String, [f64; 2]>,
+        options: &ImportOptions,
+    ) -> Self {
+        let mut names: Vec<&String> = reconstruction.images.values().map(|i| &i.name).collect();
+        names.sort();
+        let photo = |name: &String| Photo {
+            name: name.clone(),
+            path: found.root.join(name),
+            original: None,
+            ignore_mask: None,
+            object_matte: None,
+            silhouette: None,
+            depth_map: None,
+            depth_scale: None,
+            time_s: None,
+            gain: None,
+            depth_bounds: bounds.get(name.as_str()).copied(),
+            other: Extra::new(),
+        };
+        Self {
+            photos: names.into_iter().map(photo).collect(),
             reconstruction,
             proxy: None,
             exposure: None,
@@ -146,15 +174,7 @@ impl Scene {
             calibration: options.calibration.clone(),
             left_out: Vec::new(),
             other: Extra::new(),
-        };
-        // 3. Are they what was calibrated?
-        warnings.extend(scene.leave_out_unusable(options.strict)?);
-
-        // 4. What lies beside them.
-        scene.find_beside(capture, options, &mut warnings)?;
-        scene.check_beside()?;
-        scene.judge_masks(options.masks.is_some(), &mut warnings);
-        Ok((scene, warnings))
+        }
     }
 
     /// Compares every photo's size with its camera's, and leaves out what cannot be used.

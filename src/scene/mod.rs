@@ -3,7 +3,8 @@
 //! The folder holds `scene.json` (format: [`mod@file`]), a COLMAP text model in `model/`
 //! and, once there is one, the proxy's file. Photos stay where they are and are named by
 //! their path relative to the folder. For photos that came without a calibration, COLMAP's
-//! work is in `colmap/`; those taken out of a video are in `photos/`.
+//! work is in `colmap/`; those taken out of a video are in `photos/`; of a turntable's, the
+//! silhouettes found before a plain background are in `silhouettes/`.
 
 mod auto;
 mod beside;
@@ -16,9 +17,11 @@ mod import;
 mod lumigraph;
 mod names;
 mod relative;
+mod silhouettes;
 mod split;
 mod store;
 mod times;
+mod turntable;
 mod undistort;
 
 pub use auto::{Trial, trials_text};
@@ -78,6 +81,9 @@ pub struct Photo {
     pub ignore_mask: Option<PathBuf>,
     /// The silhouette of the object that the photo is about, if any.
     pub object_matte: Option<PathBuf>,
+    /// A mask that shows the object but neither cuts it out nor ignores the rest, if any: for
+    /// the visual hull.
+    pub silhouette: Option<PathBuf>,
     /// Depth along z, if known.
     pub depth_map: Option<PathBuf>,
     /// World units a step of the depth map.

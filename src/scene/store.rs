@@ -3,7 +3,7 @@
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
 use super::relative::relative;
-use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER};
+use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use proxy::Proxy;
@@ -17,10 +17,11 @@ const PROXY_FILE: &str = "proxy.json";
 /// The same of one that is a mesh.
 const PROXY_MESH: &str = "proxy.ply";
 /// In the order in which they take their places: a folder without the last is no scene.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 9] = [
     IMAGES_FOLDER,
     MASKS_FOLDER,
     MATTES_FOLDER,
+    SILHOUETTES_FOLDER,
     DEPTH_FOLDER,
     MODEL_FOLDER,
     PROXY_FILE,
@@ -96,6 +97,7 @@ impl Scene {
                 original: entry.original,
                 ignore_mask: at(&entry.ignore_mask),
                 object_matte: at(&entry.object_matte),
+                silhouette: at(&entry.silhouette),
                 depth_map: at(&entry.depth_map),
                 depth_scale: entry.depth_scale,
                 time_s: entry.time_s,
@@ -183,6 +185,9 @@ impl Scene {
             FRAMES_FOLDER,
             PARTIAL_FRAMES,
         ];
+        if is_scene {
+            parts.push(SILHOUETTES_FOLDER);
+        }
         // Other photos are part of a scene only where it says that they are its own.
         if is_scene && holds_photos(folder) {
             parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER, DEPTH_FOLDER]);
@@ -312,6 +317,7 @@ impl Scene {
             original: photo.original.clone(),
             ignore_mask: from_here(&photo.ignore_mask),
             object_matte: from_here(&photo.object_matte),
+            silhouette: from_here(&photo.silhouette),
             depth_map: from_here(&photo.depth_map),
             depth_scale: photo.depth_scale,
             time_s: photo.time_s,

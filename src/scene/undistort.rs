@@ -1,5 +1,5 @@
 //! A scene whose photos are a pinhole's: its folder holds them, in `images/`, and in
-//! `masks/`, `mattes/` and `depth/` what belongs to them.
+//! `masks/`, `mattes/`, `silhouettes/` and `depth/` what belongs to them.
 
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::{Photo, Scene, SceneError, Warning, picture_files};
@@ -16,8 +16,10 @@ use std::path::{Path, PathBuf};
 
 /// Photos, in a scene that was undistorted.
 pub(super) const IMAGES_FOLDER: &str = "images";
-/// Silhouettes, in a scene that was undistorted.
+/// Mattes, in a scene that was undistorted.
 pub(super) const MATTES_FOLDER: &str = "mattes";
+/// Silhouettes for the hull alone, in a scene that was undistorted or that found them itself.
+pub(super) const SILHOUETTES_FOLDER: &str = "silhouettes";
 /// Sharper than a tent, and computed without a transcendental function, so that every machine
 /// writes the same bytes.
 const KERNEL: Kernel = Kernel::CatmullRom;
@@ -28,8 +30,8 @@ impl Scene {
     ///
     /// A pinhole's photos are copied as they are. All others become PNG files of the size that
     /// [`calibrate::undistort`] chooses, their names' extension replaced; [`Photo::original`]
-    /// is what they were called. Masks and mattes are undistorted likewise, as
-    /// `masks/NAME.png` and `mattes/NAME.png`, and depth maps by their nearest pixels, as
+    /// is what they were called. Masks, mattes and silhouettes are undistorted likewise, as
+    /// `masks/NAME.png`, `mattes/NAME.png` and `silhouettes/NAME.png`, and depth maps by their nearest pixels, as
     /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z.
     /// Where a photo does not fill its picture, that is ignored. `progress` is called after
     /// each photo.
@@ -83,6 +85,7 @@ impl Scene {
                         path,
                         ignore_mask,
                         object_matte,
+                        silhouette,
                         depth_map,
                         ..
                     }) => {
@@ -94,6 +97,7 @@ impl Scene {
                         photo.path = there(path);
                         photo.ignore_mask = ignore_mask.map(there);
                         photo.object_matte = object_matte.map(there);
+                        photo.silhouette = silhouette.map(there);
                         photo.depth_map = depth_map.map(there);
                         photo.name = name;
                     }
@@ -170,14 +174,14 @@ fn write_photo(
             Luma([255]),
         ))),
     };
-    let matte = match &photo.object_matte {
-        Some(path) => {
-            let kind = Beside::ObjectMatte;
-            let matte = capture::decode_mask(kind, path, &photo.name, photo_size)?;
-            Some(warped(matte))
-        }
-        None => None,
+    let warped_file = |path: &Option<PathBuf>| {
+        let Some(path) = path else { return Ok(None) };
+        let kind = Beside::ObjectMatte;
+        let matte = capture::decode_mask(kind, path, &photo.name, photo_size)?;
+        Ok::<_, CaptureError>(Some(warped(matte)))
     };
+    let matte = warped_file(&photo.object_matte)?;
+    let silhouette = warped_file(&photo.silhouette)?;
     let depth_map = match &photo.depth_map {
         Some(path) => {
             let steps = decode_depth_steps(path, &photo.name, photo_size)?;
@@ -193,6 +197,7 @@ fn write_photo(
         path: file,
         ignore_mask: written(MASKS_FOLDER, ignored)?,
         object_matte: written(MATTES_FOLDER, matte)?,
+        silhouette: written(SILHOUETTES_FOLDER, silhouette)?,
         depth_map,
         ..photo.clone()
     })

@@ -151,7 +151,8 @@ pub enum HullError {
     /// The hull goes on for ever.
     #[error(
         "the silhouettes of {photos} photos do not bound the object from all sides; add photos \
-         from other sides, or ones that show all of it"
+         from other sides, or ones that show all of it (are the masks the right way round, white \
+         where the object is?)"
     )]
     Unbounded {
         /// How many photos.

@@ -91,8 +91,8 @@ pub enum TurntableError {
     /// The silhouettes fit many circles.
     #[error(
         "the silhouettes do not tell the focal length: too much the same from all sides, seen \
-         from too far away, or the table turns the other way (turn the step's sign); calibrate \
-         the photos"
+         from too far away, or the step is another (turn the step's sign if the table turns the \
+         other way); calibrate the photos"
     )]
     Undetermined,
 }
