@@ -351,26 +351,46 @@ fn outlines_are_those_of_rays() {
     assert!(drawn.area() > 50);
 }
 
-/// Masks that contradict one another get the misses they need, others none. Simplified, a hull
-/// covers no less and is worth looking at.
+/// Masks that contradict one another get the misses they need, others none.
 #[test]
 fn real_masks_carve_real_hulls() {
-    for (name, misses, coverage, iou, simplified) in [
-        ("lego", 0, 0.999, 0.96, 0.82),
-        ("temple-ring", 1, 0.98, 0.95, 0.78),
-    ] {
+    for (name, misses, coverage, iou) in [("lego", 0, 0.999, 0.96), ("temple-ring", 1, 0.98, 0.95)]
+    {
         let Some(capture) = captured(name) else {
             continue;
         };
-        let hull = carve(&capture.views, &capture.silhouettes, &Options::default()).unwrap();
+        let options = Options {
+            faces: None,
+            ..Options::default()
+        };
+        let hull = carve(&capture.views, &capture.silhouettes, &options).unwrap();
         assert!(is_closed(&hull.mesh), "{name}");
-        let (carved, measures) = (hull.carved, hull.measures);
+        let carved = hull.carved;
         assert_eq!(hull.misses, misses, "{name}: {carved:?}");
         assert!(carved.coverage >= coverage, "{name}: {carved:?}");
         assert!(carved.iou >= iou, "{name}: {carved:?}");
+    }
+}
+
+/// However many holes contradictions leave, few faces follow the hull, cover no less, and are
+/// worth looking at. Cells are large for the sake of time.
+#[test]
+fn real_hulls_come_down_to_few_faces() {
+    for (name, cell_px, iou) in [("lego", 5.0, 0.8), ("temple-ring", 7.0, 0.75)] {
+        let Some(capture) = captured(name) else {
+            continue;
+        };
+        let options = Options {
+            cell_px,
+            ..Options::default()
+        };
+        let hull = carve(&capture.views, &capture.silhouettes, &options).unwrap();
+        let (carved, measures) = (hull.carved, hull.measures);
+        println!("{name}: {carved:?}, {measures:?}");
+        assert!(is_closed(&hull.mesh), "{name}");
         assert!(measures.faces <= 500, "{name}: {measures:?}");
         assert!(measures.coverage >= carved.coverage, "{name}: {measures:?}");
-        assert!(measures.iou >= simplified, "{name}: {measures:?}");
+        assert!(measures.iou >= iou, "{name}: {measures:?}");
     }
 }
 
