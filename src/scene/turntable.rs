@@ -141,9 +141,11 @@ fn by_numbers(a: &str, b: &str) -> Ordering {
             let (text, after) = rest.split_at(rest.find(is_digit).unwrap_or(rest.len()));
             let end = after.find(|c| !is_digit(c)).unwrap_or(after.len());
             let (digits, after) = after.split_at(end);
+            // Against other text a number counts as a digit.
+            let text = format!("{text}{}", if digits.is_empty() { "" } else { "0" });
             let digits = digits.trim_start_matches('0');
             // Numbers of any length: the longer, then by digits.
-            parts.push((text.to_owned(), digits.len(), digits.to_owned()));
+            parts.push((text, digits.len(), digits.to_owned()));
             rest = after;
         }
         parts
