@@ -19,6 +19,7 @@ mod relative;
 mod split;
 mod store;
 mod times;
+mod truth;
 mod undistort;
 
 pub use auto::{Trial, trials_text};
@@ -32,6 +33,7 @@ pub use names::{NameError, picture_files};
 pub use relative::relative;
 pub use split::SplitFile;
 pub use times::TimeSource;
+pub use truth::{Truth, TruthScore};
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{ExposureEntry, Extra, Settings};
