@@ -12,6 +12,7 @@ use score::Scored;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use table::{Figure, table};
 
 /// Fits proxies to captures without their held-out photos, renders these and scores them.
@@ -74,7 +75,7 @@ struct Row {
     distances: Vec<Option<Distances>>,
 }
 
-fn main() {
+fn main() -> ExitCode {
     let args = Args::parse();
     let mut rows = Vec::new();
     for capture in &args.captures {
@@ -85,8 +86,17 @@ fn main() {
     }
     if args.json {
         println!("{:#}", json(&args, &rows));
-        return;
+    } else {
+        print(&args, &rows);
     }
+    if rows.len() < args.captures.len() {
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
+
+/// The tables, and what `auto` chose.
+fn print(args: &Args, rows: &[Row]) {
     let columns: Vec<String> = args.kinds.iter().map(Column::to_string).collect();
     let figures = if args.geometry {
         [&Figure::SCORES[..], &Figure::DISTANCES].concat()
@@ -108,7 +118,7 @@ fn main() {
             println!("{text}");
         }
     }
-    for row in &rows {
+    for row in rows {
         let chosen = row.scored.iter().flatten().find_map(|s| s.chosen.as_ref());
         if let Some(chosen) = chosen {
             println!("{}: auto is {chosen}", row.name);
