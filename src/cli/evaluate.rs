@@ -10,9 +10,8 @@ use super::surface::ProxyArgs;
 use super::time::TimeArgs;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
-use image::{DynamicImage, RgbaImage};
-use lumigraph::scene::{Scene, picture_files};
-use render::score::{MaskedScore, PSNR_CAP_DB, Score, mean, mean_masked, score, score_masked};
+use lumigraph::scene::{Scene, TruthScore, picture_files};
+use render::score::{PSNR_CAP_DB, mean_of};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -22,10 +21,13 @@ use std::path::PathBuf;
 ///
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR once the
 /// picture is given the photo's own exposure (psnr_exposed), PSNR over the covered pixels,
-/// coverage, how far the photos that share a pixel are apart in steps of 255, details aside
-/// (seams), and processor time without decoding; where a photo has an ignore mask or a matte,
-/// also PSNR, SSIM and coverage inside. Held out are the photos that the capture's split.json
-/// names, else every 8th. With --period or --time-window each is rendered as of its own time.
+/// coverage (the mean alpha), the share of covered pixels among those that show sparse points
+/// which two or more other photos see (coverage_points), how far the photos that share a pixel
+/// are apart in steps of 255, details aside (seams), and processor time without decoding. Where
+/// a photo has an ignore mask or a matte, also PSNR, SSIM and coverage inside; with a matte, the
+/// mean alpha inside it (coverage_matte) and outside (coverage_background: best is 0). Held out
+/// are the photos that the capture's split.json names, else every 8th. With --period or
+/// --time-window each is rendered as of its own time.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -63,17 +65,11 @@ pub(super) struct Args {
 struct Line {
     name: String,
     #[serde(flatten)]
-    score: Score,
+    scores: TruthScore,
     /// See [`render::seams`].
     seams: Option<f64>,
-    /// Inside the photo's own mask or matte, if it has one.
-    #[serde(flatten)]
-    masked: Option<MaskedScore>,
     cpu_ms: f64,
 }
-
-/// The photos held out where nobody says which.
-const EVERY: usize = 8;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
@@ -104,21 +100,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
-    let split = match args.every {
-        Some(every) => return Ok(scene.every(every)),
-        None => args.hold_out.clone().or_else(|| scene.own_split()),
-    };
-    let Some(split) = split else {
-        return Ok(scene.every(EVERY));
-    };
-    let names = scene.held_out(&split)?;
-    if names.is_empty() {
-        bail!(
-            "{}: all of its photos are missing or corrupt",
-            split.display()
-        );
-    }
-    Ok(names)
+    Ok(match (args.every, &args.hold_out) {
+        (Some(every), _) => scene.every(every),
+        (None, Some(split)) => scene.held_out_some(split)?,
+        (None, None) => scene.held_out_by_default()?,
+    })
 }
 
 /// Renders and scores each of the given photos; where one turns out corrupt it is left out,
@@ -136,17 +122,11 @@ fn score_photos(
     let mut lines = Vec::new();
     for (name, file) in names.iter().zip(files) {
         let view = session.scene.view(name)?;
-        let Some(photo) = session.decode(name, (view.width, view.height))? else {
+        let Some(truth) = session.truth(name)? else {
             continue;
         };
         let desired = resized(view, size);
-        let inside = photo
-            .inside()
-            .map(DynamicImage::from)
-            .map(|mask| mask.into_rgba8());
-        let size = (desired.width, desired.height);
-        let photo = at_size(photo.pixels, size);
-        let inside = inside.map(|mask| DynamicImage::from(at_size(mask, size)).into_luma8());
+        let truth = truth.resized(desired.width, desired.height);
         let moment = session.moment(&format!("photo {name}"), session.scene.time_s(name))?;
         let drawn = session.draw_timed(&desired, moment.as_ref())?;
         if output.is_some() {
@@ -154,12 +134,8 @@ fn score_photos(
         }
         lines.push(Line {
             name: name.clone(),
-            score: score(&drawn.picture, &photo)?,
+            scores: truth.score(&drawn.picture)?,
             seams: session.seams(&desired, moment.as_ref())?,
-            masked: match inside {
-                Some(inside) => score_masked(&drawn.picture, &photo, &inside)?,
-                None => None,
-            },
             cpu_ms: drawn.cpu.as_secs_f64() * 1e3,
         });
         bar.inc(1);
@@ -171,24 +147,15 @@ fn score_photos(
     Ok(lines)
 }
 
-fn at_size(photo: RgbaImage, (width, height): (u32, u32)) -> RgbaImage {
-    if photo.dimensions() == (width, height) {
-        return photo;
-    }
-    capture::resize(&photo, width, height)
-}
-
 fn mean_line(lines: &[Line]) -> Option<Line> {
-    let scores: Vec<Score> = lines.iter().map(|line| line.score).collect();
+    let scores: Vec<TruthScore> = lines.iter().map(|line| line.scores).collect();
     let seams: Vec<f64> = lines.iter().filter_map(|line| line.seams).collect();
-    let masked: Vec<MaskedScore> = lines.iter().filter_map(|line| line.masked).collect();
-    let cpu_ms: f64 = lines.iter().map(|line| line.cpu_ms).sum();
+    let cpu_ms: Vec<f64> = lines.iter().map(|line| line.cpu_ms).collect();
     Some(Line {
         name: "mean".to_owned(),
-        score: mean(&scores)?,
-        seams: (!seams.is_empty()).then(|| seams.iter().sum::<f64>() / seams.len() as f64),
-        masked: mean_masked(&masked),
-        cpu_ms: cpu_ms / lines.len() as f64,
+        scores: TruthScore::mean(&scores)?,
+        seams: mean_of(&seams),
+        cpu_ms: mean_of(&cpu_ms)?,
     })
 }
 
@@ -212,37 +179,72 @@ fn json(session: &Session, lines: &[Line]) -> Value {
 /// For people.
 fn table(lines: &[Line]) -> String {
     let mean = mean_line(lines);
-    let widest = lines.iter().map(|line| line.name.chars().count()).max();
-    let width = widest.unwrap_or_default().max("photo".len());
-    let any_masked = mean.as_ref().is_some_and(|line| line.masked.is_some());
-    let mut text = format!(
-        "{:width$}  {:>7}  {:>12}  {:>6}  {:>12}  {:>8}  {:>6}",
-        "photo", "psnr", "psnr_exposed", "ssim", "psnr_covered", "coverage", "seams"
-    );
-    if any_masked {
-        text += &format!("  {:>11}  {:>11}", "psnr_masked", "ssim_masked");
-    }
-    text += &format!("  {:>8}\n", "cpu ms");
-    let db =
-        |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.2}", v.min(PSNR_CAP_DB)));
-    for line in lines.iter().chain(&mean) {
-        text += &format!(
-            "{:width$}  {:>7}  {:>12}  {:>6.4}  {:>12}  {:>8.4}  {:>6}",
-            line.name,
-            db(Some(line.score.psnr)),
-            db(Some(line.score.psnr_exposed)),
-            line.score.ssim,
-            db(line.score.psnr_covered),
-            line.score.coverage,
-            line.seams.map_or("-".to_owned(), |v| format!("{v:.2}")),
-        );
+    let any = |has: fn(&TruthScore) -> bool| mean.as_ref().is_some_and(|line| has(&line.scores));
+    let (any_masked, any_matte) = (any(|s| s.masked.is_some()), any(|s| s.matte.is_some()));
+    let db = |value: Option<f64>| {
+        value.map_or_else(missing, |value| format!("{:.2}", value.min(PSNR_CAP_DB)))
+    };
+    let share = |value: Option<f64>| value.map_or_else(missing, |value| format!("{value:.4}"));
+    let columns = |line: &Line| {
+        let TruthScore {
+            score,
+            coverage_points,
+            masked,
+            matte,
+        } = line.scores;
+        let mut columns = vec![
+            ("psnr", db(Some(score.psnr))),
+            ("psnr_exposed", db(Some(score.psnr_exposed))),
+            ("ssim", share(Some(score.ssim))),
+            ("psnr_covered", db(score.psnr_covered)),
+            ("coverage", share(Some(score.coverage))),
+            ("coverage_points", share(coverage_points)),
+        ];
         if any_masked {
-            let ssim = line.masked.and_then(|m| m.ssim_masked);
-            let ssim = ssim.map_or("-".to_owned(), |v| format!("{v:.4}"));
-            let psnr = db(line.masked.map(|m| m.psnr_masked));
-            text += &format!("  {psnr:>11}  {ssim:>11}");
+            columns.extend([
+                ("psnr_masked", db(masked.map(|m| m.psnr_masked))),
+                ("ssim_masked", share(masked.and_then(|m| m.ssim_masked))),
+            ]);
         }
-        text += &format!("  {:>8.1}\n", line.cpu_ms);
+        if any_matte {
+            let background = matte.and_then(|m| m.coverage_background);
+            columns.extend([
+                (
+                    "coverage_matte",
+                    share(matte.and_then(|m| m.coverage_matte)),
+                ),
+                ("coverage_background", share(background)),
+            ]);
+        }
+        let seams = line.seams.map_or_else(missing, |v| format!("{v:.2}"));
+        columns.extend([("seams", seams), ("cpu ms", format!("{:.1}", line.cpu_ms))]);
+        columns
+    };
+    let rows = lines.iter().chain(&mean);
+    let rows: Vec<(&str, Vec<(&str, String)>)> = rows
+        .map(|line| (line.name.as_str(), columns(line)))
+        .collect();
+    let widest = rows.iter().map(|(name, _)| name.chars().count()).max();
+    let width = widest.unwrap_or_default().max("photo".len());
+    let mut text = format!("{:width$}", "photo");
+    for (title, _) in rows.first().map_or(&[][..], |(_, columns)| columns) {
+        text += &format!("  {title:>NARROWEST$}");
+    }
+    text += "\n";
+    for (name, columns) in &rows {
+        text += &format!("{name:width$}");
+        for (title, value) in columns {
+            let width = title.len().max(NARROWEST);
+            text += &format!("  {value:>width$}");
+        }
+        text += "\n";
     }
     text
+}
+
+/// Columns are no narrower than any of their numbers.
+const NARROWEST: usize = 7;
+
+fn missing() -> String {
+    "-".to_owned()
 }

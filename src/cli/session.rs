@@ -9,9 +9,9 @@ use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
 use glam::DVec3;
-use image::{GrayImage, Luma, RgbaImage};
+use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use lumigraph::scene::{Scene, SceneError};
+use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
 };
@@ -44,30 +44,6 @@ pub(super) struct Timed {
     pub(super) picture: RgbaImage,
     /// Processor time for the picture, decoding photos not included.
     pub(super) cpu: Duration,
-}
-
-/// A photo to compare with.
-pub(super) struct Truth {
-    pub(super) pixels: RgbaImage,
-    /// What to ignore of it.
-    mask: Option<GrayImage>,
-}
-
-impl Truth {
-    /// Where the photo shows its object and nothing that is to be ignored, 0…255; `None`
-    /// where neither mask nor alpha tells.
-    pub(super) fn inside(&self) -> Option<GrayImage> {
-        let opaque = self.pixels.pixels().all(|p| p.0[3] == 255);
-        if opaque && self.mask.is_none() {
-            return None;
-        }
-        let (width, height) = self.pixels.dimensions();
-        Some(GrayImage::from_fn(width, height, |x, y| {
-            let alpha = self.pixels.get_pixel(x, y).0[3];
-            let used = self.mask.as_ref().map_or(255, |m| m.get_pixel(x, y).0[0]);
-            Luma([alpha.min(used)])
-        }))
-    }
 }
 
 impl Session {
@@ -234,16 +210,11 @@ impl Session {
         Ok(Timed { picture, cpu })
     }
 
-    /// The pixels of a photo of the scene, cut out by its matte; `None`, with a warning, for
-    /// one that is corrupt, unless `--strict`.
-    pub(super) fn decode(&self, name: &str, size: (u32, u32)) -> anyhow::Result<Option<Truth>> {
-        let photo = self.scene.photos.iter().find(|p| p.name == name);
-        let Some(photo) = photo else {
-            bail!("photo {name} is not in the scene");
-        };
-        let pixels = photo.decode(size);
-        match pixels.and_then(|pixels| Ok((pixels, photo.decode_ignore_mask(size)?))) {
-            Ok((pixels, mask)) => Ok(Some(Truth { pixels, mask })),
+    /// A photo of the scene to compare with; `None`, with a warning, for one that is corrupt,
+    /// unless `--strict`.
+    pub(super) fn truth(&self, name: &str) -> anyhow::Result<Option<Truth>> {
+        match self.scene.truth(name, &self.without)? {
+            Ok(truth) => Ok(Some(truth)),
             Err(error) if self.strict => Err(error.into()),
             Err(error) => {
                 say!("warning: photo {name} is left out: {error}");

@@ -202,6 +202,9 @@ pub enum SceneError {
     /// A split that names no photo.
     #[error("{}: \"test\" names no photo; name some to hold out", .0.display())]
     EmptySplit(PathBuf),
+    /// None of the photos that a split names can be used.
+    #[error("{}: all of its photos are missing or corrupt", .0.display())]
+    UnusableSplit(PathBuf),
     /// Every photo is held out or corrupt.
     #[error("no photo is left to render from: all {0} are held out or corrupt")]
     NothingLeft(usize),

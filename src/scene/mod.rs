@@ -21,6 +21,7 @@ mod silhouettes;
 mod split;
 mod store;
 mod times;
+mod truth;
 mod turntable;
 mod undistort;
 
@@ -35,6 +36,7 @@ pub use names::{NameError, picture_files};
 pub use relative::relative;
 pub use split::SplitFile;
 pub use times::TimeSource;
+pub use truth::{Truth, TruthScore};
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{ExposureEntry, Extra, Settings};

@@ -5,6 +5,9 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+/// The photos held out where nobody says which.
+const EVERY: usize = 8;
+
 /// The file.
 #[derive(Clone, Debug, Deserialize)]
 pub struct SplitFile {
@@ -74,6 +77,30 @@ impl Scene {
             .flatten()
             .map(|folder| folder.join("split.json"))
             .find(|path| path.is_file())
+    }
+
+    /// The photos to score where nobody says which: those of its own split, else every 8th by
+    /// name.
+    ///
+    /// # Errors
+    /// As [`Self::held_out`]; the split's photos are all missing or corrupt.
+    pub fn held_out_by_default(&self) -> Result<BTreeSet<String>, SceneError> {
+        match self.own_split() {
+            Some(split) => self.held_out_some(&split),
+            None => Ok(self.every(EVERY)),
+        }
+    }
+
+    /// As [`Self::held_out`], but at least one.
+    ///
+    /// # Errors
+    /// As there; they are all missing or corrupt.
+    pub fn held_out_some(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
+        let names = self.held_out(split)?;
+        if names.is_empty() {
+            return Err(SceneError::UnusableSplit(split.to_owned()));
+        }
+        Ok(names)
     }
 
     /// Every `step`-th photo by name, the first included.

@@ -30,6 +30,7 @@ fn the_json_is_as_documented() {
         "ssim",
         "psnr_covered",
         "coverage",
+        "coverage_points",
         "seams",
         "cpu_ms",
     ];
@@ -37,6 +38,7 @@ fn the_json_is_as_documented() {
         assert_eq!(keys(photo)[1..], scores);
         assert!(scores.iter().all(|&score| photo[score].is_f64()), "{photo}");
         // The wall is a plane, so the other photos must give it back.
+        assert_eq!(photo["coverage_points"], 1.0, "{photo}");
         assert!(photo["psnr_covered"].as_f64().unwrap() > 30.0, "{photo}");
     }
     for score in scores {
@@ -47,6 +49,52 @@ fn the_json_is_as_documented() {
     assert_eq!(result["proxy"]["kind"], "plane");
     let frames = files(&folder.path().join("frames"));
     assert_eq!(frames.len(), 2);
+}
+
+/// A car before nothing: its alpha is its matte.
+#[test]
+fn an_object_and_its_background_are_covered_each_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "generate car --size 96x72 -o car";
+    lumigraph(folder.path(), line).ok();
+    let of = |kind: &str| {
+        let line = format!("evaluate car --every 12 --json --proxy {kind}");
+        let result = lumigraph(folder.path(), &line).ok().json();
+        let keys: Vec<&String> = result["photos"][0].as_object().unwrap().keys().collect();
+        assert_eq!(keys[6..8], ["coverage_points", "psnr_masked"]);
+        assert_eq!(keys[10..12], ["coverage_matte", "coverage_background"]);
+        for key in ["coverage_matte", "coverage_background", "coverage_points"] {
+            let photos = result["photos"].as_array().unwrap();
+            let sum: f64 = photos.iter().map(|p| p[key].as_f64().unwrap()).sum();
+            assert!((result["mean"][key].as_f64().unwrap() - sum / 3.0).abs() < 1e-9);
+        }
+        let mean = |key: &str| result["mean"][key].as_f64().unwrap();
+        // Nothing of the photo is ignored, so inside its mask is inside its matte.
+        assert_eq!(mean("coverage_matte"), mean("coverage_masked"));
+        [
+            mean("coverage_matte"),
+            mean("coverage_background"),
+            mean("coverage_points"),
+        ]
+    };
+    // What the silhouettes leave is the car and nothing else; a plane smears it.
+    let [matte, background, points] = of("hull");
+    assert!(
+        matte > 0.95 && background < 0.05 && points > 0.95,
+        "{matte} {background} {points}"
+    );
+    let [_, smeared, _] = of("plane");
+    assert!(smeared > background, "{smeared} {background}");
+    let table = lumigraph(folder.path(), "evaluate car --every 12 --proxy hull")
+        .ok()
+        .stdout;
+    let heads: Vec<&str> = table.lines().next().unwrap().split_whitespace().collect();
+    assert_eq!(heads[5..7], ["coverage", "coverage_points"]);
+    assert_eq!(heads[9..11], ["coverage_matte", "coverage_background"]);
+    let cells = table.lines().map(|line| line.split_whitespace().count());
+    let cells: Vec<usize> = cells.collect();
+    // "cpu ms" is two words.
+    assert_eq!(cells, [14, 13, 13, 13, 13]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod captures;
+mod degenerate;
 mod evaluate;
 mod export;
 mod exposure;

@@ -107,12 +107,12 @@ fn what_masks_cover_is_not_seen() {
             "ssim",
             "psnr_covered",
             "coverage",
-            "seams",
+            "coverage_points",
         ];
         let masked = ["psnr_masked", "ssim_masked", "coverage_masked"];
         assert_eq!(
             keys,
-            [&["name"], &scores[..], &masked, &["cpu_ms"]].concat()
+            [&["name"], &scores[..], &masked, &["seams", "cpu_ms"]].concat()
         );
         // Past the people all is as if there were none.
         let inside = with["mean"]["psnr_masked"].as_f64().unwrap();

@@ -55,7 +55,7 @@ pub enum ExportError {
     #[error("the mesh has no triangle: there is nothing to write")]
     Empty,
     /// A corner is NaN or infinite, or far beyond what f32 holds.
-    #[error("corner {0} of the mesh is {1}: its file's numbers cannot hold that")]
+    #[error("corner {0} of the mesh is {1:?}: its file's numbers cannot hold that")]
     Position(usize, glam::DVec3),
     /// A camera's pose or focal length is not finite.
     #[error("the camera {0} has no finite pose and focal length; leave it out")]
