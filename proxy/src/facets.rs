@@ -12,7 +12,7 @@ pub struct Facets {
     pub directions: Vec<DVec3>,
     /// 1/distance of the corners; positive.
     pub inverse_distances: Vec<f64>,
-    /// Corners of each facet, so that det(a, b, c) > 0.
+    /// Corners of each facet, so that det(a, b, c) > 0 but for rounding.
     pub triangles: Vec<[u32; 3]>,
     /// The facet across the side that lies opposite each corner.
     pub neighbours: Vec<[u32; 3]>,
@@ -21,22 +21,18 @@ pub struct Facets {
 }
 
 impl Facets {
-    /// Facets from corners and triangles of either orientation. Triangles too thin to carry
-    /// a plane take that of equal inverse distance, which is close to the same thing there.
+    /// Facets from corners and triangles, all oriented alike: det(a, b, c) > 0 for all but those
+    /// that rounding has turned over. Triangles too thin to carry a plane take that of equal
+    /// inverse distance, which is close to the same thing there.
     ///
     /// # Panics
     /// If a side has no triangle beyond it: the sphere must be closed.
     pub fn new(
         directions: Vec<DVec3>,
         inverse_distances: Vec<f64>,
-        mut triangles: Vec<[u32; 3]>,
+        triangles: Vec<[u32; 3]>,
     ) -> Self {
         let corner = |i: u32| directions[i as usize];
-        for [a, b, c] in &mut triangles {
-            if corner(*a).cross(corner(*b)).dot(corner(*c)) < 0.0 {
-                std::mem::swap(b, c);
-            }
-        }
         let planes = triangles
             .iter()
             .map(|t| {

@@ -59,6 +59,9 @@ struct Stored {
     version: u32,
     #[serde(flatten)]
     surface: StoredSurface,
+    /// Of a mesh, where it is not to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    occludes: Option<bool>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -109,9 +112,11 @@ impl Stored {
                 MeshKind::Mesh => StoredSurface::Mesh,
             },
         };
+        let transparent = matches!(proxy, Proxy::Mesh(solid) if hides_nothing(solid));
         Self {
             version: 1,
             surface,
+            occludes: transparent.then_some(false),
         }
     }
 
@@ -146,8 +151,17 @@ impl Stored {
             StoredSurface::Depth => MeshKind::Depth,
             StoredSurface::Mesh => MeshKind::Mesh,
         };
-        Ok(Proxy::Mesh(Arc::new(Solid::new(kind, mesh()?))))
+        let mut solid = Solid::new(kind, mesh()?);
+        if self.occludes == Some(false) {
+            solid.hide_nothing();
+        }
+        Ok(Proxy::Mesh(Arc::new(solid)))
     }
+}
+
+/// Whether a mesh could hide parts of itself, and is not to.
+fn hides_nothing(solid: &Solid) -> bool {
+    solid.kind().can_occlude_itself() && !solid.occludes()
 }
 
 fn dense(names: Vec<String>, points: &[[f64; 3]], seen_by: Vec<Vec<u32>>) -> Result<Proxy, String> {
@@ -201,7 +215,14 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
                 None => solid(MeshKind::Mesh),
             }
         }
-        "ply" => solid(kind_of_ply(bytes)),
+        "ply" => {
+            let (kind, occludes) = kind_of_ply(bytes);
+            let mut solid = Solid::new(kind, mesh()?);
+            if !occludes {
+                solid.hide_nothing();
+            }
+            Ok(Proxy::Mesh(Arc::new(solid)))
+        }
         "gltf" | "obj" => solid(MeshKind::Mesh),
         _ => Err(FileError::Extension(path.to_owned())),
     }
@@ -209,14 +230,24 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
 
 /// What the comment in a PLY's header says of its kind, before it.
 const KIND_COMMENT: &str = "lumigraph proxy ";
+/// And after it, where a mesh is taken to hide nothing.
+const HIDES_NOTHING: &str = " without occlusion";
 
-fn kind_of_ply(bytes: &[u8]) -> MeshKind {
+/// Its kind, and whether it hides what lies behind it.
+fn kind_of_ply(bytes: &[u8]) -> (MeshKind, bool) {
     // Within the first few lines, or nowhere.
     let header = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
     let mut lines = header.lines();
     let name = lines.find_map(|line| line.strip_prefix("comment ")?.strip_prefix(KIND_COMMENT));
-    let kind = MeshKind::ALL.into_iter().find(|k| Some(k.name()) == name);
-    kind.unwrap_or(MeshKind::Mesh)
+    let Some(name) = name else {
+        return (MeshKind::Mesh, true);
+    };
+    let (name, occludes) = match name.strip_suffix(HIDES_NOTHING) {
+        Some(name) => (name, false),
+        None => (name, true),
+    };
+    let kind = MeshKind::ALL.into_iter().find(|k| k.name() == name);
+    (kind.unwrap_or(MeshKind::Mesh), occludes)
 }
 
 /// Writes a proxy as `.json`, a mesh as `.ply`, or what can be shown as `.glb`, with cameras.
@@ -241,10 +272,15 @@ pub fn write(
             let text = serde_json::to_string_pretty(&Stored::of(proxy)).map_err(json)?;
             (text + "\n").into_bytes()
         }
-        ("ply", Proxy::Mesh(solid)) => mesh::to_ply(
-            solid.mesh(),
-            &format!("{KIND_COMMENT}{}", solid.kind().name()),
-        ),
+        ("ply", Proxy::Mesh(solid)) => {
+            let kind = solid.kind().name();
+            let how = if hides_nothing(solid) {
+                HIDES_NOTHING
+            } else {
+                ""
+            };
+            mesh::to_ply(solid.mesh(), &format!("{KIND_COMMENT}{kind}{how}"))
+        }
         ("glb", Proxy::Mesh(_) | Proxy::Plane(_)) => {
             let extras = serde_json::to_string(&Stored::of(proxy)).map_err(json)?;
             let shown = match proxy {

@@ -56,6 +56,7 @@ impl MeshKind {
 /// A mesh and what finds its triangles.
 pub struct Solid {
     kind: MeshKind,
+    occludes: bool,
     mesh: Mesh,
     bvh: Bvh2,
     /// Where the hierarchy's origin lies in the world: f32 has digits only around it.
@@ -113,10 +114,22 @@ impl Solid {
         let bvh = build_bvh2(&bounds, BvhBuildParams::fast_build(), &mut spent);
         Self {
             kind,
+            occludes: kind.can_occlude_itself(),
             mesh,
             bvh,
             origin,
         }
+    }
+
+    /// From now on no part of it is taken to hide another: where it is far from the truth, what
+    /// it would hide from photos is what they show best.
+    pub fn hide_nothing(&mut self) {
+        self.occludes = false;
+    }
+
+    /// Whether what lies behind a part of it counts as hidden.
+    pub fn occludes(&self) -> bool {
+        self.occludes
     }
 
     /// Where it came from.
@@ -172,7 +185,7 @@ impl Solid {
 /// Two meshes are alike where their triangles are; the rest follows from them.
 impl PartialEq for Solid {
     fn eq(&self, other: &Self) -> bool {
-        self.kind == other.kind && self.mesh == other.mesh
+        (self.kind, self.occludes) == (other.kind, other.occludes) && self.mesh == other.mesh
     }
 }
 

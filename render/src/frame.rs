@@ -118,6 +118,8 @@ pub struct Frame<'a> {
     pub sources: Vec<FrameSource>,
     /// The proxy from there.
     pub surface: Surface,
+    /// A source view that takes no part.
+    gone: Option<usize>,
 }
 
 impl<'a> Frame<'a> {
@@ -126,6 +128,20 @@ impl<'a> Frame<'a> {
     /// # Panics
     /// If the options fail [`FieldOptions::check`]: check them where they come in.
     pub fn new(lumigraph: &'a Lumigraph, desired: View, options: FieldOptions) -> Self {
+        Self::without(lumigraph, desired, options, None)
+    }
+
+    /// As [`Self::new`], with a source view of the given index that takes no part. (The
+    /// lumigraph's proxy and points are as they are, whoever they rest on.)
+    ///
+    /// # Panics
+    /// If the options fail [`FieldOptions::check`].
+    pub fn without(
+        lumigraph: &'a Lumigraph,
+        desired: View,
+        options: FieldOptions,
+        gone: Option<usize>,
+    ) -> Self {
         assert_eq!(options.check(), Ok(()));
         // A desired view finer than every photo undersamples all of them alike; that is no
         // reason to prefer any. So its focal length counts only up to the longest there is.
@@ -139,9 +155,11 @@ impl<'a> Frame<'a> {
         let sources = lumigraph
             .sources
             .iter()
-            .map(|source| {
+            .enumerate()
+            .map(|(i, source)| {
                 let View { width, height, .. } = source.view;
                 FrameSource {
+                    time_penalty: if gone == Some(i) { f64::INFINITY } else { 0.0 },
                     footprint_ratio: match options.resolution {
                         Resolution::Footprint => desired_focal / source.view.lens.mean_focal(),
                         Resolution::Distance | Resolution::Length => 1.0,
@@ -158,6 +176,7 @@ impl<'a> Frame<'a> {
             options,
             sources,
             surface,
+            gone,
         };
         frame.match_exposures();
         frame
@@ -176,6 +195,9 @@ impl<'a> Frame<'a> {
         let penalties = moment.penalties(&times_s, self.options.k);
         for (source, penalty) in self.sources.iter_mut().zip(penalties) {
             source.time_penalty = penalty;
+        }
+        if let Some(gone) = self.gone {
+            self.sources[gone].time_penalty = f64::INFINITY;
         }
         self.match_exposures();
         self

@@ -14,6 +14,9 @@ const HALVINGS: u32 = 6;
 
 /// Whether the point at ray / s lies in a source view's image.
 fn sees(source: &FrameSource, ray: DVec3, s: f64) -> bool {
+    if source.time_penalty == f64::INFINITY {
+        return false;
+    }
     let pixel = source
         .lens
         .project(source.rotation * ray + source.translation * s);

@@ -53,7 +53,7 @@ impl Visibility {
     pub fn of(proxy: &Proxy, sources: &[SourceView]) -> Option<Self> {
         static NEXT_ID: AtomicU64 = AtomicU64::new(0);
         match proxy {
-            Proxy::Mesh(solid) if solid.kind().can_occlude_itself() => Some(Self {
+            Proxy::Mesh(solid) if solid.occludes() => Some(Self {
                 id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
                 solid: Arc::clone(solid),
                 views: sources.iter().map(|s| s.view.clone()).collect(),

@@ -122,9 +122,12 @@ impl ChosenProxy {
         let mut value = proxy_json(&self.proxy);
         value["from"] = json!(self.origin);
         if !self.trials.is_empty() {
-            let trial = |t: &Trial| match &t.score {
-                Ok(db) => json!({"kind": t.kind.name(), "psnr": db}),
-                Err(why) => json!({"kind": t.kind.name(), "not": why}),
+            let trial = |t: &Trial| {
+                let (kind, occludes) = (t.kind.name(), t.occludes);
+                match &t.score {
+                    Ok(db) => json!({"kind": kind, "occludes": occludes, "psnr": db}),
+                    Err(why) => json!({"kind": kind, "occludes": occludes, "not": why}),
+                }
             };
             value["trials"] = json!(self.trials.iter().map(trial).collect::<Vec<_>>());
         }

@@ -1,18 +1,17 @@
 //! Which proxy suits a scene: decided by photos held out for it.
 
-use super::fit::{Fitted, Kind, unfit};
+use super::fit::{Fitted, Kind};
+use super::trial::{Scores, Trials};
 use super::{Scene, SceneError};
 use proxy::Proxy;
-use render::{FieldOptions, Frame, Method, cpu, score};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-/// Photos held out to decide, at most; of fewer than [`FEWEST`] none is.
-const HELD_OUT: usize = 4;
+/// Photos that judge, at most; of fewer than [`FEWEST`] none does.
+const JUDGES: usize = 8;
 const FEWEST: usize = 6;
-/// Pixels along the longer side of the pictures that decide.
-const LONG_SIDE: u32 = 240;
 /// Differences that mean nothing: the kind that is fitted and drawn faster is taken.
-const TIED_DB: f64 = 0.1;
+const TIED_DB: f64 = 0.05;
 /// Comparing so many photos with one another takes longer than anyone waits unasked.
 const MOST_COMPARED: usize = 400;
 
@@ -21,6 +20,8 @@ const MOST_COMPARED: usize = 400;
 pub struct Trial {
     /// Which.
     pub kind: Kind,
+    /// Whether what lies behind a part of it counted as hidden.
+    pub occludes: bool,
     /// The mean PSNR of the pictures that decide, in dB, or why there is none.
     pub score: Result<f64, String>,
 }
@@ -45,7 +46,7 @@ impl Scene {
 
         // 1. Too few photos to spare any: the kind that suits most scenes.
         if rest.len() < FEWEST {
-            let kinds = [Kind::Points, Kind::Plane];
+            let kinds = [Kind::Points, Kind::Hull, Kind::Plane];
             let kind = kinds.into_iter().find(|k| candidates.contains(k));
             let mut fitted = self.fit(kind.unwrap_or(Kind::Plane), without)?;
             fitted.note.get_or_insert_with(|| {
@@ -54,35 +55,52 @@ impl Scene {
             return Ok(fitted);
         }
 
-        // 2. Each kind, without some photos spread over the rest.
-        let count = HELD_OUT.min(rest.len() / 3);
-        let judges: Vec<&str> = (0..count)
-            .map(|i| rest[(2 * i + 1) * rest.len() / (2 * count)])
-            .collect();
-        let mut fewer = without.clone();
-        fewer.extend(judges.iter().map(|name| (*name).to_owned()));
+        // 2. Each kind, judged by photos spread over the rest, each drawn without itself.
         let mut trials: Vec<Trial> = Vec::new();
+        let mut bench = Trials::new(self, without, JUDGES.min(rest.len()))?;
+        let mut leader: Option<Scores> = None;
+        let mut best: Option<(Kind, bool)> = None;
         for kind in candidates {
-            let score = if kind == Kind::Dense && rest.len() > MOST_COMPARED {
-                Err(format!("{} photos take long to compare", rest.len()))
-            } else {
-                // A box may happen to suit a few photos of anything.
-                let fitted = match kind {
-                    Kind::Tunnel => self.fit_hallway(&fewer),
-                    _ => self.fit_coarsely(kind, &fewer, LONG_SIDE),
-                };
-                fitted
-                    .and_then(|fitted| self.judge(fitted.proxy, &fewer, &judges))
-                    .map_err(|error| error.to_string())
+            if kind == Kind::Dense && rest.len() > MOST_COMPARED {
+                let score = Err(format!("{} photos take long to compare", rest.len()));
+                trials.push(Trial::of(kind, true, score));
+                continue;
+            }
+            let (scores, plain) = match bench.scores(kind, leader.as_ref()) {
+                Ok(scores) => scores,
+                Err(error) => {
+                    trials.push(Trial::of(kind, true, Err(error.to_string())));
+                    continue;
+                }
             };
-            trials.push(Trial { kind, score });
+            for (occludes, scores) in [(true, Some(scores)), (false, plain)] {
+                let Some(scores) = scores else { continue };
+                let score = if scores.complete {
+                    Ok(scores.mean())
+                } else {
+                    let (asked, behind) = (scores.psnr.len(), scores.mean());
+                    Err(format!("given up at {behind:.2} dB after {asked} photos"))
+                };
+                trials.push(Trial::of(kind, occludes, score));
+                let most = leader.as_ref().map_or(f64::NEG_INFINITY, Scores::mean);
+                if scores.complete && scores.mean() > most + TIED_DB {
+                    leader = Some(scores);
+                    best = Some((kind, occludes));
+                }
+            }
         }
 
-        // 3. The first that is as good as the best, from all.
-        let score = |trial: &Trial| trial.score.as_ref().copied().unwrap_or(f64::NEG_INFINITY);
-        let most = trials.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
-        let best = trials.iter().find(|trial| score(trial) >= most - TIED_DB);
-        let mut fitted = self.fit(best.map_or(Kind::Plane, |t| t.kind), without)?;
+        // 3. The best, from all.
+        let (kind, occludes) = best.unwrap_or((Kind::Plane, true));
+        let mut fitted = match kind {
+            Kind::Dense => bench.dense()?,
+            _ => self.fit(kind, without)?,
+        };
+        if let (false, Proxy::Mesh(solid)) = (occludes, &mut fitted.proxy)
+            && let Some(own) = Arc::get_mut(solid)
+        {
+            own.hide_nothing();
+        }
         fitted.trials = trials;
         Ok(fitted)
     }
@@ -97,50 +115,35 @@ impl Scene {
             | Kind::Points
             | Kind::Carved
             | Kind::Dense => self.reconstruction.points.len() >= 3,
-            Kind::Hull => self.photos.iter().all(|p| p.object_matte.is_some()),
+            Kind::Hull => self.has_silhouettes(),
             Kind::Depth => self.photos.iter().any(|p| p.depth_map.is_some()),
         }
     }
+}
 
-    /// The mean PSNR of small pictures of the photos of the given names, in dB.
-    fn judge(
-        &self,
-        proxy: Proxy,
-        without: &BTreeSet<String>,
-        judges: &[&str],
-    ) -> Result<f64, SceneError> {
-        let lumigraph = self.lumigraph(without, proxy)?;
-        let mut scores = Vec::new();
-        for name in judges {
-            let view = self.view(name)?;
-            let (width, height) = capture::reduced_size((view.width, view.height), LONG_SIDE);
-            let photo = self.photos.iter().find(|p| p.name == *name);
-            // One that cannot be decoded is no judge; drawing will report it.
-            let truth = photo.and_then(|p| p.decode((view.width, view.height)).ok());
-            let Some(truth) = truth else { continue };
-            let truth = capture::resize(&truth, width, height);
-            let frame = Frame::new(
-                &lumigraph,
-                view.resized(width, height),
-                FieldOptions::default(),
-            );
-            let picture = cpu::render(&frame, Method::Exact);
-            let picture = picture.map_err(unfit)?;
-            let score = score::score(&picture, &truth);
-            scores.push(score.map_err(unfit)?.psnr);
+impl Trial {
+    fn of(kind: Kind, occludes: bool, score: Result<f64, String>) -> Self {
+        Self {
+            kind,
+            occludes,
+            score,
         }
-        if scores.is_empty() {
-            return Err(unfit("no photo to judge by"));
-        }
-        Ok(scores.iter().sum::<f64>() / scores.len() as f64)
     }
 }
 
 /// What the trials came to, for people.
 pub fn trials_text(trials: &[Trial]) -> String {
-    let of = |trial: &Trial| match &trial.score {
-        Ok(db) => format!("{} {db:.2} dB", trial.kind.name()),
-        Err(why) => format!("no {} ({why})", trial.kind.name()),
+    let of = |trial: &Trial| {
+        let name = trial.kind.name();
+        let how = if trial.occludes {
+            ""
+        } else {
+            " that hides nothing"
+        };
+        match &trial.score {
+            Ok(db) => format!("{name}{how} {db:.2} dB"),
+            Err(why) => format!("no {name}{how} ({why})"),
+        }
     };
     trials.iter().map(of).collect::<Vec<_>>().join(", ")
 }

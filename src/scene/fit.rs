@@ -91,26 +91,6 @@ impl Scene {
     /// # Errors
     /// The scene does not have what it takes; the message says what that is.
     pub fn fit(&self, kind: Kind, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        self.fit_with(kind, without, &DenseOptions::default())
-    }
-
-    /// As [`Self::fit`], no finer than pictures of `long_side` pixels can tell.
-    pub(super) fn fit_coarsely(
-        &self,
-        kind: Kind,
-        without: &BTreeSet<String>,
-        long_side: u32,
-    ) -> Result<Fitted, SceneError> {
-        let spacing = 3;
-        self.fit_with(kind, without, &DenseOptions { long_side, spacing })
-    }
-
-    fn fit_with(
-        &self,
-        kind: Kind,
-        without: &BTreeSet<String>,
-        dense: &DenseOptions,
-    ) -> Result<Fitted, SceneError> {
         let sparse = || self.sparse(without);
         match kind {
             Kind::Plane => {
@@ -147,7 +127,7 @@ impl Scene {
             }
             Kind::Hull => self.fit_hull(without),
             Kind::Depth => self.fit_depth(without),
-            Kind::Dense => self.fit_dense(without, dense),
+            Kind::Dense => self.fit_dense(without),
         }
     }
 
@@ -269,24 +249,14 @@ impl Scene {
         }
     }
 
-    fn fit_dense(
-        &self,
-        without: &BTreeSet<String>,
-        options: &DenseOptions,
-    ) -> Result<Fitted, SceneError> {
+    fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         self.needs_points(Kind::Dense)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
         let (views, sparse) = self.sparse(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
-        let points = densify(&views, &sparse, photo, options);
-        let how = format!(
-            "{} points, {} of them found between the sparse ones",
-            points.len(),
-            points.len() - sparse.len()
-        );
-        let dense = DensePoints { names, points };
-        Ok(Fitted::new(Proxy::Dense(Arc::new(dense)), how))
+        let points = densify(&views, &sparse, photo, &DenseOptions::default());
+        Ok(Fitted::dense(names, points, sparse.len()))
     }
 }
 
@@ -298,6 +268,17 @@ impl Fitted {
             note: None,
             trials: Vec::new(),
         }
+    }
+
+    /// Of points, the first of which are the sparse ones.
+    pub(super) fn dense(names: Vec<String>, points: Vec<SparsePoint>, sparse: usize) -> Self {
+        let how = format!(
+            "{} points, {} of them found between the sparse ones",
+            points.len(),
+            points.len() - sparse
+        );
+        let dense = DensePoints { names, points };
+        Self::new(Proxy::Dense(Arc::new(dense)), how)
     }
 
     fn tunnel(tunnel: &Tunnel) -> Self {
@@ -327,7 +308,7 @@ pub(super) fn unfit(reason: impl ToString) -> SceneError {
 
 /// A photo, transparent where its mask ignores it; `None` where it cannot be decoded, which
 /// drawing will report.
-fn usable(photo: &Photo, view: &View) -> Option<RgbaImage> {
+pub(super) fn usable(photo: &Photo, view: &View) -> Option<RgbaImage> {
     let size = (view.width, view.height);
     let mut pixels = photo.decode(size).ok()?;
     if let Some(mask) = photo.decode_ignore_mask(size).ok()? {

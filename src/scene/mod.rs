@@ -21,6 +21,7 @@ mod silhouettes;
 mod split;
 mod store;
 mod times;
+mod trial;
 mod truth;
 mod turntable;
 mod undistort;

@@ -28,7 +28,7 @@ struct Agreed {
 /// Points about `spacing` pixels apart in each photo.
 pub(super) fn points(
     photos: &[Option<SmallPhoto>],
-    maps: &[Option<DepthMap>],
+    maps: &[Option<&DepthMap>],
     neighbours: &[Vec<usize>],
     spacing: u32,
 ) -> Vec<SparsePoint> {
@@ -95,16 +95,16 @@ fn alike(a: f64, b: f64) -> bool {
 fn of_photo(
     i: usize,
     photos: &[Option<SmallPhoto>],
-    maps: &[Option<DepthMap>],
+    maps: &[Option<&DepthMap>],
     related: &[usize],
     spacing: usize,
 ) -> Vec<Agreed> {
-    let (Some(photo), Some(map)) = (&photos[i], &maps[i]) else {
+    let (Some(photo), Some(map)) = (&photos[i], maps[i]) else {
         return Vec::new();
     };
     let with_maps: Vec<(usize, &SmallPhoto, &DepthMap)> = related
         .iter()
-        .filter_map(|&j| Some((j, photos[j].as_ref()?, maps[j].as_ref()?)))
+        .filter_map(|&j| Some((j, photos[j].as_ref()?, maps[j]?)))
         .collect();
     let needed = OTHERS.min(with_maps.len());
     if needed == 0 {
@@ -126,7 +126,7 @@ fn of_photo(
     };
     let objections = |position: DVec3| {
         let all = photos.iter().zip(maps);
-        let with_maps = all.filter_map(|(photo, map)| Some((photo.as_ref()?, map.as_ref()?)));
+        let with_maps = all.filter_map(|(photo, map)| Some((photo.as_ref()?, (*map)?)));
         with_maps
             .filter(|(other, map)| objects(position, other, map).is_some())
             .count()

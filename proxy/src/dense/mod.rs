@@ -17,8 +17,11 @@ mod sweep;
 use crate::SparsePoint;
 use calibrate::View;
 use image::RgbaImage;
+use neighbours::Affinity;
 use rayon::prelude::*;
 use small::SmallPhoto;
+use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// Points, and the names of the views that their `seen_by` counts.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,38 +69,90 @@ pub fn densify(
     photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
     options: &DenseOptions,
 ) -> Vec<SparsePoint> {
-    // 1. Small pinhole photos, and which of them to compare.
-    let indices = 0..views.len();
-    let photos: Vec<Option<SmallPhoto>> = indices
-        .into_par_iter()
-        .map(|i| SmallPhoto::new(&views[i], &photo(i)?, options.long_side))
-        .collect();
-    let neighbours = neighbours::of_all(views, sparse, &photos);
+    Matching::new(views, sparse, photo, options).points(sparse, None)
+}
 
-    // 2. Their depths.
-    let ranges = neighbours::depth_ranges(&photos, sparse);
-    let maps: Vec<Option<DepthMap>> = (0..views.len())
-        .into_par_iter()
-        .map(|i| {
-            let reference = photos[i].as_ref()?;
-            let others: Vec<&SmallPhoto> = neighbours[i]
-                .iter()
-                .filter_map(|&j| photos[j].as_ref())
-                .collect();
-            let costs = sweep::costs(reference, &others, ranges[i]?)?;
-            Some(smooth::depths(reference, &costs))
-        })
-        .collect();
+/// Photos made ready to be compared, and the depths found so far: to ask for the points that
+/// would be found without one of them or another, most depths are the same.
+pub struct Matching {
+    spacing: u32,
+    photos: Vec<Option<SmallPhoto>>,
+    affinity: Affinity,
+    /// The inverse depths to try.
+    ranges: Vec<Option<[f64; 2]>>,
+    /// With all photos, each when first needed.
+    maps: Vec<OnceLock<Option<DepthMap>>>,
+}
 
-    // 3. What they agree on.
-    let mut points = sparse.to_vec();
-    points.extend(consistent::points(
-        &photos,
-        &maps,
-        &neighbours,
-        options.spacing,
-    ));
-    points
+impl Matching {
+    /// See [`densify`], which takes the same.
+    pub fn new(
+        views: &[View],
+        sparse: &[SparsePoint],
+        photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
+        options: &DenseOptions,
+    ) -> Self {
+        let indices = 0..views.len();
+        let photos: Vec<Option<SmallPhoto>> = indices
+            .into_par_iter()
+            .map(|i| SmallPhoto::new(&views[i], &photo(i)?, options.long_side))
+            .collect();
+        Self {
+            spacing: options.spacing,
+            affinity: Affinity::new(views, sparse),
+            ranges: neighbours::depth_ranges(&photos, sparse),
+            maps: photos.iter().map(|_| OnceLock::new()).collect(),
+            photos,
+        }
+    }
+
+    /// The given points, and those that the photos agree on between them, or that all but
+    /// one of them do. Without it, only the range of depths that are tried remembers it.
+    pub fn points(&self, sparse: &[SparsePoint], without: Option<usize>) -> Vec<SparsePoint> {
+        // 1. Which photos to compare.
+        let usable = |i: usize| self.photos[i].is_some();
+        let of_all = self.affinity.neighbours(usable);
+        let neighbours = match without {
+            Some(gone) => self.affinity.neighbours(|i| usable(i) && i != gone),
+            None => of_all.clone(),
+        };
+
+        // 2. Their depths.
+        let maps: Vec<Option<Cow<'_, DepthMap>>> = (0..self.photos.len())
+            .into_par_iter()
+            .map(|i| {
+                if without == Some(i) {
+                    None
+                } else if neighbours[i] == of_all[i] {
+                    let map = self.maps[i].get_or_init(|| self.map(i, &of_all[i]));
+                    map.as_ref().map(Cow::Borrowed)
+                } else {
+                    self.map(i, &neighbours[i]).map(Cow::Owned)
+                }
+            })
+            .collect();
+        let maps: Vec<Option<&DepthMap>> = maps.iter().map(|map| map.as_deref()).collect();
+
+        // 3. What they agree on.
+        let mut points = sparse.to_vec();
+        points.extend(consistent::points(
+            &self.photos,
+            &maps,
+            &neighbours,
+            self.spacing,
+        ));
+        points
+    }
+
+    fn map(&self, i: usize, neighbours: &[usize]) -> Option<DepthMap> {
+        let reference = self.photos[i].as_ref()?;
+        let others: Vec<&SmallPhoto> = neighbours
+            .iter()
+            .filter_map(|&j| self.photos[j].as_ref())
+            .collect();
+        let costs = sweep::costs(reference, &others, self.ranges[i]?)?;
+        Some(smooth::depths(reference, &costs))
+    }
 }
 
 #[cfg(test)]

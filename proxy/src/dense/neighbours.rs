@@ -16,40 +16,51 @@ const OUTLIERS: f64 = 0.01;
 const NEARER: f64 = 1.25;
 const FARTHER: f64 = 0.6;
 
-/// For each view those it is best compared with, best first.
-pub(super) fn of_all(
-    views: &[View],
-    sparse: &[SparsePoint],
-    photos: &[Option<SmallPhoto>],
-) -> Vec<Vec<usize>> {
-    let count = views.len();
-    let centers: Vec<_> = views.iter().map(View::center).collect();
-    let mut score = vec![0.0; count * count];
-    for point in sparse {
-        let seen = || point.seen_by.iter().map(|&i| i as usize);
-        for i in seen() {
-            let here = centers[i] - point.position;
-            for j in seen().filter(|&j| j > i) {
-                let there = centers[j] - point.position;
-                let angle = here.cross(there).length().atan2(here.dot(there));
-                let good = (angle / LEAST_ANGLE).min(1.0) * (MOST_ANGLE / angle).min(1.0).powi(2);
-                if good.is_finite() {
-                    score[i * count + j] += good;
-                    score[j * count + i] += good;
+/// How well any two photos tell the depths of what both show.
+pub(super) struct Affinity {
+    /// A row for each view.
+    scores: Vec<f64>,
+    count: usize,
+}
+
+impl Affinity {
+    /// Judged by the points that both observe.
+    pub(super) fn new(views: &[View], sparse: &[SparsePoint]) -> Self {
+        let count = views.len();
+        let centers: Vec<_> = views.iter().map(View::center).collect();
+        let mut scores = vec![0.0; count * count];
+        for point in sparse {
+            let seen = || point.seen_by.iter().map(|&i| i as usize);
+            for i in seen() {
+                let here = centers[i] - point.position;
+                for j in seen().filter(|&j| j > i) {
+                    let there = centers[j] - point.position;
+                    let angle = here.cross(there).length().atan2(here.dot(there));
+                    let good =
+                        (angle / LEAST_ANGLE).min(1.0) * (MOST_ANGLE / angle).min(1.0).powi(2);
+                    if good.is_finite() {
+                        scores[i * count + j] += good;
+                        scores[j * count + i] += good;
+                    }
                 }
             }
         }
+        Self { scores, count }
     }
-    let of = |i: usize| -> Vec<usize> {
-        let row = &score[i * count..][..count];
-        let mut order: Vec<usize> = (0..count)
-            .filter(|&j| row[j] > 0.0 && photos[j].is_some())
-            .collect();
-        order.sort_by(|&a, &b| row[b].total_cmp(&row[a]).then(a.cmp(&b)));
-        order.truncate(NEIGHBOURS);
-        order
-    };
-    (0..count).map(of).collect()
+
+    /// For each view those it is best compared with, best first, of the usable ones.
+    pub(super) fn neighbours(&self, usable: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+        let of = |i: usize| -> Vec<usize> {
+            let row = &self.scores[i * self.count..][..self.count];
+            let mut order: Vec<usize> = (0..self.count)
+                .filter(|&j| row[j] > 0.0 && usable(j))
+                .collect();
+            order.sort_by(|&a, &b| row[b].total_cmp(&row[a]).then(a.cmp(&b)));
+            order.truncate(NEIGHBOURS);
+            order
+        };
+        (0..self.count).map(of).collect()
+    }
 }
 
 /// The least and greatest inverse depth to try for each photo, from the points it sees.

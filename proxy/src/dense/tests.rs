@@ -126,6 +126,43 @@ fn the_same_photos_give_the_same_points_on_any_number_of_threads() {
 }
 
 #[test]
+fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
+    let options = DenseOptions {
+        long_side: 96,
+        spacing: 4,
+    };
+    let solid = scene();
+    let views: Vec<View> = (0..9).map(view).collect();
+    let sparse = sparse(&solid);
+    let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
+    let matching = Matching::new(&views, &sparse, |i| Some(photos[i].clone()), &options);
+    assert!(matching.points(&sparse, None).len() > sparse.len() + 100);
+    for gone in [0, 4, 8] {
+        let seen_by_rest = |shift: bool| -> Vec<SparsePoint> {
+            let rest = |p: &SparsePoint| SparsePoint {
+                position: p.position,
+                seen_by: p
+                    .seen_by
+                    .iter()
+                    .filter(|&&i| i != gone)
+                    .map(|&i| i - u32::from(shift && i > gone))
+                    .collect(),
+            };
+            sparse.iter().map(rest).collect()
+        };
+        let left: Vec<usize> = (0..9).filter(|&i| i != gone as usize).collect();
+        let fewer: Vec<View> = left.iter().map(|&i| views[i].clone()).collect();
+        let photo = |i: usize| Some(photos[left[i]].clone());
+        let mut never = densify(&fewer, &seen_by_rest(true), photo, &options);
+        for i in never.iter_mut().flat_map(|p| &mut p.seen_by) {
+            *i += u32::from(*i >= gone);
+        }
+        let without = matching.points(&seen_by_rest(false), Some(gone as usize));
+        assert!(without == never, "{gone}");
+    }
+}
+
+#[test]
 fn photos_that_tell_nothing_add_nothing() {
     let views: Vec<View> = (0..4).map(view).collect();
     let points = vec![SparsePoint {

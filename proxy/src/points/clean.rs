@@ -5,15 +5,21 @@ use super::{Node, delaunay};
 use spade::Triangulation;
 
 /// A point sticks out when its inverse distance is beyond that of all its neighbours by
-/// this factor.
-const SPIKE: f64 = 1.1;
+/// this factor; it is gone at the second.
+const SPIKE: [f64; 2] = [1.08, 1.12];
 /// Spikes hide behind spikes: the second round finds those.
 const ROUNDS: usize = 2;
-/// A point is taken to be hidden when this many of its nearest so many neighbours are
-/// nearer by this factor.
-const HIDING: usize = 6;
+/// A point is taken to be hidden when so large a share of its nearest so many neighbours is nearer
+/// by about this factor: from the first number on in part, at the second altogether.
 const NEIGHBOURS: usize = 12;
-const NEARER: f64 = 1.2;
+const HIDING: [f64; 2] = [0.28, 0.48];
+const NEARER: [f64; 2] = [1.15, 1.25];
+
+/// 0 up to the first number, 1 from the second on, smooth between.
+fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
+    let s = ((value - from) / (to - from)).clamp(0.0, 1.0);
+    s * s * (3.0 - 2.0 * s)
+}
 
 /// The nodes without those that stick out of all their neighbours in the triangulation.
 pub(super) fn without_spikes(mut nodes: Vec<Node>) -> Vec<Node> {
@@ -21,7 +27,7 @@ pub(super) fn without_spikes(mut nodes: Vec<Node>) -> Vec<Node> {
         let Some(triangulation) = delaunay(&nodes) else {
             break;
         };
-        let mut keep = vec![true; nodes.len()];
+        let mut left = vec![1.0; nodes.len()];
         for vertex in triangulation.vertices() {
             let around = vertex.out_edges().map(|edge| {
                 let neighbour = edge.to().data().index;
@@ -30,10 +36,11 @@ pub(super) fn without_spikes(mut nodes: Vec<Node>) -> Vec<Node> {
             let (least, most) = around.fold((f64::MAX, 0.0), |(least, most): (f64, f64), s| {
                 (least.min(s), most.max(s))
             });
-            let own = nodes[vertex.data().index as usize].inverse_distance;
-            keep[vertex.data().index as usize] = own <= most * SPIKE && own * SPIKE >= least;
+            let index = vertex.data().index as usize;
+            let own = nodes[index].inverse_distance;
+            left[index] = 1.0 - smoothstep(SPIKE, (own / most).max(least / own));
         }
-        nodes = only(&nodes, &keep);
+        nodes = weighted(nodes, &left);
     }
     nodes
 }
@@ -43,17 +50,52 @@ pub(super) fn without_spikes(mut nodes: Vec<Node>) -> Vec<Node> {
 pub(super) fn without_hidden(nodes: Vec<Node>) -> Vec<Node> {
     let nearest = Nearest::new(&nodes);
     let in_the_open = |node: &Node| {
-        // One more than asked for: the nearest is the point itself.
-        let around = nearest.of(node.chart(), NEIGHBOURS + 1);
-        let limit = NEARER * node.inverse_distance;
-        let nearer = around.iter().filter(|(_, n)| n.inverse_distance > limit);
-        nearer.count() < HIDING
+        let (mut nearer, mut all) = (0.0, 0.0);
+        for (share, other) in nearest.around(node, NEIGHBOURS) {
+            nearer += share * smoothstep(NEARER, other.inverse_distance / node.inverse_distance);
+            all += share;
+        }
+        if all > 0.0 {
+            1.0 - smoothstep(HIDING, nearer / all)
+        } else {
+            1.0
+        }
     };
-    let keep: Vec<bool> = nodes.iter().map(in_the_open).collect();
-    only(&nodes, &keep)
+    let left: Vec<f64> = nodes.iter().map(in_the_open).collect();
+    weighted(nodes, &left)
 }
 
-fn only(nodes: &[Node], keep: &[bool]) -> Vec<Node> {
-    let kept = nodes.iter().zip(keep).filter(|(_, keep)| **keep);
-    kept.map(|(node, _)| *node).collect()
+/// Brings what is there only in part to where the surface would about be without it.
+pub(super) fn faded(nodes: Vec<Node>) -> Vec<Node> {
+    let nearest = Nearest::new(&nodes);
+    let of = |node: &Node| {
+        if node.weight >= 1.0 {
+            return *node;
+        }
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (share, other) in nearest.around(node, NEIGHBOURS) {
+            sum += share * other.inverse_distance;
+            all += share;
+        }
+        let without = if all > 0.0 {
+            sum / all
+        } else {
+            node.inverse_distance
+        };
+        Node {
+            inverse_distance: without + node.weight * (node.inverse_distance - without),
+            ..*node
+        }
+    };
+    nodes.iter().map(of).collect()
+}
+
+/// The nodes with a part of their weights; those that have none left are gone.
+fn weighted(mut nodes: Vec<Node>, left: &[f64]) -> Vec<Node> {
+    nodes
+        .iter_mut()
+        .zip(left)
+        .for_each(|(node, left)| node.weight *= left);
+    nodes.retain(|node| node.weight > 0.0);
+    nodes
 }

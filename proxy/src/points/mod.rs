@@ -11,7 +11,7 @@ mod nearest;
 
 use crate::Facets;
 use calibrate::{Pixel, View};
-use clean::{without_hidden, without_spikes};
+use clean::{faded, without_hidden, without_spikes};
 use glam::{DVec2, DVec3};
 use nearest::Nearest;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -42,11 +42,17 @@ const MARGIN: f64 = 1.1;
 /// The widest ring; what lies behind it is not seen.
 const WIDEST: f64 = 2.8;
 
+/// A view counts fully from so much more likeness on, relatively, than the first that does
+/// not count.
+const FADE: f64 = 0.1;
+
 /// A point as the desired view sees it: a unit vector in its frame, and 1/distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node {
     direction: DVec3,
     inverse_distance: f64,
+    /// How much of it is there, 0…1: points come and go with the desired view.
+    weight: f64,
 }
 
 impl Node {
@@ -72,6 +78,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         let node = Node {
             direction: offset / offset.length(),
             inverse_distance: 1.0 / offset.length(),
+            weight: 1.0,
         };
         let finite = node.direction.is_finite() && node.inverse_distance > 0.0;
         (finite && node.direction.z > reach.cos()).then_some(node)
@@ -83,12 +90,17 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
     let chosen = views_most_like(center, sources, &in_sight);
     let mut nodes: Vec<Node> = in_sight
         .iter()
-        .filter(|(_, p)| p.seen_by.iter().any(|&i| chosen[i as usize]))
-        .map(|(node, _)| *node)
+        .map(|(node, p)| {
+            let weights = p.seen_by.iter().map(|&i| chosen[i as usize]);
+            let weight = weights.fold(0.0, f64::max);
+            Node { weight, ..*node }
+        })
+        .filter(|node| node.weight > 0.0)
         .collect();
     nodes = distinct(nodes);
     nodes = without_spikes(nodes);
     nodes = without_hidden(nodes);
+    nodes = faded(nodes);
     if nodes.len() < 3 {
         return None;
     }
@@ -102,6 +114,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
             let mut anchor = Node {
                 direction: across.extend(reach.cos()),
                 inverse_distance: 0.0,
+                weight: 1.0,
             };
             anchor.inverse_distance = nearest.inverse_distance(anchor.chart(), ANCHORED_TO);
             anchor
@@ -117,6 +130,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
     let behind = Node {
         direction: DVec3::NEG_Z,
         inverse_distance: nodes[nodes.len() - 1].inverse_distance,
+        weight: 1.0,
     };
     let rim = rim(&triangles);
     triangles.extend(rim.into_iter().map(|[a, b]| [b, a, nodes.len() as u32]));
@@ -137,12 +151,9 @@ fn rim(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
 }
 
 /// Which source views are most like one at `center`: those that share many points with it
-/// and see them from about the same direction and distance.
-fn views_most_like(
-    center: DVec3,
-    sources: &[View],
-    in_sight: &[(Node, &SparsePoint)],
-) -> Vec<bool> {
+/// and see them from about the same direction and distance. Each has a weight, 0…1, that falls to
+/// zero before another takes its place.
+fn views_most_like(center: DVec3, sources: &[View], in_sight: &[(Node, &SparsePoint)]) -> Vec<f64> {
     let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
     let mut likeness = vec![0.0; sources.len()];
     for (node, point) in in_sight {
@@ -156,9 +167,12 @@ fn views_most_like(
     }
     let mut order: Vec<usize> = (0..sources.len()).filter(|&i| likeness[i] > 0.0).collect();
     order.sort_by(|&i, &j| likeness[j].total_cmp(&likeness[i]).then(i.cmp(&j)));
+    let least = order.get(VIEWS).map_or(0.0, |&i| likeness[i]);
     order.truncate(VIEWS);
-    let mut chosen = vec![false; sources.len()];
-    order.into_iter().for_each(|i| chosen[i] = true);
+    let mut chosen = vec![0.0; sources.len()];
+    for i in order {
+        chosen[i] = ((likeness[i] - least) / (FADE * likeness[i])).min(1.0);
+    }
     chosen
 }
 

@@ -35,6 +35,24 @@ impl<'a> Nearest<'a> {
             .collect()
     }
 
+    /// The `count` nodes nearest to a node but itself, each with its weight times a share that
+    /// falls smoothly to zero where the next one lies, so that nothing jumps when another
+    /// comes nearer.
+    pub(super) fn around(
+        &self,
+        node: &Node,
+        count: usize,
+    ) -> impl Iterator<Item = (f64, &'a Node)> {
+        // The nearest is the node itself, and the farthest only says where shares end.
+        let near = self.of(node.chart(), count + 2);
+        let end = near.iter().map(|(squared, _)| *squared).fold(0.0, f64::max);
+        let own = *node;
+        near.into_iter().filter_map(move |(squared, other)| {
+            let share = 1.0 - squared / end;
+            (*other != own && share > 0.0).then_some((share * other.weight, other))
+        })
+    }
+
     /// The mean inverse distance of the `count` nodes nearest to a place, by the inverse
     /// squares of their distances there.
     pub(super) fn inverse_distance(&self, at: DVec2, count: usize) -> f64 {
