@@ -409,12 +409,19 @@ mod tests {
             let solid = Proxy::Mesh(Arc::new(Solid::new(kind, mesh.clone())));
             proxies.push(("ply", solid.clone()));
             proxies.push(("glb", solid));
+            let mut seen_through = Solid::new(kind, mesh.clone());
+            seen_through.hide_nothing();
+            let seen_through = Proxy::Mesh(Arc::new(seen_through));
+            proxies.push(("ply", seen_through.clone()));
+            proxies.push(("glb", seen_through));
         }
         for (extension, proxy) in proxies {
             let path = folder.path().join(format!("p.{extension}"));
             write(&path, &proxy, &[], &[]).unwrap();
             let back = read(&path).unwrap();
             assert_eq!(back.kind(), proxy.kind());
+            let occludes = |p: &Proxy| matches!(p, Proxy::Mesh(solid) if solid.occludes());
+            assert_eq!(occludes(&back), occludes(&proxy), "{extension}");
             if extension != "glb" {
                 assert_eq!(back, proxy);
             }

@@ -251,6 +251,40 @@ fn times_alone_change_nothing() {
 }
 
 #[test]
+fn a_source_view_that_takes_no_part_might_as_well_not_be_there() {
+    let shot = helicopter();
+    let all: Vec<usize> = (0..shot.views.len()).collect();
+    let gone = 5;
+    let rest: Vec<usize> = all.iter().copied().filter(|&i| i != gone).collect();
+    let (with, without) = (lumigraph_of(shot, &all), lumigraph_of(shot, &rest));
+    let desired = &shot.views[gone];
+    let options = FieldOptions::default();
+    let frames = || {
+        let with = Frame::without(&with, desired.clone(), options, Some(gone));
+        (with, Frame::new(&without, desired.clone(), options))
+    };
+    for method in METHODS {
+        let (with, without) = frames();
+        assert_eq!(
+            with.taking_part().count(),
+            without.taking_part().count(),
+            "{method:?}"
+        );
+        assert!(
+            by_engines(&with, method) == by_engines(&without, method),
+            "{method:?}"
+        );
+        // Whatever the time.
+        let (with, without) = frames();
+        let (with, without) = (with.at(&moment(0.3)), without.at(&moment(0.3)));
+        assert!(
+            by_engines(&with, method) == by_engines(&without, method),
+            "{method:?}"
+        );
+    }
+}
+
+#[test]
 fn the_order_of_photos_does_not_matter() {
     let shot = helicopter();
     let mut order: Vec<usize> = (0..shot.views.len()).collect();

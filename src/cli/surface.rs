@@ -11,6 +11,7 @@ use proxy::Proxy;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::time::Instant;
 
 /// Which surface.
 #[derive(Args)]
@@ -35,6 +36,7 @@ pub(super) fn fit(
     kind: Option<Kind>,
     without: &BTreeSet<String>,
 ) -> anyhow::Result<Fitted> {
+    let start = Instant::now();
     let busy = spinner("fitting the proxy");
     let fitted = match kind {
         Some(kind) => scene.fit(kind, without),
@@ -48,8 +50,9 @@ pub(super) fn fit(
     if !fitted.trials.is_empty() {
         let kind = fitted.proxy.kind();
         say!(
-            "proxy: {kind}, by photos held out for it: {}",
-            trials_text(&fitted.trials)
+            "proxy: {kind}, by photos held out for it: {} ({:.1} s)",
+            trials_text(&fitted.trials),
+            start.elapsed().as_secs_f64()
         );
     }
     Ok(fitted)
