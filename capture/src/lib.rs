@@ -28,7 +28,7 @@ pub use decode::{content_size, decode, decode_content, decode_reduced, photo_siz
 pub use error::CaptureError;
 pub use exif::{Exif, read_exif};
 pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
-pub use resize::{reduced_size, resize};
+pub use resize::{reduced_size, resize, resize_mask};
 pub use sequence::is_sequence;
 pub use times::{
     NameTime, TimeListError, Times, from_earliest, number_in_name, read_times, time_in_name,

@@ -1,5 +1,5 @@
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
-use image::RgbaImage;
+use image::{DynamicImage, GrayImage, RgbaImage};
 
 /// The size of a photo reduced so that its longer side is at most `max_side` pixels (at
 /// least one); its own size where it is small enough. The shape is kept to within half a
@@ -36,6 +36,15 @@ pub fn resize(image: &RgbaImage, width: u32, height: u32) -> RgbaImage {
         .resize(image, &mut resized, &options)
         .expect("two RGBA pictures of non-zero size");
     resized
+}
+
+/// As [`resize`], of a mask or a matte.
+///
+/// # Panics
+/// If either size is zero.
+pub fn resize_mask(mask: &GrayImage, width: u32, height: u32) -> GrayImage {
+    let pixels = DynamicImage::from(mask.clone()).into_rgba8();
+    DynamicImage::from(resize(&pixels, width, height)).into_luma8()
 }
 
 /// The sharpest filter that puts every pixel where it belongs.

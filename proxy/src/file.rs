@@ -59,7 +59,7 @@ struct Stored {
     version: u32,
     #[serde(flatten)]
     surface: StoredSurface,
-    /// Of a mesh, where it is not to.
+    /// Of a mesh: whether it hides what lies behind it, where it does not as its kind does.
     #[serde(skip_serializing_if = "Option::is_none")]
     occludes: Option<bool>,
 }
@@ -151,12 +151,16 @@ impl Stored {
             StoredSurface::Depth => MeshKind::Depth,
             StoredSurface::Mesh => MeshKind::Mesh,
         };
-        let mut solid = Solid::new(kind, mesh()?);
-        if self.occludes == Some(false) {
-            solid.hide_nothing();
-        }
-        Ok(Proxy::Mesh(Arc::new(solid)))
+        Ok(solid(kind, mesh()?, self.occludes != Some(false)))
     }
+}
+
+fn solid(kind: MeshKind, mesh: mesh::Mesh, occludes: bool) -> Proxy {
+    let mut solid = Solid::new(kind, mesh);
+    if !occludes {
+        solid.hide_nothing();
+    }
+    Proxy::Mesh(Arc::new(solid))
 }
 
 /// Whether a mesh could hide parts of itself, and is not to.
@@ -201,7 +205,6 @@ pub fn read(path: &Path) -> Result<Proxy, FileError> {
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
     let json = |e| FileError::Json(path.to_owned(), e);
     let mesh = || Ok(mesh::parse(path, bytes)?);
-    let solid = |kind| Ok(Proxy::Mesh(Arc::new(Solid::new(kind, mesh()?))));
     match extension(path).as_str() {
         "json" => {
             let stored: Stored = serde_json::from_slice(bytes).map_err(json)?;
@@ -212,18 +215,14 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
             // Extras of somebody else's are none of ours.
             match extras.and_then(|text| serde_json::from_str::<Stored>(&text).ok()) {
                 Some(stored) => stored.proxy(path, mesh),
-                None => solid(MeshKind::Mesh),
+                None => Ok(solid(MeshKind::Mesh, mesh()?, true)),
             }
         }
         "ply" => {
             let (kind, occludes) = kind_of_ply(bytes);
-            let mut solid = Solid::new(kind, mesh()?);
-            if !occludes {
-                solid.hide_nothing();
-            }
-            Ok(Proxy::Mesh(Arc::new(solid)))
+            Ok(solid(kind, mesh()?, occludes))
         }
-        "gltf" | "obj" => solid(MeshKind::Mesh),
+        "gltf" | "obj" => Ok(solid(MeshKind::Mesh, mesh()?, true)),
         _ => Err(FileError::Extension(path.to_owned())),
     }
 }

@@ -79,6 +79,11 @@ pub struct FrameSource {
 }
 
 impl FrameSource {
+    /// Not where its time is outside the window, or where it was left out.
+    pub(crate) fn takes_part(&self) -> bool {
+        self.time_penalty < f64::INFINITY
+    }
+
     /// A source view as a desired one has it, without feather and alike in footprint.
     pub(crate) fn of(view: &View, desired: &View) -> Self {
         let View {
@@ -209,7 +214,7 @@ impl<'a> Frame<'a> {
     }
 
     fn takes_part(&self, source_idx: usize) -> bool {
-        self.sources[source_idx].time_penalty < f64::INFINITY
+        self.sources[source_idx].takes_part()
     }
 
     /// Whether any source view is brought to another exposure.

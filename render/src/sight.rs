@@ -14,7 +14,7 @@ const HALVINGS: u32 = 6;
 
 /// Whether the point at ray / s lies in a source view's image.
 fn sees(source: &FrameSource, ray: DVec3, s: f64) -> bool {
-    if source.time_penalty == f64::INFINITY {
+    if !source.takes_part() {
         return false;
     }
     let pixel = source

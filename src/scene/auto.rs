@@ -75,15 +75,15 @@ impl Scene {
             };
             for (occludes, scores) in [(true, Some(scores)), (false, plain)] {
                 let Some(scores) = scores else { continue };
-                let score = if scores.complete {
+                let score = if scores.complete() {
                     Ok(scores.mean())
                 } else {
-                    let (asked, behind) = (scores.psnr.len(), scores.mean());
+                    let (asked, behind) = (scores.asked(), scores.mean());
                     Err(format!("given up at {behind:.2} dB after {asked} photos"))
                 };
                 trials.push(Trial::of(kind, occludes, score));
                 let most = leader.as_ref().map_or(f64::NEG_INFINITY, Scores::mean);
-                if scores.complete && scores.mean() > most + TIED_DB {
+                if scores.complete() && scores.mean() > most + TIED_DB {
                     leader = Some(scores);
                     best = Some((kind, occludes));
                 }

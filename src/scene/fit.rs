@@ -5,7 +5,7 @@ use super::{Photo, Scene, SceneError};
 use calibrate::View;
 use glam::DVec3;
 use image::RgbaImage;
-use proxy::dense::{DenseOptions, DensePoints, densify};
+use proxy::dense::{DenseOptions, DensePoints, Matching};
 use proxy::depth;
 use proxy::hull;
 use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint, Tunnel};
@@ -253,10 +253,22 @@ impl Scene {
         self.needs_points(Kind::Dense)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
+        let (_, sparse) = self.sparse(without)?;
+        let points = self.matching(without)?.points(&sparse, None);
+        Ok(Fitted::dense(names, points, sparse.len()))
+    }
+
+    /// The photos but those of the given names, ready to be compared.
+    pub(super) fn matching(&self, without: &BTreeSet<String>) -> Result<Matching, SceneError> {
+        let sources = self.sources(without)?;
         let (views, sparse) = self.sparse(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
-        let points = densify(&views, &sparse, photo, &DenseOptions::default());
-        Ok(Fitted::dense(names, points, sparse.len()))
+        Ok(Matching::new(
+            &views,
+            &sparse,
+            photo,
+            &DenseOptions::default(),
+        ))
     }
 }
 
@@ -308,7 +320,7 @@ pub(super) fn unfit(reason: impl ToString) -> SceneError {
 
 /// A photo, transparent where its mask ignores it; `None` where it cannot be decoded, which
 /// drawing will report.
-pub(super) fn usable(photo: &Photo, view: &View) -> Option<RgbaImage> {
+fn usable(photo: &Photo, view: &View) -> Option<RgbaImage> {
     let size = (view.width, view.height);
     let mut pixels = photo.decode(size).ok()?;
     if let Some(mask) = photo.decode_ignore_mask(size).ok()? {

@@ -56,13 +56,25 @@ impl Scene {
         without: &BTreeSet<String>,
         proxy: Proxy,
     ) -> Result<Lumigraph, SceneError> {
+        self.reduced_lumigraph(without, proxy, u32::MAX)
+    }
+
+    /// The same, its photos reduced to `long_side` pixels along the longer side.
+    pub(super) fn reduced_lumigraph(
+        &self,
+        without: &BTreeSet<String>,
+        proxy: Proxy,
+        long_side: u32,
+    ) -> Result<Lumigraph, SceneError> {
         let mut sources = Vec::new();
         let mut files = Vec::new();
         for (photo, view) in self.sources(without)? {
-            files.push((photo.clone(), (view.width, view.height)));
+            let own = (view.width, view.height);
+            let reduced = capture::reduced_size(own, long_side);
+            files.push((photo.clone(), own, reduced));
             sources.push(SourceView {
                 name: photo.name.clone(),
-                view,
+                view: view.resized(reduced.0, reduced.1),
                 gain: photo.gain.unwrap_or([1.0; 3]),
                 time_s: photo.time_s,
             });
@@ -70,18 +82,29 @@ impl Scene {
         if sources.is_empty() {
             return Err(SceneError::NothingLeft(self.photos.len()));
         }
-        let masked: Vec<bool> = files.iter().map(|(p, _)| p.ignore_mask.is_some()).collect();
+        let masked: Vec<bool> = files
+            .iter()
+            .map(|(p, ..)| p.ignore_mask.is_some())
+            .collect();
         let files = Arc::new(files);
         let of_masks = Arc::clone(&files);
         let photos = PhotoStore::new(files.len(), move |source_idx| {
-            let (photo, size) = &files[source_idx];
-            photo.decode(*size).map_err(|error| error.to_string())
+            let (photo, own, reduced) = &files[source_idx];
+            let pixels = photo.decode(*own).map_err(|error| error.to_string())?;
+            Ok(match own == reduced {
+                true => pixels,
+                false => capture::resize(&pixels, reduced.0, reduced.1),
+            })
         });
         let photos = photos.with_masks(&masked, move |source_idx| {
-            let (photo, size) = &of_masks[source_idx];
-            let mask = photo.decode_ignore_mask(*size);
+            let (photo, own, reduced) = &of_masks[source_idx];
+            let mask = photo.decode_ignore_mask(*own);
             let mask = mask.map_err(|error| error.to_string())?;
-            mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))
+            let mask = mask.ok_or_else(|| format!("{}: no ignore mask", photo.name))?;
+            Ok(match own == reduced {
+                true => mask,
+                false => capture::resize_mask(&mask, reduced.0, reduced.1),
+            })
         });
         let points = match &proxy {
             Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),

@@ -3,7 +3,7 @@
 use super::{Photo, Scene, SceneError};
 use calibrate::{ImageId, Pixel};
 use capture::CaptureError;
-use image::{DynamicImage, GrayImage, Luma, RgbaImage};
+use image::{GrayImage, Luma, RgbaImage};
 use render::score::{
     MaskedScore, MatteCoverage, Score, ScoreError, coverage_matte, coverage_points, mean,
     mean_masked, mean_matte, mean_of, score, score_masked,
@@ -72,10 +72,7 @@ impl Truth {
         if (old_width, old_height) == (width, height) {
             return self;
         }
-        let mask = |mask: GrayImage| {
-            let mask = capture::resize(&DynamicImage::from(mask).into_rgba8(), width, height);
-            DynamicImage::from(mask).into_luma8()
-        };
+        let mask = |mask: GrayImage| capture::resize_mask(&mask, width, height);
         let (x, y) = (
             f64::from(width) / f64::from(old_width),
             f64::from(height) / f64::from(old_height),

@@ -78,6 +78,8 @@ pub struct Matching {
     spacing: u32,
     photos: Vec<Option<SmallPhoto>>,
     affinity: Affinity,
+    /// Of each photo, with all of them.
+    neighbours: Vec<Vec<usize>>,
     /// The inverse depths to try.
     ranges: Vec<Option<[f64; 2]>>,
     /// With all photos, each when first needed.
@@ -97,9 +99,11 @@ impl Matching {
             .into_par_iter()
             .map(|i| SmallPhoto::new(&views[i], &photo(i)?, options.long_side))
             .collect();
+        let affinity = Affinity::new(views, sparse);
         Self {
             spacing: options.spacing,
-            affinity: Affinity::new(views, sparse),
+            neighbours: affinity.neighbours(|i| photos[i].is_some()),
+            affinity,
             ranges: neighbours::depth_ranges(&photos, sparse),
             maps: photos.iter().map(|_| OnceLock::new()).collect(),
             photos,
@@ -110,11 +114,13 @@ impl Matching {
     /// one of them do. Without it, only the range of depths that are tried remembers it.
     pub fn points(&self, sparse: &[SparsePoint], without: Option<usize>) -> Vec<SparsePoint> {
         // 1. Which photos to compare.
-        let usable = |i: usize| self.photos[i].is_some();
-        let of_all = self.affinity.neighbours(usable);
+        let of_all = &self.neighbours;
         let neighbours = match without {
-            Some(gone) => self.affinity.neighbours(|i| usable(i) && i != gone),
-            None => of_all.clone(),
+            Some(gone) => {
+                let usable = |i: usize| self.photos[i].is_some() && i != gone;
+                Cow::Owned(self.affinity.neighbours(usable))
+            }
+            None => Cow::Borrowed(of_all),
         };
 
         // 2. Their depths.

@@ -36,8 +36,7 @@ impl<'a> Nearest<'a> {
     }
 
     /// The `count` nodes nearest to a node but itself, each with its weight times a share that
-    /// falls smoothly to zero where the next one lies, so that nothing jumps when another
-    /// comes nearer.
+    /// falls to zero where the next one lies, so that nothing jumps when another comes nearer.
     pub(super) fn around(
         &self,
         node: &Node,
