@@ -5,6 +5,7 @@
 //! f64, is the specification; [`cpu`] and [`gpu`] are fast and compared with it.
 
 pub mod blend;
+pub mod coverage;
 pub mod cpu;
 mod engine;
 pub mod field;

@@ -1,6 +1,5 @@
 //! How close a rendered picture comes to the photo that was taken there.
 
-use calibrate::Pixel;
 use image::{GrayImage, RgbaImage};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
@@ -43,21 +42,12 @@ pub struct MaskedScore {
     pub coverage_masked: f64,
 }
 
-/// How much a rendered picture covers of an object, and of what lies behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct MatteCoverage {
-    /// The mean alpha inside the object's matte, 0…1; `None` where it is nowhere.
-    pub coverage_matte: Option<f64>,
-    /// The mean alpha outside, 0…1: best is 0. `None` where all is object.
-    pub coverage_background: Option<f64>,
-}
-
 /// No PSNR counts for more than this in [`mean`] and in JSON, so that one photo reproduced
 /// exactly does not outweigh all others.
 pub const PSNR_CAP_DB: f64 = 99.0;
 
 /// A rendered pixel is covered when its alpha is at least this, and a mask's value inside.
-const HALF: u8 = 128;
+pub(crate) const HALF: u8 = 128;
 
 /// Wang et al. 2004, "Image quality assessment: from error visibility to structural
 /// similarity", §III: an 11 × 11 Gaussian window with σ = 1.5, K₁ = 0.01, K₂ = 0.03.
@@ -179,73 +169,6 @@ pub fn mean_masked(scores: &[MaskedScore]) -> Option<MaskedScore> {
         psnr_masked: mean(&|s| Some(s.psnr_masked.min(PSNR_CAP_DB)))?,
         ssim_masked: mean(&|s| s.ssim_masked),
         coverage_masked: mean(&|s| Some(s.coverage_masked))?,
-    })
-}
-
-/// The share of the pixels at the given places that are covered: of the points that a photo
-/// shows and others see too, how many the picture shows. Places outside the picture do not
-/// count; `None` where none is inside.
-pub fn coverage_points(
-    rendered: &RgbaImage,
-    places: impl IntoIterator<Item = Pixel>,
-) -> Option<f64> {
-    let (width, height) = rendered.dimensions();
-    let (mut covered, mut count) = (0_usize, 0_usize);
-    for place in places {
-        let inside = (0.0..f64::from(width)).contains(&place.x)
-            && (0.0..f64::from(height)).contains(&place.y);
-        if inside {
-            let pixel = rendered.get_pixel(place.x as u32, place.y as u32);
-            covered += usize::from(pixel.0[3] >= HALF);
-            count += 1;
-        }
-    }
-    (count > 0).then(|| covered as f64 / count as f64)
-}
-
-/// How much a rendered picture covers of the pixels inside a matte, where it is half or more,
-/// and of the others. Pixels that are `used` less than half count as neither.
-///
-/// # Errors
-/// The sizes differ.
-pub fn coverage_matte(
-    rendered: &RgbaImage,
-    matte: &GrayImage,
-    used: Option<&GrayImage>,
-) -> Result<MatteCoverage, ScoreError> {
-    for mask in [Some(matte), used].into_iter().flatten() {
-        if mask.dimensions() != rendered.dimensions() {
-            return Err(ScoreError::MaskSize {
-                mask: mask.dimensions(),
-                photo: rendered.dimensions(),
-            });
-        }
-    }
-    // The sums of alpha, and the pixels: inside and outside.
-    let mut sums = [(0_u64, 0_u64); 2];
-    for (i, pixel) in rendered.pixels().enumerate() {
-        if used.is_none_or(|used| used.as_raw()[i] >= HALF) {
-            let (sum, count) = &mut sums[usize::from(matte.as_raw()[i] < HALF)];
-            *sum += u64::from(pixel.0[3]);
-            *count += 1;
-        }
-    }
-    let [coverage_matte, coverage_background] =
-        sums.map(|(sum, count)| (count > 0).then(|| sum as f64 / (255.0 * count as f64)));
-    Ok(MatteCoverage {
-        coverage_matte,
-        coverage_background,
-    })
-}
-
-/// The means of those that there are; `None` of nothing.
-pub fn mean_matte(coverages: &[MatteCoverage]) -> Option<MatteCoverage> {
-    let mean = |value: fn(&MatteCoverage) -> Option<f64>| {
-        mean_of(&coverages.iter().filter_map(value).collect::<Vec<_>>())
-    };
-    (!coverages.is_empty()).then(|| MatteCoverage {
-        coverage_matte: mean(|c| c.coverage_matte),
-        coverage_background: mean(|c| c.coverage_background),
     })
 }
 
@@ -644,70 +567,6 @@ mod tests {
         let mean = mean_masked(&[left, margin]).unwrap();
         assert_eq!(mean.ssim_masked, left.ssim_masked);
         assert!((mean.psnr_masked - left.psnr_masked).abs() < 1e-12);
-    }
-
-    #[test]
-    fn points_are_covered_where_their_pixels_are() {
-        // Left half covered, the middle column only a little.
-        let rendered = RgbaImage::from_fn(9, 4, |x, _| match x {
-            0..4 => Rgba([0, 0, 0, 128]),
-            4 => Rgba([0, 0, 0, 127]),
-            _ => Rgba([0; 4]),
-        });
-        let at = |places: &[(f64, f64)]| {
-            coverage_points(&rendered, places.iter().map(|&(x, y)| Pixel::new(x, y)))
-        };
-        assert_eq!(at(&[(0.0, 0.0), (3.99, 3.99)]), Some(1.0));
-        assert_eq!(
-            at(&[(0.5, 0.5), (4.0, 1.0), (8.9, 2.0), (2.0, 3.0)]),
-            Some(0.5)
-        );
-        // Outside, on the far border, nowhere.
-        let outside = [
-            (-0.1, 1.0),
-            (9.0, 1.0),
-            (1.0, 4.0),
-            (f64::NAN, 1.0),
-            (1e300, 1.0),
-        ];
-        assert_eq!(at(&outside), None);
-        assert_eq!(at(&[outside[0], (1.0, 1.0)]), Some(1.0));
-        assert_eq!(at(&[]), None);
-    }
-
-    #[test]
-    fn matte_and_background_are_covered_each_by_itself() {
-        // The object is the left half; what is drawn reaches beyond it, and lacks its top.
-        let matte = GrayImage::from_fn(10, 4, |x, _| Luma([if x < 5 { 128 } else { 127 }]));
-        let rendered = RgbaImage::from_fn(10, 4, |x, y| match (x, y) {
-            (_, 0) => Rgba([9, 9, 9, 0]),
-            (0..5, _) => Rgba([9, 9, 9, 255]),
-            (5, _) => Rgba([9, 9, 9, 51]),
-            _ => Rgba([0; 4]),
-        });
-        let found = coverage_matte(&rendered, &matte, None).unwrap();
-        assert_eq!(found.coverage_matte, Some(0.75));
-        assert!((found.coverage_background.unwrap() - 0.2 * 3.0 / 20.0).abs() < 1e-12);
-
-        // What is ignored is neither.
-        let used = GrayImage::from_fn(10, 4, |x, y| Luma([if x < 5 && y > 0 { 255 } else { 0 }]));
-        let found = coverage_matte(&rendered, &matte, Some(&used)).unwrap();
-        assert_eq!(found.coverage_matte, Some(1.0));
-        assert_eq!(found.coverage_background, None);
-        let nothing = GrayImage::new(10, 4);
-        let none = coverage_matte(&rendered, &nothing, None).unwrap();
-        assert_eq!(none.coverage_matte, None);
-        let mean = mean_matte(&[found, none]).unwrap();
-        assert_eq!(mean.coverage_matte, Some(1.0));
-        assert_eq!(mean.coverage_background, none.coverage_background);
-        assert_eq!(mean_matte(&[]), None);
-
-        let error = coverage_matte(&rendered, &GrayImage::new(4, 10), None).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "the mask has 4 × 10 pixels and the photo 10 × 4; make them as large as each other"
-        );
-        assert!(coverage_matte(&rendered, &matte, Some(&GrayImage::new(4, 10))).is_err());
     }
 
     #[test]

@@ -4,9 +4,9 @@ use super::{Photo, Scene, SceneError};
 use calibrate::{ImageId, Pixel};
 use capture::CaptureError;
 use image::{GrayImage, Luma, RgbaImage};
+use render::coverage::{MatteCoverage, coverage_matte, coverage_points, mean_matte};
 use render::score::{
-    MaskedScore, MatteCoverage, Score, ScoreError, coverage_matte, coverage_points, mean,
-    mean_masked, mean_matte, mean_of, score, score_masked,
+    MaskedScore, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
