@@ -33,7 +33,8 @@ pub fn seams(frame: &Frame<'_>) -> Result<Option<f64>, PhotoError> {
         }
         Ok((sum, count))
     };
-    let by_row: Vec<(f64, u32)> = rows.into_par_iter().map(of_row).collect::<Result<_, _>>()?;
+    let by_row: Vec<Result<(f64, u32), _>> = rows.into_par_iter().map(of_row).collect();
+    let by_row: Vec<(f64, u32)> = by_row.into_iter().collect::<Result<_, _>>()?;
     let count: u32 = by_row.iter().map(|(_, count)| count).sum();
     let sum: f64 = by_row.iter().map(|(sum, _)| sum).sum();
     Ok((count > 0).then(|| 255.0 * (sum / f64::from(count)).sqrt()))

@@ -7,7 +7,7 @@ use glam::DVec3;
 use image::RgbaImage;
 use proxy::dense::{DenseOptions, DensePoints, Matching};
 use proxy::depth;
-use proxy::hull;
+use proxy::hull::{self, Silhouette};
 use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint, Tunnel};
 use proxy::{carve, tunnel};
 use rayon::prelude::*;
@@ -172,10 +172,12 @@ impl Scene {
     fn fit_hull(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         let sources = self.sources(without)?;
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
-        let silhouettes = sources
+        let silhouettes: Vec<Result<Silhouette, SceneError>> = sources
             .par_iter()
             .map(|(photo, view)| photo.decode_silhouette((view.width, view.height)))
-            .collect::<Result<Vec<_>, _>>()?;
+            .collect();
+        // The first photo's error, whichever thread is the first to meet one.
+        let silhouettes: Vec<Silhouette> = silhouettes.into_iter().collect::<Result<_, _>>()?;
         let hull = hull::carve(&views, &silhouettes, &hull::Options::default()).map_err(unfit)?;
         let mut how = format!(
             "covers {:.2} % of the silhouettes, {:.2} of intersection over union",

@@ -75,13 +75,13 @@ impl Scene {
     ) -> Result<(), SceneError> {
         let mut saved = self.clone();
         saved.write_folder(folder, replace, |scene, new| {
-            let found = self
+            let found: Vec<Result<Option<PathBuf>, _>> = self
                 .sources(&Default::default())?
                 .into_par_iter()
                 .map(|(photo, view)| found_silhouette(photo, &view, new))
-                .collect::<Result<Vec<_>, _>>()?;
+                .collect();
             for (photo, file) in scene.photos.iter_mut().zip(found) {
-                if let Some(file) = file {
+                if let Some(file) = file? {
                     photo.silhouette = Some(folder.join(file));
                 }
             }

@@ -322,11 +322,14 @@ fn draw<S: Default + Send>(
     pixels
         .par_chunks_mut(pitch * BAND)
         .enumerate()
-        .try_for_each_init(S::default, |scratch, (band, rows)| {
+        .map_init(S::default, |scratch, (band, rows)| {
             let rows = rows.chunks_mut(pitch).enumerate();
             rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels))
                 .try_for_each(|done| done)
-        })?;
+        })
+        // The first error from the top, whichever thread is the first to meet one.
+        .find_map_first(Result::err)
+        .map_or(Ok(()), Err)?;
     frame.lumigraph.photos.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
 }
