@@ -51,6 +51,13 @@ impl MeshKind {
     pub fn can_occlude_itself(self) -> bool {
         self != Self::Tunnel
     }
+
+    /// Whether only the sides of triangles that are counter-clockwise count. Between free space and
+    /// solid nothing else can be seen from free space; and a desired view that strays into
+    /// what no line of sight carved looks out of it instead of at its near wall.
+    pub fn has_front_sides_only(self) -> bool {
+        self == Self::Carved
+    }
 }
 
 /// A mesh and what finds its triangles.
@@ -142,7 +149,8 @@ impl Solid {
         &self.mesh
     }
 
-    /// The first triangle, seen from either side, that a ray from a point meets.
+    /// The first triangle that a ray from a point meets, from either side but for kinds that
+    /// [have front sides only](MeshKind::has_front_sides_only).
     pub fn first_hit(&self, from_in_world: DVec3, direction: DVec3) -> Option<Hit> {
         let from = from_in_world - self.origin;
         if self.mesh.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
@@ -154,12 +162,13 @@ impl Solid {
         if !unit.is_finite() {
             return None;
         }
+        let front_only = self.kind.has_front_sides_only();
         let ray = Ray::new_inf(from.as_vec3().into(), unit.as_vec3().into());
         let mut nearest: Option<Hit> = None;
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
             let triangle_idx = self.bvh.primitive_indices[slot];
             let corners = self.mesh.corners(triangle_idx as usize);
-            let Some(along) = meet(corners.map(|p| p - from_in_world), unit) else {
+            let Some(along) = meet(corners.map(|p| p - from_in_world), unit, front_only) else {
                 return f32::INFINITY;
             };
             let first = nearest.is_none_or(|n| {
@@ -196,8 +205,9 @@ impl fmt::Debug for Solid {
     }
 }
 
-/// How far along a ray from the origin meets a triangle (Möller and Trumbore 1997).
-fn meet([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<f64> {
+/// How far along a ray from the origin meets a triangle (Möller and Trumbore 1997); if asked
+/// to, only one whose corners it sees counter-clockwise.
+fn meet([a, b, c]: [DVec3; 3], direction: DVec3, front_only: bool) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let across = direction.cross(ac);
     let volume = ab.dot(across);
@@ -206,8 +216,9 @@ fn meet([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<f64> {
     let share_c = direction.dot(turned) / volume;
     let along = ac.dot(turned) / volume;
     let inside = share_b >= -GAP && share_c >= -GAP && share_b + share_c <= 1.0 + GAP;
+    let seen = !front_only || volume > 0.0;
     // A NaN, of a triangle seen edge on, is no hit.
-    (inside && along > 0.0 && along < f64::INFINITY).then_some(along)
+    (inside && seen && along > 0.0 && along < f64::INFINITY).then_some(along)
 }
 
 fn median(positions: &[DVec3]) -> DVec3 {
@@ -289,6 +300,26 @@ mod tests {
         assert!((hit.along - 1.0).abs() < 0.01, "{}", hit.along);
         let beyond = solid.first_hit(from, DVec3::NEG_Z).unwrap();
         assert!(beyond.triangle_idx >= near);
+    }
+
+    #[test]
+    fn out_of_what_was_not_carved_one_sees_what_lies_beyond() {
+        // Solid around a view, in a free space with a wall around it.
+        let mut mesh = globe(DVec3::ZERO, 1.0);
+        let own = mesh.triangles.len() as u32;
+        let mut wall = globe(DVec3::ZERO, 10.0);
+        wall.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh.append(&wall);
+        let carved = Solid::new(MeshKind::Carved, mesh.clone());
+        let far = carved.first_hit(DVec3::ZERO, DVec3::Z).unwrap();
+        assert!(far.triangle_idx >= own && far.along > 9.0, "{far:?}");
+        // From free space it is met.
+        let near = carved.first_hit(DVec3::Z * 5.0, DVec3::NEG_Z).unwrap();
+        assert!(near.triangle_idx < own, "{near:?}");
+        // A file's triangles may be any way round.
+        let any = Solid::new(MeshKind::Mesh, mesh);
+        let near = any.first_hit(DVec3::ZERO, DVec3::Z).unwrap();
+        assert!(near.triangle_idx < own, "{near:?}");
     }
 
     #[test]
