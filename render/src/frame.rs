@@ -5,12 +5,13 @@ pub(crate) mod every_lens;
 
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
-use crate::reference::blend_at;
 use crate::surface::Surface;
 use crate::time::Moment;
+use crate::view_tree::ViewTree;
 use crate::visibility::visible;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
+use std::sync::OnceLock;
 
 /// A point of the proxy as the desired view sees it: along `ray` from its centre, at
 /// p = ray / `inverse_distance` in the desired camera's frame.
@@ -125,6 +126,8 @@ pub struct Frame<'a> {
     pub surface: Surface,
     /// A source view that takes no part.
     gone: Option<usize>,
+    /// Made when first asked for.
+    view_tree: OnceLock<ViewTree>,
 }
 
 impl<'a> Frame<'a> {
@@ -182,6 +185,7 @@ impl<'a> Frame<'a> {
             sources,
             surface,
             gone,
+            view_tree: OnceLock::new(),
         };
         frame.match_exposures();
         frame
@@ -204,8 +208,14 @@ impl<'a> Frame<'a> {
         if let Some(gone) = self.gone {
             self.sources[gone].time_penalty = f64::INFINITY;
         }
+        // It has only those that take part.
+        self.view_tree = OnceLock::new();
         self.match_exposures();
         self
+    }
+
+    pub(crate) fn view_tree(&self) -> &ViewTree {
+        self.view_tree.get_or_init(|| ViewTree::new(&self.sources))
     }
 
     /// The source views that take part: all but those outside the time window, in order.
@@ -254,7 +264,7 @@ impl<'a> Frame<'a> {
                 let Some(point) = self.proxy_point(pixel) else {
                     continue;
                 };
-                for contributor in blend_at(self, &point) {
+                for contributor in self.blend_at(&point) {
                     let gain = self.lumigraph.sources[contributor.source_idx].gain;
                     weights += contributor.weight;
                     for c in 0..3 {

@@ -30,6 +30,7 @@ mod surface;
 mod time;
 pub mod trajectory;
 pub mod triangulation;
+mod view_tree;
 mod visibility;
 
 pub use engine::{DeviceChoice, Engine};

@@ -3,6 +3,7 @@
 //! Every pixel is computed from its own inputs alone, so any number of threads gives the
 //! same bytes.
 
+mod asked;
 mod lanes;
 mod shade;
 mod source;
@@ -16,10 +17,12 @@ use crate::options::Method;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, Span};
 use crate::rays::{RayCache, RayMap};
+use asked::Asked;
 use image::RgbaImage;
 use lanes::{LANES, Lane, each};
 use rayon::prelude::*;
 use source::{Sight, Source, Tile};
+use std::sync::OnceLock;
 use weights::{Term, weigh};
 
 /// Rows that one thread does in one go.
@@ -59,26 +62,34 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
-    let sources: Vec<usize> = frame.taking_part().collect();
-    draw(frame, |row, _: &mut (), pixels| {
+    draw(frame, |row, asked: &mut Asked, pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let tile = engine.tile(tile_idx * LANES, row, |_| true);
-            // 1. Who sees the tile, how well each ray fits, and what that weighs.
-            let (seeing, mut terms): (Vec<_>, Vec<_>) = sources
-                .iter()
-                .filter_map(|&i| {
-                    let mut sight = engine.sources[i].see(&tile)?;
-                    engine.mask(i, &mut sight, |_| true);
-                    let diff = engine.sources[i].difference(&tile);
-                    let term = Term {
-                        diff,
-                        a: sight.a,
-                        weight: [0.0; LANES],
-                    };
-                    Some(((i, sight), term))
-                })
-                .unzip();
-            weigh(&mut terms, &frame.options);
+            // 1. Who sees the tile, how well each ray fits, and what that weighs; of more views
+            // where those asked don't settle it.
+            let (seeing, terms) = loop {
+                let views = asked.views(&engine, tile_idx, row);
+                let (seeing, mut terms): (Vec<_>, Vec<_>) = views
+                    .iter()
+                    .filter_map(|&i| {
+                        let source_idx = i as usize;
+                        let source = engine.source(source_idx);
+                        let mut sight = source.see(&tile)?;
+                        engine.mask(source_idx, &mut sight, |_| true);
+                        let term = Term {
+                            diff: source.difference(&tile),
+                            a: sight.a,
+                            weight: [0.0; LANES],
+                        };
+                        Some(((source_idx, sight), term))
+                    })
+                    .unzip();
+                let reach = weigh(&mut terms, &frame.options);
+                let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
+                if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
+                    break (seeing, terms);
+                }
+            };
             // 2. The photos' colours.
             let seen = seeing
                 .iter()
@@ -150,7 +161,7 @@ fn draw_field(
             let mut seen: Vec<(usize, Sight)> = Vec::with_capacity(active.len());
             let mut terms: Vec<Term> = Vec::new();
             for source in active {
-                let Some(mut sight) = engine.sources[source.source_idx].see(&tile) else {
+                let Some(mut sight) = engine.source(source.source_idx).see(&tile) else {
                     continue;
                 };
                 if any_bordered {
@@ -203,18 +214,23 @@ impl Interpolated {
 /// What all pixels of a frame share.
 struct Engine<'a> {
     frame: &'a Frame<'a>,
-    sources: Vec<Source>,
+    /// Each made when first asked for.
+    sources: Vec<OnceLock<Source>>,
     rays: &'a RayMap,
 }
 
 impl<'a> Engine<'a> {
     fn new(frame: &'a Frame<'a>, rays: &'a RayMap) -> Self {
-        let sources = &frame.lumigraph.sources;
+        let sources = frame.lumigraph.sources.iter();
         Self {
             frame,
-            sources: (0..sources.len()).map(|i| Source::new(frame, i)).collect(),
+            sources: sources.map(|_| OnceLock::new()).collect(),
             rays,
         }
+    }
+
+    fn source(&self, source_idx: usize) -> &Source {
+        self.sources[source_idx].get_or_init(|| Source::new(self.frame, source_idx))
     }
 
     /// The rays of a tile and where they meet the proxy.
@@ -287,7 +303,7 @@ impl<'a> Engine<'a> {
                 continue;
             }
             let photo = self.frame.lumigraph.photos.get(i)?;
-            let exposure = self.sources[i].exposure;
+            let exposure = self.source(i).exposure;
             let as_it_is = exposure == glam::Vec4::ONE;
             for k in 0..count {
                 let w = weight[k];

@@ -17,12 +17,23 @@ const SMALLEST: f32 = SAME_RAY as f32;
 /// Keeps diff/t defined where every diff is zero.
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 
-/// Fills in the weights.
-pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) {
+/// Fills in the weights. For each pixel the difference beyond which no further view could change
+/// them; infinite while any could.
+pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) -> Lane {
     let t = match options.blend {
         Blend::Consistent => consistent_threshold(terms, options.full_weight() as f32),
         Blend::Paper => each(|k| nth_smallest(terms, k, options.k)),
     };
+    let mut reach = t;
+    if options.blend == Blend::Paper {
+        let mut candidates = [0; LANES];
+        for term in terms.iter() {
+            (0..LANES).for_each(|k| candidates[k] += usize::from(term.a[k] > 0.0));
+        }
+        (0..LANES)
+            .filter(|&k| candidates[k] < options.k)
+            .for_each(|k| reach[k] = f32::INFINITY);
+    }
     let mut sum = [0.0; LANES];
     for term in terms.iter_mut() {
         for k in 0..LANES {
@@ -46,6 +57,7 @@ pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) {
                 .for_each(|term| term.weight[k] = term.a[k]);
         }
     }
+    reach
 }
 
 /// Solves Σ a·max(0, 1 − diff/t) = m for t in each pixel by Newton's method in 1/t.

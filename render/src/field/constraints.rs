@@ -1,9 +1,11 @@
 //! What the triangulation of the image plane must respect: epipoles and the horizon.
 
-use crate::frame::Frame;
-use crate::reference;
+use crate::blend::{Candidate, SAME_RAY};
+use crate::frame::{Frame, ProxyPoint};
+use crate::reference::candidate;
 use crate::surface::Surface;
 use crate::triangulation::Grid;
+use crate::view_tree::Ball;
 use calibrate::Lens;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -27,7 +29,10 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         let ahead = lens.project(center).or_else(|| lens.project(-center))?;
         let inside = (0.0..=width).contains(&ahead.x) && (0.0..=height).contains(&ahead.y);
         let point = inside.then(|| frame.proxy_point(ahead)).flatten()?;
-        let field = reference::blend_at(frame, &point);
+        if is_behind_two(frame, source_idx, &point) {
+            return None;
+        }
+        let field = frame.blend_at(&point);
         let own = field.iter().find(|c| c.source_idx == source_idx)?.weight;
         let stronger = field.iter().filter(|c| c.weight > own).count();
         (stronger < 2).then_some((source_idx, own, DVec2::new(ahead.x, ahead.y)))
@@ -52,6 +57,28 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         .into_iter()
         .map(|(source_idx, _, at)| (source_idx, at))
         .collect()
+}
+
+/// Whether two source views count more than a given one at a point for sure: they differ less and
+/// see it no less. Found among those that differ less alone, of which there are mostly many.
+fn is_behind_two(frame: &Frame<'_>, source_idx: usize, point: &ProxyPoint) -> bool {
+    let as_candidate = |i: usize| {
+        let pixel = frame.project(i, point)?;
+        candidate(frame, i, point, pixel, || frame.difference(i, point))
+    };
+    let Some(own) = as_candidate(source_idx) else {
+        return true;
+    };
+    if frame.asks_all() || own.diff <= SAME_RAY {
+        return false;
+    }
+    let mut nearer = Vec::new();
+    frame.views_within(Ball::around(point, 0.0).as_ref(), own.diff, &mut nearer);
+    let counts_more = |c: Candidate| {
+        c.diff < own.diff && c.fov >= own.fov && c.fov * c.mask >= own.fov * own.mask
+    };
+    let before = nearer.iter().filter_map(|&i| as_candidate(i as usize));
+    before.filter(|c| counts_more(*c)).nth(1).is_some()
 }
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.

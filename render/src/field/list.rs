@@ -1,10 +1,13 @@
 //! Which source views a triangle carries, and with what.
 
-use super::vertex::{Vertex, candidates, point_at, sources_at};
+use super::vertex::{Vertex, point_at};
 use super::{FieldEntry, MAX_LISTED};
-use crate::frame::Frame;
+use crate::frame::{Frame, ProxyPoint};
+use crate::options::Blend;
+use crate::view_tree::{Ball, FIRST_GUESS};
 use calibrate::Pixel;
 use glam::DVec2;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
@@ -25,65 +28,79 @@ enum Sees {
     Part,
 }
 
+/// A source view that may matter in a triangle.
+struct Listed {
+    source_idx: usize,
+    sees: Sees,
+    /// By corner: its difference there.
+    diffs: [f64; 3],
+}
+
 impl List {
     pub(super) fn of(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
-        if corners.iter().any(|c| c.sources.is_empty()) {
+        let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.point) else {
             // The lens ends inside the triangle. With nothing known beyond, only what the
             // other corners say counts.
             return Self::of_weights(corners);
-        }
-        let mut sees: Vec<Sees> = (0..frame.sources.len())
-            .map(|i| how_it_sees(frame, i, corners))
-            .collect();
-        // Where pixels look at what was moved into some photo, corners don't tell which.
-        let somewhere = seen_where_moved(frame, corners);
-        for &i in &somewhere {
-            sees[i] = Sees::Part;
-        }
-        if !sees.contains(&Sees::Part) {
-            return Self::of_weights(corners);
+        };
+        let points = [a, b, c];
+
+        // 1. The views that may matter: where the corners' differences bound the threshold, all
+        // within it.
+        let nears = corners.map(|corner| &corner.near);
+        let mut views: Vec<u32> = nears.iter().flat_map(|n| n.views.iter().copied()).collect();
+        let mut listed = listed_of(frame, &points, &mut views);
+        let mut bounds = bounds_of(frame, &listed);
+        if (0..3).any(|c| bounds[c] > nears[c].within) {
+            views.extend(others_within(frame, corners, bounds));
+            listed = listed_of(frame, &points, &mut views);
+            bounds = bounds_of(frame, &listed);
         }
 
-        // Those that see all of it bound the threshold at each corner from above; a view
-        // beyond that everywhere cannot contribute anywhere.
-        let bound = |corner: &Vertex| {
-            let all = (0..sees.len()).filter(|&i| sees[i] == Sees::All);
-            let diffs = all.map(|i| corner.sources[i].diff).collect();
-            frame.options.threshold_of_seen(diffs)
-        };
-        let bounds = corners.map(bound);
-        let within = |&i: &usize| {
-            somewhere.binary_search(&i).is_ok()
-                || sees[i] != Sees::Nothing
-                    && (0..3).any(|c| corners[c].sources[i].diff <= bounds[c])
-        };
-        let mut listed: Vec<(f64, usize)> = (0..sees.len())
-            .filter(within)
-            .map(|i| {
-                (
-                    corners
-                        .iter()
-                        .map(|c| c.sources[i].diff)
-                        .fold(f64::MAX, f64::min),
-                    i,
-                )
-            })
-            .collect();
+        // 2. Where pixels look at what was moved into some photo, corners don't tell which.
+        let somewhere = seen_where_moved(frame, corners);
+        for &source_idx in &somewhere {
+            match listed.binary_search_by_key(&source_idx, |l| l.source_idx) {
+                Ok(at) => listed[at].sees = Sees::Part,
+                Err(at) => listed.insert(
+                    at,
+                    Listed {
+                        source_idx,
+                        sees: Sees::Part,
+                        diffs: points.map(|point| frame.difference(source_idx, &point)),
+                    },
+                ),
+            }
+        }
+
+        // 3. A view that differs by more at every corner cannot contribute anywhere.
+        listed.retain(|view| {
+            somewhere.binary_search(&view.source_idx).is_ok()
+                || view.sees != Sees::Nothing && (0..3).any(|c| view.diffs[c] <= bounds[c])
+        });
+        // The nearest view alone (the paper's k = 1) is nothing to interpolate.
+        let jumps = frame.options.blend == Blend::Paper && frame.options.k == 1;
+        if !jumps && listed.iter().all(|view| view.sees != Sees::Part) {
+            return Self::of_weights(corners);
+        }
         if listed.len() > MAX_LISTED {
             // More borders than there is room for: the nearest of each part of the triangle
             // come first, then the second nearest. (The nearest of all alone left holes
             // beyond their borders.)
             let ranks = ranks_within(frame, corners);
+            let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
+            let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
             listed.sort_by(|x, y| {
-                let by_rank = ranks[x.1].cmp(&ranks[y.1]);
-                by_rank.then(x.0.total_cmp(&y.0)).then(x.1.cmp(&y.1))
+                let by_rank = rank(x).cmp(&rank(y));
+                let nearer = least(x).total_cmp(&least(y));
+                by_rank.then(nearer).then(x.source_idx.cmp(&y.source_idx))
             });
             listed.truncate(MAX_LISTED);
+            listed.sort_by_key(|view| view.source_idx);
         }
-        listed.sort_by_key(|(_, i)| *i);
-        let entry = |(_, i): (f64, usize)| FieldEntry {
-            source_idx: i as u32,
-            values: corners.map(|c| c.sources[i].diff as f32),
+        let entry = |view: Listed| FieldEntry {
+            source_idx: view.source_idx as u32,
+            values: view.diffs.map(|diff| diff as f32),
         };
         Self {
             entries: listed.into_iter().map(entry).collect(),
@@ -134,44 +151,94 @@ fn spread_over(corners: [&Vertex; 3]) -> impl Iterator<Item = DVec2> {
     steps.map(move |(i, j)| a + step(i) * (b - a) + step(j) * (c - a))
 }
 
-/// The source views that see any point of a triangle in which some were moved; none where none
-/// were. In order.
+/// The views of these indices, in order, and how they see a triangle.
+fn listed_of(frame: &Frame<'_>, points: &[ProxyPoint; 3], views: &mut Vec<u32>) -> Vec<Listed> {
+    views.sort_unstable();
+    views.dedup();
+    let of = |&i: &u32| Listed {
+        source_idx: i as usize,
+        sees: how_it_sees(frame, i as usize, points),
+        diffs: points.map(|point| frame.difference(i as usize, &point)),
+    };
+    views.iter().map(of).collect()
+}
+
+/// Those that see all of a triangle bound the threshold at each corner from above.
+fn bounds_of(frame: &Frame<'_>, listed: &[Listed]) -> [f64; 3] {
+    let all = || listed.iter().filter(|view| view.sees == Sees::All);
+    [0, 1, 2].map(|c| {
+        let diffs = all().map(|view| view.diffs[c]).collect();
+        frame.options.threshold_of_seen(diffs)
+    })
+}
+
+/// The source views that may matter in a triangle whose corners don't know of all that do. Where
+/// hardly any sees all of it, those that points within it say.
+fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> Vec<u32> {
+    let most = bounds.into_iter().fold(0.0, f64::max);
+    let mut views = Vec::new();
+    if most == f64::INFINITY {
+        let mut guess = FIRST_GUESS;
+        for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
+            let near = frame.near(&point, 0.0, &mut guess);
+            views.extend(near.candidates.iter().map(|c| c.source_idx as u32));
+        }
+        return views;
+    }
+    let points = corners.map(|corner| corner.point.map(|p| p.ray / p.inverse_distance));
+    let ball = match points {
+        [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
+            let center = (a + b + c) / 3.0;
+            let far = [a, b, c].map(|p| p.distance(center));
+            Some(Ball {
+                center,
+                radius: far.into_iter().fold(0.0, f64::max),
+            })
+        }
+        _ => None,
+    };
+    frame.views_within(ball.as_ref(), most, &mut views);
+    views
+}
+
+/// The source views that count at any point of a triangle in which some were moved; none where
+/// none were. In order.
 fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
     let pixel = |at: DVec2| Pixel::new(at.x, at.y);
     if !spread_over(corners).any(|at| frame.surface.is_moved_at(pixel(at))) {
         return Vec::new();
     }
-    let mut seen = vec![false; frame.sources.len()];
+    let mut seen = BTreeSet::new();
+    let mut guess = FIRST_GUESS;
     for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
-        let sources = sources_at(frame, &point);
-        candidates(frame, &point, &sources).for_each(|c| seen[c.source_idx] = true);
+        let near = frame.near(&point, 0.0, &mut guess);
+        seen.extend(near.candidates.iter().map(|c| c.source_idx));
     }
-    (0..seen.len()).filter(|&i| seen[i]).collect()
+    seen.into_iter().collect()
 }
 
-/// For each source view the best rank, by difference, that it has among the views that see
-/// a point, for points spread over a triangle.
-fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
-    let mut ranks = vec![usize::MAX; frame.sources.len()];
-    for at in spread_over(corners) {
-        let Some(point) = point_at(frame, at) else {
-            continue;
-        };
-        let sources = sources_at(frame, &point);
-        let seeing = candidates(frame, &point, &sources);
-        let mut seeing: Vec<(f64, usize)> = seeing.map(|c| (c.diff, c.source_idx)).collect();
+/// The best rank, by difference, that source views have among those that see a point, for points
+/// spread over a triangle.
+fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> BTreeMap<usize, usize> {
+    let mut ranks = BTreeMap::new();
+    let mut guess = FIRST_GUESS;
+    for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
+        let near = frame.near(&point, 0.0, &mut guess);
+        let seeing = near.candidates.iter().map(|c| (c.diff, c.source_idx));
+        let mut seeing: Vec<(f64, usize)> = seeing.collect();
         seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         for (rank, (_, i)) in seeing.into_iter().enumerate() {
-            ranks[i] = ranks[i].min(rank);
+            let best = ranks.entry(i).or_insert(rank);
+            *best = rank.min(*best);
         }
     }
     ranks
 }
 
-fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [&Vertex; 3]) -> Sees {
-    let [Some(a), Some(b), Some(c)] = corners.map(|c| c.sources[source_idx].pixel) else {
-        let unseen = |c: &Vertex| c.sources[source_idx].pixel.is_none();
-        let none = corners.into_iter().all(unseen);
+fn how_it_sees(frame: &Frame<'_>, source_idx: usize, points: &[ProxyPoint; 3]) -> Sees {
+    let pixels = points.map(|point| frame.project(source_idx, &point));
+    let [Some(a), Some(b), Some(c)] = pixels else {
+        let none = pixels.iter().all(Option::is_none);
         return if none { Sees::Nothing } else { Sees::Part };
     };
     let source = &frame.sources[source_idx];
@@ -185,9 +252,8 @@ fn how_it_sees(frame: &Frame<'_>, source_idx: usize, corners: [&Vertex; 3]) -> S
     }
     if let Some(mask) = frame.lumigraph.photos.mask(source_idx) {
         // Filtering reaches two texels of the coarser of its two levels.
-        let points = corners.iter().filter_map(|c| c.point.as_ref());
-        let levels = points.map(|point| frame.level_of_detail(source_idx, point));
-        let coarsest = levels.fold(0.0, f64::max).ceil();
+        let levels = points.map(|point| frame.level_of_detail(source_idx, &point));
+        let coarsest = levels.into_iter().fold(0.0, f64::max).ceil();
         let reach = CLEARANCE_PX + 2.0 * coarsest.min((mask.levels.len() - 1) as f64).exp2();
         match mask.range([left - reach, top - reach], [right + reach, bottom + reach]) {
             (_, 0) => return Sees::Nothing,

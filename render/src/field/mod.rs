@@ -21,6 +21,7 @@ use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
 use crate::reference::{self, candidate};
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
+use crate::view_tree::FIRST_GUESS;
 use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
 use glam::DVec2;
@@ -89,10 +90,17 @@ impl TriangulatedField {
 
         // 2. The field at every vertex. A plane looks the same from both sides of an edge,
         // so a vertex needs one value.
+        let cell = DVec2::new(
+            f64::from(width) / f64::from(grid.columns),
+            f64::from(height) / f64::from(grid.rows),
+        );
         let vertices: Vec<Vertex> = plane
             .vertices
             .par_iter()
-            .map(|at| Vertex::new(frame, *at))
+            .map_init(
+                || FIRST_GUESS,
+                |guess, at| Vertex::new(frame, *at, cell, guess),
+            )
             .collect();
 
         // 3. The triangles through which the proxy is seen, each with the views it needs.

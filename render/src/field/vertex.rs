@@ -1,8 +1,8 @@
 //! The field at the vertices of the triangulation.
 
-use crate::blend::{Candidate, Contributor, blend};
+use crate::blend::{Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
-use crate::reference::candidate;
+use crate::view_tree::Near;
 use calibrate::Pixel;
 use glam::DVec2;
 
@@ -12,32 +12,47 @@ pub(super) struct Vertex {
     pub(super) at: DVec2,
     /// `None` where the lens has no ray.
     pub(super) point: Option<ProxyPoint>,
-    /// By source view; empty where the lens has no ray.
-    pub(super) sources: Vec<VertexSource>,
+    /// The source views that matter there, and in about the triangles around it.
+    pub(super) near: Near,
     /// The exact blend, by source view.
     pub(super) weights: Vec<Contributor>,
 }
 
-pub(super) struct VertexSource {
-    pub(super) diff: f64,
-    /// Where the proxy point falls in the photo or outside it.
-    pub(super) pixel: Option<Pixel>,
-}
-
 impl Vertex {
-    pub(super) fn new(frame: &Frame<'_>, at: DVec2) -> Self {
+    /// The triangles around it are about the size of a `cell`, in pixels. The guess is of the
+    /// difference that matters; see [`Frame::near`].
+    pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: &mut f64) -> Self {
         let point = point_at(frame, at);
-        let sources = point.map_or_else(Vec::new, |point| sources_at(frame, &point));
-        let candidates = point.map_or_else(Vec::new, |point| {
-            candidates(frame, &point, &sources).collect()
+        let near = point.map_or_else(Near::default, |point| {
+            let radius = if frame.asks_all() {
+                0.0
+            } else {
+                extent(frame, at, cell, &point)
+            };
+            frame.near(&point, radius, guess)
         });
         Self {
             at,
             point,
-            sources,
-            weights: blend(&candidates, &frame.options),
+            weights: blend(&near.candidates, &frame.options),
+            near,
         }
     }
+}
+
+/// How far the corners of the cells around a vertex lie from it, if they are in its plane; within
+/// half its distance from the viewer.
+fn extent(frame: &Frame<'_>, at: DVec2, cell: DVec2, point: &ProxyPoint) -> f64 {
+    let here = point.ray / point.inverse_distance;
+    let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let offset = |(x, y): (f64, f64)| {
+        let there = at + cell * DVec2::new(x, y);
+        let ray = frame.desired.lens.unproject(Pixel::new(there.x, there.y))?;
+        let s = point.plane.dot(ray);
+        (s > 0.0).then(|| (ray / s).distance(here))
+    };
+    let farthest = corners.into_iter().filter_map(offset).fold(0.0, f64::max);
+    farthest.min(0.5 * here.length())
 }
 
 /// The proxy point at a position in the desired image; `None` where the lens has no ray.
@@ -51,28 +66,4 @@ pub(super) fn point_at(frame: &Frame<'_>, at: DVec2) -> Option<ProxyPoint> {
         inverse_distance: plane.dot(ray).max(0.0),
         plane,
     })
-}
-
-/// What every source view makes of a proxy point.
-pub(super) fn sources_at(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<VertexSource> {
-    (0..frame.sources.len())
-        .map(|source_idx| VertexSource {
-            diff: frame.difference(source_idx, point),
-            pixel: frame.project(source_idx, point),
-        })
-        .collect()
-}
-
-/// The source views that see a proxy point.
-pub(super) fn candidates<'f>(
-    frame: &'f Frame<'_>,
-    point: &'f ProxyPoint,
-    sources: &'f [VertexSource],
-) -> impl Iterator<Item = Candidate> + 'f {
-    sources
-        .iter()
-        .enumerate()
-        .filter_map(|(source_idx, source)| {
-            candidate(frame, source_idx, point, source.pixel?, || source.diff)
-        })
 }

@@ -1,0 +1,114 @@
+//! Which source views a block of pixels is to ask.
+
+use super::lanes::LANES;
+use super::{BAND, Engine};
+use crate::view_tree::{Ball, FIRST_GUESS};
+use glam::DVec3;
+
+/// For a thread: the views that the tiles of the rows it works on ask, each with those below and
+/// above it in a band. What is asked before changes time alone: views that matter are always among
+/// them in the end.
+#[derive(Default)]
+pub(super) struct Asked {
+    band: Option<usize>,
+    blocks: Vec<Block>,
+    views: Vec<u32>,
+}
+
+#[derive(Clone, Default)]
+struct Block {
+    views: Vec<u32>,
+    /// Where its proxy points are; `None` before they are known, and where they are everywhere.
+    ball: Option<Ball>,
+    /// All that differ by as much or less are among the views, once they are known; negative
+    /// before it is known itself.
+    within: f64,
+    known: bool,
+}
+
+/// Over what a tile needed, for rounding to f32.
+const MARGIN: f64 = 1.001;
+/// And for the next tile.
+const ROOM: f64 = 1.1;
+
+impl Asked {
+    /// The views for a tile of a row, by index.
+    pub(super) fn views(&mut self, engine: &Engine<'_>, tile_idx: usize, row: usize) -> &[u32] {
+        let frame = engine.frame;
+        if frame.asks_all() {
+            if self.views.is_empty() {
+                self.views.extend(frame.taking_part().map(|i| i as u32));
+            }
+            return &self.views;
+        }
+        if self.band != Some(row / BAND) {
+            self.band = Some(row / BAND);
+            let tiles = (frame.desired.width as usize).div_ceil(LANES);
+            let unknown = Block {
+                within: -1.0,
+                ..Block::default()
+            };
+            self.blocks.clear();
+            self.blocks.resize(tiles, unknown);
+        }
+        let before = tile_idx
+            .checked_sub(1)
+            .map_or(f64::INFINITY, |i| self.blocks[i].within);
+        let block = &mut self.blocks[tile_idx];
+        if block.within < 0.0 {
+            block.ball = ball_of(engine, tile_idx, row / BAND);
+            let guess = if before.is_finite() {
+                before
+            } else {
+                FIRST_GUESS
+            };
+            block.within = block.ball.map_or(f64::INFINITY, |_| guess);
+        }
+        if !block.known {
+            frame.views_within(block.ball.as_ref(), block.within, &mut block.views);
+            block.known = true;
+        }
+        &block.views
+    }
+
+    /// Whether a tile that needs views as different as `reach` had them all; if not, it asks for
+    /// more next.
+    pub(super) fn settles(&mut self, tile_idx: usize, reach: f32) -> bool {
+        let Some(block) = self.blocks.get_mut(tile_idx) else {
+            return true;
+        };
+        let needed = MARGIN * f64::from(reach);
+        if needed <= block.within {
+            return true;
+        }
+        block.within = if needed < f64::INFINITY {
+            ROOM * needed
+        } else if block.within < 4.0 {
+            3.0 * block.within.max(1e-6)
+        } else {
+            f64::INFINITY
+        };
+        block.known = false;
+        false
+    }
+}
+
+/// What holds the proxy points of a block of pixels; `None` where one is at infinity.
+fn ball_of(engine: &Engine<'_>, tile_idx: usize, band: usize) -> Option<Ball> {
+    let desired = &engine.frame.desired;
+    let rows = band * BAND..((band + 1) * BAND).min(desired.height as usize);
+    let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for row in rows {
+        let tile = engine.tile(tile_idx * LANES, row, |_| true);
+        for k in (0..LANES).filter(|&k| tile.s[k] >= 0.0) {
+            let ray = DVec3::new(tile.x[k].into(), tile.y[k].into(), tile.z[k].into());
+            let point = ray / f64::from(tile.s[k]);
+            least = least.min(point);
+            most = most.max(point);
+        }
+    }
+    let center = 0.5 * (least + most);
+    // Of nothing at all it is not finite either.
+    let radius = 0.5 * (most - least).length() * (1.0 + 1e-5);
+    (center.is_finite() && radius.is_finite()).then_some(Ball { center, radius })
+}

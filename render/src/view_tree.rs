@@ -1,0 +1,349 @@
+//! The source views that can matter around a point of the proxy, without looking at all.
+//!
+//! A hierarchy of spheres around the source views' centres, each with the cone of what its
+//! views look at. A sphere is passed over when no view in it can differ from the desired one
+//! by as little as is asked for, or none has the point in its image. The bound is the angle
+//! between the ray and the sphere, less what sphere and point subtend, plus β times the least
+//! excess of footprint. What is found is therefore *all* that lies within a difference, and a few
+//! more; see [`Frame::near`](crate::Frame::near) for how an exact field comes of it.
+
+use crate::blend::{Candidate, Contributor, blend};
+use crate::frame::{Frame, FrameSource, ProxyPoint};
+use crate::options::Resolution;
+use crate::reference::candidate;
+use calibrate::{Lens, Pixel};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Views of a leaf, at most.
+const LEAF: usize = 6;
+/// With fewer views than this, asking each is faster.
+pub(crate) const FEWEST: usize = 48;
+/// Radians by which bounds are lowered, and lengths by which radii are raised, relative to what
+/// they are computed from: more than rounding can take.
+const SLACK: f64 = 1e-9;
+
+/// A part of space around the proxy, in the desired camera's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    pub center: DVec3,
+    pub radius: f64,
+}
+
+impl Ball {
+    /// A point and what is within a distance of it; `None` at infinity.
+    pub(crate) fn around(point: &ProxyPoint, radius: f64) -> Option<Self> {
+        let center = point.ray / point.inverse_distance;
+        (center.is_finite() && radius.is_finite()).then_some(Self { center, radius })
+    }
+}
+
+/// Of one view, or of all within a node.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    /// In the desired camera's frame.
+    center: DVec3,
+    radius: f64,
+    /// What they look along, and the angle from it within which all that they see lies; π or more
+    /// where nothing is known.
+    axis: DVec3,
+    spread: f64,
+    footprint_ratio: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Its views' places in the order.
+    start: u32,
+    end: u32,
+    /// The other half's index; its own first half follows it. Zero for leaves.
+    second: u32,
+}
+
+/// The source views that take part in a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ViewTree {
+    nodes: Vec<Node>,
+    /// The views in the order of the nodes, and their indices.
+    views: Vec<(Bounds, u32)>,
+}
+
+/// What differences are made of.
+#[derive(Clone, Copy, Debug)]
+struct Measure {
+    beta: f64,
+    by_length: bool,
+}
+
+impl ViewTree {
+    pub(crate) fn new(sources: &[FrameSource]) -> Self {
+        let mut last: Option<(Lens, [f64; 2], f64)> = None;
+        let mut views: Vec<(Bounds, u32)> = Vec::with_capacity(sources.len());
+        for (i, source) in sources.iter().enumerate() {
+            if !source.takes_part() {
+                continue;
+            }
+            // Most photos share their lens.
+            let spread = match last {
+                Some((lens, size, spread)) if lens == source.lens && size == source.size => spread,
+                _ => widest(&source.lens, source.size),
+            };
+            last = Some((source.lens, source.size, spread));
+            let bounds = Bounds {
+                center: source.center,
+                radius: 0.0,
+                axis: source.rotation.row(2),
+                spread,
+                footprint_ratio: source.footprint_ratio,
+            };
+            views.push((bounds, i as u32));
+        }
+        let mut tree = Self {
+            nodes: Vec::with_capacity(2 * views.len() / LEAF + 1),
+            views,
+        };
+        if !tree.views.is_empty() {
+            tree.split(0, tree.views.len());
+        }
+        tree
+    }
+
+    /// Makes the node of a part of the views and all below it.
+    fn split(&mut self, start: usize, end: usize) {
+        let bounds = Bounds::of(&self.views[start..end]);
+        let index = self.nodes.len();
+        self.nodes.push(Node {
+            bounds,
+            start: start as u32,
+            end: end as u32,
+            second: 0,
+        });
+        if end - start <= LEAF {
+            return;
+        }
+        let (least, most) = extent(&self.views[start..end]);
+        let axis = (0..3).fold(0, |best, k| {
+            if most[k] - least[k] > most[best] - least[best] {
+                k
+            } else {
+                best
+            }
+        });
+        let middle = start + (end - start) / 2;
+        self.views[start..end].select_nth_unstable_by(middle - start, |a, b| {
+            let along = a.0.center[axis].total_cmp(&b.0.center[axis]);
+            along.then(a.1.cmp(&b.1))
+        });
+        self.split(start, middle);
+        self.nodes[index].second = self.nodes.len() as u32;
+        self.split(middle, end);
+    }
+
+    /// The views, by index, that may differ by `most` or less somewhere in a ball and may have
+    /// some of it in their images. All that do are among them.
+    fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
+        found.clear();
+        let mut stack = Vec::with_capacity(32);
+        if !self.nodes.is_empty() {
+            stack.push(0_u32);
+        }
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index as usize];
+            if !node.bounds.may_matter(ball, measure, most) {
+                continue;
+            }
+            if node.second == 0 {
+                let views = &self.views[node.start as usize..node.end as usize];
+                let near = views.iter().filter(|v| v.0.may_matter(ball, measure, most));
+                found.extend(near.map(|(_, i)| *i));
+            } else {
+                stack.push(node.second);
+                stack.push(index + 1);
+            }
+        }
+        found.sort_unstable();
+    }
+}
+
+fn extent(views: &[(Bounds, u32)]) -> (DVec3, DVec3) {
+    let all = views.iter().map(|v| v.0.center);
+    all.fold(
+        (DVec3::INFINITY, DVec3::NEG_INFINITY),
+        |(least, most), c| (least.min(c), most.max(c)),
+    )
+}
+
+/// The angle from the axis within which all of a photo lies; more than π where its lens does
+/// not say.
+fn widest(lens: &Lens, [width, height]: [f64; 2]) -> f64 {
+    const STEPS: u32 = 16;
+    /// The border between two steps may bulge.
+    const MARGIN: f64 = 1.05;
+    let mut widest = 0.0_f64;
+    for i in 0..=STEPS {
+        let share = f64::from(i) / f64::from(STEPS);
+        let (x, y) = (share * width, share * height);
+        for (x, y) in [(x, 0.0), (x, height), (0.0, y), (width, y)] {
+            let Some(ray) = lens.unproject(Pixel::new(x, y)) else {
+                return 2.0 * PI;
+            };
+            widest = widest.max(ray.truncate().length().atan2(ray.z));
+        }
+    }
+    widest * MARGIN
+}
+
+/// The angle between two vectors.
+fn angle(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
+/// The angle that a sphere subtends from its middle, seen from a distance; π from within.
+fn subtended(radius: f64, distance: f64) -> f64 {
+    if radius <= 0.0 {
+        0.0
+    } else if radius < distance {
+        (radius / distance).asin()
+    } else {
+        PI
+    }
+}
+
+impl Bounds {
+    fn of(views: &[(Bounds, u32)]) -> Self {
+        let (least, most) = extent(views);
+        let center = 0.5 * (least + most);
+        let all = || views.iter().map(|v| &v.0);
+        let radius = all().map(|b| b.center.distance(center)).fold(0.0, f64::max);
+        let sum: DVec3 = all().map(|b| b.axis).sum();
+        let axis = sum.normalize_or(DVec3::Z);
+        let spread = all().map(|b| angle(axis, b.axis) + b.spread);
+        Self {
+            center,
+            radius,
+            axis,
+            spread: spread.fold(0.0, f64::max) + SLACK,
+            footprint_ratio: all().map(|b| b.footprint_ratio).fold(f64::MAX, f64::min),
+        }
+    }
+
+    fn may_matter(&self, ball: &Ball, measure: Measure, most: f64) -> bool {
+        let away = ball.center - self.center;
+        let distance = away.length();
+        let here = ball.center.length();
+        let reach = self.radius + ball.radius + SLACK * (here + self.center.length());
+        let blurred = subtended(reach, distance);
+        // 1. Whether any of them can have it in its image.
+        if self.spread + blurred < PI && angle(self.axis, away) > self.spread + blurred {
+            return false;
+        }
+        // 2. How little any of them can differ.
+        let between = angle(ball.center, away) - blurred - subtended(ball.radius, here) - SLACK;
+        let near = (distance - reach).max(0.0);
+        let far = here + ball.radius;
+        let coarser = if measure.by_length {
+            near - far
+        } else {
+            self.footprint_ratio * near / far - 1.0
+        };
+        between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0) <= most
+    }
+}
+
+/// What there is to know about a point of the proxy without asking all source views.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Near {
+    /// All that see the point and may have a weight there, in the order of the views.
+    pub candidates: Vec<Candidate>,
+    /// All views that differ by `within` or less in the ball asked for and may see some of it, and
+    /// a few more; in order.
+    pub views: Vec<u32>,
+    /// Radians. No view that differs by more has a weight at the point.
+    pub within: f64,
+}
+
+/// A difference to begin with, in radians.
+pub(crate) const FIRST_GUESS: f64 = 0.05;
+/// From one guess to the next, and the last.
+const WIDER: f64 = 3.0;
+const WIDEST: f64 = 4.0;
+/// A guess for the next point, over what this one needed.
+const MARGIN: f64 = 1.2;
+
+impl Frame<'_> {
+    /// Whether so few source views take part that asking each is best.
+    pub(crate) fn asks_all(&self) -> bool {
+        self.sources.len() < FEWEST
+    }
+
+    /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
+    /// see it; all that do are among them. All that take part where the ball is `None`: at
+    /// infinity.
+    pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
+        match ball {
+            Some(ball) if !self.asks_all() => {
+                let measure = Measure {
+                    beta: self.options.beta,
+                    by_length: self.options.resolution == Resolution::Length,
+                };
+                self.view_tree().within(ball, measure, most, found);
+            }
+            _ => {
+                found.clear();
+                found.extend(self.taking_part().map(|i| i as u32));
+            }
+        }
+    }
+
+    /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights
+    /// are those of all views. The guess, of the difference that matters, is what tells one point
+    /// from the next in time alone.
+    ///
+    /// Views are asked for within a difference. Where those found make a threshold within it,
+    /// others cannot count, as they could only lower it; else they are asked for again.
+    pub(crate) fn near(&self, point: &ProxyPoint, radius: f64, guess: &mut f64) -> Near {
+        let ball = Ball::around(point, radius).filter(|_| !self.asks_all());
+        let mut near = Near {
+            within: if ball.is_some() {
+                *guess
+            } else {
+                f64::INFINITY
+            },
+            ..Near::default()
+        };
+        loop {
+            self.views_within(ball.as_ref(), near.within, &mut near.views);
+            let seeing = near.views.iter().filter_map(|&i| {
+                let source_idx = i as usize;
+                let pixel = self.project(source_idx, point)?;
+                candidate(self, source_idx, point, pixel, || {
+                    self.difference(source_idx, point)
+                })
+            });
+            near.candidates.clear();
+            near.candidates.extend(seeing);
+            let reach = self.options.reach(&near.candidates);
+            if reach <= near.within {
+                if ball.is_some() && reach < f64::INFINITY {
+                    *guess = MARGIN * reach;
+                }
+                return near;
+            }
+            near.within = if reach < f64::INFINITY {
+                reach
+            } else if near.within < WIDEST {
+                WIDER * near.within.max(1e-6)
+            } else {
+                f64::INFINITY
+            };
+        }
+    }
+
+    /// The exact blending field at a proxy point, as [`crate::reference::blend_at`] has it, without
+    /// asking all source views.
+    pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
+        let near = self.near(point, 0.0, &mut FIRST_GUESS.clone());
+        blend(&near.candidates, &self.options)
+    }
+}
