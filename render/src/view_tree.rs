@@ -238,14 +238,22 @@ impl Bounds {
         if self.spread + blurred < PI && angle(self.axis, away) > self.spread + blurred {
             return false;
         }
-        // 2. How little any of them can differ.
-        let between = angle(ball.center, away) - blurred - subtended(ball.radius, here) - SLACK;
-        let near = (distance - reach).max(0.0);
-        let far = here + ball.radius;
+        // 2. How little any of them can differ from the ball's middle, and by how much less from
+        // elsewhere in it: the gradients of both the angle between viewer and view and the
+        // logarithm of the ratio of their distances are as long as their distance over the
+        // product of the two.
+        let near = distance - reach;
+        let least_here = here - ball.radius;
+        if !(near > 0.0 && least_here > 0.0) {
+            return true;
+        }
+        let apart = self.center.length() + self.radius;
+        let vary = ball.radius * apart / (near * least_here) + SLACK;
+        let between = angle(ball.center, away) - subtended(reach - ball.radius, distance) - vary;
         let coarser = if measure.by_length {
-            near - far
+            near - here - ball.radius
         } else {
-            self.footprint_ratio * near / far - 1.0
+            self.footprint_ratio * ((near + ball.radius) / here) * (1.0 - vary) - 1.0
         };
         between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0) <= most
     }
@@ -263,8 +271,6 @@ pub(crate) struct Near {
     pub within: f64,
 }
 
-/// A difference to begin with, in radians.
-pub(crate) const FIRST_GUESS: f64 = 0.05;
 /// From one guess to the next, and the last.
 const WIDER: f64 = 3.0;
 const WIDEST: f64 = 4.0;
@@ -275,6 +281,11 @@ impl Frame<'_> {
     /// Whether so few source views take part that asking each is best.
     pub(crate) fn asks_all(&self) -> bool {
         self.sources.len() < FEWEST
+    }
+
+    /// A difference to begin with, in radians: the more views there are, the nearer is the nearest.
+    pub(crate) fn first_guess(&self) -> f64 {
+        1.0 / (self.sources.len() as f64).sqrt()
     }
 
     /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
@@ -343,7 +354,7 @@ impl Frame<'_> {
     /// The exact blending field at a proxy point, as [`crate::reference::blend_at`] has it, without
     /// asking all source views.
     pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
-        let near = self.near(point, 0.0, &mut FIRST_GUESS.clone());
+        let near = self.near(point, 0.0, &mut self.first_guess());
         blend(&near.candidates, &self.options)
     }
 }

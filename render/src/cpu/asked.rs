@@ -2,7 +2,7 @@
 
 use super::lanes::LANES;
 use super::{BAND, Engine};
-use crate::view_tree::{Ball, FIRST_GUESS};
+use crate::view_tree::Ball;
 use glam::DVec3;
 
 /// For a thread: the views that the tiles of the rows it works on ask, each with those below and
@@ -24,12 +24,16 @@ struct Block {
     /// before it is known itself.
     within: f64,
     known: bool,
+    /// The most that a tile needed.
+    needed: f64,
 }
 
 /// Over what a tile needed, for rounding to f32.
 const MARGIN: f64 = 1.001;
 /// And for the next tile.
 const ROOM: f64 = 1.1;
+/// Asking again for fewer pays from here on.
+const TOO_MUCH: f64 = 1.5;
 
 impl Asked {
     /// The views for a tile of a row, by index.
@@ -53,14 +57,14 @@ impl Asked {
         }
         let before = tile_idx
             .checked_sub(1)
-            .map_or(f64::INFINITY, |i| self.blocks[i].within);
+            .map_or(f64::INFINITY, |i| self.blocks[i].needed);
         let block = &mut self.blocks[tile_idx];
         if block.within < 0.0 {
             block.ball = ball_of(engine, tile_idx, row / BAND);
             let guess = if before.is_finite() {
-                before
+                ROOM * before
             } else {
-                FIRST_GUESS
+                frame.first_guess()
             };
             block.within = block.ball.map_or(f64::INFINITY, |_| guess);
         }
@@ -78,7 +82,13 @@ impl Asked {
             return true;
         };
         let needed = MARGIN * f64::from(reach);
+        block.needed = needed.max(block.needed);
         if needed <= block.within {
+            // The tiles below will hardly need more.
+            if block.within > TOO_MUCH * block.needed {
+                block.within = ROOM * block.needed;
+                block.known = false;
+            }
             return true;
         }
         block.within = if needed < f64::INFINITY {

@@ -4,7 +4,7 @@ use super::vertex::{Vertex, point_at};
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
 use crate::options::Blend;
-use crate::view_tree::{Ball, FIRST_GUESS};
+use crate::view_tree::Ball;
 use calibrate::Pixel;
 use glam::DVec2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -178,7 +178,7 @@ fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> 
     let most = bounds.into_iter().fold(0.0, f64::max);
     let mut views = Vec::new();
     if most == f64::INFINITY {
-        let mut guess = FIRST_GUESS;
+        let mut guess = frame.first_guess();
         for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
             let near = frame.near(&point, 0.0, &mut guess);
             views.extend(near.candidates.iter().map(|c| c.source_idx as u32));
@@ -209,7 +209,7 @@ fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
         return Vec::new();
     }
     let mut seen = BTreeSet::new();
-    let mut guess = FIRST_GUESS;
+    let mut guess = frame.first_guess();
     for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
         let near = frame.near(&point, 0.0, &mut guess);
         seen.extend(near.candidates.iter().map(|c| c.source_idx));
@@ -221,7 +221,7 @@ fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
 /// spread over a triangle.
 fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> BTreeMap<usize, usize> {
     let mut ranks = BTreeMap::new();
-    let mut guess = FIRST_GUESS;
+    let mut guess = frame.first_guess();
     for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
         let near = frame.near(&point, 0.0, &mut guess);
         let seeing = near.candidates.iter().map(|c| (c.diff, c.source_idx));

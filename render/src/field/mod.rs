@@ -21,7 +21,6 @@ use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
 use crate::reference::{self, candidate};
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
-use crate::view_tree::FIRST_GUESS;
 use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
 use glam::DVec2;
@@ -98,7 +97,7 @@ impl TriangulatedField {
             .vertices
             .par_iter()
             .map_init(
-                || FIRST_GUESS,
+                || frame.first_guess(),
                 |guess, at| Vertex::new(frame, *at, cell, guess),
             )
             .collect();
