@@ -126,6 +126,8 @@ pub struct Frame<'a> {
     pub surface: Surface,
     /// A source view that takes no part.
     gone: Option<usize>,
+    /// Asks every source view about every ray.
+    no_skip: bool,
     /// Made when first asked for.
     view_tree: OnceLock<ViewTree>,
 }
@@ -185,6 +187,7 @@ impl<'a> Frame<'a> {
             sources,
             surface,
             gone,
+            no_skip: false,
             view_tree: OnceLock::new(),
         };
         frame.match_exposures();
@@ -214,8 +217,18 @@ impl<'a> Frame<'a> {
         self
     }
 
+    /// The same view, with every source view asked whether it counts for a ray, one by one: the
+    /// same pictures, later.
+    #[must_use]
+    pub fn without_skipping(mut self) -> Self {
+        self.no_skip = true;
+        self.view_tree = OnceLock::new();
+        self
+    }
+
     pub(crate) fn view_tree(&self) -> &ViewTree {
-        self.view_tree.get_or_init(|| ViewTree::new(&self.sources))
+        self.view_tree
+            .get_or_init(|| ViewTree::new(&self.sources, !self.no_skip))
     }
 
     /// The source views that take part: all but those outside the time window, in order.

@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 /// Views of a leaf, at most.
 const LEAF: usize = 6;
 /// With fewer views than this, asking each is faster.
-pub(crate) const FEWEST: usize = 48;
+const FEWEST: usize = 48;
 /// Radians by which bounds are lowered, and lengths by which radii are raised, relative to what
 /// they are computed from: more than rounding can take.
 const SLACK: f64 = 1e-9;
@@ -44,10 +44,11 @@ struct Bounds {
     /// In the desired camera's frame.
     center: DVec3,
     radius: f64,
-    /// What they look along, and the angle from it within which all that they see lies; π or more
-    /// where nothing is known.
+    /// What they look along.
     axis: DVec3,
-    spread: f64,
+    /// Cosine and sine of the angle from it within which all that they see lies; `None` where it
+    /// is all around.
+    spread: Option<[f64; 2]>,
     footprint_ratio: f64,
 }
 
@@ -77,7 +78,8 @@ struct Measure {
 }
 
 impl ViewTree {
-    pub(crate) fn new(sources: &[FrameSource]) -> Self {
+    /// With a hierarchy where that is faster than asking each view, and `may_skip`.
+    pub(crate) fn new(sources: &[FrameSource], may_skip: bool) -> Self {
         let mut last: Option<(Lens, [f64; 2], f64)> = None;
         let mut views: Vec<(Bounds, u32)> = Vec::with_capacity(sources.len());
         for (i, source) in sources.iter().enumerate() {
@@ -94,7 +96,7 @@ impl ViewTree {
                 center: source.center,
                 radius: 0.0,
                 axis: source.rotation.row(2),
-                spread,
+                spread: cosine_and_sine(spread),
                 footprint_ratio: source.footprint_ratio,
             };
             views.push((bounds, i as u32));
@@ -103,7 +105,7 @@ impl ViewTree {
             nodes: Vec::with_capacity(2 * views.len() / LEAF + 1),
             views,
         };
-        if !tree.views.is_empty() {
+        if may_skip && tree.views.len() >= FEWEST {
             tree.split(0, tree.views.len());
         }
         tree
@@ -111,15 +113,19 @@ impl ViewTree {
 
     /// Makes the node of a part of the views and all below it.
     fn split(&mut self, start: usize, end: usize) {
-        let bounds = Bounds::of(&self.views[start..end]);
         let index = self.nodes.len();
+        let leaf = end - start <= LEAF;
         self.nodes.push(Node {
-            bounds,
+            bounds: if leaf {
+                Bounds::of(&self.views[start..end])
+            } else {
+                self.views[start].0
+            },
             start: start as u32,
             end: end as u32,
             second: 0,
         });
-        if end - start <= LEAF {
+        if leaf {
             return;
         }
         let (least, most) = extent(&self.views[start..end]);
@@ -136,27 +142,33 @@ impl ViewTree {
             along.then(a.1.cmp(&b.1))
         });
         self.split(start, middle);
-        self.nodes[index].second = self.nodes.len() as u32;
+        let second = self.nodes.len();
         self.split(middle, end);
+        self.nodes[index].second = second as u32;
+        self.nodes[index].bounds = self.nodes[index + 1].bounds.join(self.nodes[second].bounds);
     }
 
     /// The views, by index, that may differ by `most` or less somewhere in a ball and may have
     /// some of it in their images. All that do are among them.
     fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
-        let mut stack = Vec::with_capacity(32);
-        if !self.nodes.is_empty() {
-            stack.push(0_u32);
+        let near = |views: &[(Bounds, u32)], found: &mut Vec<u32>| {
+            let near = views.iter().filter(|v| v.0.may_matter(ball, measure, most));
+            found.extend(near.map(|(_, i)| *i));
+        };
+        if self.nodes.is_empty() {
+            near(&self.views, found);
+            return;
         }
+        let mut stack = Vec::with_capacity(32);
+        stack.push(0_u32);
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
             if !node.bounds.may_matter(ball, measure, most) {
                 continue;
             }
             if node.second == 0 {
-                let views = &self.views[node.start as usize..node.end as usize];
-                let near = views.iter().filter(|v| v.0.may_matter(ball, measure, most));
-                found.extend(near.map(|(_, i)| *i));
+                near(&self.views[node.start as usize..node.end as usize], found);
             } else {
                 stack.push(node.second);
                 stack.push(index + 1);
@@ -199,15 +211,25 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// The angle that a sphere subtends from its middle, seen from a distance; π from within.
-fn subtended(radius: f64, distance: f64) -> f64 {
-    if radius <= 0.0 {
-        0.0
-    } else if radius < distance {
-        (radius / distance).asin()
+/// At least asin x, of 0…1.
+fn more_than_asin(x: f64) -> f64 {
+    // x over asin x falls steadily.
+    x * if x < 0.25 {
+        1.011
+    } else if x < 0.5 {
+        1.048
     } else {
-        PI
+        1.571
     }
+}
+
+/// At most the angle of which one has the sine and the sign of the cosine.
+fn less_than_angle(sine: f64, cosine: f64) -> f64 {
+    if cosine > 0.0 { sine } else { 1.0 }
+}
+
+fn cosine_and_sine(angle: f64) -> Option<[f64; 2]> {
+    (angle < PI).then(|| [angle.cos() - SLACK, angle.sin()])
 }
 
 impl Bounds {
@@ -218,13 +240,46 @@ impl Bounds {
         let radius = all().map(|b| b.center.distance(center)).fold(0.0, f64::max);
         let sum: DVec3 = all().map(|b| b.axis).sum();
         let axis = sum.normalize_or(DVec3::Z);
-        let spread = all().map(|b| angle(axis, b.axis) + b.spread);
+        let spread = all().map(|b| {
+            let own = b.spread.map_or(PI, |[cos, sin]| sin.atan2(cos));
+            angle(axis, b.axis) + own
+        });
         Self {
             center,
             radius,
             axis,
-            spread: spread.fold(0.0, f64::max) + SLACK,
+            spread: cosine_and_sine(spread.fold(0.0, f64::max)),
             footprint_ratio: all().map(|b| b.footprint_ratio).fold(f64::MAX, f64::min),
+        }
+    }
+
+    /// Of both halves together.
+    fn join(self, other: Self) -> Self {
+        let away = other.center - self.center;
+        let distance = away.length();
+        let radius = (0.5 * (distance + self.radius + other.radius))
+            .max(self.radius)
+            .max(other.radius);
+        let center = if distance > 0.0 {
+            self.center + away * ((radius - self.radius) / distance).clamp(0.0, 1.0)
+        } else {
+            self.center
+        };
+        let radius = [self, other]
+            .map(|half| half.center.distance(center) + half.radius)
+            .into_iter()
+            .fold(0.0, f64::max);
+        let axis = (self.axis + other.axis).normalize_or(DVec3::Z);
+        let spread = [self, other].map(|half| {
+            let own = half.spread.map_or(PI, |[cos, sin]| sin.atan2(cos));
+            angle(axis, half.axis) + own
+        });
+        Self {
+            center,
+            radius,
+            axis,
+            spread: cosine_and_sine(spread[0].max(spread[1])),
+            footprint_ratio: self.footprint_ratio.min(other.footprint_ratio),
         }
     }
 
@@ -233,29 +288,39 @@ impl Bounds {
         let distance = away.length();
         let here = ball.center.length();
         let reach = self.radius + ball.radius + SLACK * (here + self.center.length());
-        let blurred = subtended(reach, distance);
-        // 1. Whether any of them can have it in its image.
-        if self.spread + blurred < PI && angle(self.axis, away) > self.spread + blurred {
-            return false;
-        }
-        // 2. How little any of them can differ from the ball's middle, and by how much less from
-        // elsewhere in it: the gradients of both the angle between viewer and view and the
-        // logarithm of the ratio of their distances are as long as their distance over the
-        // product of the two.
         let near = distance - reach;
         let least_here = here - ball.radius;
         if !(near > 0.0 && least_here > 0.0) {
             return true;
         }
+        // 1. How little any of them can differ from the ball's middle, and by how much less from
+        // elsewhere in it: the gradients of both the angle between viewer and view and the
+        // logarithm of the ratio of their distances are as long as their distance over the
+        // product of the two.
         let apart = self.center.length() + self.radius;
         let vary = ball.radius * apart / (near * least_here) + SLACK;
-        let between = angle(ball.center, away) - subtended(reach - ball.radius, distance) - vary;
+        let sine = ball.center.cross(away).length() / (here * distance);
+        let between = less_than_angle(sine, ball.center.dot(away))
+            - more_than_asin((reach - ball.radius) / distance)
+            - vary;
         let coarser = if measure.by_length {
             near - here - ball.radius
         } else {
             self.footprint_ratio * ((near + ball.radius) / here) * (1.0 - vary) - 1.0
         };
-        between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0) <= most
+        if between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0) > most {
+            return false;
+        }
+        // 2. Whether any of them can have it in its image: not where it is farther from what they
+        // look along than they see, and it subtends.
+        let Some([cos, sin]) = self.spread else {
+            return true;
+        };
+        let blurred = reach / distance;
+        let sharp = (1.0 - blurred * blurred).max(0.0).sqrt();
+        // The sum of both angles is beyond π where its sine is negative.
+        let (sum_cos, sum_sin) = (cos * sharp - sin * blurred, sin * sharp + cos * blurred);
+        sum_sin <= 0.0 || self.axis.dot(away) >= (sum_cos - SLACK) * distance
     }
 }
 
@@ -267,8 +332,18 @@ pub(crate) struct Near {
     /// All views that differ by `within` or less in the ball asked for and may see some of it, and
     /// a few more; in order.
     pub views: Vec<u32>,
+    /// Of each of them, its difference and where the point falls in its photo or outside it.
+    pub of_views: Vec<(f64, Option<Pixel>)>,
     /// Radians. No view that differs by more has a weight at the point.
     pub within: f64,
+}
+
+impl Near {
+    /// A view's difference and where the point falls in its photo, if they are known.
+    pub(crate) fn of_view(&self, source_idx: usize) -> Option<(f64, Option<Pixel>)> {
+        let at = self.views.binary_search(&(source_idx as u32)).ok()?;
+        Some(self.of_views[at])
+    }
 }
 
 /// From one guess to the next, and the last.
@@ -278,11 +353,6 @@ const WIDEST: f64 = 4.0;
 const MARGIN: f64 = 1.2;
 
 impl Frame<'_> {
-    /// Whether so few source views take part that asking each is best.
-    pub(crate) fn asks_all(&self) -> bool {
-        self.sources.len() < FEWEST
-    }
-
     /// A difference to begin with, in radians: the more views there are, the nearer is the nearest.
     pub(crate) fn first_guess(&self) -> f64 {
         1.0 / (self.sources.len() as f64).sqrt()
@@ -293,14 +363,14 @@ impl Frame<'_> {
     /// infinity.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
-            Some(ball) if !self.asks_all() => {
+            Some(ball) => {
                 let measure = Measure {
                     beta: self.options.beta,
                     by_length: self.options.resolution == Resolution::Length,
                 };
                 self.view_tree().within(ball, measure, most, found);
             }
-            _ => {
+            None => {
                 found.clear();
                 found.extend(self.taking_part().map(|i| i as u32));
             }
@@ -314,7 +384,7 @@ impl Frame<'_> {
     /// Views are asked for within a difference. Where those found make a threshold within it,
     /// others cannot count, as they could only lower it; else they are asked for again.
     pub(crate) fn near(&self, point: &ProxyPoint, radius: f64, guess: &mut f64) -> Near {
-        let ball = Ball::around(point, radius).filter(|_| !self.asks_all());
+        let ball = Ball::around(point, radius);
         let mut near = Near {
             within: if ball.is_some() {
                 *guess
@@ -325,15 +395,16 @@ impl Frame<'_> {
         };
         loop {
             self.views_within(ball.as_ref(), near.within, &mut near.views);
-            let seeing = near.views.iter().filter_map(|&i| {
-                let source_idx = i as usize;
-                let pixel = self.project(source_idx, point)?;
-                candidate(self, source_idx, point, pixel, || {
-                    self.difference(source_idx, point)
-                })
-            });
             near.candidates.clear();
-            near.candidates.extend(seeing);
+            near.of_views.clear();
+            for &i in &near.views {
+                let source_idx = i as usize;
+                let pixel = self.project(source_idx, point);
+                let diff = self.difference(source_idx, point);
+                near.of_views.push((diff, pixel));
+                let seen = pixel.and_then(|p| candidate(self, source_idx, point, p, || diff));
+                near.candidates.extend(seen);
+            }
             let reach = self.options.reach(&near.candidates);
             if reach <= near.within {
                 if ball.is_some() && reach < f64::INFINITY {

@@ -144,6 +144,9 @@ fn a_triangulated_field_of_many_views_is_close_to_the_exact_one() {
         let lumigraph = lumigraph(views, &mut random);
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
         let field = TriangulatedField::new(&frame, 32).unwrap();
+        let desired = frame.desired.clone();
+        let asking_all = Frame::new(&lumigraph, desired, frame.options).without_skipping();
+        assert_eq!(field, TriangulatedField::new(&asking_all, 32).unwrap());
         let found = field.contributors(&frame);
         let (mut sum, mut count) = (0.0, 0);
         for (i, found) in found.iter().enumerate().step_by(7) {

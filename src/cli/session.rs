@@ -163,7 +163,10 @@ impl Session {
     ) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let frame = frame(&self.lumigraph, desired, self.options, moment);
+            let mut frame = frame(&self.lumigraph, desired, self.options, moment);
+            if self.no_skip {
+                frame = frame.without_skipping();
+            }
             if moment.is_some() {
                 self.in_window.note(frame.taking_part().count());
             }

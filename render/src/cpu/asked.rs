@@ -12,7 +12,6 @@ use glam::DVec3;
 pub(super) struct Asked {
     band: Option<usize>,
     blocks: Vec<Block>,
-    views: Vec<u32>,
 }
 
 #[derive(Clone, Default)]
@@ -39,12 +38,6 @@ impl Asked {
     /// The views for a tile of a row, by index.
     pub(super) fn views(&mut self, engine: &Engine<'_>, tile_idx: usize, row: usize) -> &[u32] {
         let frame = engine.frame;
-        if frame.asks_all() {
-            if self.views.is_empty() {
-                self.views.extend(frame.taking_part().map(|i| i as u32));
-            }
-            return &self.views;
-        }
         if self.band != Some(row / BAND) {
             self.band = Some(row / BAND);
             let tiles = (frame.desired.width as usize).div_ceil(LANES);
@@ -78,9 +71,7 @@ impl Asked {
     /// Whether a tile that needs views as different as `reach` had them all; if not, it asks for
     /// more next.
     pub(super) fn settles(&mut self, tile_idx: usize, reach: f32) -> bool {
-        let Some(block) = self.blocks.get_mut(tile_idx) else {
-            return true;
-        };
+        let block = &mut self.blocks[tile_idx];
         let needed = MARGIN * f64::from(reach);
         block.needed = needed.max(block.needed);
         if needed <= block.within {

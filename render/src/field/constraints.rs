@@ -69,7 +69,7 @@ fn is_behind_two(frame: &Frame<'_>, source_idx: usize, point: &ProxyPoint) -> bo
     let Some(own) = as_candidate(source_idx) else {
         return true;
     };
-    if frame.asks_all() || own.diff <= SAME_RAY {
+    if own.diff <= SAME_RAY {
         return false;
     }
     let mut nearer = Vec::new();

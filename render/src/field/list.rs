@@ -4,6 +4,7 @@ use super::vertex::{Vertex, point_at};
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
 use crate::options::Blend;
+use crate::reference::candidate;
 use crate::view_tree::Ball;
 use calibrate::Pixel;
 use glam::DVec2;
@@ -49,11 +50,11 @@ impl List {
         // within it.
         let nears = corners.map(|corner| &corner.near);
         let mut views: Vec<u32> = nears.iter().flat_map(|n| n.views.iter().copied()).collect();
-        let mut listed = listed_of(frame, &points, &mut views);
+        let mut listed = listed_of(frame, corners, &points, &mut views);
         let mut bounds = bounds_of(frame, &listed);
         if (0..3).any(|c| bounds[c] > nears[c].within) {
             views.extend(others_within(frame, corners, bounds));
-            listed = listed_of(frame, &points, &mut views);
+            listed = listed_of(frame, corners, &points, &mut views);
             bounds = bounds_of(frame, &listed);
         }
 
@@ -87,7 +88,7 @@ impl List {
             // More borders than there is room for: the nearest of each part of the triangle
             // come first, then the second nearest. (The nearest of all alone left holes
             // beyond their borders.)
-            let ranks = ranks_within(frame, corners);
+            let ranks = ranks_within(frame, corners, &listed);
             let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
             let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
             listed.sort_by(|x, y| {
@@ -141,10 +142,11 @@ impl List {
     }
 }
 
+/// Steps between points that are spread over a triangle, along each side.
+const STEPS: u32 = 4;
+
 /// Points spread over a triangle.
 fn spread_over(corners: [&Vertex; 3]) -> impl Iterator<Item = DVec2> {
-    // Steps between points, along each side.
-    const STEPS: u32 = 4;
     let [a, b, c] = corners.map(|corner| corner.at);
     let step = |i: u32| f64::from(i) / f64::from(STEPS);
     let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
@@ -152,13 +154,31 @@ fn spread_over(corners: [&Vertex; 3]) -> impl Iterator<Item = DVec2> {
 }
 
 /// The views of these indices, in order, and how they see a triangle.
-fn listed_of(frame: &Frame<'_>, points: &[ProxyPoint; 3], views: &mut Vec<u32>) -> Vec<Listed> {
+fn listed_of(
+    frame: &Frame<'_>,
+    corners: [&Vertex; 3],
+    points: &[ProxyPoint; 3],
+    views: &mut Vec<u32>,
+) -> Vec<Listed> {
     views.sort_unstable();
     views.dedup();
-    let of = |&i: &u32| Listed {
-        source_idx: i as usize,
-        sees: how_it_sees(frame, i as usize, points),
-        diffs: points.map(|point| frame.difference(i as usize, &point)),
+    let of = |&i: &u32| {
+        let source_idx = i as usize;
+        let at = [0, 1, 2].map(|c| {
+            let anew = || {
+                let point = &points[c];
+                (
+                    frame.difference(source_idx, point),
+                    frame.project(source_idx, point),
+                )
+            };
+            corners[c].near.of_view(source_idx).unwrap_or_else(anew)
+        });
+        Listed {
+            source_idx,
+            sees: how_it_sees(frame, source_idx, points, at.map(|a| a.1)),
+            diffs: at.map(|a| a.0),
+        }
     };
     views.iter().map(of).collect()
 }
@@ -177,14 +197,6 @@ fn bounds_of(frame: &Frame<'_>, listed: &[Listed]) -> [f64; 3] {
 fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> Vec<u32> {
     let most = bounds.into_iter().fold(0.0, f64::max);
     let mut views = Vec::new();
-    if most == f64::INFINITY {
-        let mut guess = frame.first_guess();
-        for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
-            let near = frame.near(&point, 0.0, &mut guess);
-            views.extend(near.candidates.iter().map(|c| c.source_idx as u32));
-        }
-        return views;
-    }
     let points = corners.map(|corner| corner.point.map(|p| p.ray / p.inverse_distance));
     let ball = match points {
         [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
@@ -197,6 +209,15 @@ fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> 
         }
         _ => None,
     };
+    let mut most = most;
+    if most == f64::INFINITY {
+        // Borders anywhere: what points spread over it need, all of it may.
+        let mut guess = frame.first_guess();
+        let needed = spread_over(corners).filter_map(|at| point_at(frame, at));
+        most = needed
+            .map(|point| frame.near(&point, 0.0, &mut guess).within)
+            .fold(0.0, f64::max);
+    }
     frame.views_within(ball.as_ref(), most, &mut views);
     views
 }
@@ -217,14 +238,21 @@ fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
     seen.into_iter().collect()
 }
 
-/// The best rank, by difference, that source views have among those that see a point, for points
-/// spread over a triangle.
-fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> BTreeMap<usize, usize> {
+/// The best rank, by difference, that listed views have among those of them that see a point, for
+/// points spread over a triangle.
+fn ranks_within(
+    frame: &Frame<'_>,
+    corners: [&Vertex; 3],
+    listed: &[Listed],
+) -> BTreeMap<usize, usize> {
     let mut ranks = BTreeMap::new();
-    let mut guess = frame.first_guess();
     for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
-        let near = frame.near(&point, 0.0, &mut guess);
-        let seeing = near.candidates.iter().map(|c| (c.diff, c.source_idx));
+        let seeing = listed.iter().filter_map(|view| {
+            let i = view.source_idx;
+            let pixel = frame.project(i, &point)?;
+            let seen = candidate(frame, i, &point, pixel, || frame.difference(i, &point))?;
+            Some((seen.diff, i))
+        });
         let mut seeing: Vec<(f64, usize)> = seeing.collect();
         seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         for (rank, (_, i)) in seeing.into_iter().enumerate() {
@@ -235,8 +263,12 @@ fn ranks_within(frame: &Frame<'_>, corners: [&Vertex; 3]) -> BTreeMap<usize, usi
     ranks
 }
 
-fn how_it_sees(frame: &Frame<'_>, source_idx: usize, points: &[ProxyPoint; 3]) -> Sees {
-    let pixels = points.map(|point| frame.project(source_idx, &point));
+fn how_it_sees(
+    frame: &Frame<'_>,
+    source_idx: usize,
+    points: &[ProxyPoint; 3],
+    pixels: [Option<Pixel>; 3],
+) -> Sees {
     let [Some(a), Some(b), Some(c)] = pixels else {
         let none = pixels.iter().all(Option::is_none);
         return if none { Sees::Nothing } else { Sees::Part };

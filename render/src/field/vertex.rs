@@ -24,12 +24,7 @@ impl Vertex {
     pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: &mut f64) -> Self {
         let point = point_at(frame, at);
         let near = point.map_or_else(Near::default, |point| {
-            let radius = if frame.asks_all() {
-                0.0
-            } else {
-                extent(frame, at, cell, &point)
-            };
-            frame.near(&point, radius, guess)
+            frame.near(&point, extent(frame, at, cell, &point), guess)
         });
         Self {
             at,
