@@ -23,6 +23,9 @@ struct Args {
     /// Engines to take in turn; gpu is passed over where there is none
     #[arg(long, value_delimiter = ',', default_value = "cpu,gpu")]
     engines: Vec<String>,
+    /// Every so many frames one is drawn by a new engine, too
+    #[arg(long, default_value_t = 100)]
+    compare_every: usize,
     /// Of the paths and options
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -33,8 +36,6 @@ struct Args {
 
 /// Frames of a path from one random view to the next.
 const PATH: usize = 25;
-/// Every so many frames one is drawn by a new engine, too.
-const COMPARED: usize = 100;
 /// Of the frames: until then caches fill.
 const WARM_UP: f64 = 0.2;
 /// How much memory may grow after that, at most.
@@ -102,7 +103,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let (choice, engine) = &mut engines[which];
         let picture = engine.render(&frame, method)?;
 
-        if i % COMPARED == COMPARED - 1 {
+        if (i + 1) % args.compare_every.max(1) == 0 {
             compared += 1;
             if Engine::open(*choice)?.render(&frame, method)? != picture {
                 unlike += 1;
