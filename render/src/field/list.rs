@@ -10,6 +10,9 @@ use glam::DVec2;
 /// straight in the desired image are not quite so in a photo.
 const CLEARANCE_PX: f64 = 2.0;
 
+/// How much of a view's weight may come or go between a triangle's corners.
+const TURNOVER: f64 = 0.5;
+
 /// The source views of one triangle.
 pub(super) struct List {
     pub(super) entries: Vec<FieldEntry>,
@@ -40,7 +43,7 @@ impl List {
         for &i in &somewhere {
             sees[i] = Sees::Part;
         }
-        if !sees.contains(&Sees::Part) {
+        if !sees.contains(&Sees::Part) && !weights_turn_over(corners) {
             return Self::of_weights(corners);
         }
 
@@ -122,6 +125,24 @@ impl List {
             bordered: false,
         }
     }
+}
+
+/// Whether some view's weight differs so much between corners that it is no linear function:
+/// at an epipole a view has all the weight, and where another is nearly on the line of sight,
+/// too, it has lost it within a pixel. Differences are linear there.
+fn weights_turn_over(corners: [&Vertex; 3]) -> bool {
+    let weight = |corner: &Vertex, source_idx: usize| {
+        let own = corner.weights.iter().find(|w| w.source_idx == source_idx);
+        own.map_or(0.0, |w| w.weight)
+    };
+    let least = |i: usize| {
+        corners
+            .map(|c| weight(c, i))
+            .into_iter()
+            .fold(1.0, f64::min)
+    };
+    let mut all = corners.iter().flat_map(|c| &c.weights);
+    all.any(|w| w.weight - least(w.source_idx) > TURNOVER)
 }
 
 /// Points spread over a triangle.
