@@ -3,7 +3,6 @@
 use super::vertex::{Vertex, point_at};
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
-use crate::options::Blend;
 use crate::reference::candidate;
 use crate::view_tree::Ball;
 use calibrate::Pixel;
@@ -13,6 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
 const CLEARANCE_PX: f64 = 2.0;
+
+/// How much of a view's weight may come or go between a triangle's corners.
+const TURNOVER: f64 = 0.5;
 
 /// The source views of one triangle.
 pub(super) struct List {
@@ -79,9 +81,8 @@ impl List {
             somewhere.binary_search(&view.source_idx).is_ok()
                 || view.sees != Sees::Nothing && (0..3).any(|c| view.diffs[c] <= bounds[c])
         });
-        // The nearest view alone (the paper's k = 1) is nothing to interpolate.
-        let jumps = frame.options.blend == Blend::Paper && frame.options.k == 1;
-        if !jumps && listed.iter().all(|view| view.sees != Sees::Part) {
+        let bordered = listed.iter().any(|view| view.sees == Sees::Part);
+        if !bordered && !weights_turn_over(corners) {
             return Self::of_weights(corners);
         }
         if listed.len() > MAX_LISTED {
@@ -140,6 +141,24 @@ impl List {
             bordered: false,
         }
     }
+}
+
+/// Whether some view's weight differs so much between corners that it is no linear function:
+/// at an epipole a view has all the weight, and where another is nearly on the line of sight,
+/// too, it has lost it within a pixel. Differences are linear there.
+fn weights_turn_over(corners: [&Vertex; 3]) -> bool {
+    let weight = |corner: &Vertex, source_idx: usize| {
+        let own = corner.weights.iter().find(|w| w.source_idx == source_idx);
+        own.map_or(0.0, |w| w.weight)
+    };
+    let least = |i: usize| {
+        corners
+            .map(|c| weight(c, i))
+            .into_iter()
+            .fold(1.0, f64::min)
+    };
+    let mut all = corners.iter().flat_map(|c| &c.weights);
+    all.any(|w| w.weight - least(w.source_idx) > TURNOVER)
 }
 
 /// Steps between points that are spread over a triangle, along each side.

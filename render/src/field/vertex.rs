@@ -6,6 +6,9 @@ use crate::view_tree::Near;
 use calibrate::Pixel;
 use glam::DVec2;
 
+/// How far short of the plane's horizon vertices on it are evaluated: the sine of the angle.
+const SHORT_OF_HORIZON: f64 = 1e-6;
+
 /// The field at a vertex.
 pub(super) struct Vertex {
     /// In pixels of the desired image.
@@ -55,10 +58,13 @@ pub(super) fn point_at(frame: &Frame<'_>, at: DVec2) -> Option<ProxyPoint> {
     let pixel = Pixel::new(at.x, at.y);
     let ray = frame.desired.lens.unproject(pixel)?;
     let plane = frame.surface.plane_at(pixel).unwrap_or_default();
+    // Snapping may have put a vertex of the horizon a little beyond it. On it every view's
+    // angle is zero and they all tie; just short of it they don't, and that is what the
+    // triangles below it show.
+    let least = SHORT_OF_HORIZON * plane.length() * ray.length();
     Some(ProxyPoint {
         ray,
-        // Snapping may have put a vertex of the horizon a little beyond it.
-        inverse_distance: plane.dot(ray).max(0.0),
+        inverse_distance: plane.dot(ray).max(least),
         plane,
     })
 }

@@ -102,7 +102,9 @@ const LENS_INVERSE_RADIAL: f32 = 10.0;
 const LENS_TILTED: f32 = 11.0;
 const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
-@group(0) @binding(0) var<uniform> params: Params;
+// A buffer of uniforms would do, but where shaders branch on those lavapipe makes and keeps a
+// shader of its own for every frame: 1 to 2 MB each.
+@group(0) @binding(0) var<storage, read> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
 // The plane that each pixel sees; w: 1 where there is one.

@@ -323,7 +323,7 @@ impl Gpu {
         };
         let sources: Vec<Source> = listed.into_iter().map(source).collect();
         let planes = self.planes(frame);
-        let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
+        let params = self.buffer("params", &[params], wgpu::BufferUsages::STORAGE);
         let sources = self.table(
             "sources",
             bytemuck::cast_slice(&sources),

@@ -45,7 +45,7 @@ pub(crate) struct Pipelines {
 
 impl Pipelines {
     pub(crate) fn new(device: &Device) -> Self {
-        use wgpu::BufferBindingType::{Storage, Uniform};
+        use wgpu::BufferBindingType::Storage;
         let buffer = |ty| wgpu::BindingType::Buffer {
             ty,
             has_dynamic_offset: false,
@@ -89,7 +89,7 @@ impl Pipelines {
                 "shared",
                 all,
                 &[
-                    buffer(Uniform),
+                    buffer(Storage { read_only: true }),
                     table,
                     table,
                     table,
