@@ -4,6 +4,7 @@
 //! same bytes.
 
 mod lanes;
+mod mark;
 mod shade;
 mod source;
 mod weights;
@@ -11,6 +12,7 @@ mod weights;
 use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
+use crate::held::Held;
 use crate::image_out::straight_rgba8;
 use crate::options::Method;
 use crate::photos::PhotoError;
@@ -60,6 +62,7 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
 fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
     let sources: Vec<usize> = frame.taking_part().collect();
+    let photos = mark::hold(&engine, &sources);
     draw(frame, |row, _: &mut (), pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let tile = engine.tile(tile_idx * LANES, row, |_| true);
@@ -84,7 +87,7 @@ fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError>
                 .iter()
                 .zip(&terms)
                 .map(|((i, sight), term)| (*i, sight, &term.weight));
-            engine.shade(seen, out)?;
+            engine.shade(&photos, seen, out)?;
         }
         Ok(())
     })
@@ -99,6 +102,7 @@ fn draw_field(
 ) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
     let raster = Raster::new(field);
+    let photos = Held::new(frame, &field.listed());
     draw(frame, |row, spans: &mut Vec<Span>, pixels| {
         raster.spans(row, spans);
         let mut triangle_of = [None; LANES];
@@ -172,7 +176,8 @@ fn draw_field(
                     sight.a = each(|k| sight.a[k] + term.weight[k]);
                 }
             }
-            engine.shade(seen.iter().map(|(i, sight)| (*i, sight, &sight.a)), out)?;
+            let shares = seen.iter().map(|(i, sight)| (*i, sight, &sight.a));
+            engine.shade(&photos, shares, out)?;
         }
         Ok(())
     })
@@ -276,6 +281,7 @@ impl<'a> Engine<'a> {
     /// Blends the photos of a tile and writes its pixels.
     fn shade<'s>(
         &self,
+        photos: &Held<'_>,
         seen: impl Iterator<Item = (usize, &'s Sight, &'s Lane)>,
         out: &mut [u8],
     ) -> Result<(), PhotoError> {
@@ -286,7 +292,7 @@ impl<'a> Engine<'a> {
             if weight[..count].iter().all(|w| *w == 0.0) {
                 continue;
             }
-            let photo = self.frame.lumigraph.photos.get(i)?;
+            let photo = photos.get(i)?;
             let exposure = self.sources[i].exposure;
             let as_it_is = exposure == glam::Vec4::ONE;
             for k in 0..count {

@@ -2,7 +2,7 @@
 
 use crate::RenderError;
 use crate::frame::Frame;
-use crate::photos::MAX_LEVELS;
+use crate::pyramid::MAX_LEVELS;
 use crate::visibility::{DistanceMap, REDUCTION};
 use image::{ImageBuffer, Luma, Pixel};
 
