@@ -14,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
+    Residency,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -37,6 +38,8 @@ pub(super) struct Session {
     device: DeviceChoice,
     strict: bool,
     no_skip: bool,
+    cpu_memory: Option<u64>,
+    gpu_memory: Option<u64>,
 }
 
 /// A view drawn, and how long that took.
@@ -65,7 +68,8 @@ impl Session {
         }
         let proxy = proxy.choose(&scene, &without)?;
         let exposure = exposure.choose(&mut scene, &without);
-        let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
+        let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
+        lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,
@@ -81,6 +85,8 @@ impl Session {
             device: draw.device(),
             strict,
             no_skip: draw.no_skip,
+            cpu_memory: draw.cpu_memory,
+            gpu_memory: draw.gpu_memory,
         })
     }
 
@@ -118,13 +124,24 @@ impl Session {
         engine.map_or_else(|| "nothing yet".to_owned(), Engine::description)
     }
 
+    /// What photos took on the graphics processor, where one draws.
+    pub(super) fn gpu_residency(&self) -> Option<Residency> {
+        match &self.engine {
+            Some(Engine::Gpu(gpu)) => Some(gpu.residency()),
+            _ => None,
+        }
+    }
+
     /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
     /// but messages look better before a progress bar than in it.
     pub(super) fn prepare(&mut self) -> anyhow::Result<()> {
         if self.engine.is_some() {
             return Ok(());
         }
-        let engine = Engine::open(self.device)?;
+        let mut engine = Engine::open(self.device)?;
+        if let Engine::Gpu(gpu) = &mut engine {
+            gpu.set_budget(self.gpu_memory);
+        }
         if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu(_)) {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
@@ -233,6 +250,7 @@ impl Session {
         self.lumigraph = self
             .scene
             .lumigraph(&self.without, self.proxy.proxy.clone())?;
+        self.lumigraph.photos.set_budget(self.cpu_memory);
         Ok(())
     }
 }
