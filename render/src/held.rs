@@ -4,6 +4,9 @@ use crate::frame::Frame;
 use crate::photos::{PhotoError, PhotoStore};
 use crate::pyramid::Pyramid;
 use crate::residency::finest_level;
+use calibrate::View;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// What one drawing of a frame samples from: the store's photos, decoded when first asked for,
@@ -54,6 +57,26 @@ impl<'a> Held<'a> {
             .get_or_init(|| self.store.get_from_level(source_idx, self.finest));
         photo.as_ref().map(Arc::as_ref).map_err(Clone::clone)
     }
+}
+
+/// Decodes the photos that the next frame may sample, while another is drawn, on all threads
+/// of rayon, until told to `stop`: no photo whose turn comes later is begun then. Those in
+/// `without` are left alone; what the budget has no room for beside the current frame's photos
+/// is, too. No picture depends on it.
+pub fn decode_ahead(next: &Frame<'_>, wanted: &[usize], without: &[usize], stop: &AtomicBool) {
+    if !Held::fit(next, wanted) {
+        return;
+    }
+    let store = &next.lumigraph.photos;
+    let mut stay = vec![false; store.len()];
+    wanted.iter().for_each(|&i| stay[i] = true);
+    let missing = wanted.par_iter().filter(|i| !without.contains(i));
+    missing.for_each(|&i| {
+        if !stop.load(Ordering::Relaxed) {
+            let View { width, height, .. } = next.lumigraph.sources[i].view;
+            store.decode_ahead(i, [width, height], &stay);
+        }
+    });
 }
 
 fn sizes_of(frame: &Frame<'_>, wanted: &[usize]) -> impl Iterator<Item = [u32; 2]> + Clone {

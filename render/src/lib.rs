@@ -35,10 +35,10 @@ pub mod trajectory;
 pub mod triangulation;
 mod visibility;
 
-pub use engine::{DeviceChoice, Engine};
+pub use engine::{DeviceChoice, Engine, Prepared};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};
-pub use held::Held;
+pub use held::{Held, decode_ahead};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use mask::Mask;
 pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};

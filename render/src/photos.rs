@@ -44,6 +44,10 @@ struct Shelf {
     slots: Vec<Slot>,
     /// Counts uses.
     clock: u64,
+    /// The clock when the last frame's photos were named: those used since are its own.
+    frame_began: u64,
+    /// Bytes of photos that are on their way, for which room was made.
+    awaited: u64,
     residency: Residency,
 }
 
@@ -52,6 +56,7 @@ struct Slot {
     photo: Option<Arc<Pyramid>>,
     error: Option<PhotoError>,
     last_used: u64,
+    awaited: u64,
     ever_decoded: bool,
 }
 
@@ -61,6 +66,14 @@ impl Shelf {
         let slot = &mut self.slots[source_idx];
         self.residency.change(bytes(&photo), bytes(&slot.photo));
         slot.photo = photo;
+        self.awaited -= std::mem::take(&mut slot.awaited);
+    }
+
+    /// Keeps room for a photo that is on its way.
+    fn await_photo(&mut self, source_idx: usize, bytes: u64) {
+        let slot = &mut self.slots[source_idx];
+        self.awaited += bytes;
+        self.awaited -= std::mem::replace(&mut slot.awaited, bytes);
     }
 
     fn touch(&mut self, source_idx: usize) {
@@ -290,6 +303,7 @@ impl PhotoStore {
                 Ok(photo)
             }
             Err(error) => {
+                shelf.put(source_idx, None);
                 shelf.slots[source_idx].error = Some(error.clone());
                 Err(error)
             }
@@ -307,8 +321,10 @@ impl PhotoStore {
     ) {
         let mut shelf = self.shelf();
         shelf.residency.note_frame(finest);
+        shelf.slots.iter_mut().for_each(|slot| slot.awaited = 0);
+        shelf.awaited = 0;
+        shelf.frame_began = shelf.clock;
         let mut stays = vec![false; self.len()];
-        let mut more = 0;
         for (&i, size) in wanted.iter().zip(sizes) {
             stays[i] = true;
             shelf.touch(i);
@@ -321,10 +337,50 @@ impl PhotoStore {
                 shelf.put(i, as_wanted);
             }
             if shelf.slots[i].photo.is_none() {
-                more += photo_bytes(size, finest);
+                shelf.await_photo(i, photo_bytes(size, finest));
             }
         }
+        let more = shelf.awaited;
         shelf.evict(more, |i| stays[i]);
+    }
+
+    /// Begins a frame that asks for photos one by one; see [`Self::decode_ahead`].
+    pub(crate) fn begin_frame(&self) {
+        let mut shelf = self.shelf();
+        shelf.frame_began = shelf.clock;
+    }
+
+    /// Decodes a photo in full that the next frame will ask for, of the given size, if that
+    /// leaves the current one's and those that `stay` where they are. Pictures do not depend on
+    /// it, and errors wait until somebody asks for the photo.
+    pub(crate) fn decode_ahead(&self, source_idx: usize, size: [u32; 2], stay: &[bool]) {
+        let bytes = photo_bytes(size, 0);
+        {
+            let mut shelf = self.shelf();
+            let slot = &shelf.slots[source_idx];
+            if slot.photo.is_some() || slot.error.is_some() || slot.awaited > 0 {
+                return;
+            }
+            let stays: Vec<bool> = (0..self.len())
+                .map(|i| stay[i] || shelf.slots[i].last_used > shelf.frame_began)
+                .collect();
+            let staying = shelf.slots.iter().zip(&stays).filter(|(_, stays)| **stays);
+            let staying = staying.filter_map(|(slot, _)| slot.photo.as_ref());
+            let staying: u64 = staying.map(|photo| photo.bytes() as u64).sum();
+            if !shelf.residency.allows(staying + shelf.awaited + bytes) {
+                return;
+            }
+            let more = shelf.awaited + bytes;
+            shelf.evict(more, |i| stays[i]);
+            shelf.await_photo(source_idx, bytes);
+        }
+        // An error is kept for whoever asks.
+        let _ = self.find_or_decode(source_idx, 0, |shelf, photo| {
+            // A frame that began meanwhile may have taken the room.
+            if shelf.slots[source_idx].awaited == bytes {
+                shelf.put(source_idx, Some(Arc::clone(photo)));
+            }
+        });
     }
 
     /// The photo of a source view, decoded anew and not kept.

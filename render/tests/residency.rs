@@ -9,9 +9,10 @@ use image::{Rgba, RgbaImage};
 use proptest::prelude::*;
 use proxy::{Plane, Proxy};
 use render::{
-    FieldOptions, Frame, Held, Lumigraph, Method, PhotoStore, Pyramid, Residency, SourceView, cpu,
-    reference,
+    FieldOptions, Frame, Held, Lumigraph, Method, PhotoStore, Prepared, Pyramid, Residency,
+    SourceView, cpu, decode_ahead, reference,
 };
+use std::sync::atomic::AtomicBool;
 
 const COUNT: usize = 24;
 const SIZE: (u32, u32) = (100, 80);
@@ -274,6 +275,63 @@ fn seams_are_measured_within_the_budget() {
         (unlimited.unwrap() - limited.unwrap()).abs() < 0.5,
         "{unlimited:?}, {limited:?}"
     );
+}
+
+#[test]
+fn decoding_ahead_keeps_to_the_budget_and_changes_no_picture() {
+    let shot = shot();
+    let bytes = photo_bytes(&shot);
+    let views = path(&shot);
+    let most = most_needed(&shot, Method::TRIANGULATED) as u64;
+    let going = AtomicBool::new(false);
+    let unlimited = within(&shot, None);
+    // Room for one frame, for one and a half, for two, for all; and for none.
+    for budget in [most, most * 3 / 2, 2 * most, 99, most / 2] {
+        let lumigraph = within(&shot, Some(budget * bytes));
+        for pair in views.windows(2) {
+            let next = frame(&lumigraph, &pair[1]);
+            let wanted = Prepared::new(&next, Method::TRIANGULATED).unwrap().listed();
+            let picture = std::thread::scope(|scope| {
+                scope.spawn(|| decode_ahead(&next, &wanted, &[], &going));
+                draw(Engine::Cpu, &lumigraph, &pair[0], Method::TRIANGULATED)
+            });
+            let expected = draw(Engine::Cpu, &unlimited, &pair[0], Method::TRIANGULATED);
+            assert!(picture == expected || budget < most, "{budget} photos");
+            if budget >= most {
+                let took = lumigraph.photos.residency();
+                assert!(took.peak <= budget * bytes, "{took:?}");
+            }
+        }
+        let took = lumigraph.photos.residency();
+        println!("room for {budget}: {took:?}");
+        assert_eq!(took.capped_frames > 0, budget < most);
+    }
+}
+
+#[test]
+fn photos_decoded_ahead_are_those_of_the_next_frame() {
+    let shot = shot();
+    let bytes = photo_bytes(&shot);
+    let views = path(&shot);
+    let lumigraph = within(&shot, Some(20 * bytes));
+    let next = frame(&lumigraph, &views[0]);
+    let wanted = Prepared::new(&next, Method::TRIANGULATED).unwrap().listed();
+    decode_ahead(&next, &wanted, &[], &AtomicBool::new(true));
+    decode_ahead(&next, &wanted, &wanted, &AtomicBool::new(false));
+    assert_eq!(
+        lumigraph.photos.decoded(),
+        0,
+        "stopped, or without all of them"
+    );
+    decode_ahead(&next, &wanted, &wanted[..1], &AtomicBool::new(false));
+    assert_eq!(lumigraph.photos.residency().loads, wanted.len() as u64 - 1);
+    cpu::render(&next, Method::TRIANGULATED).unwrap();
+    assert!(lumigraph.photos.residency().loads <= wanted.len() as u64);
+    // What a frame cannot have in full is left to it.
+    let small = within(&shot, Some(bytes));
+    let next = frame(&small, &views[0]);
+    decode_ahead(&next, &wanted, &[], &AtomicBool::new(false));
+    assert_eq!(small.photos.decoded(), 0);
 }
 
 /// Draws a path on the device within a budget; every picture, and what it took.

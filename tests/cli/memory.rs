@@ -37,7 +37,7 @@ fn a_path_is_drawn_within_the_budget_and_the_report_says_how() {
     for renderer in ["triangulated", "exact"] {
         let render = |options: &str, out: &str| {
             let line = format!(
-                "render wall --path sweep --frames 4 --size 48x36 --k 2 --renderer {renderer} \
+                "render wall --proxy plane --path sweep --frames 4 --size 48x36 --k 2 --renderer {renderer} \
                  --json -o {out}{options}"
             );
             let report = lumigraph(folder.path(), &line).ok().json()["report"].clone();
@@ -73,7 +73,7 @@ fn a_path_is_drawn_within_the_budget_and_the_report_says_how() {
             assert!(again == pictures, "{renderer}, {threads} threads");
         }
     }
-    let line = "render wall --path sweep --frames 2 --cpu-memory 20kB -o text";
+    let line = "render wall --proxy plane --path sweep --frames 2 --cpu-memory 20kB -o text";
     let said = lumigraph(folder.path(), line).ok().stderr;
     assert!(
         said.contains("too little for 2 drawings: mip levels from"),
@@ -86,7 +86,7 @@ fn decoding_all_of_them_first_keeps_to_the_budget() {
     let folder = with_wall();
     let render = |options: &str, out: &str| {
         let line = format!(
-            "render wall --path sweep --frames 2 --cpu-memory {} --json -o {out}{options}",
+            "render wall --proxy plane --path sweep --frames 2 --cpu-memory {} --json -o {out}{options}",
             3 * PHOTO
         );
         let report = lumigraph(folder.path(), &line).ok().json()["report"].clone();

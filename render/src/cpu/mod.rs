@@ -48,6 +48,18 @@ impl Cpu {
             }
         }
     }
+
+    /// Draws a triangulated field.
+    ///
+    /// # Errors
+    /// A photo or mask that is needed cannot be decoded.
+    pub fn render_field(
+        &mut self,
+        frame: &Frame<'_>,
+        field: &TriangulatedField,
+    ) -> Result<RgbaImage, RenderError> {
+        Ok(draw_field(frame, field, self.rays.of(&frame.desired))?)
+    }
 }
 
 /// Draws a single frame, keeping nothing for the next.

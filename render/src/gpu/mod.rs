@@ -3,6 +3,7 @@
 mod layout;
 mod photos;
 mod pipelines;
+mod room;
 #[cfg(test)]
 mod shader_tests;
 mod target;
@@ -11,14 +12,16 @@ use crate::RenderError;
 use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
+use crate::photos::PhotoStore;
 use crate::rays::RayMap;
 use crate::residency::Residency;
 use crate::surface::Surface;
 use calibrate::Lens;
 use image::RgbaImage;
 use layout::{Corner, Entry, Params, Source, Special};
-use photos::{Content, Layers};
+use photos::Layers;
 use pipelines::{Pass, Pipelines};
+use room::Content;
 use std::fmt;
 use std::sync::{Arc, Mutex};
 use target::Target;
@@ -132,6 +135,12 @@ impl Gpu {
         self.residency
     }
 
+    /// The source views whose photos are on the device, in no order.
+    pub fn resident(&self, photos: &PhotoStore) -> Vec<usize> {
+        let layers = self.photos.as_ref();
+        layers.map_or_else(Vec::new, |layers| layers.resident(photos.id()))
+    }
+
     /// The device's name and its driver, for people.
     pub fn description(&self) -> &str {
         &self.description
@@ -217,7 +226,7 @@ impl Gpu {
         let photos = self.photos.as_ref();
         // More of them than there is room for are never there in full.
         let limits = self.device.limits();
-        let fit = photos::fit(frame, taking_part.len(), self.residency.budget, &limits);
+        let fit = room::fit(frame, taking_part.len(), self.residency.budget, &limits);
         if !fit || !photos.is_some_and(|p| p.holds(store_id, &taking_part)) {
             let used = self.mark(frame)?;
             self.prepare(frame, &used, Order::AsGiven)?;
@@ -275,6 +284,9 @@ impl Gpu {
         order: Order,
     ) -> Result<wgpu::BindGroup, RenderError> {
         let (device, queue) = (&self.device, &self.queue);
+        if !wanted.is_empty() {
+            frame.lumigraph.photos.begin_frame();
+        }
         Layers::ensure(
             &mut self.photos,
             &mut self.residency,
