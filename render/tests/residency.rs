@@ -402,8 +402,12 @@ fn the_device_and_the_processor_leave_out_the_same_levels() {
     for method in METHODS {
         let most = most_needed(&shot, method) as u64;
         let budget = Some(LAYER * most / 2);
-        let Some((pictures, _)) = on_device(&shot.lumigraph(), &[view.clone()], method, budget)
-        else {
+        let Some((pictures, _)) = on_device(
+            &shot.lumigraph(),
+            std::slice::from_ref(view),
+            method,
+            budget,
+        ) else {
             return;
         };
         let lumigraph = within(&shot, Some(photo_bytes(&shot) * most / 2));
