@@ -215,10 +215,10 @@ pub(super) struct DrawArgs {
     pub(super) no_skip: bool,
     /// What decoded photos may take in memory, as in 512MiB or 1.5GB: those used last stay.
     /// Too little for one frame draws it from coarser mip levels [default: no limit]
-    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     pub(super) cpu_memory: Option<u64>,
     /// The same for photos on the graphics processor [default: no limit]
-    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     pub(super) gpu_memory: Option<u64>,
 }
 
