@@ -5,6 +5,7 @@ use crate::field::{self, TriangulatedField};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::options::Method;
+use crate::photos::PhotoStore;
 use crate::{RenderError, reference};
 use image::RgbaImage;
 
@@ -64,14 +65,68 @@ impl Engine {
     /// # Errors
     /// A photo that is needed cannot be decoded; the device fails.
     pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
-        match (self, method) {
-            (Self::Gpu(gpu), method) => gpu.render(frame, method),
-            (Self::Cpu(cpu), method) => cpu.render(frame, method),
-            (Self::Reference, Method::Exact) => Ok(reference::render_exact(frame)?),
-            (Self::Reference, Method::Triangulated { cells_across }) => {
-                let field = TriangulatedField::new(frame, cells_across)?;
-                Ok(field::render_reference(frame, &field)?)
+        self.draw(frame, &Prepared::new(frame, method)?)
+    }
+
+    /// Draws a frame that was prepared before.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn draw(
+        &mut self,
+        frame: &Frame<'_>,
+        prepared: &Prepared,
+    ) -> Result<RgbaImage, RenderError> {
+        match (self, prepared) {
+            (Self::Gpu(gpu), Prepared::Exact) => gpu.render(frame, Method::Exact),
+            (Self::Cpu(cpu), Prepared::Exact) => cpu.render(frame, Method::Exact),
+            (Self::Reference, Prepared::Exact) => Ok(reference::render_exact(frame)?),
+            (Self::Gpu(gpu), Prepared::Field(field)) => {
+                frame.lumigraph.photos.check_masks()?;
+                gpu.render_field(frame, field)
             }
+            (Self::Cpu(cpu), Prepared::Field(field)) => cpu.render_field(frame, field),
+            (Self::Reference, Prepared::Field(field)) => Ok(field::render_reference(frame, field)?),
+        }
+    }
+
+    /// The source views whose photos need no decoding for the next frame: those on the device.
+    pub fn resident(&self, photos: &PhotoStore) -> Vec<usize> {
+        match self {
+            Self::Gpu(gpu) => gpu.resident(photos),
+            Self::Cpu(_) | Self::Reference => Vec::new(),
+        }
+    }
+}
+
+/// What can be made of a frame before any photo is sampled.
+#[derive(Clone, Debug)]
+pub enum Prepared {
+    /// The field is evaluated at every pixel.
+    Exact,
+    /// It is interpolated.
+    Field(TriangulatedField),
+}
+
+impl Prepared {
+    /// Prepares a frame.
+    ///
+    /// # Errors
+    /// The triangulation refuses the view.
+    pub fn new(frame: &Frame<'_>, method: Method) -> Result<Self, RenderError> {
+        Ok(match method {
+            Method::Exact => Self::Exact,
+            Method::Triangulated { cells_across } => {
+                Self::Field(TriangulatedField::new(frame, cells_across)?)
+            }
+        })
+    }
+
+    /// The source views that are sampled, as far as known.
+    pub fn listed(&self) -> Vec<usize> {
+        match self {
+            Self::Exact => Vec::new(),
+            Self::Field(field) => field.listed(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Ignore masks: where a photo does not count.
 
-use crate::photos::{MAX_LEVELS, halve};
+use crate::pyramid::{MAX_LEVELS, halve};
 use image::GrayImage;
 use std::fmt;
 

@@ -1,143 +1,12 @@
-//! Photos as the engine samples them: decoded when first needed, premultiplied, with mip
-//! levels.
+//! The photos of a lumigraph, decoded when first needed and kept within a memory budget.
 
 use crate::mask::Mask;
-use image::{GrayImage, ImageBuffer, Pixel, Rgba, RgbaImage};
+use crate::pyramid::Pyramid;
+use crate::residency::{Residency, photo_bytes};
+use image::{GrayImage, RgbaImage};
 use std::fmt;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-
-/// A decoded photo and its mip levels.
-///
-/// Texel (i, j) of level l covers pixels i·2ˡ…(i+1)·2ˡ of the photo exactly, whatever its
-/// size; what would lie outside repeats the border. Colour is premultiplied by alpha.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Pyramid {
-    /// Level 0 is the photo.
-    pub levels: Vec<RgbaImage>,
-    /// Whether every pixel is opaque.
-    pub opaque: bool,
-}
-
-/// Mip levels at most: a footprint of 64 × 64 pixels.
-pub const MAX_LEVELS: usize = 7;
-
-impl Pyramid {
-    /// Builds the levels of a photo with straight alpha.
-    pub fn new(photo: RgbaImage) -> Self {
-        let (photo, opaque) = premultiplied(photo);
-        let mut levels = vec![photo];
-        while levels.len() < MAX_LEVELS && levels[levels.len() - 1].dimensions() != (1, 1) {
-            levels.push(halve(&levels[levels.len() - 1], |_| 1));
-        }
-        Self { levels, opaque }
-    }
-
-    /// Builds the levels of a photo with straight alpha, of which some is to be ignored.
-    ///
-    /// What is ignored takes on the colours around it, and coarser levels are means of what
-    /// is not ignored: filtering never mixes in anything that the mask hides.
-    ///
-    /// # Panics
-    /// If the sizes differ.
-    pub fn masked(photo: RgbaImage, mask: &Mask) -> Self {
-        assert_eq!(photo.dimensions(), mask.levels[0].dimensions());
-        let (photo, opaque) = premultiplied(photo);
-        // 1. Means by weight, from fine to coarse.
-        let mut levels = vec![photo];
-        for mask in &mask.levels[..mask.levels.len() - 1] {
-            let weights = mask.as_raw();
-            levels.push(halve(&levels[levels.len() - 1], |i| u32::from(weights[i])));
-        }
-        // 2. What is ignored, from coarse to fine; at first the mean of the whole.
-        let coarsest = levels.len() - 1;
-        let mean = mean_by(&levels[coarsest], &mask.levels[coarsest]);
-        for level in (0..levels.len()).rev() {
-            let (fine, coarse) = levels.split_at_mut(level + 1);
-            let weights = mask.levels[level].pixels();
-            for ((x, y, texel), weight) in fine[level].enumerate_pixels_mut().zip(weights) {
-                if weight.0[0] == 0 {
-                    *texel = coarse.first().map_or(mean, |c| *c.get_pixel(x / 2, y / 2));
-                }
-            }
-        }
-        Self { levels, opaque }
-    }
-
-    /// Bytes held in memory.
-    pub fn bytes(&self) -> usize {
-        self.levels.iter().map(|l| l.as_raw().len()).sum()
-    }
-}
-
-impl fmt::Debug for Pyramid {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (width, height) = self.levels[0].dimensions();
-        write!(
-            f,
-            "Pyramid({width} × {height}, {} levels)",
-            self.levels.len()
-        )
-    }
-}
-
-/// The photo with its colours premultiplied by its alpha, and whether that is one all over.
-fn premultiplied(mut photo: RgbaImage) -> (RgbaImage, bool) {
-    let opaque = photo.pixels().all(|p| p.0[3] == 255);
-    if !opaque {
-        for pixel in photo.pixels_mut() {
-            let [r, g, b, a] = pixel.0.map(u32::from);
-            let times_alpha = |v: u32| ((v * a + 127) / 255) as u8;
-            pixel.0 = [times_alpha(r), times_alpha(g), times_alpha(b), a as u8];
-        }
-    }
-    (photo, opaque)
-}
-
-/// Averages 2 × 2 texels by the weights of their indices, alike where all are zero; an odd
-/// last row or column pairs with itself.
-pub(crate) fn halve<P: Pixel<Subpixel = u8>>(
-    image: &ImageBuffer<P, Vec<u8>>,
-    weight: impl Fn(usize) -> u32,
-) -> ImageBuffer<P, Vec<u8>> {
-    let (width, height) = image.dimensions();
-    let channels = usize::from(P::CHANNEL_COUNT);
-    let texels = image.as_raw();
-    let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
-    let mut half = Vec::with_capacity(half_width as usize * half_height as usize * channels);
-    for y in 0..half_height {
-        let top = 2 * y as usize * width as usize;
-        let bottom = (2 * y + 1).min(height - 1) as usize * width as usize;
-        for x in 0..half_width {
-            let left = 2 * x as usize;
-            let right = (2 * x + 1).min(width - 1) as usize;
-            let four = [top + left, top + right, bottom + left, bottom + right];
-            let mut weights = four.map(&weight);
-            if weights == [0; 4] {
-                weights = [1; 4];
-            }
-            let total: u32 = weights.iter().sum();
-            for c in 0..channels {
-                let value = |k: usize| weights[k] * u32::from(texels[four[k] * channels + c]);
-                let sum: u32 = (0..4).map(value).sum();
-                half.push(((sum + total / 2) / total) as u8);
-            }
-        }
-    }
-    ImageBuffer::from_raw(half_width, half_height, half).expect("the size was computed above")
-}
-
-/// The mean colour by the weights of a mask; black where all are zero.
-fn mean_by(image: &RgbaImage, mask: &GrayImage) -> Rgba<u8> {
-    let mut sums = [0_u64; 4];
-    let mut total = 0;
-    for (texel, weight) in image.pixels().zip(mask.pixels()) {
-        let weight = u64::from(weight.0[0]);
-        total += weight;
-        (0..4).for_each(|c| sums[c] += weight * u64::from(texel.0[c]));
-    }
-    Rgba(sums.map(|sum| (sum / total.max(1)) as u8))
-}
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Why a photo could not be had.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -151,37 +20,107 @@ pub struct PhotoError {
 
 type Load<T> = dyn Fn(usize) -> Result<T, String> + Send + Sync;
 
-/// The photos of a lumigraph and their ignore masks, each decoded when it is first asked
-/// for and then kept.
+/// The photos of a lumigraph and their ignore masks, each decoded when it is first asked for.
+///
+/// Photos are kept as far as the memory budget goes, masks always: the field asks all of them
+/// for every frame. A photo that is being decoded comes on top of the budget.
 pub struct PhotoStore {
-    slots: Vec<OnceLock<Result<Pyramid, PhotoError>>>,
+    /// Held by whoever decodes the photo, so that nobody else does.
+    decoding: Vec<Mutex<()>>,
+    /// Never locked for long; nothing else is locked meanwhile.
+    shelf: Mutex<Shelf>,
     load: Box<Load<RgbaImage>>,
     /// By source view, where any has a mask.
     masks: Vec<Option<OnceLock<Result<Mask, PhotoError>>>>,
     load_mask: Box<Load<GrayImage>>,
     /// Stands in for a mask that cannot be decoded.
     nothing: Mask,
-    decoded: AtomicUsize,
     id: u64,
 }
 
+/// What is in memory.
+#[derive(Default)]
+struct Shelf {
+    slots: Vec<Slot>,
+    /// Counts uses.
+    clock: u64,
+    /// The clock when the last frame's photos were named: those used since are its own.
+    frame_began: u64,
+    /// Bytes of photos that are on their way, for which room was made.
+    awaited: u64,
+    residency: Residency,
+}
+
+#[derive(Clone, Default)]
+struct Slot {
+    photo: Option<Arc<Pyramid>>,
+    error: Option<PhotoError>,
+    last_used: u64,
+    awaited: u64,
+    ever_decoded: bool,
+}
+
+impl Shelf {
+    fn put(&mut self, source_idx: usize, photo: Option<Arc<Pyramid>>) {
+        let bytes = |photo: &Option<Arc<Pyramid>>| photo.as_ref().map_or(0, |p| p.bytes() as u64);
+        let slot = &mut self.slots[source_idx];
+        self.residency.change(bytes(&photo), bytes(&slot.photo));
+        slot.photo = photo;
+        self.awaited -= std::mem::take(&mut slot.awaited);
+    }
+
+    /// Keeps room for a photo that is on its way.
+    fn await_photo(&mut self, source_idx: usize, bytes: u64) {
+        let slot = &mut self.slots[source_idx];
+        self.awaited += bytes;
+        self.awaited -= std::mem::replace(&mut slot.awaited, bytes);
+    }
+
+    fn touch(&mut self, source_idx: usize) {
+        self.clock += 1;
+        self.slots[source_idx].last_used = self.clock;
+    }
+
+    /// Lets go of the least recently used photos but those that are to `stay`, until `more`
+    /// bytes fit.
+    fn evict(&mut self, more: u64, stay: impl Fn(usize) -> bool) {
+        if self.residency.allows(self.residency.held + more) {
+            return;
+        }
+        let mut by_age: Vec<(u64, usize)> = (0..self.slots.len())
+            .filter(|&i| self.slots[i].photo.is_some() && !stay(i))
+            .map(|i| (self.slots[i].last_used, i))
+            .collect();
+        by_age.sort_unstable();
+        for (_, i) in by_age {
+            if self.residency.allows(self.residency.held + more) {
+                break;
+            }
+            self.put(i, None);
+            self.residency.evictions += 1;
+        }
+    }
+}
+
 impl PhotoStore {
-    /// A store of `count` photos. `load` decodes one by its source view's index, or says
-    /// what is wrong, naming the file.
+    /// A store of `count` photos without a memory budget. `load` decodes one by its source
+    /// view's index, or says what is wrong, naming the file.
     pub fn new(
         count: usize,
         load: impl Fn(usize) -> Result<RgbaImage, String> + Send + Sync + 'static,
     ) -> Self {
-        let slots = (0..count).map(|_| OnceLock::new()).collect();
         static NEXT_ID: AtomicU64 = AtomicU64::new(0);
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         Self {
-            slots,
+            decoding: (0..count).map(|_| Mutex::new(())).collect(),
+            shelf: Mutex::new(Shelf {
+                slots: vec![Slot::default(); count],
+                ..Shelf::default()
+            }),
             load: Box::new(load),
             masks: Vec::new(),
             load_mask: Box::new(|_| Err("there is no mask".to_owned())),
             nothing: Mask::nothing(),
-            decoded: AtomicUsize::new(0),
             id,
         }
     }
@@ -203,7 +142,7 @@ impl PhotoStore {
         masked: &[bool],
         load: impl Fn(usize) -> Result<GrayImage, String> + Send + Sync + 'static,
     ) -> Self {
-        assert_eq!(masked.len(), self.slots.len());
+        assert_eq!(masked.len(), self.decoding.len());
         if masked.contains(&true) {
             let slot = |&masked: &bool| masked.then(OnceLock::new);
             self.masks = masked.iter().map(slot).collect();
@@ -214,12 +153,12 @@ impl PhotoStore {
 
     /// How many photos there are.
     pub fn len(&self) -> usize {
-        self.slots.len()
+        self.decoding.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.slots.is_empty()
+        self.decoding.is_empty()
     }
 
     /// Tells this store from every other in the program, for caches.
@@ -227,17 +166,33 @@ impl PhotoStore {
         self.id
     }
 
-    /// How many have been decoded.
-    pub fn decoded(&self) -> usize {
-        self.decoded.load(Ordering::Relaxed)
+    /// The most bytes that photos may take between frames; `None` for no limit.
+    pub fn set_budget(&mut self, bytes: Option<u64>) {
+        let mut shelf = self.shelf();
+        shelf.residency.budget = bytes;
+        shelf.evict(0, |_| false);
     }
 
-    /// Bytes held by decoded photos.
+    /// How many different ones have been decoded.
+    pub fn decoded(&self) -> usize {
+        let shelf = self.shelf();
+        shelf.slots.iter().filter(|slot| slot.ever_decoded).count()
+    }
+
+    /// What the photos took so far, masks not included.
+    pub fn residency(&self) -> Residency {
+        self.shelf().residency
+    }
+
+    /// Bytes held by decoded photos and masks.
     pub fn bytes(&self) -> usize {
-        let photos = self.slots.iter().filter_map(|s| s.get()?.as_ref().ok());
         let masks = self.masks.iter().flatten();
         let masks = masks.filter_map(|m| m.get()?.as_ref().ok());
-        photos.map(Pyramid::bytes).sum::<usize>() + masks.map(Mask::bytes).sum::<usize>()
+        self.residency().held as usize + masks.map(Mask::bytes).sum::<usize>()
+    }
+
+    fn shelf(&self) -> MutexGuard<'_, Shelf> {
+        lock(&self.shelf)
     }
 
     /// Whether any source view has an ignore mask.
@@ -288,17 +243,144 @@ impl PhotoStore {
         }
     }
 
-    /// The photo of a source view.
+    /// The photo of a source view, in full; kept if the budget has room for it.
     ///
     /// # Errors
     /// It or its ignore mask cannot be decoded, or their sizes differ; every later call
     /// says the same.
-    pub fn get(&self, source_idx: usize) -> Result<&Pyramid, PhotoError> {
-        let slot = self.slots[source_idx].get_or_init(|| {
-            self.decoded.fetch_add(1, Ordering::Relaxed);
-            self.decode(source_idx)
+    pub fn get(&self, source_idx: usize) -> Result<Arc<Pyramid>, PhotoError> {
+        self.find_or_decode(source_idx, 0, |shelf, photo| {
+            let bytes = photo.bytes() as u64;
+            if shelf.residency.allows(bytes) {
+                shelf.put(source_idx, None);
+                shelf.evict(bytes, |_| false);
+                shelf.put(source_idx, Some(Arc::clone(photo)));
+            }
+        })
+    }
+
+    /// The photo of a source view from a mip level on, kept whatever the budget: room was made
+    /// before.
+    pub(crate) fn get_from_level(
+        &self,
+        source_idx: usize,
+        finest: usize,
+    ) -> Result<Arc<Pyramid>, PhotoError> {
+        self.find_or_decode(source_idx, finest, |shelf, photo| {
+            shelf.put(source_idx, Some(Arc::clone(photo)));
+        })
+    }
+
+    fn find_or_decode(
+        &self,
+        source_idx: usize,
+        finest: usize,
+        keep: impl FnOnce(&mut Shelf, &Arc<Pyramid>),
+    ) -> Result<Arc<Pyramid>, PhotoError> {
+        let _alone = lock(&self.decoding[source_idx]);
+        {
+            let mut shelf = self.shelf();
+            shelf.touch(source_idx);
+            let slot = &shelf.slots[source_idx];
+            if let Some(error) = &slot.error {
+                return Err(error.clone());
+            }
+            if let Some(photo) = slot.photo.as_ref().filter(|p| is_from(p, finest)) {
+                return Ok(Arc::clone(photo));
+            }
+        }
+        let decoded = self.decode(source_idx);
+        let mut shelf = self.shelf();
+        shelf.residency.loads += 1;
+        shelf.slots[source_idx].ever_decoded = true;
+        match decoded {
+            Ok(photo) => {
+                let photo = Arc::new(match finest {
+                    0 => photo,
+                    _ => photo.from_level(finest),
+                });
+                keep(&mut shelf, &photo);
+                Ok(photo)
+            }
+            Err(error) => {
+                shelf.put(source_idx, None);
+                shelf.slots[source_idx].error = Some(error.clone());
+                Err(error)
+            }
+        }
+    }
+
+    /// Makes room for the photos `wanted`, of the given sizes, from a mip level on. Of those
+    /// that are there, levels that are finer go, and what is coarser goes as a whole, so that
+    /// all that is there is as it will be sampled.
+    pub(crate) fn make_room(
+        &self,
+        wanted: &[usize],
+        sizes: impl Iterator<Item = [u32; 2]>,
+        finest: usize,
+    ) {
+        let mut shelf = self.shelf();
+        shelf.residency.note_frame(finest);
+        shelf.slots.iter_mut().for_each(|slot| slot.awaited = 0);
+        shelf.awaited = 0;
+        shelf.frame_began = shelf.clock;
+        let mut stays = vec![false; self.len()];
+        for (&i, size) in wanted.iter().zip(sizes) {
+            stays[i] = true;
+            shelf.touch(i);
+            let as_wanted = shelf.slots[i].photo.as_ref().map(|photo| match photo {
+                photo if is_from(photo, finest) => Some(Arc::clone(photo)),
+                photo if photo.finest < finest => Some(Arc::new(photo.from_level(finest))),
+                _ => None,
+            });
+            if let Some(as_wanted) = as_wanted {
+                shelf.put(i, as_wanted);
+            }
+            if shelf.slots[i].photo.is_none() {
+                shelf.await_photo(i, photo_bytes(size, finest));
+            }
+        }
+        let more = shelf.awaited;
+        shelf.evict(more, |i| stays[i]);
+    }
+
+    /// Begins a frame that asks for photos one by one; see [`Self::decode_ahead`].
+    pub(crate) fn begin_frame(&self) {
+        let mut shelf = self.shelf();
+        shelf.frame_began = shelf.clock;
+    }
+
+    /// Decodes a photo in full that the next frame will ask for, of the given size, if that
+    /// leaves the current one's and those that `stay` where they are. Pictures do not depend on
+    /// it, and errors wait until somebody asks for the photo.
+    pub(crate) fn decode_ahead(&self, source_idx: usize, size: [u32; 2], stay: &[bool]) {
+        let bytes = photo_bytes(size, 0);
+        {
+            let mut shelf = self.shelf();
+            let slot = &shelf.slots[source_idx];
+            if slot.photo.is_some() || slot.error.is_some() || slot.awaited > 0 {
+                return;
+            }
+            let stays: Vec<bool> = (0..self.len())
+                .map(|i| stay[i] || shelf.slots[i].last_used > shelf.frame_began)
+                .collect();
+            let staying = shelf.slots.iter().zip(&stays).filter(|(_, stays)| **stays);
+            let staying = staying.filter_map(|(slot, _)| slot.photo.as_ref());
+            let staying: u64 = staying.map(|photo| photo.bytes() as u64).sum();
+            if !shelf.residency.allows(staying + shelf.awaited + bytes) {
+                return;
+            }
+            let more = shelf.awaited + bytes;
+            shelf.evict(more, |i| stays[i]);
+            shelf.await_photo(source_idx, bytes);
+        }
+        // An error is kept for whoever asks.
+        let _ = self.find_or_decode(source_idx, 0, |shelf, photo| {
+            // A frame that began meanwhile may have taken the room.
+            if shelf.slots[source_idx].awaited == bytes {
+                shelf.put(source_idx, Some(Arc::clone(photo)));
+            }
         });
-        slot.as_ref().map_err(Clone::clone)
     }
 
     /// The photo of a source view, decoded anew and not kept.
@@ -337,46 +419,19 @@ impl fmt::Debug for PhotoStore {
     }
 }
 
+/// Whether a photo is what it is from a mip level on, no more and no less.
+fn is_from(photo: &Pyramid, finest: usize) -> bool {
+    photo.finest == finest.min(photo.levels.len() - 1)
+}
+
+/// A thread that panicked while it held the lock left nothing half done.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgba;
-
-    #[test]
-    fn levels_average_and_odd_borders_repeat() {
-        let photo = RgbaImage::from_fn(3, 2, |x, y| Rgba([(x * 10 + y * 100) as u8, 0, 0, 255]));
-        let pyramid = Pyramid::new(photo);
-        let sizes: Vec<_> = pyramid.levels.iter().map(RgbaImage::dimensions).collect();
-        assert_eq!(sizes, [(3, 2), (2, 1), (1, 1)]);
-        assert_eq!(pyramid.levels[1].get_pixel(0, 0).0, [55, 0, 0, 255]);
-        assert_eq!(pyramid.levels[1].get_pixel(1, 0).0, [70, 0, 0, 255]);
-    }
-
-    #[test]
-    fn alpha_is_premultiplied() {
-        let pyramid = Pyramid::new(RgbaImage::from_pixel(2, 2, Rgba([200, 100, 0, 128])));
-        assert!(!pyramid.opaque);
-        assert_eq!(pyramid.levels[0].get_pixel(0, 0).0, [100, 50, 0, 128]);
-    }
-
-    #[test]
-    fn what_a_mask_hides_bleeds_into_no_level() {
-        // Red to be used, and blue to be ignored: a block, a single pixel, a whole corner.
-        let hidden = |x: u32, y: u32| (x > 40 && y > 30) || (9..13).contains(&x) || x * y == 6;
-        let photo = RgbaImage::from_fn(101, 77, |x, y| match hidden(x, y) {
-            true => Rgba([0, 0, 255, 255]),
-            false => Rgba([200, 0, 0, 255]),
-        });
-        let mask = GrayImage::from_fn(101, 77, |x, y| image::Luma([u8::from(!hidden(x, y)) * 255]));
-        let pyramid = Pyramid::masked(photo.clone(), &Mask::new(mask));
-        assert_eq!(pyramid.levels.len(), MAX_LEVELS);
-        for level in &pyramid.levels {
-            assert!(level.pixels().all(|p| p.0 == [200, 0, 0, 255]));
-        }
-        // One that hides nothing changes nothing.
-        let whole = Mask::new(GrayImage::from_pixel(101, 77, image::Luma([255])));
-        assert!(Pyramid::masked(photo.clone(), &whole) == Pyramid::new(photo));
-    }
 
     #[test]
     fn a_mask_that_cannot_be_decoded_ignores_all_and_tells() {

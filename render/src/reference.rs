@@ -4,9 +4,11 @@
 
 use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint, exposed};
+use crate::held::Held;
 use crate::image_out::straight_rgba8;
 use crate::mask::IGNORED;
-use crate::photos::{PhotoError, Pyramid};
+use crate::photos::PhotoError;
+use crate::pyramid::Pyramid;
 use calibrate::Pixel;
 use image::{ImageBuffer, RgbaImage};
 use rayon::prelude::*;
@@ -59,6 +61,7 @@ pub(crate) fn candidate(
 /// A contributor's photo cannot be decoded.
 pub fn color_at(
     frame: &Frame<'_>,
+    photos: &Held<'_>,
     point: &ProxyPoint,
     contributors: &[Contributor],
 ) -> Result<[f64; 4], PhotoError> {
@@ -67,7 +70,7 @@ pub fn color_at(
         let Some(pixel) = frame.project(source_idx, point) else {
             continue;
         };
-        let photo = frame.lumigraph.photos.get(source_idx)?;
+        let photo = photos.get(source_idx)?;
         let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
         let sample = exposed(sample, frame.sources[source_idx].exposure);
         for c in 0..4 {
@@ -82,12 +85,34 @@ pub fn color_at(
 /// # Errors
 /// A photo or mask that is needed cannot be decoded.
 pub fn render_exact(frame: &Frame<'_>) -> Result<RgbaImage, PhotoError> {
-    render(frame, |_, point| blend_at(frame, point))
+    let taking_part: Vec<usize> = frame.taking_part().collect();
+    if Held::fit(frame, &taking_part) {
+        let photos = Held::new(frame, &taking_part);
+        return render(frame, &photos, |_, point| blend_at(frame, point));
+    }
+    // With little memory, who paints is found out before any photo is decoded.
+    let width = frame.desired.width;
+    let at_pixel = |i: u32| {
+        let point = frame.proxy_point(Pixel::center_of(i % width, i / width));
+        point.map_or_else(Vec::new, |point| blend_at(frame, &point))
+    };
+    let field: Vec<Vec<Contributor>> = (0..width * frame.desired.height)
+        .into_par_iter()
+        .map(at_pixel)
+        .collect();
+    let mut used: Vec<usize> = field.iter().flatten().map(|c| c.source_idx).collect();
+    used.sort_unstable();
+    used.dedup();
+    let photos = Held::new(frame, &used);
+    render(frame, &photos, |(x, y), _| {
+        field[(y * width + x) as usize].clone()
+    })
 }
 
 /// A picture from any field over pixels.
 pub(crate) fn render(
     frame: &Frame<'_>,
+    photos: &Held<'_>,
     field: impl Fn((u32, u32), &ProxyPoint) -> Vec<Contributor> + Sync,
 ) -> Result<RgbaImage, PhotoError> {
     let (width, height) = (frame.desired.width, frame.desired.height);
@@ -95,7 +120,7 @@ pub(crate) fn render(
         let mut pixels = Vec::with_capacity(width as usize * 4);
         for x in 0..width {
             let color = match frame.proxy_point(Pixel::center_of(x, y)) {
-                Some(point) => color_at(frame, &point, &field((x, y), &point))?,
+                Some(point) => color_at(frame, photos, &point, &field((x, y), &point))?,
                 None => [0.0; 4],
             };
             pixels.extend(straight_rgba8(color));
@@ -111,7 +136,8 @@ pub(crate) fn render(
 
 /// A photo's colour at a pixel: premultiplied, 0…1.
 pub fn sample(photo: &Pyramid, pixel: Pixel, level_of_detail: f64) -> [f64; 4] {
-    trilinear(&photo.levels, pixel, level_of_detail)
+    let level = level_of_detail.max(photo.finest as f64);
+    trilinear(&photo.levels, pixel, level)
 }
 
 /// Bilinear in the two nearest mip levels, 0…1.

@@ -213,6 +213,13 @@ pub(super) struct DrawArgs {
     /// Decode every photo, needed or not: the same bytes, later
     #[arg(long)]
     pub(super) no_skip: bool,
+    /// What decoded photos may take in memory, as in 512MiB or 1.5GB: those used last stay.
+    /// Too little for one frame draws it from coarser mip levels [default: no limit]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
+    pub(super) cpu_memory: Option<u64>,
+    /// The same for photos on the graphics processor [default: no limit]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
+    pub(super) gpu_memory: Option<u64>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -266,6 +273,35 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
+/// `512MiB`: at least one byte.
+fn bytes(text: &str) -> Result<u64, String> {
+    const UNITS: [(&str, u64); 10] = [
+        ("", 1),
+        ("b", 1),
+        ("kb", 1000),
+        ("mb", 1000_u64.pow(2)),
+        ("gb", 1000_u64.pow(3)),
+        ("tb", 1000_u64.pow(4)),
+        ("kib", 1 << 10),
+        ("mib", 1 << 20),
+        ("gib", 1 << 30),
+        ("tib", 1 << 40),
+    ];
+    let parse = || {
+        let end = text.find(|c: char| !c.is_ascii_digit() && c != '.');
+        let (number, unit) = text.split_at(end.unwrap_or(text.len()));
+        let unit = unit.trim().to_ascii_lowercase();
+        let (_, factor) = UNITS.iter().find(|(name, _)| *name == unit)?;
+        let bytes = number.parse::<f64>().ok()? * *factor as f64;
+        (bytes >= 1.0 && bytes < u64::MAX as f64).then_some(bytes as u64)
+    };
+    parse().ok_or_else(|| {
+        "expected a size above zero, with or without one of kB, MB, GB, TB, KiB, MiB, GiB and \
+         TiB, as in 512MiB"
+            .to_owned()
+    })
+}
+
 /// `1.5,-2,0`.
 pub(super) fn triple(text: &str) -> Result<DVec3, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
@@ -300,6 +336,24 @@ mod tests {
         assert!(size("0x480").is_err() && size("640").is_err() && size("-3x4").is_err());
         assert_eq!(triple("1, -2,3e-1"), Ok(DVec3::new(1.0, -2.0, 0.3)));
         assert!(triple("1,2").is_err() && triple("1,2,NaN").is_err());
+        assert_eq!(bytes("512MiB"), Ok(512 << 20));
+        assert_eq!((bytes("1.5 gb"), bytes("77")), (Ok(1_500_000_000), Ok(77)));
+        for bad in [
+            "",
+            "0",
+            "0.2",
+            "-1GB",
+            "GB",
+            "1XB",
+            "1.2.3MB",
+            "NaN",
+            "inf",
+            "1e99",
+            "9999999TiB99",
+        ] {
+            assert!(bytes(bad).is_err(), "{bad}");
+        }
+        assert!(bytes("99999999999TiB").is_err());
         assert!(positive("0").is_err() && positive("x").is_err());
         assert_eq!(positive("1e-3"), Ok(1e-3));
         assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());

@@ -1,7 +1,7 @@
 //! `lumigraph render`
 
 use super::exposure::ExposureArgs;
-use super::frames::{ViewArgs, frames};
+use super::frames::{NamedView, ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
 use super::output::{print, print_json};
@@ -70,13 +70,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     session.prepare()?;
 
     let bar = progress(frames.len(), "rendering");
-    for (frame, file) in frames.iter().zip(&files) {
-        let view = args.draw.resized(frame.view.clone());
+    let view = |frame: &NamedView| {
         let moment = session.moment(&frame.name, frame.time_s)?;
-        let picture = session.draw(&view, moment.as_ref())?;
-        capture::write_png(file, &picture)?;
+        Ok((args.draw.resized(frame.view.clone()), moment))
+    };
+    let views = frames
+        .iter()
+        .map(view)
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    session.draw_all(&views, |i, picture| {
+        capture::write_png(&files[i], &picture)?;
         bar.inc(1);
-    }
+        Ok(())
+    })?;
     bar.finish_and_clear();
 
     let report = Report::new(&session, &start);

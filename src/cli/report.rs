@@ -3,8 +3,9 @@
 use super::session::Session;
 use super::time::InWindow;
 use cpu_time::ProcessTime;
-use serde::Serialize;
-use serde_json::Value;
+use render::Residency;
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 use std::time::Instant;
 
 /// When a command began.
@@ -29,6 +30,10 @@ pub(super) struct Report {
     photos_decoded: usize,
     photos_total: usize,
     photos_bytes: usize,
+    cpu_memory: Memory,
+    /// Where a graphics processor draws.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gpu_memory: Option<Memory>,
     seconds: f64,
     cpu_seconds: f64,
     /// `None` where the system does not say.
@@ -48,6 +53,8 @@ impl Report {
             photos_decoded: photos.decoded(),
             photos_total: photos.len(),
             photos_bytes: photos.bytes(),
+            cpu_memory: Memory(photos.residency()),
+            gpu_memory: session.gpu_residency().map(Memory),
             seconds: start.wall.elapsed().as_secs_f64(),
             cpu_seconds: start.cpu.elapsed().as_secs_f64(),
             peak_memory_bytes: peak_memory_bytes(),
@@ -61,16 +68,59 @@ impl Report {
         let peak = self.peak_memory_bytes.map_or_else(String::new, |bytes| {
             format!(", peak memory {}", megabytes(bytes))
         });
+        let mut memory = self.cpu_memory.text();
+        if let Some(gpu) = self.gpu_memory {
+            memory += &format!("; on the device {}", gpu.text());
+        }
         format!(
             "{} of {} photos decoded ({}), {:.1} s ({:.1} CPU s) on {}{peak}{}",
             self.photos_decoded,
             self.photos_total,
-            megabytes(self.photos_bytes as u64),
+            memory,
             self.seconds,
             self.cpu_seconds,
             self.device,
             self.in_window.text(),
         )
+    }
+}
+
+/// What photos took of a memory.
+#[derive(Clone, Copy)]
+struct Memory(Residency);
+
+impl Memory {
+    /// `12 MB at most`, and what the budget had to do with it.
+    fn text(self) -> String {
+        let took = self.0;
+        let mut text = format!("{} at most", megabytes(took.peak));
+        if let Some(budget) = took.budget {
+            text += &format!(" of {}", megabytes(budget));
+        }
+        if took.evictions > 0 {
+            text += &format!(", {} let go", took.evictions);
+        }
+        if took.level_cap > 0 {
+            let (frames, level) = (took.capped_frames, took.level_cap);
+            text += &format!(", too little for {frames} drawings: mip levels from {level} on");
+        }
+        text
+    }
+}
+
+impl Serialize for Memory {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let took = self.0;
+        json!({
+            "budget_bytes": took.budget,
+            "held_bytes": took.held,
+            "peak_bytes": took.peak,
+            "loads": took.loads,
+            "evictions": took.evictions,
+            "level_cap": took.level_cap,
+            "capped_drawings": took.capped_frames,
+        })
+        .serialize(serializer)
     }
 }
 

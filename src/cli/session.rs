@@ -13,11 +13,14 @@ use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
-    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, RenderError,
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, Prepared,
+    RenderError, Residency, decode_ahead,
 };
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::ScopedJoinHandle;
 use std::time::Duration;
 
 /// Everything needed to draw.
@@ -37,6 +40,8 @@ pub(super) struct Session {
     device: DeviceChoice,
     strict: bool,
     no_skip: bool,
+    cpu_memory: Option<u64>,
+    gpu_memory: Option<u64>,
 }
 
 /// A view drawn, and how long that took.
@@ -65,7 +70,8 @@ impl Session {
         }
         let proxy = proxy.choose(&scene, &without)?;
         let exposure = exposure.choose(&mut scene, &without);
-        let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
+        let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
+        lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,
@@ -81,6 +87,8 @@ impl Session {
             device: draw.device(),
             strict,
             no_skip: draw.no_skip,
+            cpu_memory: draw.cpu_memory,
+            gpu_memory: draw.gpu_memory,
         })
     }
 
@@ -118,13 +126,24 @@ impl Session {
         engine.map_or_else(|| "nothing yet".to_owned(), Engine::description)
     }
 
+    /// What photos took on the graphics processor, where one draws.
+    pub(super) fn gpu_residency(&self) -> Option<Residency> {
+        match &self.engine {
+            Some(Engine::Gpu(gpu)) => Some(gpu.residency()),
+            _ => None,
+        }
+    }
+
     /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
     /// but messages look better before a progress bar than in it.
     pub(super) fn prepare(&mut self) -> anyhow::Result<()> {
         if self.engine.is_some() {
             return Ok(());
         }
-        let engine = Engine::open(self.device)?;
+        let mut engine = Engine::open(self.device)?;
+        if let Engine::Gpu(gpu) = &mut engine {
+            gpu.set_budget(self.gpu_memory);
+        }
         if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu(_)) {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
@@ -179,6 +198,79 @@ impl Session {
                 Err(error) => return Err(error.into()),
             }
         }
+    }
+
+    /// Draws views one after the other and gives each picture to `take`. While one is drawn the
+    /// next is prepared and its photos are decoded. Corrupt photos as in [`Self::draw`].
+    pub(super) fn draw_all(
+        &mut self,
+        views: &[(View, Option<Moment>)],
+        mut take: impl FnMut(usize, RgbaImage) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        self.prepare()?;
+        let mut done = 0;
+        while done < views.len() {
+            match self.draw_rest(views, &mut done, &mut take) {
+                Err(error) => match error.downcast_ref() {
+                    Some(RenderError::Photo(error)) => self.leave_out(error)?,
+                    _ => return Err(error),
+                },
+                Ok(()) => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws all views from `done` on, and counts them there.
+    fn draw_rest(
+        &mut self,
+        views: &[(View, Option<Moment>)],
+        done: &mut usize,
+        take: &mut impl FnMut(usize, RgbaImage) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let Some(engine) = &mut self.engine else {
+            bail!("the engine was opened above");
+        };
+        let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
+        let ready = |(view, moment): &(View, Option<Moment>)| {
+            let frame = frame(lumigraph, view, options, moment.as_ref());
+            let prepared = Prepared::new(&frame, method);
+            (frame, prepared)
+        };
+        let mut next = views.get(*done).map(&ready);
+        while let Some((frame, prepared)) = next {
+            let prepared = prepared?;
+            if views[*done].1.is_some() {
+                self.in_window.note(frame.taking_part().count());
+            }
+            let mut without = engine.resident(&lumigraph.photos);
+            without.extend(prepared.listed());
+            let drawn = AtomicBool::new(false);
+            // A mask that cannot be decoded must be found by the frame that asks for it.
+            let ahead = !lumigraph.photos.any_masked();
+            let coming = views.get(*done + 1).filter(|_| ahead);
+            let (picture, coming) = std::thread::scope(|scope| {
+                let prepare = |view| {
+                    let (frame, prepared) = ready(view);
+                    if let Ok(prepared) = &prepared {
+                        decode_ahead(&frame, &prepared.listed(), &without, &drawn);
+                    }
+                    (frame, prepared)
+                };
+                let coming = coming.map(|view| scope.spawn(move || prepare(view)));
+                let picture = engine.draw(&frame, &prepared);
+                drawn.store(true, Ordering::Relaxed);
+                (picture, coming.map(ScopedJoinHandle::join))
+            });
+            take(*done, picture?)?;
+            *done += 1;
+            next = match coming.transpose() {
+                Ok(None) => views.get(*done).map(&ready),
+                Ok(next) => next,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+        }
+        Ok(())
     }
 
     /// How visible seams are in a view: see [`render::seams`].
@@ -236,6 +328,7 @@ impl Session {
         self.lumigraph = self
             .scene
             .lumigraph(&self.without, self.proxy.proxy.clone())?;
+        self.lumigraph.photos.set_budget(self.cpu_memory);
         Ok(())
     }
 }

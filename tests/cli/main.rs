@@ -12,6 +12,7 @@ mod gpu;
 mod help;
 mod hull;
 mod masks;
+mod memory;
 mod opencv;
 mod render;
 mod repeat;

@@ -5,6 +5,7 @@
 
 mod asked;
 mod lanes;
+mod mark;
 mod shade;
 mod source;
 mod weights;
@@ -12,6 +13,7 @@ mod weights;
 use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
+use crate::held::Held;
 use crate::image_out::straight_rgba8;
 use crate::options::Method;
 use crate::photos::PhotoError;
@@ -49,6 +51,18 @@ impl Cpu {
             }
         }
     }
+
+    /// Draws a triangulated field.
+    ///
+    /// # Errors
+    /// A photo or mask that is needed cannot be decoded.
+    pub fn render_field(
+        &mut self,
+        frame: &Frame<'_>,
+        field: &TriangulatedField,
+    ) -> Result<RgbaImage, RenderError> {
+        Ok(draw_field(frame, field, self.rays.of(&frame.desired))?)
+    }
 }
 
 /// Draws a single frame, keeping nothing for the next.
@@ -62,40 +76,18 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
+    let sources: Vec<usize> = frame.taking_part().collect();
+    let photos = mark::hold(&engine, &sources);
     draw(frame, |row, asked: &mut Asked, pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
-            let tile = engine.tile(tile_idx * LANES, row, |_| true);
-            // 1. Who sees the tile, how well each ray fits, and what that weighs; of more views
-            // where those asked don't settle it.
-            let (seeing, terms) = loop {
-                let views = asked.views(&engine, tile_idx, row);
-                let (seeing, mut terms): (Vec<_>, Vec<_>) = views
-                    .iter()
-                    .filter_map(|&i| {
-                        let source_idx = i as usize;
-                        let source = engine.source(source_idx);
-                        let mut sight = source.see(&tile)?;
-                        engine.mask(source_idx, &mut sight, |_| true);
-                        let term = Term {
-                            diff: source.difference(&tile),
-                            a: sight.a,
-                            weight: [0.0; LANES],
-                        };
-                        Some(((source_idx, sight), term))
-                    })
-                    .unzip();
-                let reach = weigh(&mut terms, &frame.options);
-                let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
-                if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
-                    break (seeing, terms);
-                }
-            };
+            // 1. Who sees the tile, and what that weighs.
+            let (seeing, terms) = engine.weigh_tile(asked, tile_idx, row);
             // 2. The photos' colours.
             let seen = seeing
                 .iter()
                 .zip(&terms)
                 .map(|((i, sight), term)| (*i, sight, &term.weight));
-            engine.shade(seen, out)?;
+            engine.shade(&photos, seen, out)?;
         }
         Ok(())
     })
@@ -110,6 +102,7 @@ fn draw_field(
 ) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
     let raster = Raster::new(field);
+    let photos = Held::new(frame, &field.listed());
     draw(frame, |row, spans: &mut Vec<Span>, pixels| {
         raster.spans(row, spans);
         let mut triangle_of = [None; LANES];
@@ -183,7 +176,8 @@ fn draw_field(
                     sight.a = each(|k| sight.a[k] + term.weight[k]);
                 }
             }
-            engine.shade(seen.iter().map(|(i, sight)| (*i, sight, &sight.a)), out)?;
+            let shares = seen.iter().map(|(i, sight)| (*i, sight, &sight.a));
+            engine.shade(&photos, shares, out)?;
         }
         Ok(())
     })
@@ -263,6 +257,40 @@ impl<'a> Engine<'a> {
         tile
     }
 
+    /// The exact field of a tile: the source views that see it, and what they weigh; of more views
+    /// where those asked first don't settle it.
+    fn weigh_tile(
+        &self,
+        asked: &mut Asked,
+        tile_idx: usize,
+        row: usize,
+    ) -> (Vec<(usize, Sight)>, Vec<Term>) {
+        let tile = self.tile(tile_idx * LANES, row, |_| true);
+        loop {
+            let views = asked.views(self, tile_idx, row);
+            let (seeing, mut terms): (Vec<_>, Vec<_>) = views
+                .iter()
+                .filter_map(|&i| {
+                    let source_idx = i as usize;
+                    let source = self.source(source_idx);
+                    let mut sight = source.see(&tile)?;
+                    self.mask(source_idx, &mut sight, |_| true);
+                    let term = Term {
+                        diff: source.difference(&tile),
+                        a: sight.a,
+                        weight: [0.0; LANES],
+                    };
+                    Some(((source_idx, sight), term))
+                })
+                .unzip();
+            let reach = weigh(&mut terms, &self.frame.options);
+            let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
+            if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
+                return (seeing, terms);
+            }
+        }
+    }
+
     /// Takes what a photo's mask ignores and what hides points from it off its relevance, in
     /// the pixels that are `wanted`.
     fn mask(&self, source_idx: usize, sight: &mut Sight, wanted: impl Fn(usize) -> bool) {
@@ -292,6 +320,7 @@ impl<'a> Engine<'a> {
     /// Blends the photos of a tile and writes its pixels.
     fn shade<'s>(
         &self,
+        photos: &Held<'_>,
         seen: impl Iterator<Item = (usize, &'s Sight, &'s Lane)>,
         out: &mut [u8],
     ) -> Result<(), PhotoError> {
@@ -302,7 +331,7 @@ impl<'a> Engine<'a> {
             if weight[..count].iter().all(|w| *w == 0.0) {
                 continue;
             }
-            let photo = self.frame.lumigraph.photos.get(i)?;
+            let photo = photos.get(i)?;
             let exposure = self.source(i).exposure;
             let as_it_is = exposure == glam::Vec4::ONE;
             for k in 0..count {

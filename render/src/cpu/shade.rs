@@ -2,7 +2,7 @@
 
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
-use crate::photos::Pyramid;
+use crate::pyramid::Pyramid;
 use crate::visibility::{DistanceMap, HIDDEN, TEXEL_PER_PIXEL, TOLERANCE};
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
@@ -13,7 +13,7 @@ use std::ops::{Add, Mul, Sub};
 pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
     let texel =
         |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
-    trilinear(&photo.levels, u, v, level, texel)
+    trilinear(&photo.levels, u, v, level.max(photo.finest as f32), texel)
 }
 
 /// [`crate::frame::exposed`] for a colour of 0…255.

@@ -17,6 +17,7 @@ mod vertex;
 
 use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
+use crate::held::Held;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
 use crate::reference::{self, candidate};
@@ -133,6 +134,14 @@ impl TriangulatedField {
         Ok(field)
     }
 
+    /// The source views that any triangle lists, in order: no other photo is sampled.
+    pub fn listed(&self) -> Vec<usize> {
+        let mut listed: Vec<usize> = self.entries.iter().map(|e| e.source_idx as usize).collect();
+        listed.sort_unstable();
+        listed.dedup();
+        listed
+    }
+
     /// The source views of a triangle.
     pub fn entries_of(&self, triangle_idx: usize) -> &[FieldEntry] {
         let triangle = &self.triangles[triangle_idx];
@@ -203,7 +212,8 @@ pub fn render_reference(
 ) -> Result<RgbaImage, PhotoError> {
     let width = frame.desired.width as usize;
     let contributors = field.contributors(frame);
-    reference::render(frame, |(x, y), _| {
+    let photos = Held::new(frame, &field.listed());
+    reference::render(frame, &photos, |(x, y), _| {
         contributors[y as usize * width + x as usize].clone()
     })
 }

@@ -26,6 +26,8 @@ struct Params {
     timed: u32,
     // 1 where each pixel sees a plane of its own.
     facets: u32,
+    // The photos' mip level that is the finest of their array.
+    finest: f32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.

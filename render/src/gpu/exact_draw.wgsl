@@ -30,7 +30,7 @@ fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let layer = u32(source_data(source_idx, KIND).y);
         let uv = sight.pixel / params.array_size;
         let level = level_of_detail(source_idx, sight, ray, plane.xyz);
-        let color = textureSampleLevel(photos, photo_sampler, uv, layer, level);
+        let color = textureSampleLevel(photos, photo_sampler, uv, layer, level - params.finest);
         add(&mix, nearest.a[n], color, source_idx);
     }
     return resolve(mix);

@@ -30,7 +30,7 @@ pub(crate) struct Params {
     pub exposures_differ: u32,
     pub timed: u32,
     pub facets: u32,
-    pub padding: u32,
+    pub finest: f32,
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -99,7 +99,7 @@ pub(super) const LENS_TILTED: f32 = 11.0;
 pub(super) const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
 impl Params {
-    pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2]) -> Self {
+    pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2], finest: usize) -> Self {
         let lens = frame.desired.lens;
         Self {
             plane: common_plane(frame).as_vec3().to_array(),
@@ -125,7 +125,7 @@ impl Params {
             exposures_differ: u32::from(frame.exposures_differ()),
             timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
             facets: u32::from(matches!(frame.surface, Surface::Facets(_))),
-            padding: 0,
+            finest: finest as f32,
         }
     }
 }

@@ -3,6 +3,7 @@
 mod layout;
 mod photos;
 mod pipelines;
+mod room;
 #[cfg(test)]
 mod shader_tests;
 mod target;
@@ -11,13 +12,16 @@ use crate::RenderError;
 use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
+use crate::photos::PhotoStore;
 use crate::rays::RayMap;
+use crate::residency::Residency;
 use crate::surface::Surface;
 use calibrate::Lens;
 use image::RgbaImage;
 use layout::{Corner, Entry, Params, Source, Special};
-use photos::{Content, Layers};
+use photos::Layers;
 use pipelines::{Pass, Pipelines};
+use room::Content;
 use std::fmt;
 use std::sync::{Arc, Mutex};
 use target::Target;
@@ -33,6 +37,7 @@ pub struct Gpu {
     pipelines: Pipelines,
     sampler: wgpu::Sampler,
     photos: Option<Layers>,
+    residency: Residency,
     masks: Option<Layers>,
     distances: Option<Layers>,
     no_layers: wgpu::TextureView,
@@ -104,6 +109,7 @@ impl Gpu {
             pipelines,
             sampler,
             photos: None,
+            residency: Residency::default(),
             masks: None,
             distances: None,
             no_layers,
@@ -116,6 +122,23 @@ impl Gpu {
     /// Whether the driver imitates a graphics processor in software.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The most bytes that photos may take on the device; `None` for as many as there are.
+    /// Masks and distance maps come on top.
+    pub fn set_budget(&mut self, bytes: Option<u64>) {
+        self.residency.budget = bytes;
+    }
+
+    /// What photos took on the device so far.
+    pub fn residency(&self) -> Residency {
+        self.residency
+    }
+
+    /// The source views whose photos are on the device, in no order.
+    pub fn resident(&self, photos: &PhotoStore) -> Vec<usize> {
+        let layers = self.photos.as_ref();
+        layers.map_or_else(Vec::new, |layers| layers.resident(photos.id()))
     }
 
     /// The device's name and its driver, for people.
@@ -148,14 +171,7 @@ impl Gpu {
         frame: &Frame<'_>,
         field: &TriangulatedField,
     ) -> Result<RgbaImage, RenderError> {
-        let mut wanted: Vec<usize> = field
-            .entries
-            .iter()
-            .map(|e| e.source_idx as usize)
-            .collect();
-        wanted.sort_unstable();
-        wanted.dedup();
-        let shared = self.prepare(frame, &wanted, Order::ByLayer)?;
+        let shared = self.prepare(frame, &field.listed(), Order::ByLayer)?;
 
         let corners_of = |bordered: bool| -> Vec<Corner> {
             let triangles = field.triangles.iter().filter(|t| t.bordered == bordered);
@@ -206,9 +222,12 @@ impl Gpu {
     /// that take part are on the device already.
     fn render_exact(&mut self, frame: &Frame<'_>) -> Result<RgbaImage, RenderError> {
         let store_id = frame.lumigraph.photos.id();
-        let taking_part = frame.taking_part();
+        let taking_part: Vec<usize> = frame.taking_part().collect();
         let photos = self.photos.as_ref();
-        if !photos.is_some_and(|p| p.holds(store_id, taking_part)) {
+        // More of them than there is room for are never there in full.
+        let limits = self.device.limits();
+        let fit = room::fit(frame, taking_part.len(), self.residency.budget, &limits);
+        if !fit || !photos.is_some_and(|p| p.holds(store_id, &taking_part)) {
             let used = self.mark(frame)?;
             self.prepare(frame, &used, Order::AsGiven)?;
         }
@@ -265,8 +284,12 @@ impl Gpu {
         order: Order,
     ) -> Result<wgpu::BindGroup, RenderError> {
         let (device, queue) = (&self.device, &self.queue);
+        if !wanted.is_empty() {
+            frame.lumigraph.photos.begin_frame();
+        }
         Layers::ensure(
             &mut self.photos,
+            &mut self.residency,
             Content::Photos,
             device,
             queue,
@@ -282,6 +305,7 @@ impl Gpu {
         if frame.lumigraph.visibility.is_some() {
             Layers::ensure(
                 &mut self.distances,
+                &mut Residency::default(),
                 Content::Distances,
                 device,
                 queue,
@@ -296,6 +320,7 @@ impl Gpu {
         if store.any_masked() {
             Layers::ensure(
                 &mut self.masks,
+                &mut Residency::default(),
                 Content::Masks,
                 device,
                 queue,
@@ -308,7 +333,7 @@ impl Gpu {
         let rays = self.rays(frame)?;
         let photos = self.photos.as_ref().expect("ensured above");
         let (masks, distances) = (self.masks.as_ref(), self.distances.as_ref());
-        let params = Params::of(frame, photos.size);
+        let params = Params::of(frame, photos.size, photos.finest);
         let source = |i| {
             let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
             Source::of(
@@ -456,6 +481,14 @@ impl Gpu {
             .as_ref()
             .is_none_or(|t| t.size != [width, height])
         {
+            let bytes = u64::from(width.next_multiple_of(64)) * u64::from(height) * 4;
+            let limit = self.device.limits().max_buffer_size;
+            if bytes > limit {
+                return Err(RenderError::Gpu(format!(
+                    "a picture of {width} × {height} takes {bytes} bytes, more than this device \
+                     reads back at once ({limit}); use --device cpu or a smaller --size"
+                )));
+            }
             self.target = Some(Target::new(&self.device, width, height));
         }
         let target = self.target.as_ref().expect("made above");

@@ -94,7 +94,7 @@ fn params_lie_where_the_shaders_read_them() {
     let expected = offsets!(
         plane rays_in_table ray_scale ray_offset array_size size source_count
         desired_by_distance beta full_weight k blend resolution plane_seen exposures_differ timed
-        facets
+        facets finest
     );
     for shader in SHADERS {
         let (found, size) = members(&parse(shader), "Params");

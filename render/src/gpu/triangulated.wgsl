@@ -33,7 +33,7 @@ fn corner(
 
 fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, texel: vec3f) {
     let uv = texel.xy / params.array_size;
-    let color = textureSampleLevel(photos, photo_sampler, uv, source_idx, texel.z);
+    let color = textureSampleLevel(photos, photo_sampler, uv, source_idx, texel.z - params.finest);
     add(mix, weight, color, source_idx);
 }
 

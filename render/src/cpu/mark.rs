@@ -1,0 +1,44 @@
+//! Which photos the exact field samples, found before any is decoded.
+
+use super::asked::Asked;
+use super::lanes::LANES;
+use super::{BAND, Engine};
+use crate::held::Held;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Holds the photos that the exact field samples. `sources` are those that take part. Where
+/// the store has room for all of them, nothing needs to be found out.
+pub(super) fn hold<'a>(engine: &Engine<'a>, sources: &[usize]) -> Held<'a> {
+    if Held::fit(engine.frame, sources) {
+        return Held::new(engine.frame, sources);
+    }
+    Held::new(engine.frame, &marked(engine))
+}
+
+/// The source views that have any weight at any pixel, in order.
+fn marked(engine: &Engine<'_>) -> Vec<usize> {
+    let sources = engine.frame.lumigraph.sources.iter();
+    let used: Vec<AtomicBool> = sources.map(|_| AtomicBool::new(false)).collect();
+    let desired = &engine.frame.desired;
+    let (width, height) = (desired.width as usize, desired.height as usize);
+    let of_band = |asked: &mut Asked, band: usize| {
+        for row in band * BAND..((band + 1) * BAND).min(height) {
+            for (tile_idx, x0) in (0..width).step_by(LANES).enumerate() {
+                let count = LANES.min(width - x0);
+                let (seeing, terms) = engine.weigh_tile(asked, tile_idx, row);
+                for ((i, _), term) in seeing.iter().zip(&terms) {
+                    if term.weight[..count].iter().any(|w| *w > 0.0) {
+                        used[*i].store(true, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+    };
+    let bands = 0..height.div_ceil(BAND);
+    bands.into_par_iter().for_each_init(Asked::default, of_band);
+    let used = used.iter().enumerate();
+    used.filter(|(_, used)| used.load(Ordering::Relaxed))
+        .map(|(i, _)| i)
+        .collect()
+}
