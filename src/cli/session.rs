@@ -182,10 +182,7 @@ impl Session {
     ) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let mut frame = frame(&self.lumigraph, desired, self.options, moment);
-            if self.no_skip {
-                frame = frame.without_skipping();
-            }
+            let frame = frame(&self.lumigraph, desired, self.options, moment, self.no_skip);
             if moment.is_some() {
                 self.in_window.note(frame.taking_part().count());
             }
@@ -232,8 +229,9 @@ impl Session {
             bail!("the engine was opened above");
         };
         let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
+        let no_skip = self.no_skip;
         let ready = |(view, moment): &(View, Option<Moment>)| {
-            let frame = frame(lumigraph, view, options, moment.as_ref());
+            let frame = frame(lumigraph, view, options, moment.as_ref(), no_skip);
             let prepared = Prepared::new(&frame, method);
             (frame, prepared)
         };
@@ -280,7 +278,7 @@ impl Session {
         moment: Option<&Moment>,
     ) -> anyhow::Result<Option<f64>> {
         loop {
-            let frame = frame(&self.lumigraph, desired, self.options, moment);
+            let frame = frame(&self.lumigraph, desired, self.options, moment, self.no_skip);
             match render::seams(&frame) {
                 Ok(seams) => return Ok(seams),
                 Err(error) => self.leave_out(&error)?,
@@ -339,12 +337,16 @@ fn frame<'a>(
     desired: &View,
     options: FieldOptions,
     moment: Option<&Moment>,
+    no_skip: bool,
 ) -> Frame<'a> {
-    let frame = Frame::new(lumigraph, desired.clone(), options);
-    match moment {
-        Some(moment) => frame.at(moment),
-        None => frame,
+    let mut frame = Frame::new(lumigraph, desired.clone(), options);
+    if let Some(moment) = moment {
+        frame = frame.at(moment);
     }
+    if no_skip {
+        frame = frame.without_skipping();
+    }
+    frame
 }
 
 /// A scene's sparse points that do not rest on the photos left out, in the world.
