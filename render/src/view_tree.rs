@@ -353,6 +353,12 @@ const WIDEST: f64 = 4.0;
 const MARGIN: f64 = 1.2;
 
 impl Frame<'_> {
+    /// Whether so many source views take part that a list of all of them costs more than finding
+    /// those that can count.
+    pub(crate) fn has_many_views(&self) -> bool {
+        self.view_tree().views.len() >= FEWEST
+    }
+
     /// A difference to begin with, in radians: the more views there are, the nearer is the nearest.
     pub(crate) fn first_guess(&self) -> f64 {
         1.0 / (self.sources.len() as f64).sqrt()

@@ -229,7 +229,7 @@ fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> 
         _ => None,
     };
     let mut most = most;
-    if most == f64::INFINITY {
+    if most == f64::INFINITY && frame.has_many_views() {
         // Borders anywhere: what points spread over it need, all of it may.
         let mut guess = frame.first_guess();
         let needed = spread_over(corners).filter_map(|at| point_at(frame, at));
