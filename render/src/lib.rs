@@ -15,6 +15,7 @@ mod held;
 mod image_out;
 mod lumigraph;
 mod mask;
+mod near;
 mod options;
 pub mod path;
 mod photos;

@@ -2,7 +2,6 @@
 
 use crate::blend::Contributor;
 use crate::frame::Frame;
-use crate::reference::blend_at;
 use calibrate::Pixel;
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
@@ -101,7 +100,7 @@ pub fn contributors_exact(frame: &Frame<'_>) -> Vec<Vec<Contributor>> {
         let center = Pixel::center_of((i % width) as u32, (i / width) as u32);
         frame
             .proxy_point(center)
-            .map_or_else(Vec::new, |point| blend_at(frame, &point))
+            .map_or_else(Vec::new, |point| frame.blend_at(&point))
     };
     (0..width * height).into_par_iter().map(at_pixel).collect()
 }

@@ -4,7 +4,7 @@ use crate::blend::Contributor;
 use crate::frame::{Frame, ProxyPoint, exposed};
 use crate::held::Held;
 use crate::photos::PhotoError;
-use crate::reference::{blend_at, sample};
+use crate::reference::sample;
 use calibrate::Pixel;
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ pub fn seams(frame: &Frame<'_>) -> Result<Option<f64>, PhotoError> {
         let columns = (STEP / 2..frame.desired.width).step_by(STEP as usize);
         let points = columns.filter_map(|x| frame.proxy_point(Pixel::center_of(x, y)));
         points
-            .map(|point| (point, blend_at(frame, &point)))
+            .map(|point| (point, frame.blend_at(&point)))
             .collect()
     };
     let painted: Vec<Vec<(ProxyPoint, Vec<Contributor>)>> =

@@ -5,12 +5,9 @@
 //! by as little as is asked for, or none has the point in its image. The bound is the angle
 //! between the ray and the sphere, less what sphere and point subtend, plus β times the least
 //! excess of footprint. What is found is therefore *all* that lies within a difference, and a few
-//! more; see [`Frame::near`](crate::Frame::near) for how an exact field comes of it.
+//! more; `near.rs` has how an exact field comes of it.
 
-use crate::blend::{Candidate, Contributor, blend};
-use crate::frame::{Frame, FrameSource, ProxyPoint};
-use crate::options::Resolution;
-use crate::reference::candidate;
+use crate::frame::{FrameSource, ProxyPoint};
 use calibrate::{Lens, Pixel};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -72,9 +69,9 @@ pub(crate) struct ViewTree {
 
 /// What differences are made of.
 #[derive(Clone, Copy, Debug)]
-struct Measure {
-    beta: f64,
-    by_length: bool,
+pub(crate) struct Measure {
+    pub beta: f64,
+    pub by_length: bool,
 }
 
 impl ViewTree {
@@ -105,22 +102,30 @@ impl ViewTree {
             nodes: Vec::with_capacity(2 * views.len() / LEAF + 1),
             views,
         };
-        if may_skip && tree.views.len() >= FEWEST {
+        if may_skip && tree.is_large() {
             tree.split(0, tree.views.len());
         }
         tree
+    }
+
+    /// Whether so many views take part that a list of all of them costs more than finding those
+    /// that can count.
+    pub(crate) fn is_large(&self) -> bool {
+        self.views.len() >= FEWEST
     }
 
     /// Makes the node of a part of the views and all below it.
     fn split(&mut self, start: usize, end: usize) {
         let index = self.nodes.len();
         let leaf = end - start <= LEAF;
+        let of_each = self.views[start..end].iter().map(|v| v.0);
+        let bounds = match leaf {
+            true => of_each.reduce(Bounds::join),
+            // Until its halves are known.
+            false => None,
+        };
         self.nodes.push(Node {
-            bounds: if leaf {
-                Bounds::of(&self.views[start..end])
-            } else {
-                self.views[start].0
-            },
+            bounds: bounds.unwrap_or(self.views[start].0),
             start: start as u32,
             end: end as u32,
             second: 0,
@@ -150,7 +155,7 @@ impl ViewTree {
 
     /// The views, by index, that may differ by `most` or less somewhere in a ball and may have
     /// some of it in their images. All that do are among them.
-    fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
+    pub(crate) fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
         let near = |views: &[(Bounds, u32)], found: &mut Vec<u32>| {
             let near = views.iter().filter(|v| v.0.may_matter(ball, measure, most));
@@ -233,27 +238,7 @@ fn cosine_and_sine(angle: f64) -> Option<[f64; 2]> {
 }
 
 impl Bounds {
-    fn of(views: &[(Bounds, u32)]) -> Self {
-        let (least, most) = extent(views);
-        let center = 0.5 * (least + most);
-        let all = || views.iter().map(|v| &v.0);
-        let radius = all().map(|b| b.center.distance(center)).fold(0.0, f64::max);
-        let sum: DVec3 = all().map(|b| b.axis).sum();
-        let axis = sum.normalize_or(DVec3::Z);
-        let spread = all().map(|b| {
-            let own = b.spread.map_or(PI, |[cos, sin]| sin.atan2(cos));
-            angle(axis, b.axis) + own
-        });
-        Self {
-            center,
-            radius,
-            axis,
-            spread: cosine_and_sine(spread.fold(0.0, f64::max)),
-            footprint_ratio: all().map(|b| b.footprint_ratio).fold(f64::MAX, f64::min),
-        }
-    }
-
-    /// Of both halves together.
+    /// Of both together.
     fn join(self, other: Self) -> Self {
         let away = other.center - self.center;
         let distance = away.length();
@@ -321,117 +306,5 @@ impl Bounds {
         // The sum of both angles is beyond π where its sine is negative.
         let (sum_cos, sum_sin) = (cos * sharp - sin * blurred, sin * sharp + cos * blurred);
         sum_sin <= 0.0 || self.axis.dot(away) >= (sum_cos - SLACK) * distance
-    }
-}
-
-/// What there is to know about a point of the proxy without asking all source views.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Near {
-    /// All that see the point and may have a weight there, in the order of the views.
-    pub candidates: Vec<Candidate>,
-    /// All views that differ by `within` or less in the ball asked for and may see some of it, and
-    /// a few more; in order.
-    pub views: Vec<u32>,
-    /// Of each of them, its difference and where the point falls in its photo or outside it.
-    pub of_views: Vec<(f64, Option<Pixel>)>,
-    /// Radians. No view that differs by more has a weight at the point.
-    pub within: f64,
-}
-
-impl Near {
-    /// A view's difference and where the point falls in its photo, if they are known.
-    pub(crate) fn of_view(&self, source_idx: usize) -> Option<(f64, Option<Pixel>)> {
-        let at = self.views.binary_search(&(source_idx as u32)).ok()?;
-        Some(self.of_views[at])
-    }
-}
-
-/// From one guess to the next, and the last.
-const WIDER: f64 = 3.0;
-const WIDEST: f64 = 4.0;
-/// A guess for the next point, over what this one needed.
-const MARGIN: f64 = 1.2;
-
-impl Frame<'_> {
-    /// Whether so many source views take part that a list of all of them costs more than finding
-    /// those that can count.
-    pub(crate) fn has_many_views(&self) -> bool {
-        self.view_tree().views.len() >= FEWEST
-    }
-
-    /// A difference to begin with, in radians: the more views there are, the nearer is the nearest.
-    pub(crate) fn first_guess(&self) -> f64 {
-        1.0 / (self.sources.len() as f64).sqrt()
-    }
-
-    /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
-    /// see it; all that do are among them. All that take part where the ball is `None`: at
-    /// infinity.
-    pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
-        match ball {
-            Some(ball) => {
-                let measure = Measure {
-                    beta: self.options.beta,
-                    by_length: self.options.resolution == Resolution::Length,
-                };
-                self.view_tree().within(ball, measure, most, found);
-            }
-            None => {
-                found.clear();
-                found.extend(self.taking_part().map(|i| i as u32));
-            }
-        }
-    }
-
-    /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights
-    /// are those of all views. The guess, of the difference that matters, is what tells one point
-    /// from the next in time alone.
-    ///
-    /// Views are asked for within a difference. Where those found make a threshold within it,
-    /// others cannot count, as they could only lower it; else they are asked for again.
-    pub(crate) fn near(&self, point: &ProxyPoint, radius: f64, guess: &mut f64) -> Near {
-        let ball = Ball::around(point, radius);
-        let mut near = Near {
-            within: if ball.is_some() {
-                *guess
-            } else {
-                f64::INFINITY
-            },
-            ..Near::default()
-        };
-        loop {
-            self.views_within(ball.as_ref(), near.within, &mut near.views);
-            near.candidates.clear();
-            near.of_views.clear();
-            for &i in &near.views {
-                let source_idx = i as usize;
-                let pixel = self.project(source_idx, point);
-                let diff = self.difference(source_idx, point);
-                near.of_views.push((diff, pixel));
-                let seen = pixel.and_then(|p| candidate(self, source_idx, point, p, || diff));
-                near.candidates.extend(seen);
-            }
-            let reach = self.options.reach(&near.candidates);
-            if reach <= near.within {
-                if ball.is_some() && reach < f64::INFINITY {
-                    *guess = MARGIN * reach;
-                }
-                return near;
-            }
-            near.within = if reach < f64::INFINITY {
-                reach
-            } else if near.within < WIDEST {
-                WIDER * near.within.max(1e-6)
-            } else {
-                f64::INFINITY
-            };
-        }
-    }
-
-    /// The exact blending field at a proxy point, as [`crate::reference::blend_at`] has it, without
-    /// asking all source views.
-    pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
-        let near = self.near(point, 0.0, &mut self.first_guess());
-        blend(&near.candidates, &self.options)
     }
 }

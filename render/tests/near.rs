@@ -5,11 +5,13 @@ mod common;
 use calibrate::{Distortion, Lens, Rigid3, View};
 use common::Random;
 use glam::{DVec2, DVec3};
+use image::{Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
 use render::field::TriangulatedField;
 use render::reference::blend_at;
 use render::{
-    Blend, FieldOptions, Frame, Lumigraph, Moment, PhotoStore, ProxyPoint, Resolution, SourceView,
+    Blend, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoStore, ProxyPoint, Resolution,
+    SourceView, cpu,
 };
 
 fn lumigraph(views: Vec<View>, random: &mut Random) -> Lumigraph {
@@ -163,5 +165,33 @@ fn a_triangulated_field_of_many_views_is_close_to_the_exact_one() {
         }
         let mean = sum / f64::from(count);
         assert!(mean < 0.02, "kind {kind}: {mean}");
+    }
+}
+
+#[test]
+fn pictures_are_the_same_bytes_when_all_views_are_asked() {
+    let mut random = Random(7);
+    for kind in [0, 2, 4] {
+        let mut lumigraph = lumigraph(crowd(kind, &mut random), &mut random);
+        let count = lumigraph.sources.len();
+        lumigraph.photos = PhotoStore::new(count, |i| {
+            Ok(RgbaImage::from_fn(100, 75, |x, y| {
+                let wave = |n: u32| (x * 7 * n + y * 3 + 40 * i as u32 * n) as u8;
+                Rgba([wave(1), wave(2), wave(3), 255])
+            }))
+        });
+        let desired = View {
+            width: 101,
+            height: 67,
+            lens: lens_of(80.0, 101.0, 67.0),
+            ..lumigraph.sources[count / 2].view.clone()
+        };
+        let new = || Frame::new(&lumigraph, desired.clone(), FieldOptions::default());
+        for method in [Method::Exact, Method::TRIANGULATED] {
+            let picture = cpu::render(&new(), method).unwrap();
+            let asking_all = cpu::render(&new().without_skipping(), method).unwrap();
+            assert!(picture == asking_all, "{kind}, {method:?}");
+            assert!(picture.pixels().any(|p| p.0[3] > 0), "{kind}");
+        }
     }
 }

@@ -210,7 +210,7 @@ pub(super) struct DrawArgs {
     /// Size of the pictures in pixels [default: each view's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<(u32, u32)>,
-    /// Decode every photo, needed or not: the same bytes, later
+    /// Decode every photo and ask each about every ray, needed or not: the same bytes, later
     #[arg(long)]
     pub(super) no_skip: bool,
     /// What decoded photos may take in memory, as in 512MiB or 1.5GB: those used last stay.

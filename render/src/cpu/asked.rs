@@ -2,6 +2,7 @@
 
 use super::lanes::LANES;
 use super::{BAND, Engine};
+use crate::near::wider;
 use crate::view_tree::Ball;
 use glam::DVec3;
 
@@ -11,18 +12,18 @@ use glam::DVec3;
 #[derive(Default)]
 pub(super) struct Asked {
     band: Option<usize>,
-    blocks: Vec<Block>,
+    /// `None` where no tile of the band asked yet.
+    blocks: Vec<Option<Block>>,
 }
 
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Block {
-    views: Vec<u32>,
-    /// Where its proxy points are; `None` before they are known, and where they are everywhere.
+    /// Where its proxy points are; `None` where they are everywhere.
     ball: Option<Ball>,
-    /// All that differ by as much or less are among the views, once they are known; negative
-    /// before it is known itself.
+    /// All that differ by as much or less are among the views, unless they are `stale`.
     within: f64,
-    known: bool,
+    views: Vec<u32>,
+    stale: bool,
     /// The most that a tile needed.
     needed: f64,
 }
@@ -41,29 +42,28 @@ impl Asked {
         if self.band != Some(row / BAND) {
             self.band = Some(row / BAND);
             let tiles = (frame.desired.width as usize).div_ceil(LANES);
-            let unknown = Block {
-                within: -1.0,
-                ..Block::default()
-            };
             self.blocks.clear();
-            self.blocks.resize(tiles, unknown);
+            self.blocks.resize(tiles, None);
         }
-        let before = tile_idx
-            .checked_sub(1)
-            .map_or(f64::INFINITY, |i| self.blocks[i].needed);
-        let block = &mut self.blocks[tile_idx];
-        if block.within < 0.0 {
-            block.ball = ball_of(engine, tile_idx, row / BAND);
-            let guess = if before.is_finite() {
-                ROOM * before
-            } else {
-                frame.first_guess()
+        let before = tile_idx.checked_sub(1);
+        let before = before.and_then(|i| Some(self.blocks[i].as_ref()?.needed));
+        let block = self.blocks[tile_idx].get_or_insert_with(|| {
+            let ball = ball_of(engine, tile_idx, row / BAND);
+            let guess = match before {
+                Some(needed) if needed < f64::INFINITY => ROOM * needed,
+                _ => frame.first_guess(),
             };
-            block.within = block.ball.map_or(f64::INFINITY, |_| guess);
-        }
-        if !block.known {
+            Block {
+                within: ball.map_or(f64::INFINITY, |_| guess),
+                ball,
+                views: Vec::new(),
+                stale: true,
+                needed: 0.0,
+            }
+        });
+        if block.stale {
             frame.views_within(block.ball.as_ref(), block.within, &mut block.views);
-            block.known = true;
+            block.stale = false;
         }
         &block.views
     }
@@ -71,25 +71,25 @@ impl Asked {
     /// Whether a tile that needs views as different as `reach` had them all; if not, it asks for
     /// more next.
     pub(super) fn settles(&mut self, tile_idx: usize, reach: f32) -> bool {
-        let block = &mut self.blocks[tile_idx];
+        let Some(block) = &mut self.blocks[tile_idx] else {
+            return false;
+        };
         let needed = MARGIN * f64::from(reach);
         block.needed = needed.max(block.needed);
         if needed <= block.within {
             // The tiles below will hardly need more.
             if block.within > TOO_MUCH * block.needed {
                 block.within = ROOM * block.needed;
-                block.known = false;
+                block.stale = true;
             }
             return true;
         }
         block.within = if needed < f64::INFINITY {
             ROOM * needed
-        } else if block.within < 4.0 {
-            3.0 * block.within.max(1e-6)
         } else {
-            f64::INFINITY
+            wider(block.within)
         };
-        block.known = false;
+        block.stale = true;
         false
     }
 }

@@ -214,8 +214,6 @@ fn bounds_of(frame: &Frame<'_>, listed: &[Listed]) -> [f64; 3] {
 /// The source views that may matter in a triangle whose corners don't know of all that do. Where
 /// hardly any sees all of it, those that points within it say.
 fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> Vec<u32> {
-    let most = bounds.into_iter().fold(0.0, f64::max);
-    let mut views = Vec::new();
     let points = corners.map(|corner| corner.point.map(|p| p.ray / p.inverse_distance));
     let ball = match points {
         [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
@@ -228,8 +226,8 @@ fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> 
         }
         _ => None,
     };
-    let mut most = most;
-    if most == f64::INFINITY && frame.has_many_views() {
+    let mut most = bounds.into_iter().fold(0.0, f64::max);
+    if most == f64::INFINITY && frame.view_tree().is_large() {
         // Borders anywhere: what points spread over it need, all of it may.
         let mut guess = frame.first_guess();
         let needed = spread_over(corners).filter_map(|at| point_at(frame, at));
@@ -237,6 +235,7 @@ fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> 
             .map(|point| frame.near(&point, 0.0, &mut guess).within)
             .fold(0.0, f64::max);
     }
+    let mut views = Vec::new();
     frame.views_within(ball.as_ref(), most, &mut views);
     views
 }

@@ -3,7 +3,7 @@
 //! The field is evaluated at the vertices of a triangulation of the image plane (a regular
 //! grid, the epipoles, the projected edges of the proxy) and interpolated.
 //!
-//! Where every source view either sees all of a triangle or nothing of it, the corners'
+//! Where every source view that can count either sees all of a triangle or nothing of it, the corners'
 //! weights are interpolated, as in the paper. Where the border of a photo, or of what its
 //! mask ignores, crosses the triangle, weights change faster than any grid can follow: fovBlend rises within a few
 //! pixels, and the threshold t of all the others moves with it. There the *differences*
@@ -69,6 +69,9 @@ pub struct FieldEntry {
 /// Source views that a triangle lists, at most: those of least difference.
 pub const MAX_LISTED: usize = 32;
 
+/// Vertices that are evaluated one after the other.
+const RUN: usize = 32;
+
 impl TriangulatedField {
     /// Evaluates the field of a frame on a grid of `cells_across` cells.
     ///
@@ -94,14 +97,15 @@ impl TriangulatedField {
             f64::from(width) / f64::from(grid.columns),
             f64::from(height) / f64::from(grid.rows),
         );
-        let vertices: Vec<Vertex> = plane
-            .vertices
-            .par_iter()
-            .map_init(
-                || frame.first_guess(),
-                |guess, at| Vertex::new(frame, *at, cell, guess),
-            )
-            .collect();
+        // A vertex' guess is the one before's, in runs that do not depend on the threads: lists
+        // are made of what was found, and what was asked for decides that, too.
+        let of_run = |run: &[DVec2]| {
+            let mut guess = frame.first_guess();
+            run.iter()
+                .map(|at| Vertex::new(frame, *at, cell, &mut guess))
+                .collect::<Vec<Vertex>>()
+        };
+        let vertices: Vec<Vertex> = plane.vertices.par_chunks(RUN).flat_map(of_run).collect();
 
         // 3. The triangles through which the proxy is seen, each with the views it needs.
         let seen = |corners: &[u32; 3]| {

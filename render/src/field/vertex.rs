@@ -2,7 +2,7 @@
 
 use crate::blend::{Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
-use crate::view_tree::Near;
+use crate::near::Near;
 use calibrate::Pixel;
 use glam::DVec2;
 

@@ -1,0 +1,121 @@
+//! The exact field at a point of the proxy, from the source views that can count there.
+
+use crate::blend::{Candidate, Contributor, blend};
+use crate::frame::{Frame, ProxyPoint};
+use crate::options::Resolution;
+use crate::reference::candidate;
+use crate::view_tree::{Ball, Measure};
+use calibrate::Pixel;
+
+/// What there is to know about a point of the proxy without asking all source views.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Near {
+    /// All that see the point and may have a weight there, in the order of the views.
+    pub candidates: Vec<Candidate>,
+    /// All views that differ by `within` or less in the ball asked for and may see some of it, and
+    /// a few more; in order.
+    pub views: Vec<u32>,
+    /// Of each of them, its difference and where the point falls in its photo or outside it.
+    pub of_views: Vec<(f64, Option<Pixel>)>,
+    /// Radians. No view that differs by more has a weight at the point.
+    pub within: f64,
+}
+
+impl Near {
+    /// A view's difference and where the point falls in its photo, if they are known.
+    pub(crate) fn of_view(&self, source_idx: usize) -> Option<(f64, Option<Pixel>)> {
+        let at = self.views.binary_search(&(source_idx as u32)).ok()?;
+        Some(self.of_views[at])
+    }
+}
+
+/// From one guess to the next, and the last.
+const WIDER: f64 = 3.0;
+const WIDEST: f64 = 4.0;
+/// A guess for the next point, over what this one needed.
+const MARGIN: f64 = 1.2;
+
+/// The difference to try after one within which too few views were found.
+pub(crate) fn wider(within: f64) -> f64 {
+    if within < WIDEST {
+        WIDER * within.max(1e-6)
+    } else {
+        f64::INFINITY
+    }
+}
+
+impl Frame<'_> {
+    /// A difference to begin with, in radians: the more views there are, the nearer is the nearest.
+    pub(crate) fn first_guess(&self) -> f64 {
+        1.0 / (self.sources.len() as f64).sqrt()
+    }
+
+    /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
+    /// see it; all that do are among them. All that take part where the ball is `None`: at
+    /// infinity.
+    pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
+        match ball {
+            Some(ball) => {
+                let measure = Measure {
+                    beta: self.options.beta,
+                    by_length: self.options.resolution == Resolution::Length,
+                };
+                self.view_tree().within(ball, measure, most, found);
+            }
+            None => {
+                found.clear();
+                found.extend(self.taking_part().map(|i| i as u32));
+            }
+        }
+    }
+
+    /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights
+    /// are those of all views. The guess is of the difference that matters: time depends on it, and
+    /// which views are found besides those that count, but no weight.
+    ///
+    /// Views are asked for within a difference. Where those found make a threshold within it,
+    /// others cannot count, as they could only lower it; else they are asked for again.
+    pub(crate) fn near(&self, point: &ProxyPoint, radius: f64, guess: &mut f64) -> Near {
+        let ball = Ball::around(point, radius);
+        let mut near = Near {
+            within: if ball.is_some() {
+                *guess
+            } else {
+                f64::INFINITY
+            },
+            ..Near::default()
+        };
+        loop {
+            self.views_within(ball.as_ref(), near.within, &mut near.views);
+            near.candidates.clear();
+            near.of_views.clear();
+            for &i in &near.views {
+                let source_idx = i as usize;
+                let pixel = self.project(source_idx, point);
+                let diff = self.difference(source_idx, point);
+                near.of_views.push((diff, pixel));
+                let seen = pixel.and_then(|p| candidate(self, source_idx, point, p, || diff));
+                near.candidates.extend(seen);
+            }
+            let reach = self.options.reach(&near.candidates);
+            if reach <= near.within {
+                if ball.is_some() && reach < f64::INFINITY {
+                    *guess = MARGIN * reach;
+                }
+                return near;
+            }
+            near.within = if reach < f64::INFINITY {
+                reach
+            } else {
+                wider(near.within)
+            };
+        }
+    }
+
+    /// The exact blending field at a proxy point, as [`crate::reference::blend_at`] has it, without
+    /// asking all source views.
+    pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
+        let near = self.near(point, 0.0, &mut self.first_guess());
+        blend(&near.candidates, &self.options)
+    }
+}
