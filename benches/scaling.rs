@@ -1,5 +1,5 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --json FILE --gpu]`; see README.md.
+//! [-- --photos N,N… --proxies NAME,NAME… --field --json FILE --gpu]`; see README.md.
 
 use calibrate::{Lens, Pixel, Rigid3, View};
 use cpu_time::ProcessTime;
@@ -52,7 +52,12 @@ fn main() {
     println!("{:>8}{:>8}", "used", "dB");
 
     let mut lines = Vec::new();
-    for kind in ["plane", "tunnel", "hull"] {
+    let asked = value("--proxies");
+    let is_asked = |kind: &&str| {
+        let asked = asked.as_ref();
+        asked.is_none_or(|list| list.split(',').any(|name| name == *kind))
+    };
+    for kind in ["plane", "tunnel", "hull"].into_iter().filter(is_asked) {
         for size in [(960, 720), (1920, 1080)] {
             for &count in &counts {
                 if kind == "hull" && count > MOST_OCCLUDED {
@@ -60,6 +65,10 @@ fn main() {
                 }
                 let lumigraph = lumigraph(kind, count);
                 let desired = desired(kind, size);
+                if arguments.iter().any(|a| a == "--field") {
+                    field_alone(kind, &lumigraph, &desired);
+                    continue;
+                }
                 lines.push(measure(kind, &lumigraph, &desired, &mut gpu));
             }
         }
@@ -85,17 +94,21 @@ fn place(i: usize) -> DVec3 {
 fn lumigraph(kind: &str, count: usize) -> Lumigraph {
     let pose = |i: usize| {
         let v = place(i);
-        let aside = 0.3 * DVec3::new(spread(i, 0.381_966), spread(i, 0.267_949), 0.0);
+        let target = 0.3 * DVec3::new(spread(i, 0.381_966), spread(i, 0.267_949), 0.0);
         match kind {
             "hull" => {
-                let center = DVec3::new(v.x, v.y, v.z).normalize_or(DVec3::X) * (3.0 + 0.5 * v.z);
-                Rigid3::looking_at(center, 0.3 * aside, DVec3::Y)
+                // As many from every side.
+                let (cos, around) = (v.x, std::f64::consts::TAU * spread(i, 0.754_877_666_2));
+                let aside = (1.0 - cos * cos).sqrt();
+                let direction = DVec3::new(aside * around.cos(), aside * around.sin(), cos);
+                let center = direction * (3.0 + 0.5 * v.z);
+                Rigid3::looking_at(center, 0.3 * target, DVec3::Y)
             }
             "tunnel" => {
                 let center = DVec3::new(0.3 * v.x, 0.3 * v.y, 10.0 * v.z);
-                Rigid3::looking_at(center, center + DVec3::Z + aside, DVec3::Y)
+                Rigid3::looking_at(center, center + DVec3::Z + target, DVec3::Y)
             }
-            _ => Rigid3::looking_at(v, v + DVec3::Z + 0.5 * aside, DVec3::Y),
+            _ => Rigid3::looking_at(v, v + DVec3::Z + 0.5 * target, DVec3::Y),
         }
     };
     let (width, height) = PHOTO;
@@ -294,6 +307,28 @@ fn measure(
         },
         "photos_decoded": used, "triangulated_db": db,
     })
+}
+
+/// Prints the time of the field over and over, for profiles.
+fn field_alone(kind: &str, lumigraph: &Lumigraph, desired: &View) {
+    const FRAMES: u32 = 60;
+    let Method::Triangulated { cells_across } = Method::TRIANGULATED else {
+        unreachable!("the default method is triangulated")
+    };
+    let work = || {
+        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        let (cpu, wall) = timed(|| {
+            drop(TriangulatedField::new(&frame, cells_across).expect("the grid fits"));
+        });
+        (ms(cpu), ms(wall))
+    };
+    work();
+    let mut times: Vec<(f64, f64)> = (0..FRAMES).map(|_| work()).collect();
+    times.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let (cpu, wall) = times[times.len() / 2];
+    let size = format!("{} × {}", desired.width, desired.height);
+    let count = lumigraph.sources.len();
+    println!("{kind:8}{size:>12}{count:>9}  field {cpu:.1} / {wall:.1}");
 }
 
 fn timed(work: impl FnOnce()) -> (Duration, Duration) {

@@ -61,16 +61,16 @@ pub fn blend(candidates: &[Candidate], options: &FieldOptions) -> Vec<Contributo
     };
 
     // 2. The weights by the formula.
-    let sorted: Vec<(f64, f64)> = relevant.iter().map(|&(_, diff, a)| (diff, a)).collect();
+    let sorted = |i: usize| relevant.get(i).map(|&(_, diff, a)| (diff, a));
     let mut weighted: Vec<Contributor> = match options.blend {
         Blend::Consistent if smallest <= SAME_RAY => Vec::new(),
         Blend::Consistent => {
-            let t = threshold(&sorted, options.full_weight());
+            let t = threshold_of(sorted, options.full_weight());
             let weight = |diff: f64, a: f64| a * (1.0 - diff / t).max(0.0) / diff;
             contributors(&relevant, weight)
         }
         Blend::Paper => {
-            let t = sorted[options.k.min(sorted.len()) - 1].0;
+            let t = relevant[options.k.min(relevant.len()) - 1].1;
             let weight = |diff: f64, a: f64| {
                 if t > 0.0 {
                     a * (1.0 - diff / t).max(0.0)
@@ -119,15 +119,12 @@ impl FieldOptions {
     }
 
     /// The threshold t among views that all see the whole of what matters (a = 1), from
-    /// their differences. More views can only lower it.
-    pub(crate) fn threshold_of_seen(&self, mut diffs: Vec<f64>) -> f64 {
-        diffs.sort_by(f64::total_cmp);
+    /// their differences, which it sorts. More views can only lower it.
+    pub(crate) fn threshold_of_seen(&self, diffs: &mut [f64]) -> f64 {
+        diffs.sort_unstable_by(f64::total_cmp);
         match self.blend {
             Blend::Paper => diffs.get(self.k - 1).copied().unwrap_or(f64::INFINITY),
-            Blend::Consistent => {
-                let sorted: Vec<(f64, f64)> = diffs.into_iter().map(|d| (d, 1.0)).collect();
-                threshold(&sorted, self.full_weight())
-            }
+            Blend::Consistent => threshold_of(|i| Some((*diffs.get(i)?, 1.0)), self.full_weight()),
         }
     }
 }
@@ -150,14 +147,21 @@ fn contributors(
 /// is the first whose t does not reach the next diff. Infinite where Σ aᵢ ≤ m. At most
 /// [`MAX_CONTRIBUTORS`] stay below it.
 pub fn threshold(sorted: &[(f64, f64)], m: f64) -> f64 {
-    let limit = sorted.get(MAX_CONTRIBUTORS).map_or(f64::INFINITY, |s| s.0);
+    threshold_of(|i| sorted.get(i).copied(), m)
+}
+
+/// [`threshold`] of what a function has at each index from zero on.
+fn threshold_of(sorted: impl Fn(usize) -> Option<(f64, f64)>, m: f64) -> f64 {
+    let limit = sorted(MAX_CONTRIBUTORS).map_or(f64::INFINITY, |s| s.0);
     let (mut sum_a, mut sum_a_diff) = (0.0, 0.0);
-    for (n, &(diff, a)) in sorted.iter().enumerate() {
+    let mut n = 0;
+    while let Some((diff, a)) = sorted(n) {
+        n += 1;
         sum_a += a;
         sum_a_diff += a * diff;
         if sum_a > m {
             let t = sum_a_diff / (sum_a - m);
-            if sorted.get(n + 1).is_none_or(|next| t <= next.0) {
+            if sorted(n).is_none_or(|next| t <= next.0) {
                 return t.min(limit);
             }
         }

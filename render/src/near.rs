@@ -12,21 +12,13 @@ use calibrate::Pixel;
 pub(crate) struct Near {
     /// All that see the point and may have a weight there, in the order of the views.
     pub candidates: Vec<Candidate>,
-    /// All views that differ by `within` or less in the ball asked for and may see some of it, and
-    /// a few more; in order.
+    /// All views that differ by `within` or less at the point and may see something in sight of
+    /// it, and a few more; in order.
     pub views: Vec<u32>,
     /// Of each of them, its difference and where the point falls in its photo or outside it.
     pub of_views: Vec<(f64, Option<Pixel>)>,
     /// Radians. No view that differs by more has a weight at the point.
     pub within: f64,
-}
-
-impl Near {
-    /// A view's difference and where the point falls in its photo, if they are known.
-    pub(crate) fn of_view(&self, source_idx: usize) -> Option<(f64, Option<Pixel>)> {
-        let at = self.views.binary_search(&(source_idx as u32)).ok()?;
-        Some(self.of_views[at])
-    }
 }
 
 /// From one guess to the next, and the last.
@@ -51,7 +43,7 @@ impl Frame<'_> {
     }
 
     /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
-    /// see it; all that do are among them. All that take part where the ball is `None`: at
+    /// see something in sight of it; all that do are among them. All that take part where the ball is `None`: at
     /// infinity.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
@@ -70,13 +62,14 @@ impl Frame<'_> {
     }
 
     /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights
-    /// are those of all views. The guess is of the difference that matters: time depends on it, and
+    /// are those of all views. Views that see something within a distance of it, `sight`, are found,
+    /// too. The guess is of the difference that matters: time depends on it, and
     /// which views are found besides those that count, but no weight.
     ///
     /// Views are asked for within a difference. Where those found make a threshold within it,
     /// others cannot count, as they could only lower it; else they are asked for again.
-    pub(crate) fn near(&self, point: &ProxyPoint, radius: f64, guess: &mut f64) -> Near {
-        let ball = Ball::around(point, radius);
+    pub(crate) fn near(&self, point: &ProxyPoint, sight: f64, guess: &mut f64) -> Near {
+        let ball = Ball::around(point, sight);
         let mut near = Near {
             within: if ball.is_some() {
                 *guess

@@ -4,7 +4,7 @@ use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
 use crate::sight::within_sight;
 use calibrate::{Pixel, View};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use proxy::{Facets, Plane, Proxy, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
 
@@ -105,8 +105,40 @@ impl FacetMap {
         facet != NO_FACET && facet >= self.moved_from
     }
 
+    /// Whether any pixel of a rectangle sees a facet.
+    pub(crate) fn any_within(&self, least: DVec2, most: DVec2) -> bool {
+        let [width, height] = self.size;
+        let (x0, y0) = (least.x.max(0.0) as usize, least.y.max(0.0) as usize);
+        let beyond = |at: f64, side: u32| at.ceil().clamp(0.0, f64::from(side)) as usize;
+        let (x1, y1) = (beyond(most.x, width), beyond(most.y, height));
+        (y0..y1).any(|y| {
+            let row = y * width as usize;
+            let pixels = self.facet_of.get(row + x0..row + x1);
+            pixels.is_some_and(|pixels| pixels.iter().any(|&facet| facet != NO_FACET))
+        })
+    }
+
+    /// The centre of the pixel nearest to a position, within so many columns and rows, that sees a
+    /// facet.
+    pub(crate) fn nearest(&self, pixel: Pixel, within: i64) -> Option<Pixel> {
+        let [width, height] = self.size.map(i64::from);
+        let (x, y) = (pixel.x.floor() as i64, pixel.y.floor() as i64);
+        let center = |x: i64, y: i64| Pixel::center_of(x as u32, y as u32);
+        let far = |p: &Pixel| (p.x - pixel.x).powi(2) + (p.y - pixel.y).powi(2);
+        // Ring by ring. One may hold what is nearer than the first found, but hardly.
+        (0..=within).find_map(|r| {
+            let ring = (-r..=r).flat_map(|i| [(i, -r), (i, r), (-r, i), (r, i)]);
+            let inside = ring
+                .map(|(dx, dy)| (x + dx, y + dy))
+                .filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y));
+            let seen = inside.filter(|(x, y)| self.facet_of[(y * width + x) as usize] != NO_FACET);
+            seen.map(|(x, y)| center(x, y))
+                .min_by(|a, b| far(a).total_cmp(&far(b)))
+        })
+    }
+
     /// The facet at the pixel around a position.
-    fn facet_at(&self, pixel: Pixel) -> u32 {
+    pub(crate) fn facet_at(&self, pixel: Pixel) -> u32 {
         let [width, height] = self.size;
         let column = pixel.x.clamp(0.0, f64::from(width - 1)) as usize;
         let row = pixel.y.clamp(0.0, f64::from(height - 1)) as usize;

@@ -14,6 +14,8 @@ use std::f64::consts::PI;
 
 /// Views of a leaf, at most.
 const LEAF: usize = 6;
+/// More views than this are worth a thread.
+const ALONE: usize = 1024;
 /// With fewer views than this, asking each is faster.
 const FEWEST: usize = 48;
 /// Radians by which bounds are lowered, and lengths by which radii are raised, relative to what
@@ -24,14 +26,22 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
     pub center: DVec3,
+    /// Within it, a view may differ little.
     pub radius: f64,
+    /// Within it, a view may see something; infinite for anywhere.
+    pub sight: f64,
 }
 
 impl Ball {
-    /// A point and what is within a distance of it; `None` at infinity.
-    pub(crate) fn around(point: &ProxyPoint, radius: f64) -> Option<Self> {
+    /// For the differences at a point, of views that may see something within a distance of it;
+    /// `None` at infinity.
+    pub(crate) fn around(point: &ProxyPoint, sight: f64) -> Option<Self> {
         let center = point.ray / point.inverse_distance;
-        (center.is_finite() && radius.is_finite()).then_some(Self { center, radius })
+        center.is_finite().then_some(Self {
+            center,
+            radius: 0.0,
+            sight,
+        })
     }
 }
 
@@ -47,6 +57,8 @@ struct Bounds {
     /// is all around.
     spread: Option<[f64; 2]>,
     footprint_ratio: f64,
+    /// How far from the viewer the farthest may be.
+    far: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +67,7 @@ struct Node {
     /// Its views' places in the order.
     start: u32,
     end: u32,
-    /// The other half's index; its own first half follows it. Zero for leaves.
+    /// How far behind it its other half is; its first half follows it. Zero for leaves.
     second: u32,
 }
 
@@ -65,6 +77,16 @@ pub(crate) struct ViewTree {
     nodes: Vec<Node>,
     /// The views in the order of the nodes, and their indices.
     views: Vec<(Bounds, u32)>,
+}
+
+/// What is asked of the tree.
+struct Query<'a> {
+    ball: &'a Ball,
+    measure: Measure,
+    most: f64,
+    /// From the viewer to the ball's middle, and one over it.
+    here: f64,
+    by_here: f64,
 }
 
 /// What differences are made of.
@@ -95,17 +117,22 @@ impl ViewTree {
                 axis: source.rotation.row(2),
                 spread: cosine_and_sine(spread),
                 footprint_ratio: source.footprint_ratio,
+                far: source.center.length(),
             };
             views.push((bounds, i as u32));
         }
-        let mut tree = Self {
-            nodes: Vec::with_capacity(2 * views.len() / LEAF + 1),
-            views,
-        };
-        if may_skip && tree.is_large() {
-            tree.split(0, tree.views.len());
+        let mut nodes = Vec::new();
+        if may_skip && views.len() >= FEWEST {
+            let mut order: Vec<(DVec3, u32)> = views
+                .iter()
+                .zip(0..)
+                .map(|(view, i)| (view.0.center, i))
+                .collect();
+            arrange(&mut order);
+            views = order.iter().map(|(_, i)| views[*i as usize]).collect();
+            add_nodes(&views, 0, &mut nodes);
         }
-        tree
+        Self { nodes, views }
     }
 
     /// Whether so many views take part that a list of all of them costs more than finding those
@@ -114,51 +141,20 @@ impl ViewTree {
         self.views.len() >= FEWEST
     }
 
-    /// Makes the node of a part of the views and all below it.
-    fn split(&mut self, start: usize, end: usize) {
-        let index = self.nodes.len();
-        let leaf = end - start <= LEAF;
-        let of_each = self.views[start..end].iter().map(|v| v.0);
-        let bounds = match leaf {
-            true => of_each.reduce(Bounds::join),
-            // Until its halves are known.
-            false => None,
-        };
-        self.nodes.push(Node {
-            bounds: bounds.unwrap_or(self.views[start].0),
-            start: start as u32,
-            end: end as u32,
-            second: 0,
-        });
-        if leaf {
-            return;
-        }
-        let (least, most) = extent(&self.views[start..end]);
-        let axis = (0..3).fold(0, |best, k| {
-            if most[k] - least[k] > most[best] - least[best] {
-                k
-            } else {
-                best
-            }
-        });
-        let middle = start + (end - start) / 2;
-        self.views[start..end].select_nth_unstable_by(middle - start, |a, b| {
-            let along = a.0.center[axis].total_cmp(&b.0.center[axis]);
-            along.then(a.1.cmp(&b.1))
-        });
-        self.split(start, middle);
-        let second = self.nodes.len();
-        self.split(middle, end);
-        self.nodes[index].second = second as u32;
-        self.nodes[index].bounds = self.nodes[index + 1].bounds.join(self.nodes[second].bounds);
-    }
-
     /// The views, by index, that may differ by `most` or less somewhere in a ball and may have
-    /// some of it in their images. All that do are among them.
+    /// something in their images that is in sight of it. All that do are among them.
     pub(crate) fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
+        let here = ball.center.length();
+        let query = &Query {
+            ball,
+            measure,
+            most,
+            here,
+            by_here: 1.0 / here,
+        };
         let near = |views: &[(Bounds, u32)], found: &mut Vec<u32>| {
-            let near = views.iter().filter(|v| v.0.may_matter(ball, measure, most));
+            let near = views.iter().filter(|v| v.0.may_matter(query));
             found.extend(near.map(|(_, i)| *i));
         };
         if self.nodes.is_empty() {
@@ -169,13 +165,13 @@ impl ViewTree {
         stack.push(0_u32);
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
-            if !node.bounds.may_matter(ball, measure, most) {
+            if !node.bounds.may_matter(query) {
                 continue;
             }
             if node.second == 0 {
                 near(&self.views[node.start as usize..node.end as usize], found);
             } else {
-                stack.push(node.second);
+                stack.push(index + node.second);
                 stack.push(index + 1);
             }
         }
@@ -183,12 +179,75 @@ impl ViewTree {
     }
 }
 
-fn extent(views: &[(Bounds, u32)]) -> (DVec3, DVec3) {
-    let all = views.iter().map(|v| v.0.center);
-    all.fold(
+/// Sorts views such that halves are apart, and halves of halves, as [`add_nodes`] takes them.
+fn arrange(views: &mut [(DVec3, u32)]) {
+    if views.len() <= LEAF {
+        return;
+    }
+    let (least, most) = views.iter().fold(
         (DVec3::INFINITY, DVec3::NEG_INFINITY),
-        |(least, most), c| (least.min(c), most.max(c)),
-    )
+        |(least, most), (center, _)| (least.min(*center), most.max(*center)),
+    );
+    let wide = most - least;
+    let axis = if wide.x >= wide.y && wide.x >= wide.z {
+        0
+    } else if wide.y >= wide.z {
+        1
+    } else {
+        2
+    };
+    let middle = views.len() / 2;
+    views.select_nth_unstable_by(middle, |a, b| {
+        a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
+    });
+    let (first, second) = views.split_at_mut(middle);
+    if first.len() > ALONE {
+        rayon::join(|| arrange(first), || arrange(second));
+    } else {
+        arrange(first);
+        arrange(second);
+    }
+}
+
+/// Adds the node of some views, of which the first is at `start` in the order, and then all below
+/// it.
+fn add_nodes(views: &[(Bounds, u32)], start: usize, nodes: &mut Vec<Node>) {
+    let index = nodes.len();
+    let leaf = views.len() <= LEAF;
+    let of_each = views.iter().map(|v| v.0);
+    let bounds = match leaf {
+        true => of_each.reduce(Bounds::join),
+        // Until its halves are known.
+        false => None,
+    };
+    nodes.push(Node {
+        bounds: bounds.unwrap_or(views[0].0),
+        start: start as u32,
+        end: (start + views.len()) as u32,
+        second: 0,
+    });
+    if leaf {
+        return;
+    }
+    let middle = views.len() / 2;
+    let (first, rest) = views.split_at(middle);
+    let second;
+    if middle > ALONE {
+        let of_rest = || {
+            let mut nodes = Vec::new();
+            add_nodes(rest, start + middle, &mut nodes);
+            nodes
+        };
+        let (rest, ()) = rayon::join(of_rest, || add_nodes(first, start, nodes));
+        second = nodes.len();
+        nodes.extend(rest);
+    } else {
+        add_nodes(first, start, nodes);
+        second = nodes.len();
+        add_nodes(rest, start + middle, nodes);
+    }
+    nodes[index].second = (second - index) as u32;
+    nodes[index].bounds = nodes[index + 1].bounds.join(nodes[second].bounds);
 }
 
 /// The angle from the axis within which all of a photo lies; more than π where its lens does
@@ -265,46 +324,66 @@ impl Bounds {
             axis,
             spread: cosine_and_sine(spread[0].max(spread[1])),
             footprint_ratio: self.footprint_ratio.min(other.footprint_ratio),
+            far: center.length() + radius,
         }
     }
 
-    fn may_matter(&self, ball: &Ball, measure: Measure, most: f64) -> bool {
-        let away = ball.center - self.center;
+    fn may_matter(&self, query: &Query<'_>) -> bool {
+        let away = query.ball.center - self.center;
         let distance = away.length();
-        let here = ball.center.length();
-        let reach = self.radius + ball.radius + SLACK * (here + self.center.length());
-        let near = distance - reach;
-        let least_here = here - ball.radius;
+        let slack = SLACK * (query.here + self.far);
+        self.may_differ_by_so_little(query, away, distance, self.radius + slack)
+            && self.may_see(away, distance, self.radius + slack + query.ball.sight)
+    }
+
+    /// Whether any of them can have in its image what is `away` and within a reach: not where it is
+    /// farther from what they look along than they see, and it subtends.
+    fn may_see(&self, away: DVec3, distance: f64, reach: f64) -> bool {
+        let Some([cos, sin]) = self.spread.filter(|_| reach < distance) else {
+            return true;
+        };
+        // The cosine and sine of what it subtends, and of the sum of both angles, which is beyond
+        // π where its sine is negative; all by the distance.
+        let sharp = ((distance - reach) * (distance + reach)).sqrt();
+        let (sum_cos, sum_sin) = (cos * sharp - sin * reach, sin * sharp + cos * reach);
+        sum_sin <= 0.0 || self.axis.dot(away) >= sum_cos - SLACK * distance
+    }
+
+    /// Whether any of them, within `own` of their middle, can differ by as little as is asked for
+    /// within the ball's radius.
+    fn may_differ_by_so_little(
+        &self,
+        query: &Query<'_>,
+        away: DVec3,
+        distance: f64,
+        own: f64,
+    ) -> bool {
+        let (ball, measure) = (query.ball, query.measure);
+        let near = distance - own - ball.radius;
+        let least_here = query.here - ball.radius;
         if !(near > 0.0 && least_here > 0.0) {
             return true;
         }
-        // 1. How little any of them can differ from the ball's middle, and by how much less from
+        // How little any of them can differ from the ball's middle, and by how much less from
         // elsewhere in it: the gradients of both the angle between viewer and view and the
         // logarithm of the ratio of their distances are as long as their distance over the
         // product of the two.
-        let apart = self.center.length() + self.radius;
-        let vary = ball.radius * apart / (near * least_here) + SLACK;
-        let sine = ball.center.cross(away).length() / (here * distance);
-        let between = less_than_angle(sine, ball.center.dot(away))
-            - more_than_asin((reach - ball.radius) / distance)
-            - vary;
-        let coarser = if measure.by_length {
-            near - here - ball.radius
+        let vary = if ball.radius > 0.0 {
+            ball.radius * self.far / (near * least_here) + SLACK
         } else {
-            self.footprint_ratio * ((near + ball.radius) / here) * (1.0 - vary) - 1.0
+            SLACK
         };
-        if between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0) > most {
-            return false;
-        }
-        // 2. Whether any of them can have it in its image: not where it is farther from what they
-        // look along than they see, and it subtends.
-        let Some([cos, sin]) = self.spread else {
-            return true;
+        let by_distance = 1.0 / distance;
+        let sine = ball.center.cross(away).length() * (query.by_here * by_distance);
+        let between =
+            less_than_angle(sine, ball.center.dot(away)) - more_than_asin(own * by_distance) - vary;
+        let coarser = if measure.by_length {
+            near - query.here - ball.radius
+        } else {
+            self.footprint_ratio * ((distance - own) * query.by_here) * (1.0 - vary) - 1.0
         };
-        let blurred = reach / distance;
-        let sharp = (1.0 - blurred * blurred).max(0.0).sqrt();
-        // The sum of both angles is beyond π where its sine is negative.
-        let (sum_cos, sum_sin) = (cos * sharp - sin * blurred, sin * sharp + cos * blurred);
-        sum_sin <= 0.0 || self.axis.dot(away) >= (sum_cos - SLACK) * distance
+        let least = between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0);
+        // What is no number is kept.
+        !(least > query.most)
     }
 }

@@ -32,6 +32,8 @@ pub struct DistanceMap {
     pub values: Vec<f32>,
     /// What the values are in units of, 1/world units.
     pub unit: f64,
+    /// The largest of 2 × 2 values, of 4 × 4 and so on to the whole.
+    largest: Vec<Vec<f32>>,
 }
 
 /// What the source views see of a proxy that can occlude itself, by way of a distance map
@@ -107,11 +109,36 @@ impl DistanceMap {
                 let value = block.map(|(x, y)| rows[y][x]).fold(0.0, f64::max);
                 f16::from_f64(value / unit).to_f32()
             });
+        let values: Vec<f32> = values.collect();
         Self {
             size,
-            values: values.collect(),
+            largest: largest_of(&values, width),
+            values,
             unit,
         }
+    }
+
+    /// At least the inverse distance in every direction between two corners of a rectangle of
+    /// pixels of the photo.
+    pub(crate) fn largest_within(&self, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) -> f64 {
+        // Filtering takes in the texels beside.
+        let texel = |at: f64, beside: f64, side: u32| {
+            (at / f64::from(REDUCTION) + beside).clamp(0.0, f64::from(side - 1)) as usize
+        };
+        let [width, height] = self.size;
+        let (mut x0, mut x1) = (texel(left, -0.5, width), texel(right, 0.5, width));
+        let (mut y0, mut y1) = (texel(top, -0.5, height), texel(bottom, 0.5, height));
+        // As fine as a few texels allow.
+        const ACROSS: usize = 4;
+        let (mut values, mut columns) = (&self.values, width as usize);
+        let mut coarser = self.largest.iter();
+        while x1 - x0 >= ACROSS || y1 - y0 >= ACROSS {
+            let Some(next) = coarser.next() else { break };
+            (x0, x1, y0, y1) = (x0 / 2, x1 / 2, y0 / 2, y1 / 2);
+            (values, columns) = (next, columns.div_ceil(2));
+        }
+        let rows = (y0..=y1).map(|y| &values[y * columns + x0..=y * columns + x1]);
+        self.unit * f64::from(rows.flatten().copied().fold(0.0, f32::max))
     }
 
     /// The inverse distance in a direction, given by a pixel of the photo; bilinear.
@@ -136,6 +163,26 @@ impl DistanceMap {
         };
         let (upper, lower) = (across(y0), across(y1));
         upper + fy * (lower - upper)
+    }
+}
+
+/// The largest of 2 × 2 values of a map that is so wide, of 2 × 2 of those, and so on to the whole.
+fn largest_of(values: &[f32], mut width: usize) -> Vec<Vec<f32>> {
+    let mut levels: Vec<Vec<f32>> = Vec::new();
+    loop {
+        let last = levels.last().map_or(values, Vec::as_slice);
+        let height = last.len() / width;
+        if last.len() <= 1 {
+            return levels;
+        }
+        let columns = width.div_ceil(2);
+        let mut next = vec![0.0_f32; columns * height.div_ceil(2)];
+        for (i, &value) in last.iter().enumerate() {
+            let largest = &mut next[(i / width / 2) * columns + i % width / 2];
+            *largest = largest.max(value);
+        }
+        levels.push(next);
+        width = columns;
     }
 }
 

@@ -111,5 +111,9 @@ fn ball_of(engine: &Engine<'_>, tile_idx: usize, band: usize) -> Option<Ball> {
     let center = 0.5 * (least + most);
     // Of nothing at all it is not finite either.
     let radius = 0.5 * (most - least).length() * (1.0 + 1e-5);
-    (center.is_finite() && radius.is_finite()).then_some(Ball { center, radius })
+    (center.is_finite() && radius.is_finite()).then_some(Ball {
+        center,
+        radius,
+        sight: radius,
+    })
 }

@@ -9,12 +9,13 @@ use crate::view_tree::Ball;
 use calibrate::Lens;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Epipoles that become vertices in one cell of the grid, at most.
 const EPIPOLES_PER_CELL: usize = 4;
 
 /// The epipoles worth a vertex: inside the image, their view among the first two of the
-/// field there, the strongest few of each cell.
+/// field there, the nearest few of each cell.
 ///
 /// A view behind the desired one has its epipole where the line through both centres
 /// meets the image: the difference of angles vanishes there as well.
@@ -23,62 +24,85 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         f64::from(frame.desired.width),
         f64::from(frame.desired.height),
     );
-    let candidate = |source_idx: usize| {
+    let cells = DVec2::new(
+        f64::from(grid.columns) / width,
+        f64::from(grid.rows) / height,
+    );
+    let epipole = |source_idx: usize| {
         let center = frame.sources[source_idx].center;
         let lens = &frame.desired.lens;
         let ahead = lens.project(center).or_else(|| lens.project(-center))?;
         let inside = (0.0..=width).contains(&ahead.x) && (0.0..=height).contains(&ahead.y);
         let point = inside.then(|| frame.proxy_point(ahead)).flatten()?;
-        if is_behind_two(frame, source_idx, &point) {
-            return None;
-        }
-        let field = frame.blend_at(&point);
-        let own = field.iter().find(|c| c.source_idx == source_idx)?.weight;
-        let stronger = field.iter().filter(|c| c.weight > own).count();
-        (stronger < 2).then_some((source_idx, own, DVec2::new(ahead.x, ahead.y)))
+        let at = DVec2::new(ahead.x, ahead.y);
+        let cell = (at * cells).floor();
+        Some(Epipole {
+            own: candidate_at(frame, source_idx, &point)?,
+            distance: center.length(),
+            cell: [cell.y, cell.x].map(|index| index as i64),
+            point,
+            at,
+        })
     };
-    let mut candidates: Vec<(usize, f64, DVec2)> = (0..frame.sources.len())
+    let mut epipoles: Vec<Epipole> = (0..frame.sources.len())
         .into_par_iter()
-        .filter_map(candidate)
+        .filter_map(epipole)
         .collect();
-    candidates.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
-    let cells = DVec2::new(
-        f64::from(grid.columns) / width,
-        f64::from(grid.rows) / height,
-    );
-    let mut taken = std::collections::BTreeMap::new();
-    candidates.retain(|(_, _, at)| {
-        let cell = (*at * cells).floor();
-        let count = taken.entry((cell.x as i64, cell.y as i64)).or_insert(0);
-        *count += 1;
-        *count <= EPIPOLES_PER_CELL
-    });
-    candidates
-        .into_iter()
-        .map(|(source_idx, _, at)| (source_idx, at))
-        .collect()
+    epipoles.sort_by(Epipole::order);
+    let of_cell = |epipoles: &[Epipole]| {
+        let strong = epipoles.iter().filter(|e| !is_behind_two(frame, e));
+        let few = strong.take(EPIPOLES_PER_CELL);
+        few.map(|e| (e.own.source_idx, e.at)).collect::<Vec<_>>()
+    };
+    let by_cell: Vec<&[Epipole]> = epipoles.chunk_by(|x, y| x.cell == y.cell).collect();
+    by_cell.into_par_iter().flat_map_iter(of_cell).collect()
 }
 
-/// Whether two source views count more than a given one at a point for sure: they differ less and
-/// see it no less. Found among those that differ less alone, of which there are mostly many.
-fn is_behind_two(frame: &Frame<'_>, source_idx: usize, point: &ProxyPoint) -> bool {
-    let as_candidate = |i: usize| {
-        let pixel = frame.project(i, point)?;
-        candidate(frame, i, point, pixel, || frame.difference(i, point))
-    };
-    let Some(own) = as_candidate(source_idx) else {
-        return true;
-    };
+/// Where a source view's centre, or what lies opposite to it, appears in the desired image.
+struct Epipole {
+    own: Candidate,
+    /// Of the view from the viewer.
+    distance: f64,
+    /// Row and column.
+    cell: [i64; 2],
+    point: ProxyPoint,
+    at: DVec2,
+}
+
+impl Epipole {
+    /// Cell by cell, the view that differs least first; of those on the line of sight, the nearest.
+    fn order(&self, other: &Self) -> Ordering {
+        let diff = |epipole: &Self| epipole.own.diff.max(SAME_RAY);
+        self.cell
+            .cmp(&other.cell)
+            .then_with(|| diff(self).total_cmp(&diff(other)))
+            .then_with(|| self.distance.total_cmp(&other.distance))
+            .then_with(|| self.own.source_idx.cmp(&other.own.source_idx))
+    }
+}
+
+fn candidate_at(frame: &Frame<'_>, source_idx: usize, point: &ProxyPoint) -> Option<Candidate> {
+    let pixel = frame.project(source_idx, point)?;
+    let diff = || frame.difference(source_idx, point);
+    candidate(frame, source_idx, point, pixel, diff)
+}
+
+/// Whether two source views count more at an epipole than its own: they differ less and see the
+/// point no less.
+fn is_behind_two(frame: &Frame<'_>, epipole: &Epipole) -> bool {
+    let Epipole { own, point, .. } = epipole;
     if own.diff <= SAME_RAY {
         return false;
     }
     let mut nearer = Vec::new();
     frame.views_within(Ball::around(point, 0.0).as_ref(), own.diff, &mut nearer);
-    let counts_more = |c: Candidate| {
+    let counts_more = |c: &Candidate| {
         c.diff < own.diff && c.fov >= own.fov && c.fov * c.mask >= own.fov * own.mask
     };
-    let before = nearer.iter().filter_map(|&i| as_candidate(i as usize));
-    before.filter(|c| counts_more(*c)).nth(1).is_some()
+    let candidates = nearer
+        .iter()
+        .map(|&i| candidate_at(frame, i as usize, point));
+    candidates.flatten().filter(counts_more).nth(1).is_some()
 }
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.

@@ -1,12 +1,14 @@
 //! Which source views a triangle carries, and with what.
 
-use super::vertex::{Vertex, point_at};
+use super::patch::Patch;
+use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
 use crate::reference::candidate;
+use crate::surface::Surface;
 use crate::view_tree::Ball;
 use calibrate::Pixel;
-use glam::DVec2;
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
@@ -46,33 +48,38 @@ impl List {
             // other corners say counts.
             return Self::of_weights(corners);
         };
-        let points = [a, b, c];
-
         // 1. The views that may matter: where the corners' differences bound the threshold, all
         // within it.
-        let nears = corners.map(|corner| &corner.near);
-        let mut views: Vec<u32> = nears.iter().flat_map(|n| n.views.iter().copied()).collect();
-        let mut listed = listed_of(frame, corners, &points, &mut views);
-        let mut bounds = bounds_of(frame, &listed);
-        if (0..3).any(|c| bounds[c] > nears[c].within) {
-            views.extend(others_within(frame, corners, bounds));
-            listed = listed_of(frame, corners, &points, &mut views);
-            bounds = bounds_of(frame, &listed);
+        let triangle = Triangle {
+            frame,
+            corners,
+            points: [a, b, c],
+            patch: OnceCell::new(),
+        };
+        let mut listed = triangle.list(&[]);
+        let mut bounds = triangle.bounds(&listed);
+        if (0..3).any(|c| bounds[c] > corners[c].near.within) {
+            listed = triangle.list(&triangle.others_within(bounds));
+            bounds = triangle.bounds(&listed);
         }
 
         // 2. Where pixels look at what was moved into some photo, corners don't tell which.
-        let somewhere = seen_where_moved(frame, corners);
+        let somewhere = triangle.seen_where_moved();
         for &source_idx in &somewhere {
             match listed.binary_search_by_key(&source_idx, |l| l.source_idx) {
                 Ok(at) => listed[at].sees = Sees::Part,
-                Err(at) => listed.insert(
-                    at,
-                    Listed {
-                        source_idx,
-                        sees: Sees::Part,
-                        diffs: points.map(|point| frame.difference(source_idx, &point)),
-                    },
-                ),
+                Err(at) => {
+                    let diffs = triangle.points.map(|p| frame.difference(source_idx, &p));
+                    let sees = Sees::Part;
+                    listed.insert(
+                        at,
+                        Listed {
+                            source_idx,
+                            sees,
+                            diffs,
+                        },
+                    );
+                }
             }
         }
 
@@ -89,7 +96,7 @@ impl List {
             // More borders than there is room for: the nearest of each part of the triangle
             // come first, then the second nearest. (The nearest of all alone left holes
             // beyond their borders.)
-            let ranks = ranks_within(frame, corners, &listed);
+            let ranks = triangle.ranks(&listed);
             let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
             let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
             listed.sort_by(|x, y| {
@@ -161,161 +168,178 @@ fn weights_turn_over(corners: [&Vertex; 3]) -> bool {
     all.any(|w| w.weight - least(w.source_idx) > TURNOVER)
 }
 
-/// Steps between points that are spread over a triangle, along each side.
-const STEPS: u32 = 4;
-
-/// Points spread over a triangle.
-fn spread_over(corners: [&Vertex; 3]) -> impl Iterator<Item = DVec2> {
-    let [a, b, c] = corners.map(|corner| corner.at);
-    let step = |i: u32| f64::from(i) / f64::from(STEPS);
-    let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
-    steps.map(move |(i, j)| a + step(i) * (b - a) + step(j) * (c - a))
+/// A triangle of the image plane, with what is worked out about it when needed.
+struct Triangle<'a> {
+    frame: &'a Frame<'a>,
+    corners: [&'a Vertex; 3],
+    /// Those of the corners.
+    points: [ProxyPoint; 3],
+    patch: OnceCell<Patch>,
 }
 
-/// The views of these indices, in order, and how they see a triangle.
-fn listed_of(
-    frame: &Frame<'_>,
-    corners: [&Vertex; 3],
-    points: &[ProxyPoint; 3],
-    views: &mut Vec<u32>,
-) -> Vec<Listed> {
-    views.sort_unstable();
-    views.dedup();
-    let of = |&i: &u32| {
-        let source_idx = i as usize;
-        let at = [0, 1, 2].map(|c| {
-            let anew = || {
-                let point = &points[c];
-                (
-                    frame.difference(source_idx, point),
-                    frame.project(source_idx, point),
-                )
-            };
-            corners[c].near.of_view(source_idx).unwrap_or_else(anew)
-        });
-        Listed {
-            source_idx,
-            sees: how_it_sees(frame, source_idx, points, at.map(|a| a.1)),
-            diffs: at.map(|a| a.0),
+impl Triangle<'_> {
+    fn patch(&self) -> &Patch {
+        self.patch
+            .get_or_init(|| Patch::new(self.frame, self.corners))
+    }
+
+    /// The source views that the corners know of and `others`, in order, and how they see the
+    /// triangle.
+    fn list(&self, others: &[u32]) -> Vec<Listed> {
+        let nears = self.corners.map(|corner| &corner.near);
+        let mut next = [0; 4];
+        let lists: [&[u32]; 4] = [&nears[0].views, &nears[1].views, &nears[2].views, others];
+        let mut listed = Vec::with_capacity(lists.iter().map(|l| l.len()).sum());
+        // The least of all that come next.
+        while let Some(source_idx) = (0..4).filter_map(|l| lists[l].get(next[l])).min() {
+            let source_idx = *source_idx;
+            let at = [0, 1, 2, 3].map(|l| {
+                let is_known = lists[l].get(next[l]) == Some(&source_idx);
+                next[l] += usize::from(is_known);
+                (is_known && l < 3).then(|| nears[l].of_views[next[l] - 1])
+            });
+            let source_idx = source_idx as usize;
+            let at = [0, 1, 2].map(|c| {
+                let point = &self.points[c];
+                at[c].unwrap_or_else(|| {
+                    let diff = self.frame.difference(source_idx, point);
+                    (diff, self.frame.project(source_idx, point))
+                })
+            });
+            listed.push(Listed {
+                source_idx,
+                sees: self.how_it_is_seen(source_idx, at.map(|a| a.1)),
+                diffs: at.map(|a| a.0),
+            });
         }
-    };
-    views.iter().map(of).collect()
-}
+        listed
+    }
 
-/// Those that see all of a triangle bound the threshold at each corner from above.
-fn bounds_of(frame: &Frame<'_>, listed: &[Listed]) -> [f64; 3] {
-    let all = || listed.iter().filter(|view| view.sees == Sees::All);
-    [0, 1, 2].map(|c| {
-        let diffs = all().map(|view| view.diffs[c]).collect();
-        frame.options.threshold_of_seen(diffs)
-    })
-}
+    /// Those that see all of a triangle bound the threshold at each corner from above.
+    fn bounds(&self, listed: &[Listed]) -> [f64; 3] {
+        let mut diffs = Vec::with_capacity(listed.len());
+        [0, 1, 2].map(|c| {
+            diffs.clear();
+            let all = listed.iter().filter(|view| view.sees == Sees::All);
+            diffs.extend(all.map(|view| view.diffs[c]));
+            self.frame.options.threshold_of_seen(&mut diffs)
+        })
+    }
 
-/// The source views that may matter in a triangle whose corners don't know of all that do. Where
-/// hardly any sees all of it, those that points within it say.
-fn others_within(frame: &Frame<'_>, corners: [&Vertex; 3], bounds: [f64; 3]) -> Vec<u32> {
-    let points = corners.map(|corner| corner.point.map(|p| p.ray / p.inverse_distance));
-    let ball = match points {
-        [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
-            let center = (a + b + c) / 3.0;
-            let far = [a, b, c].map(|p| p.distance(center));
-            Some(Ball {
-                center,
-                radius: far.into_iter().fold(0.0, f64::max),
-            })
+    /// The source views that may matter where the corners don't know of all that do, in order. Where
+    /// hardly any sees all of the triangle, those that points within it say.
+    fn others_within(&self, bounds: [f64; 3]) -> Vec<u32> {
+        let frame = self.frame;
+        let places = self.points.map(|p| p.ray / p.inverse_distance);
+        // How far the triangle reaches from a corner.
+        let reach = |c: usize| {
+            let others = [(c + 1) % 3, (c + 2) % 3];
+            let far = others.map(|other| places[c].distance(places[other]));
+            if far.iter().all(|far| far.is_finite()) {
+                far[0].max(far[1])
+            } else {
+                f64::INFINITY
+            }
+        };
+        let mut views = Vec::new();
+        if bounds.contains(&f64::INFINITY) && frame.view_tree().is_large() {
+            // Borders anywhere: what the corners and points between them need, all of it may.
+            let within = self.corners.map(|corner| corner.near.within);
+            let mut guess = within.into_iter().fold(frame.first_guess(), f64::max);
+            let sight = 0.5 * (0..3).map(reach).fold(0.0, f64::max);
+            for point in self.patch().between() {
+                views.extend(frame.near(&point, sight, &mut guess).views);
+            }
+        } else {
+            let mut found = Vec::new();
+            for c in (0..3).filter(|&c| bounds[c] > self.corners[c].near.within) {
+                let ball = Ball::around(&self.points[c], reach(c));
+                frame.views_within(ball.as_ref(), bounds[c], &mut found);
+                views.extend_from_slice(&found);
+            }
         }
-        _ => None,
-    };
-    let mut most = bounds.into_iter().fold(0.0, f64::max);
-    if most == f64::INFINITY && frame.view_tree().is_large() {
-        // Borders anywhere: what points spread over it need, all of it may.
+        views.sort_unstable();
+        views.dedup();
+        views
+    }
+
+    /// The source views that count at any point of a triangle in which some were moved; none where
+    /// none were. In order.
+    fn seen_where_moved(&self) -> Vec<usize> {
+        let frame = self.frame;
+        if !matches!(frame.surface, Surface::Facets(_)) || !self.patch().is_moved {
+            return Vec::new();
+        }
+        let mut seen = BTreeSet::new();
         let mut guess = frame.first_guess();
-        let needed = spread_over(corners).filter_map(|at| point_at(frame, at));
-        most = needed
-            .map(|point| frame.near(&point, 0.0, &mut guess).within)
-            .fold(0.0, f64::max);
-    }
-    let mut views = Vec::new();
-    frame.views_within(ball.as_ref(), most, &mut views);
-    views
-}
-
-/// The source views that count at any point of a triangle in which some were moved; none where
-/// none were. In order.
-fn seen_where_moved(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Vec<usize> {
-    let pixel = |at: DVec2| Pixel::new(at.x, at.y);
-    if !spread_over(corners).any(|at| frame.surface.is_moved_at(pixel(at))) {
-        return Vec::new();
-    }
-    let mut seen = BTreeSet::new();
-    let mut guess = frame.first_guess();
-    for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
-        let near = frame.near(&point, 0.0, &mut guess);
-        seen.extend(near.candidates.iter().map(|c| c.source_idx));
-    }
-    seen.into_iter().collect()
-}
-
-/// The best rank, by difference, that listed views have among those of them that see a point, for
-/// points spread over a triangle.
-fn ranks_within(
-    frame: &Frame<'_>,
-    corners: [&Vertex; 3],
-    listed: &[Listed],
-) -> BTreeMap<usize, usize> {
-    let mut ranks = BTreeMap::new();
-    for point in spread_over(corners).filter_map(|at| point_at(frame, at)) {
-        let seeing = listed.iter().filter_map(|view| {
-            let i = view.source_idx;
-            let pixel = frame.project(i, &point)?;
-            let seen = candidate(frame, i, &point, pixel, || frame.difference(i, &point))?;
-            Some((seen.diff, i))
-        });
-        let mut seeing: Vec<(f64, usize)> = seeing.collect();
-        seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        for (rank, (_, i)) in seeing.into_iter().enumerate() {
-            let best = ranks.entry(i).or_insert(rank);
-            *best = rank.min(*best);
+        for point in self.patch().points() {
+            let near = frame.near(&point, 0.0, &mut guess);
+            seen.extend(near.candidates.iter().map(|c| c.source_idx));
         }
+        seen.into_iter().collect()
     }
-    ranks
-}
 
-fn how_it_sees(
-    frame: &Frame<'_>,
-    source_idx: usize,
-    points: &[ProxyPoint; 3],
-    pixels: [Option<Pixel>; 3],
-) -> Sees {
-    let [Some(a), Some(b), Some(c)] = pixels else {
-        let none = pixels.iter().all(Option::is_none);
-        return if none { Sees::Nothing } else { Sees::Part };
-    };
-    let source = &frame.sources[source_idx];
-    let [width, height] = source.size;
-    let (left, right) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
-    let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
-    let beyond = (-right).max(left - width).max(-bottom).max(top - height);
-    let inside = left.min(width - right).min(top).min(height - bottom);
-    if beyond > CLEARANCE_PX {
-        return Sees::Nothing;
-    }
-    if let Some(mask) = frame.lumigraph.photos.mask(source_idx) {
-        // Filtering reaches two texels of the coarser of its two levels.
-        let levels = points.map(|point| frame.level_of_detail(source_idx, &point));
-        let coarsest = levels.into_iter().fold(0.0, f64::max).ceil();
-        let reach = CLEARANCE_PX + 2.0 * coarsest.min((mask.levels.len() - 1) as f64).exp2();
-        match mask.range([left - reach, top - reach], [right + reach, bottom + reach]) {
-            (_, 0) => return Sees::Nothing,
-            (255, _) => {}
-            _ => return Sees::Part,
+    /// The best rank, by difference, that listed views have among those of them that see a point,
+    /// for points spread over the triangle.
+    fn ranks(&self, listed: &[Listed]) -> BTreeMap<usize, usize> {
+        let frame = self.frame;
+        let mut ranks = BTreeMap::new();
+        for point in self.patch().points() {
+            let seeing = listed.iter().filter_map(|view| {
+                let i = view.source_idx;
+                let pixel = frame.project(i, &point)?;
+                let seen = candidate(frame, i, &point, pixel, || frame.difference(i, &point))?;
+                Some((seen.diff, i))
+            });
+            let mut seeing: Vec<(f64, usize)> = seeing.collect();
+            seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            for (rank, (_, i)) in seeing.into_iter().enumerate() {
+                let best = ranks.entry(i).or_insert(rank);
+                *best = rank.min(*best);
+            }
         }
+        ranks
     }
-    // What hides something from a view has borders anywhere.
-    let hidden = frame.lumigraph.visibility.is_some();
-    if !hidden && inside >= source.feather_px + CLEARANCE_PX {
-        Sees::All
-    } else {
-        Sees::Part
+
+    /// How a source view sees the triangle, whose corners fall on these pixels of its photo.
+    fn how_it_is_seen(&self, source_idx: usize, pixels: [Option<Pixel>; 3]) -> Sees {
+        let frame = self.frame;
+        let [Some(a), Some(b), Some(c)] = pixels else {
+            let none = pixels.iter().all(Option::is_none);
+            return if none { Sees::Nothing } else { Sees::Part };
+        };
+        let source = &frame.sources[source_idx];
+        let [width, height] = source.size;
+        let (left, right) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        let (top, bottom) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        let beyond = (-right).max(left - width).max(-bottom).max(top - height);
+        let inside = left.min(width - right).min(top).min(height - bottom);
+        if beyond > CLEARANCE_PX {
+            return Sees::Nothing;
+        }
+        if let Some(mask) = frame.lumigraph.photos.mask(source_idx) {
+            // Filtering reaches two texels of the coarser of its two levels.
+            let levels = self.points.map(|p| frame.level_of_detail(source_idx, &p));
+            let coarsest = levels.into_iter().fold(0.0, f64::max).ceil();
+            let reach = CLEARANCE_PX + 2.0 * coarsest.min((mask.levels.len() - 1) as f64).exp2();
+            match mask.range([left - reach, top - reach], [right + reach, bottom + reach]) {
+                (_, 0) => return Sees::Nothing,
+                (255, _) => {}
+                _ => return Sees::Part,
+            }
+        }
+        if inside < source.feather_px + CLEARANCE_PX {
+            return Sees::Part;
+        }
+        match &frame.lumigraph.visibility {
+            Some(visibility)
+                if !self
+                    .patch()
+                    .is_open_to(frame, source_idx, visibility.map(source_idx)) =>
+            {
+                Sees::Part
+            }
+            _ => Sees::All,
+        }
     }
 }

@@ -13,6 +13,7 @@
 
 mod constraints;
 mod list;
+mod patch;
 mod vertex;
 
 use crate::blend::{Candidate, Contributor, blend};
@@ -21,6 +22,7 @@ use crate::held::Held;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, triangle_map};
 use crate::reference::{self, candidate};
+use crate::surface::Surface;
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
 use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
@@ -91,7 +93,27 @@ impl TriangulatedField {
         };
         let plane = triangulation::triangulate(width, height, grid, &constraints)?;
 
-        // 2. The field at every vertex. A plane looks the same from both sides of an edge,
+        // 2. The triangles through which the proxy is seen.
+        let seen = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|i| plane.vertices[i as usize]);
+            match &frame.surface {
+                // Its horizon is an edge of the triangulation.
+                Surface::Plane(_) | Surface::Nothing => {
+                    let centroid = (a + b + c) / 3.0;
+                    let pixel = Pixel::new(centroid.x, centroid.y);
+                    frame.proxy_point(pixel).is_some()
+                }
+                // Any pixel may have it, as long as edges of the proxy are not.
+                Surface::Facets(map) => map.any_within(a.min(b).min(c), a.max(b).max(c)),
+            }
+        };
+        let visible: Vec<[u32; 3]> = plane.triangles.into_iter().filter(seen).collect();
+        let mut is_used = vec![false; plane.vertices.len()];
+        for &corner in visible.iter().flatten() {
+            is_used[corner as usize] = true;
+        }
+
+        // 3. The field at their vertices. A plane looks the same from both sides of an edge,
         // so a vertex needs one value.
         let cell = DVec2::new(
             f64::from(width) / f64::from(grid.columns),
@@ -99,23 +121,18 @@ impl TriangulatedField {
         );
         // A vertex' guess is the one before's, in runs that do not depend on the threads: lists
         // are made of what was found, and what was asked for decides that, too.
-        let of_run = |run: &[DVec2]| {
+        let of_run = |(run, is_used): (&[DVec2], &[bool])| {
             let mut guess = frame.first_guess();
-            run.iter()
-                .map(|at| Vertex::new(frame, *at, cell, &mut guess))
-                .collect::<Vec<Vertex>>()
+            let of_vertex = |(at, is_used): (&DVec2, &bool)| match is_used {
+                true => Vertex::new(frame, *at, cell, &mut guess),
+                false => Vertex::unused(*at),
+            };
+            run.iter().zip(is_used).map(of_vertex).collect::<Vec<_>>()
         };
-        let vertices: Vec<Vertex> = plane.vertices.par_chunks(RUN).flat_map(of_run).collect();
+        let runs = plane.vertices.par_chunks(RUN).zip(is_used.par_chunks(RUN));
+        let vertices: Vec<Vertex> = runs.flat_map_iter(of_run).collect();
 
-        // 3. The triangles through which the proxy is seen, each with the views it needs.
-        let seen = |corners: &[u32; 3]| {
-            let sum: DVec2 = corners.iter().map(|&i| plane.vertices[i as usize]).sum();
-            let centroid = sum / 3.0;
-            frame
-                .proxy_point(Pixel::new(centroid.x, centroid.y))
-                .is_some()
-        };
-        let visible: Vec<[u32; 3]> = plane.triangles.into_iter().filter(seen).collect();
+        // 4. What each triangle needs.
         let lists: Vec<List> = visible
             .par_iter()
             .map(|corners| List::of(frame, corners.map(|i| &vertices[i as usize])))

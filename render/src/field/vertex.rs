@@ -3,6 +3,7 @@
 use crate::blend::{Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::near::Near;
+use crate::surface::{NO_FACET, Surface};
 use calibrate::Pixel;
 use glam::DVec2;
 
@@ -22,10 +23,20 @@ pub(super) struct Vertex {
 }
 
 impl Vertex {
+    /// One that no triangle needs.
+    pub(super) fn unused(at: DVec2) -> Self {
+        Self {
+            at,
+            point: None,
+            near: Near::default(),
+            weights: Vec::new(),
+        }
+    }
+
     /// The triangles around it are about the size of a `cell`, in pixels. The guess is of the
     /// difference that matters; see [`Frame::near`].
     pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: &mut f64) -> Self {
-        let point = point_at(frame, at);
+        let point = point_at(frame, at, cell);
         let near = point.map_or_else(Near::default, |point| {
             frame.near(&point, extent(frame, at, cell, &point), guess)
         });
@@ -38,25 +49,39 @@ impl Vertex {
     }
 }
 
-/// How far the corners of the cells around a vertex lie from it, if they are in its plane; within
-/// half its distance from the viewer.
+/// How far the corners of the cells around a vertex lie from it, if they are in its plane: infinite
+/// where that meets no ray through one.
 fn extent(frame: &Frame<'_>, at: DVec2, cell: DVec2, point: &ProxyPoint) -> f64 {
     let here = point.ray / point.inverse_distance;
     let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
     let offset = |(x, y): (f64, f64)| {
         let there = at + cell * DVec2::new(x, y);
-        let ray = frame.desired.lens.unproject(Pixel::new(there.x, there.y))?;
-        let s = point.plane.dot(ray);
-        (s > 0.0).then(|| (ray / s).distance(here))
+        let ray = frame.desired.lens.unproject(Pixel::new(there.x, there.y));
+        let along = ray.map(|ray| (ray, point.plane.dot(ray)));
+        along
+            .filter(|(_, s)| *s > 0.0)
+            .map_or(f64::INFINITY, |(ray, s)| (ray / s).distance(here))
     };
-    let farthest = corners.into_iter().filter_map(offset).fold(0.0, f64::max);
-    farthest.min(0.5 * here.length())
+    corners.into_iter().map(offset).fold(0.0, f64::max)
 }
 
-/// The proxy point at a position in the desired image; `None` where the lens has no ray.
-pub(super) fn point_at(frame: &Frame<'_>, at: DVec2) -> Option<ProxyPoint> {
+/// The proxy point at a position in the desired image; `None` where the lens has no ray. Where
+/// nothing is there, what is nearest to it in the image, within a `cell` of it, goes on.
+pub(super) fn point_at(frame: &Frame<'_>, at: DVec2, cell: DVec2) -> Option<ProxyPoint> {
     let pixel = Pixel::new(at.x, at.y);
     let ray = frame.desired.lens.unproject(pixel)?;
+    if let Surface::Facets(map) = &frame.surface
+        && map.facet_at(pixel) == NO_FACET
+    {
+        let beside = map.nearest(pixel, cell.max_element().ceil() as i64)?;
+        let beside = frame.proxy_point(beside)?;
+        let by_length = beside.inverse_distance * ray.length() / beside.ray.length();
+        return Some(ProxyPoint {
+            ray,
+            inverse_distance: by_length,
+            plane: ray * (by_length / ray.length_squared()),
+        });
+    }
     let plane = frame.surface.plane_at(pixel).unwrap_or_default();
     // Snapping may have put a vertex of the horizon a little beyond it. On it every view's
     // angle is zero and they all tie; just short of it they don't, and that is what the
