@@ -37,7 +37,7 @@ pub mod triangulation;
 mod view_tree;
 mod visibility;
 
-pub use engine::{DeviceChoice, Engine, Prepared};
+pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};
 pub use held::{Held, decode_ahead};
@@ -65,7 +65,13 @@ pub enum RenderError {
     /// The image plane could not be triangulated.
     #[error(transparent)]
     Triangulation(#[from] triangulation::TriangulationError),
-    /// The graphics device is missing or failed.
+    /// The graphics device is missing, failed, or cannot draw such a frame.
     #[error("graphics device: {0}")]
     Gpu(String),
+    /// The graphics device has too little memory.
+    #[error("graphics device: {0}")]
+    DeviceFull(String),
+    /// The graphics device is gone for good, as after a reset of its driver.
+    #[error("graphics device: it was lost ({0})")]
+    DeviceLost(String),
 }

@@ -128,10 +128,7 @@ impl Session {
 
     /// What photos took on the graphics processor, where one draws.
     pub(super) fn gpu_residency(&self) -> Option<Residency> {
-        match &self.engine {
-            Some(Engine::Gpu(gpu)) => Some(gpu.residency()),
-            _ => None,
-        }
+        Some(self.engine.as_ref()?.gpu()?.residency())
     }
 
     /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
@@ -141,10 +138,10 @@ impl Session {
             return Ok(());
         }
         let mut engine = Engine::open(self.device)?;
-        if let Engine::Gpu(gpu) = &mut engine {
+        if let Some(gpu) = engine.gpu_mut() {
             gpu.set_budget(self.gpu_memory);
         }
-        if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu(_)) {
+        if self.device == DeviceChoice::Auto && engine.gpu().is_none() {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
         self.engine = Some(engine);
