@@ -30,6 +30,7 @@ pub struct Engine {
     spare: Cpu,
     notes: Vec<String>,
     frames_by_cpu: u64,
+    last_by_cpu: bool,
 }
 
 #[derive(Debug)]
@@ -87,6 +88,7 @@ impl Engine {
             spare: Cpu::default(),
             notes: Vec::new(),
             frames_by_cpu: 0,
+            last_by_cpu: false,
         }
     }
 
@@ -123,6 +125,11 @@ impl Engine {
     /// How many frames the CPU drew because the graphics device could not, or was gone.
     pub fn frames_by_cpu(&self) -> u64 {
         self.frames_by_cpu
+    }
+
+    /// Whether the CPU engine drew the last frame.
+    pub fn last_by_cpu(&self) -> bool {
+        self.last_by_cpu
     }
 
     /// Draws a frame: straight alpha, alpha = coverage.
@@ -178,6 +185,7 @@ impl Engine {
         prepared: &Prepared,
         ready: &Ready,
     ) -> Result<RgbaImage, RenderError> {
+        self.last_by_cpu = false;
         let gpu = match &mut self.by {
             By::Gpu(gpu) => gpu,
             By::Cpu => return self.draw_by_cpu(frame, prepared),
@@ -234,6 +242,7 @@ impl Engine {
         frame: &Frame<'_>,
         prepared: &Prepared,
     ) -> Result<RgbaImage, RenderError> {
+        self.last_by_cpu = true;
         match prepared {
             Prepared::Exact => self.spare.render(frame, Method::Exact),
             Prepared::Field(field) => self.spare.render_field(frame, field),

@@ -170,8 +170,8 @@ fn what_a_device_cannot_draw_the_cpu_draws_and_it_is_said() {
         if masked {
             let photos = PhotoStore::from_images(shot.photos.clone());
             let half = |_| {
-                Ok(GrayImage::from_fn(160, 120, |x, _| {
-                    Luma([255 * u8::from(x > 80)])
+                Ok(GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| {
+                    Luma([255 * u8::from(x > 40)])
                 }))
             };
             lumigraph.photos = photos.with_masks(&[true; COUNT], half);

@@ -53,6 +53,7 @@ impl Gpu {
         frame: &Frame<'_>,
         field: Option<&TriangulatedField>,
     ) -> Result<Loaded, RenderError> {
+        self.device_time = None;
         frame.lumigraph.photos.begin_frame();
         let loaded = loop {
             let count = match self.try_load(frame, field) {

@@ -21,7 +21,7 @@ use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
 use crate::photos::PhotoStore;
-use crate::residency::{Residency, photo_bytes};
+use crate::residency::Residency;
 use calibrate::Lens;
 use device::Trouble;
 use groups::{Part, Rect};
@@ -172,16 +172,9 @@ impl Gpu {
         self.residency
     }
 
-    /// How many photos were never brought to the device, and the bytes that they and their mip
-    /// levels would have taken without any padding.
-    pub fn never_loaded(&self, frame: &Frame<'_>) -> (usize, u64) {
-        let ours = self.ever_loaded.0 == frame.lumigraph.photos.id();
-        let sources = frame.lumigraph.sources.iter().enumerate();
-        let never = sources.filter(|(i, _)| !(ours && self.ever_loaded.1[*i]));
-        never.fold((0, 0), |(count, bytes), (_, source)| {
-            let size = [source.view.width, source.view.height];
-            (count + 1, bytes + photo_bytes(size, 0))
-        })
+    /// Whether a photo was ever brought to the device.
+    pub fn was_loaded(&self, photos: &PhotoStore, source_idx: usize) -> bool {
+        self.ever_loaded.0 == photos.id() && self.ever_loaded.1[source_idx]
     }
 
     /// The source views whose photos are on the device, in no order.
@@ -193,6 +186,11 @@ impl Gpu {
     /// The device's name and its driver, for people.
     pub fn description(&self) -> &str {
         &self.description
+    }
+
+    /// Whether the device tells the time.
+    pub fn tells_time(&self) -> bool {
+        self.timestamps
     }
 
     /// How long the device took to draw the last frame; `None` where it does not tell. Marking
