@@ -66,10 +66,7 @@ impl Engine {
     /// [`DeviceChoice::Gpu`] where no driver answers.
     pub fn open(choice: DeviceChoice) -> Result<Self, RenderError> {
         let by = match choice {
-            DeviceChoice::Auto => match Gpu::open() {
-                Ok(gpu) if !gpu.is_software() => By::Gpu(Box::new(gpu)),
-                _ => By::Cpu,
-            },
+            DeviceChoice::Auto => Gpu::open_real().map_or(By::Cpu, |gpu| By::Gpu(Box::new(gpu))),
             DeviceChoice::Gpu => By::Gpu(Box::new(Gpu::open()?)),
             DeviceChoice::Cpu => By::Cpu,
             DeviceChoice::Reference => By::Reference,

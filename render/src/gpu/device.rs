@@ -84,14 +84,18 @@ impl Trouble {
 }
 
 /// Opens the best device: a real one before a software driver, then Vulkan, Metal and Direct3D
-/// before OpenGL. One that lacks something is passed over for the next.
+/// before OpenGL. One that lacks something is passed over for the next; software drivers are not
+/// tried where only a `real` one is of use.
 ///
 /// # Errors
 /// None will do; the message says of each why.
-pub(super) fn open(asked: &DeviceLimits) -> Result<Opened, RenderError> {
+pub(super) fn open(asked: &DeviceLimits, real: bool) -> Result<Opened, RenderError> {
     let mut refused = Vec::new();
     for adapter in adapters() {
         let info = adapter.get_info();
+        if real && info.device_type == wgpu::DeviceType::Cpu {
+            continue;
+        }
         let name = describe(&info);
         let missing = missing(&adapter);
         if !missing.is_empty() {

@@ -84,11 +84,23 @@ impl Gpu {
         Self::open_within(DeviceLimits::default())
     }
 
+    /// As [`Self::open`], but no software driver.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_real() -> Result<Self, RenderError> {
+        Self::open_any(DeviceLimits::default(), true)
+    }
+
     /// As [`Self::open`], with tighter limits than the device's own. Pictures have the same bytes.
     ///
     /// # Errors
     /// As [`Self::open`].
     pub fn open_within(asked: DeviceLimits) -> Result<Self, RenderError> {
+        Self::open_any(asked, false)
+    }
+
+    fn open_any(asked: DeviceLimits, real: bool) -> Result<Self, RenderError> {
         let device::Opened {
             device,
             queue,
@@ -96,7 +108,7 @@ impl Gpu {
             mut limits,
             timestamps,
             trouble,
-        } = device::open(&asked)?;
+        } = device::open(&asked, real)?;
         if info.backend == wgpu::Backend::Gl && limits.max_texture_array_layers.is_multiple_of(6) {
             // One more would be needed: see `Maker::layers_of_array`.
             limits.max_texture_array_layers -= 1;
