@@ -36,7 +36,10 @@ pub struct Engine {
 #[derive(Debug)]
 enum By {
     Gpu(Box<Gpu>),
-    Cpu,
+    Cpu {
+        /// Of a device that is gone.
+        instead: bool,
+    },
     Reference,
 }
 
@@ -66,9 +69,11 @@ impl Engine {
     /// [`DeviceChoice::Gpu`] where no driver answers.
     pub fn open(choice: DeviceChoice) -> Result<Self, RenderError> {
         let by = match choice {
-            DeviceChoice::Auto => Gpu::open_real().map_or(By::Cpu, |gpu| By::Gpu(Box::new(gpu))),
+            DeviceChoice::Auto => {
+                Gpu::open_real().map_or(By::Cpu { instead: false }, |gpu| By::Gpu(Box::new(gpu)))
+            }
             DeviceChoice::Gpu => By::Gpu(Box::new(Gpu::open()?)),
-            DeviceChoice::Cpu => By::Cpu,
+            DeviceChoice::Cpu => By::Cpu { instead: false },
             DeviceChoice::Reference => By::Reference,
         };
         Ok(Self::of(by))
@@ -93,7 +98,7 @@ impl Engine {
     pub fn description(&self) -> String {
         match &self.by {
             By::Gpu(gpu) => gpu.description().to_owned(),
-            By::Cpu => "CPU".to_owned(),
+            By::Cpu { .. } => "CPU".to_owned(),
             By::Reference => "CPU, reference".to_owned(),
         }
     }
@@ -102,7 +107,7 @@ impl Engine {
     pub fn gpu(&self) -> Option<&Gpu> {
         match &self.by {
             By::Gpu(gpu) => Some(gpu),
-            By::Cpu | By::Reference => None,
+            By::Cpu { .. } | By::Reference => None,
         }
     }
 
@@ -110,7 +115,7 @@ impl Engine {
     pub fn gpu_mut(&mut self) -> Option<&mut Gpu> {
         match &mut self.by {
             By::Gpu(gpu) => Some(gpu),
-            By::Cpu | By::Reference => None,
+            By::Cpu { .. } | By::Reference => None,
         }
     }
 
@@ -185,7 +190,10 @@ impl Engine {
         self.last_by_cpu = false;
         let gpu = match &mut self.by {
             By::Gpu(gpu) => gpu,
-            By::Cpu => return self.draw_by_cpu(frame, prepared),
+            By::Cpu { instead } => {
+                self.frames_by_cpu += u64::from(*instead);
+                return self.draw_by_cpu(frame, prepared);
+            }
             By::Reference => {
                 return Ok(match prepared {
                     Prepared::Exact => reference::render_exact(frame)?,
@@ -209,7 +217,7 @@ impl Engine {
                     Err(RenderError::Photo(_)) => {}
                     Err(_) => {
                         self.note(format!("{lost}; the CPU goes on"));
-                        self.by = By::Cpu;
+                        self.by = By::Cpu { instead: true };
                         self.frames_by_cpu += 1;
                         return self.draw_by_cpu(frame, prepared);
                     }

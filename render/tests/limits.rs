@@ -9,7 +9,8 @@ use image::{GrayImage, Luma, Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
 use render::gpu::{DeviceLimits, Gpu};
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, PhotoStore, RenderError, SourceView, cpu,
+    Engine, FieldOptions, Frame, Lumigraph, Method, PhotoStore, Prepared, RenderError, SourceView,
+    cpu,
 };
 
 const COUNT: usize = 30;
@@ -32,6 +33,15 @@ impl Shot {
             points: Vec::new(),
             visibility: None,
         }
+    }
+
+    /// Photos of which each ignores a part.
+    fn masked(&self) -> PhotoStore {
+        let mask = |i: usize| {
+            let value = |x, y| Luma([255 * u8::from((x + y + i as u32) % 40 > 15)]);
+            Ok(GrayImage::from_fn(SIZE.0, SIZE.1, value))
+        };
+        PhotoStore::from_images(self.photos.clone()).with_masks(&[true; COUNT], mask)
     }
 }
 
@@ -80,42 +90,36 @@ fn frame<'a>(lumigraph: &'a Lumigraph, view: &View) -> Frame<'a> {
 fn pictures_do_not_depend_on_what_a_device_holds() {
     let shot = shot();
     let lumigraph = shot.lumigraph();
-    let views = path();
-    for method in METHODS {
-        let Some(mut gpu) = open(DeviceLimits::default()) else {
-            return;
-        };
-        let expected: Vec<_> = views
-            .iter()
-            .map(|view| gpu.render(&frame(&lumigraph, view), method).unwrap())
-            .collect();
-        for limits in [
-            DeviceLimits {
-                array_layers: Some(12),
-                ..DeviceLimits::default()
-            },
-            DeviceLimits {
-                array_bytes: Some(14 * LAYER),
-                ..DeviceLimits::default()
-            },
-            DeviceLimits {
-                buffer_bytes: Some(1 << 15),
-                ..DeviceLimits::default()
-            },
-        ] {
-            let mut small = open(limits).unwrap();
+    let Some(mut gpu) = open(DeviceLimits::default()) else {
+        return;
+    };
+    let all = METHODS.map(|method| {
+        let render = |view: &View| gpu.render(&frame(&lumigraph, view), method).unwrap();
+        path().iter().map(render).collect::<Vec<_>>()
+    });
+    for limits in [
+        DeviceLimits {
+            array_layers: Some(12),
+            ..DeviceLimits::default()
+        },
+        DeviceLimits {
+            array_bytes: Some(14 * LAYER),
+            ..DeviceLimits::default()
+        },
+        DeviceLimits {
+            buffer_bytes: Some(1 << 15),
+            ..DeviceLimits::default()
+        },
+    ] {
+        let mut small = open(limits).unwrap();
+        for (method, expected) in METHODS.into_iter().zip(&all) {
             let mut most_parts = 0;
-            for (view, expected) in views.iter().zip(&expected) {
+            for (view, expected) in path().iter().zip(expected) {
                 let frame = frame(&lumigraph, view);
-                let field = match method {
-                    Method::Exact => None,
-                    Method::Triangulated { cells_across } => {
-                        Some(render::TriangulatedField::new(&frame, cells_across).unwrap())
-                    }
-                };
-                let loaded = small.load(&frame, field.as_ref()).unwrap();
+                let prepared = Prepared::new(&frame, method).unwrap();
+                let loaded = small.load(&frame, prepared.field()).unwrap();
                 most_parts = most_parts.max(loaded.parts());
-                let picture = small.draw(&frame, field.as_ref(), &loaded).unwrap();
+                let picture = small.draw(&frame, prepared.field(), &loaded).unwrap();
                 assert!(picture == *expected, "{method:?}, {limits:?}");
             }
             let took = small.residency();
@@ -126,6 +130,29 @@ fn pictures_do_not_depend_on_what_a_device_holds() {
             }
         }
     }
+}
+
+#[test]
+fn masks_go_with_their_parts() {
+    let shot = shot();
+    let lumigraph = Lumigraph {
+        photos: shot.masked(),
+        ..shot.lumigraph()
+    };
+    let frame = frame(&lumigraph, &path()[0]);
+    let Some(mut gpu) = open(DeviceLimits::default()) else {
+        return;
+    };
+    let mut small = open(DeviceLimits {
+        array_layers: Some(14),
+        ..DeviceLimits::default()
+    })
+    .unwrap();
+    let prepared = Prepared::new(&frame, Method::TRIANGULATED).unwrap();
+    let loaded = small.load(&frame, prepared.field()).unwrap();
+    assert!(loaded.parts() > 1);
+    let picture = small.draw(&frame, prepared.field(), &loaded).unwrap();
+    assert!(picture == gpu.render(&frame, Method::TRIANGULATED).unwrap());
 }
 
 #[test]
@@ -168,13 +195,7 @@ fn what_a_device_cannot_draw_the_cpu_draws_and_it_is_said() {
         ),
     ] {
         if masked {
-            let photos = PhotoStore::from_images(shot.photos.clone());
-            let half = |_| {
-                Ok(GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| {
-                    Luma([255 * u8::from(x > 40)])
-                }))
-            };
-            lumigraph.photos = photos.with_masks(&[true; COUNT], half);
+            lumigraph.photos = shot.masked();
         }
         let Some(gpu) = open(limits) else { return };
         let mut engine = Engine::with(gpu);
@@ -206,18 +227,43 @@ fn a_lost_device_is_opened_anew() {
         let frame = frame(&lumigraph, &views[0]);
         let expected = engine.render(&frame, method).unwrap();
         let before = engine.gpu().unwrap().residency();
-        engine.gpu().unwrap().lose();
+        engine.gpu_mut().unwrap().lose(false);
         assert!(engine.render(&frame, method).unwrap() == expected);
         let after = engine.gpu().unwrap().residency();
         assert!(after.loads == 2 * before.loads && after.held == before.held);
         // Between loading and drawing, too.
-        let prepared = render::Prepared::new(&frame, method).unwrap();
+        let prepared = Prepared::new(&frame, method).unwrap();
         let ready = engine.ready(&frame, &prepared).unwrap();
-        engine.gpu().unwrap().lose();
+        engine.gpu_mut().unwrap().lose(false);
         assert!(engine.draw_ready(&frame, &prepared, &ready).unwrap() == expected);
         let notes = engine.notes();
         assert!(
             notes[0].contains("it was lost") && notes[0].contains("goes on"),
+            "{notes:?}"
+        );
+    }
+}
+
+#[test]
+fn the_cpu_goes_on_where_a_device_is_gone_for_good() {
+    let shot = shot();
+    let lumigraph = shot.lumigraph();
+    let frame = frame(&lumigraph, &path()[1]);
+    for method in METHODS {
+        let Some(gpu) = open(DeviceLimits::default()) else {
+            return;
+        };
+        let mut engine = Engine::with(gpu);
+        engine.render(&frame, method).unwrap();
+        engine.gpu_mut().unwrap().lose(true);
+        let by_cpu = cpu::render(&frame, method).unwrap();
+        for _ in 0..2 {
+            assert!(engine.render(&frame, method).unwrap() == by_cpu);
+        }
+        assert!(engine.gpu().is_none() && engine.frames_by_cpu() == 2);
+        let notes = engine.notes();
+        assert!(
+            notes.len() == 1 && notes[0].ends_with("the CPU goes on"),
             "{notes:?}"
         );
     }
@@ -231,7 +277,7 @@ fn a_lost_device_says_so_itself() {
     let Some(mut gpu) = open(DeviceLimits::default()) else {
         return;
     };
-    gpu.lose();
+    gpu.lose(false);
     for method in METHODS {
         let error = gpu.render(&frame, method).unwrap_err();
         assert!(matches!(error, RenderError::DeviceLost(_)), "{error}");

@@ -59,6 +59,8 @@ pub struct Gpu {
     timestamps: bool,
     device_time: Option<Duration>,
     trouble: Trouble,
+    /// See [`Self::lose`].
+    gone: bool,
 }
 
 /// Which of a frame's passes.
@@ -142,6 +144,7 @@ impl Gpu {
             timestamps,
             device_time: None,
             trouble,
+            gone: false,
         })
     }
 
@@ -151,6 +154,9 @@ impl Gpu {
     /// # Errors
     /// As [`Self::open`].
     pub fn reopen(&mut self) -> Result<(), RenderError> {
+        if self.gone {
+            return Err(RenderError::Gpu("no graphics driver answers".to_owned()));
+        }
         let fresh = Self::open_within(self.asked)?;
         let old = std::mem::replace(self, fresh);
         self.residency = Residency {
@@ -161,8 +167,10 @@ impl Gpu {
         Ok(())
     }
 
-    /// Gives the device up, as if its driver had: every drawing fails until [`Self::reopen`].
-    pub fn lose(&self) {
+    /// Gives the device up, as if its driver had: every drawing fails until [`Self::reopen`], and
+    /// that fails, too, if it is gone `for_good`.
+    pub fn lose(&mut self, for_good: bool) {
+        self.gone = for_good;
         self.device.destroy();
         // Tells the callback.
         let _ = self.device.poll(wgpu::PollType::Poll);
