@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change goes in: formatting, lints, documentation and
-# all tests, those on the graphics device and with COLMAP and ffmpeg included. On Debian and
-# Ubuntu it installs what is missing of these two and of the software Vulkan driver.
+# all tests, those on the graphics device, by Vulkan and by OpenGL, and with COLMAP and ffmpeg
+# included. On Debian and Ubuntu it installs what is missing of these two and of the software
+# drivers.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -23,9 +24,18 @@ has_vulkan_loader() {
     { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep 'libvulkan\.so\.1' >/dev/null
 }
 
+has_opengl() {
+    local libraries
+    libraries=$(ldconfig -p 2>/dev/null || /sbin/ldconfig -p)
+    # The dispatcher, and someone's driver behind it.
+    grep 'libEGL\.so\.1' <<<"$libraries" >/dev/null &&
+        grep -E 'libEGL_(mesa|nvidia)\.so\.0' <<<"$libraries" >/dev/null
+}
+
 install_missing() {
     local missing=() as_root=()
     has_vulkan_driver && has_vulkan_loader || missing+=(mesa-vulkan-drivers libvulkan1)
+    has_opengl || missing+=(libegl1 libegl-mesa0 libgl1-mesa-dri)
     command -v colmap >/dev/null || missing+=(colmap)
     command -v ffmpeg >/dev/null || missing+=(ffmpeg)
     if [ ${#missing[@]} -eq 0 ]; then return; fi
@@ -55,5 +65,15 @@ RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
 step "tests"
 LUMIGRAPH_REQUIRE_GPU=1 LUMIGRAPH_REQUIRE_TOOLS=1 cargo test --workspace
+
+if [ "$(uname -s)" = Linux ]; then
+    step "tests on the graphics device, by OpenGL"
+    export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1
+    cargo test --workspace --lib gpu::
+    cargo test --workspace --test engines --test limits --test residency --test exposure \
+        --test masks --test mesh --test points --test time --test invariance
+    cargo test --workspace --test cli gpu::
+    cargo test --workspace --test cli a_graphics_device
+fi
 
 step "all is well"

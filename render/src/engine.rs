@@ -3,7 +3,7 @@
 use crate::cpu::Cpu;
 use crate::field::{self, TriangulatedField};
 use crate::frame::Frame;
-use crate::gpu::Gpu;
+use crate::gpu::{self, Gpu};
 use crate::options::Method;
 use crate::photos::PhotoStore;
 use crate::{RenderError, reference};
@@ -24,13 +24,41 @@ pub enum DeviceChoice {
 
 /// An engine, ready to draw.
 #[derive(Debug)]
-pub enum Engine {
-    /// wgpu.
+pub struct Engine {
+    by: By,
+    /// Draws what the graphics device does not.
+    spare: Cpu,
+    notes: Vec<String>,
+    frames_by_cpu: u64,
+    last_by_cpu: bool,
+}
+
+#[derive(Debug)]
+enum By {
     Gpu(Box<Gpu>),
-    /// f32, all threads.
-    Cpu(Box<Cpu>),
-    /// f64.
+    Cpu {
+        /// Of a device that is gone.
+        instead: bool,
+    },
     Reference,
+}
+
+/// A frame whose photos are where they are needed, as far as is known which.
+#[derive(Clone, Debug)]
+pub struct Ready(Option<gpu::Loaded>);
+
+impl Ready {
+    /// How many photos a graphics device was told to sample; `None` for other engines, and where
+    /// all photos that take part are on the device already.
+    pub fn photos_used(&self) -> Option<usize> {
+        self.0.as_ref()?.photos_used()
+    }
+
+    /// In how many parts a graphics device draws the frame: more than one where its photos do
+    /// not fit on the device at once.
+    pub fn parts(&self) -> usize {
+        self.0.as_ref().map_or(1, gpu::Loaded::parts)
+    }
 }
 
 impl Engine {
@@ -40,30 +68,76 @@ impl Engine {
     /// # Errors
     /// [`DeviceChoice::Gpu`] where no driver answers.
     pub fn open(choice: DeviceChoice) -> Result<Self, RenderError> {
-        Ok(match choice {
-            DeviceChoice::Auto => match Gpu::open() {
-                Ok(gpu) if !gpu.is_software() => Self::Gpu(Box::new(gpu)),
-                _ => Self::Cpu(Box::default()),
-            },
-            DeviceChoice::Gpu => Self::Gpu(Box::new(Gpu::open()?)),
-            DeviceChoice::Cpu => Self::Cpu(Box::default()),
-            DeviceChoice::Reference => Self::Reference,
-        })
+        let by = match choice {
+            DeviceChoice::Auto => {
+                Gpu::open_real().map_or(By::Cpu { instead: false }, |gpu| By::Gpu(Box::new(gpu)))
+            }
+            DeviceChoice::Gpu => By::Gpu(Box::new(Gpu::open()?)),
+            DeviceChoice::Cpu => By::Cpu { instead: false },
+            DeviceChoice::Reference => By::Reference,
+        };
+        Ok(Self::of(by))
+    }
+
+    /// An engine that draws with a device that is open.
+    pub fn with(gpu: Gpu) -> Self {
+        Self::of(By::Gpu(Box::new(gpu)))
+    }
+
+    fn of(by: By) -> Self {
+        Self {
+            by,
+            spare: Cpu::default(),
+            notes: Vec::new(),
+            frames_by_cpu: 0,
+            last_by_cpu: false,
+        }
     }
 
     /// What it draws with, for people.
     pub fn description(&self) -> String {
-        match self {
-            Self::Gpu(gpu) => gpu.description().to_owned(),
-            Self::Cpu(_) => "CPU".to_owned(),
-            Self::Reference => "CPU, reference".to_owned(),
+        match &self.by {
+            By::Gpu(gpu) => gpu.description().to_owned(),
+            By::Cpu { .. } => "CPU".to_owned(),
+            By::Reference => "CPU, reference".to_owned(),
         }
+    }
+
+    /// The graphics device, where one draws.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        match &self.by {
+            By::Gpu(gpu) => Some(gpu),
+            By::Cpu { .. } | By::Reference => None,
+        }
+    }
+
+    /// See [`Self::gpu`].
+    pub fn gpu_mut(&mut self) -> Option<&mut Gpu> {
+        match &mut self.by {
+            By::Gpu(gpu) => Some(gpu),
+            By::Cpu { .. } | By::Reference => None,
+        }
+    }
+
+    /// What became of the graphics device and what it could not draw, for people; each once.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// How many frames the CPU drew because the graphics device could not, or was gone.
+    pub fn frames_by_cpu(&self) -> u64 {
+        self.frames_by_cpu
+    }
+
+    /// Whether the CPU engine drew the last frame.
+    pub fn last_by_cpu(&self) -> bool {
+        self.last_by_cpu
     }
 
     /// Draws a frame: straight alpha, alpha = coverage.
     ///
     /// # Errors
-    /// A photo that is needed cannot be decoded; the device fails.
+    /// As [`Self::draw_ready`].
     pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
         self.draw(frame, &Prepared::new(frame, method)?)
     }
@@ -71,32 +145,134 @@ impl Engine {
     /// Draws a frame that was prepared before.
     ///
     /// # Errors
-    /// As [`Self::render`].
+    /// As [`Self::draw_ready`].
     pub fn draw(
         &mut self,
         frame: &Frame<'_>,
         prepared: &Prepared,
     ) -> Result<RgbaImage, RenderError> {
-        match (self, prepared) {
-            (Self::Gpu(gpu), Prepared::Exact) => gpu.render(frame, Method::Exact),
-            (Self::Cpu(cpu), Prepared::Exact) => cpu.render(frame, Method::Exact),
-            (Self::Reference, Prepared::Exact) => Ok(reference::render_exact(frame)?),
-            (Self::Gpu(gpu), Prepared::Field(field)) => {
-                frame.lumigraph.photos.check_masks()?;
-                gpu.render_field(frame, field)
+        let ready = self.ready(frame, prepared)?;
+        self.draw_ready(frame, prepared, &ready)
+    }
+
+    /// Brings a frame's photos to the graphics device, decoding those that are not in memory.
+    /// Other engines decode what they sample when they sample it.
+    ///
+    /// # Errors
+    /// A photo that is needed cannot be decoded. (What a device has to say is left to
+    /// [`Self::draw_ready`].)
+    pub fn ready(&mut self, frame: &Frame<'_>, prepared: &Prepared) -> Result<Ready, RenderError> {
+        let By::Gpu(gpu) = &mut self.by else {
+            return Ok(Ready(None));
+        };
+        if prepared.field().is_some() {
+            frame.lumigraph.photos.check_masks()?;
+        }
+        match gpu.load(frame, prepared.field()) {
+            Ok(loaded) => Ok(Ready(Some(loaded))),
+            Err(error @ (RenderError::Photo(_) | RenderError::Triangulation(_))) => Err(error),
+            // To be heard again.
+            Err(_) => Ok(Ready(None)),
+        }
+    }
+
+    /// Draws a frame that is [`Self::ready`]. What a graphics device cannot draw the CPU draws.
+    /// A device that is lost is opened again; if that is of no use, the CPU goes on.
+    ///
+    /// # Errors
+    /// A photo that is needed cannot be decoded.
+    pub fn draw_ready(
+        &mut self,
+        frame: &Frame<'_>,
+        prepared: &Prepared,
+        ready: &Ready,
+    ) -> Result<RgbaImage, RenderError> {
+        self.last_by_cpu = false;
+        let gpu = match &mut self.by {
+            By::Gpu(gpu) => gpu,
+            By::Cpu { instead } => {
+                self.frames_by_cpu += u64::from(*instead);
+                return self.draw_by_cpu(frame, prepared);
             }
-            (Self::Cpu(cpu), Prepared::Field(field)) => cpu.render_field(frame, field),
-            (Self::Reference, Prepared::Field(field)) => Ok(field::render_reference(frame, field)?),
+            By::Reference => {
+                return Ok(match prepared {
+                    Prepared::Exact => reference::render_exact(frame)?,
+                    Prepared::Field(field) => field::render_reference(frame, field)?,
+                });
+            }
+        };
+        let field = prepared.field();
+        let drawn = match &ready.0 {
+            Some(loaded) => gpu.draw(frame, field, loaded),
+            None => draw_anew(gpu, frame, field),
+        };
+        let drawn = match drawn {
+            Err(lost @ RenderError::DeviceLost(_)) => {
+                let again = gpu.reopen().and_then(|()| draw_anew(gpu, frame, field));
+                match &again {
+                    Ok(_) => {
+                        let name = gpu.description().to_owned();
+                        self.note(format!("{lost}; {name} was opened anew and goes on"));
+                    }
+                    Err(RenderError::Photo(_)) => {}
+                    Err(_) => {
+                        self.note(format!("{lost}; the CPU goes on"));
+                        self.by = By::Cpu { instead: true };
+                        self.frames_by_cpu += 1;
+                        return self.draw_by_cpu(frame, prepared);
+                    }
+                }
+                again
+            }
+            drawn => drawn,
+        };
+        match drawn {
+            Err(
+                error @ (RenderError::Gpu(_)
+                | RenderError::DeviceFull(_)
+                | RenderError::DeviceLost(_)),
+            ) => {
+                if self.frames_by_cpu == 0 {
+                    self.note(format!("{error}; the CPU draws such frames"));
+                }
+                self.frames_by_cpu += 1;
+                self.draw_by_cpu(frame, prepared)
+            }
+            drawn => drawn,
+        }
+    }
+
+    fn draw_by_cpu(
+        &mut self,
+        frame: &Frame<'_>,
+        prepared: &Prepared,
+    ) -> Result<RgbaImage, RenderError> {
+        self.last_by_cpu = true;
+        match prepared {
+            Prepared::Exact => self.spare.render(frame, Method::Exact),
+            Prepared::Field(field) => self.spare.render_field(frame, field),
+        }
+    }
+
+    fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
         }
     }
 
     /// The source views whose photos need no decoding for the next frame: those on the device.
     pub fn resident(&self, photos: &PhotoStore) -> Vec<usize> {
-        match self {
-            Self::Gpu(gpu) => gpu.resident(photos),
-            Self::Cpu(_) | Self::Reference => Vec::new(),
-        }
+        self.gpu().map_or_else(Vec::new, |gpu| gpu.resident(photos))
     }
+}
+
+fn draw_anew(
+    gpu: &mut Gpu,
+    frame: &Frame<'_>,
+    field: Option<&TriangulatedField>,
+) -> Result<RgbaImage, RenderError> {
+    let loaded = gpu.load(frame, field)?;
+    gpu.draw(frame, field, &loaded)
 }
 
 /// What can be made of a frame before any photo is sampled.
@@ -120,6 +296,14 @@ impl Prepared {
                 Self::Field(TriangulatedField::new(frame, cells_across)?)
             }
         })
+    }
+
+    /// The field, if it is interpolated.
+    pub fn field(&self) -> Option<&TriangulatedField> {
+        match self {
+            Self::Exact => None,
+            Self::Field(field) => Some(field),
+        }
     }
 
     /// The source views that are sampled, as far as known.

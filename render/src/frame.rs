@@ -6,6 +6,7 @@ pub(crate) mod every_lens;
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
 use crate::surface::Surface;
+use crate::tally::{Scored, Tally};
 use crate::time::Moment;
 use crate::view_tree::ViewTree;
 use crate::visibility::visible;
@@ -130,6 +131,8 @@ pub struct Frame<'a> {
     no_skip: bool,
     /// Made when first asked for.
     view_tree: OnceLock<ViewTree>,
+    /// Which views were scored.
+    pub(crate) tally: Tally,
 }
 
 impl<'a> Frame<'a> {
@@ -189,9 +192,17 @@ impl<'a> Frame<'a> {
             gone,
             no_skip: false,
             view_tree: OnceLock::new(),
+            tally: Tally::new(lumigraph.sources.len()),
         };
         frame.match_exposures();
         frame
+    }
+
+    /// Which source views were scored so far, by the field and by the exact picture on the CPU;
+    /// the same for any number of threads. (Other engines' exact pictures score all that take
+    /// part.)
+    pub fn scored(&self) -> Scored {
+        self.tally.scored()
     }
 
     /// The same view at a moment of a scene that moves: photos count by their times, too

@@ -59,6 +59,13 @@ impl<'a> Held<'a> {
     }
 }
 
+impl Drop for Held<'_> {
+    fn drop(&mut self) {
+        let sampled = self.photos.iter().filter(|photo| photo.get().is_some());
+        self.store.note_sampled(sampled.count());
+    }
+}
+
 /// Decodes the photos that the next frame may sample, while another is drawn, on all threads
 /// of rayon, until told to `stop`: no photo whose turn comes later is begun then. Those in
 /// `without` are left alone; what the budget has no room for beside the current frame's photos

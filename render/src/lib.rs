@@ -31,13 +31,14 @@ mod sensor;
 mod sight;
 mod snapshot;
 mod surface;
+mod tally;
 mod time;
 pub mod trajectory;
 pub mod triangulation;
 mod view_tree;
 mod visibility;
 
-pub use engine::{DeviceChoice, Engine, Prepared};
+pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};
 pub use held::{Held, decode_ahead};
@@ -47,11 +48,12 @@ pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
 pub use path::{CameraPath, PathFrame};
 pub use photos::{PhotoError, PhotoStore};
 pub use pyramid::{MAX_LEVELS, Pyramid};
-pub use residency::Residency;
+pub use residency::{Residency, photo_bytes};
 pub use score::Score;
 pub use seams::seams;
 pub use snapshot::snapshots;
 pub use surface::{FacetMap, NO_FACET, Surface};
+pub use tally::Scored;
 pub use time::{Moment, TIME_COST, WINDOW_TURNS};
 pub use trajectory::Trajectory;
 pub use visibility::{DistanceMap, Visibility};
@@ -65,7 +67,13 @@ pub enum RenderError {
     /// The image plane could not be triangulated.
     #[error(transparent)]
     Triangulation(#[from] triangulation::TriangulationError),
-    /// The graphics device is missing or failed.
+    /// The graphics device is missing, failed, or cannot draw such a frame.
     #[error("graphics device: {0}")]
     Gpu(String),
+    /// The graphics device has too little memory.
+    #[error("graphics device: {0}")]
+    DeviceFull(String),
+    /// The graphics device is gone for good, as after a reset of its driver.
+    #[error("graphics device: it was lost ({0})")]
+    DeviceLost(String),
 }

@@ -59,6 +59,7 @@ impl Frame<'_> {
                 found.extend(self.taking_part().map(|i| i as u32));
             }
         }
+        self.tally.note(found);
     }
 
     /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights

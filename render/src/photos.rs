@@ -5,8 +5,9 @@ use crate::pyramid::Pyramid;
 use crate::residency::{Residency, photo_bytes};
 use image::{GrayImage, RgbaImage};
 use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Why a photo could not be had.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -36,6 +37,9 @@ pub struct PhotoStore {
     /// Stands in for a mask that cannot be decoded.
     nothing: Mask,
     id: u64,
+    /// How many photos the last drawing sampled.
+    sampled: AtomicUsize,
+    decode_nanos: AtomicU64,
 }
 
 /// What is in memory.
@@ -122,6 +126,8 @@ impl PhotoStore {
             load_mask: Box::new(|_| Err("there is no mask".to_owned())),
             nothing: Mask::nothing(),
             id,
+            sampled: AtomicUsize::new(0),
+            decode_nanos: AtomicU64::new(0),
         }
     }
 
@@ -177,6 +183,26 @@ impl PhotoStore {
     pub fn decoded(&self) -> usize {
         let shelf = self.shelf();
         shelf.slots.iter().filter(|slot| slot.ever_decoded).count()
+    }
+
+    /// Whether a photo has been decoded.
+    pub fn was_decoded(&self, source_idx: usize) -> bool {
+        self.shelf().slots[source_idx].ever_decoded
+    }
+
+    /// The time that decoding took so far, with making mip levels, summed over the threads that
+    /// did it.
+    pub fn decode_time(&self) -> Duration {
+        Duration::from_nanos(self.decode_nanos.load(Ordering::Relaxed))
+    }
+
+    /// How many photos the last drawing by the CPU or the reference sampled.
+    pub fn last_sampled(&self) -> usize {
+        self.sampled.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn note_sampled(&self, count: usize) {
+        self.sampled.store(count, Ordering::Relaxed);
     }
 
     /// What the photos took so far, masks not included.
@@ -388,6 +414,14 @@ impl PhotoStore {
     /// # Errors
     /// It cannot be decoded.
     pub fn decode(&self, source_idx: usize) -> Result<Pyramid, PhotoError> {
+        let start = Instant::now();
+        let decoded = self.decode_untimed(source_idx);
+        let nanos = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.decode_nanos.fetch_add(nanos, Ordering::Relaxed);
+        decoded
+    }
+
+    fn decode_untimed(&self, source_idx: usize) -> Result<Pyramid, PhotoError> {
         let failed = |message| PhotoError {
             source_idx,
             message,

@@ -43,7 +43,7 @@ impl Residency {
 
 /// Bytes of a photo of width × height and its mip levels, without those finer than `finest`,
 /// or than its coarsest.
-pub(crate) fn photo_bytes([mut width, mut height]: [u32; 2], finest: usize) -> u64 {
+pub fn photo_bytes([mut width, mut height]: [u32; 2], finest: usize) -> u64 {
     const RGBA: u64 = 4;
     let (mut bytes, mut level) = (0, 0);
     loop {

@@ -11,6 +11,7 @@ mod generate;
 mod import;
 mod info;
 mod info_of_file;
+mod ledger;
 mod npz;
 mod options;
 mod output;

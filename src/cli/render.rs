@@ -87,10 +87,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     let report = Report::new(&session, &start);
     if args.json {
-        let listed = frames
-            .iter()
-            .zip(&files)
-            .map(|(frame, file)| json!({"name": frame.name, "file": file}));
+        let listed = frames.iter().zip(&files).enumerate().map(|(i, (frame, file))| {
+            json!({"name": frame.name, "file": file, "cost": session.cost_json(i)})
+        });
         return print_json(&json!({
             "frames": listed.collect::<Vec<_>>(),
             "proxy": session.proxy.json(),

@@ -2,11 +2,13 @@
 
 use super::session::Session;
 use super::time::InWindow;
+use calibrate::Distortion;
 use cpu_time::ProcessTime;
-use render::Residency;
+use render::gpu::Gpu;
+use render::{Engine, Frame, Method, Ready, Residency, SourceView, photo_bytes};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// When a command began.
 pub(super) struct Start {
@@ -34,6 +36,21 @@ pub(super) struct Report {
     /// Where a graphics processor draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     gpu_memory: Option<Memory>,
+    /// What the graphics device did not do, and what became of it.
+    notes: Vec<String>,
+    frames_by_cpu: u64,
+    /// Where frames were drawn one after the other: what each stage has taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stages: Option<Value>,
+    #[serde(skip)]
+    stages_text: String,
+    /// Decoding in any of the stages, summed over the threads that did it.
+    decode_seconds: f64,
+    #[serde(flatten)]
+    device_time: DeviceTime,
+    #[serde(flatten)]
+    photos_used: PhotosUsed,
+    skipped: Skipped,
     seconds: f64,
     cpu_seconds: f64,
     /// `None` where the system does not say.
@@ -48,7 +65,19 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn new(session: &Session, start: &Start) -> Self {
         let photos = &session.lumigraph().photos;
+        let engine = session.engine();
+        let costs = &session.costs;
+        let stages = session.ledger.total();
+        let drawn = !costs.frames.is_empty();
         Self {
+            notes: engine.map_or_else(Vec::new, |engine| engine.notes().to_vec()),
+            frames_by_cpu: engine.map_or(0, Engine::frames_by_cpu),
+            stages: drawn.then(|| stages.json()),
+            stages_text: stages.text(),
+            decode_seconds: photos.decode_time().as_secs_f64(),
+            device_time: DeviceTime::of(session),
+            photos_used: PhotosUsed::of(costs),
+            skipped: Skipped::of(session),
             device: session.device(),
             photos_decoded: photos.decoded(),
             photos_total: photos.len(),
@@ -63,7 +92,7 @@ impl Report {
         }
     }
 
-    /// One line for people.
+    /// A few lines for people.
     pub(super) fn text(&self) -> String {
         let peak = self.peak_memory_bytes.map_or_else(String::new, |bytes| {
             format!(", peak memory {}", megabytes(bytes))
@@ -72,7 +101,7 @@ impl Report {
         if let Some(gpu) = self.gpu_memory {
             memory += &format!("; on the device {}", gpu.text());
         }
-        format!(
+        let mut text = format!(
             "{} of {} photos decoded ({}), {:.1} s ({:.1} CPU s) on {}{peak}{}",
             self.photos_decoded,
             self.photos_total,
@@ -81,7 +110,251 @@ impl Report {
             self.cpu_seconds,
             self.device,
             self.in_window.text(),
+        );
+        if self.stages.is_some() {
+            text += &format!(
+                "\nseconds (CPU) by stage: {}; decoding {:.2}; {}",
+                self.stages_text,
+                self.decode_seconds,
+                self.device_time.text()
+            );
+            text += &self.photos_used.text();
+            text += &format!("\nskipped: {}", self.skipped.text());
+        }
+        if self.frames_by_cpu > 0 {
+            text += &format!("\n{} frames were drawn by the CPU", self.frames_by_cpu);
+        }
+        text
+    }
+}
+
+/// What the frames that were drawn one after the other have cost, besides time.
+#[derive(Default)]
+pub(super) struct Costs {
+    frames: Vec<FrameCost>,
+    /// By source view, whether any frame scored it; begun anew where photos were left out.
+    ever_scored: Vec<bool>,
+}
+
+struct FrameCost {
+    photos_used: Option<usize>,
+    parts: usize,
+    device: Option<Duration>,
+    cameras_scored: usize,
+    cameras: usize,
+    /// `None` where the graphics processor scores all at every pixel.
+    scorings: Option<u64>,
+    scorings_omitted: u64,
+    by_cpu: bool,
+}
+
+impl Costs {
+    /// Notes a frame that was just drawn.
+    pub(super) fn note(
+        &mut self,
+        frame: &Frame<'_>,
+        method: Method,
+        engine: &Engine,
+        ready: &Ready,
+    ) {
+        let scored = frame.scored();
+        let taking_part = frame.taking_part().count();
+        let by_cpu = engine.last_by_cpu();
+        let of_all = method == Method::Exact && !by_cpu;
+        let ever: Vec<bool> = (0..frame.sources.len())
+            .map(|i| scored.ever[i] || (of_all && frame.sources[i].time_penalty < f64::INFINITY))
+            .collect();
+        if self.ever_scored.len() != ever.len() {
+            self.ever_scored = vec![false; ever.len()];
+        }
+        for (of_any, of_this) in self.ever_scored.iter_mut().zip(&ever) {
+            *of_any |= of_this;
+        }
+        let gpu = engine.gpu().filter(|_| !by_cpu);
+        let photos_used = match gpu {
+            Some(_) => ready.photos_used(),
+            None => Some(frame.lumigraph.photos.last_sampled()),
+        };
+        self.frames.push(FrameCost {
+            photos_used,
+            parts: if by_cpu { 1 } else { ready.parts() },
+            device: gpu.and_then(Gpu::device_time),
+            cameras_scored: ever.iter().filter(|scored| **scored).count(),
+            cameras: ever.len(),
+            scorings: (!of_all).then_some(scored.scorings),
+            scorings_omitted: if of_all {
+                0
+            } else {
+                (scored.questions * taking_part as u64).saturating_sub(scored.scorings)
+            },
+            by_cpu,
+        });
+    }
+
+    /// A frame's, for `--json`.
+    pub(super) fn json_of(&self, frame_idx: usize) -> Value {
+        let Some(cost) = self.frames.get(frame_idx) else {
+            return json!({});
+        };
+        json!({
+            "photos_used": cost.photos_used,
+            "parts": cost.parts,
+            "drawn_by_cpu": cost.by_cpu,
+            "device_seconds": cost.device.map(|time| time.as_secs_f64()),
+            "cameras_scored": cost.cameras_scored,
+            "cameras_never_scored": cost.cameras - cost.cameras_scored,
+            "scorings": cost.scorings,
+            "scorings_omitted": cost.scorings_omitted,
+        })
+    }
+}
+
+/// How long the graphics device drew.
+#[derive(Serialize)]
+struct DeviceTime {
+    /// `None` where it does not tell, or none draws.
+    device_seconds: Option<f64>,
+    #[serde(skip)]
+    why_not: &'static str,
+}
+
+impl DeviceTime {
+    fn of(session: &Session) -> Self {
+        let frames = &session.costs.frames;
+        let gpu = session.engine().and_then(Engine::gpu);
+        let times = frames.iter().filter_map(|frame| frame.device);
+        let any = times.clone().next().is_some();
+        Self {
+            device_seconds: any.then(|| times.map(|t| t.as_secs_f64()).sum()),
+            why_not: match gpu {
+                None => "no graphics device draws",
+                Some(gpu) if gpu.tells_time() => "the device told no time",
+                Some(_) => "the device has no timestamps",
+            },
+        }
+    }
+
+    fn text(&self) -> String {
+        self.device_seconds.map_or_else(
+            || self.why_not.to_owned(),
+            |seconds| format!("on the device {seconds:.2}"),
         )
+    }
+}
+
+/// Photos that a frame samples.
+#[derive(Serialize)]
+struct PhotosUsed {
+    /// The least and the most; `None` where no frame told.
+    photos_used_per_frame: Option<[usize; 2]>,
+}
+
+impl PhotosUsed {
+    fn of(costs: &Costs) -> Self {
+        let used = costs.frames.iter().filter_map(|frame| frame.photos_used);
+        let (least, most) = (used.clone().min(), used.max());
+        Self {
+            photos_used_per_frame: least.zip(most).map(|(least, most)| [least, most]),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self.photos_used_per_frame {
+            None => String::new(),
+            Some([least, most]) if least == most => format!("; {most} photos a frame"),
+            Some([least, most]) => format!("; {least} to {most} photos a frame"),
+        }
+    }
+}
+
+/// What was not done because the frames do not need it. Counts, the same in every run.
+#[derive(Serialize)]
+struct Skipped {
+    photos_never_decoded: usize,
+    /// In memory, with mip levels.
+    bytes_never_decoded: u64,
+    /// `None` where no graphics device draws.
+    photos_never_uploaded: Option<usize>,
+    bytes_never_uploaded: Option<u64>,
+    /// By no frame's field, as far as frames were drawn one after the other.
+    cameras_never_scored: Option<usize>,
+    /// Of cameras that take part in a frame, at its vertices, triangles and blocks.
+    scorings_omitted: u64,
+    #[serde(skip)]
+    scorings: u64,
+    /// Photos whose lens needs no more than a division.
+    lens_maths_omitted_photos: usize,
+    /// Photos that nothing asks whether they see a point, as the proxy hides nothing of itself.
+    visibility_tests_omitted_photos: usize,
+    /// Photos without an ignore mask.
+    mask_tests_omitted_photos: usize,
+}
+
+impl Skipped {
+    fn of(session: &Session) -> Self {
+        let lumigraph = session.lumigraph();
+        let photos = &lumigraph.photos;
+        let count = photos.len();
+        let never = |was: &dyn Fn(usize) -> bool| {
+            let never = (0..count).filter(|&i| !was(i));
+            never.fold((0, 0), |(photos, bytes), i| {
+                let view = &lumigraph.sources[i].view;
+                (
+                    photos + 1,
+                    bytes + photo_bytes([view.width, view.height], 0),
+                )
+            })
+        };
+        let decoded = never(&|i| photos.was_decoded(i));
+        let gpu = session.engine().and_then(Engine::gpu);
+        let uploaded = gpu.map(|gpu| never(&|i| gpu.was_loaded(photos, i)));
+        let costs = &session.costs;
+        let unscored = costs.ever_scored.iter().filter(|scored| !**scored);
+        let pinhole = |source: &&SourceView| source.view.lens.distortion() == Distortion::None;
+        Self {
+            photos_never_decoded: decoded.0,
+            bytes_never_decoded: decoded.1,
+            photos_never_uploaded: uploaded.map(|never| never.0),
+            bytes_never_uploaded: uploaded.map(|never| never.1),
+            cameras_never_scored: (!costs.frames.is_empty()).then(|| unscored.count()),
+            scorings_omitted: costs.frames.iter().map(|f| f.scorings_omitted).sum(),
+            scorings: costs.frames.iter().filter_map(|f| f.scorings).sum(),
+            lens_maths_omitted_photos: lumigraph.sources.iter().filter(pinhole).count(),
+            visibility_tests_omitted_photos: match lumigraph.visibility {
+                Some(_) => 0,
+                None => count,
+            },
+            mask_tests_omitted_photos: (0..count).filter(|&i| !photos.is_masked(i)).count(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{} photos ({}) never decoded",
+            self.photos_never_decoded,
+            megabytes(self.bytes_never_decoded)
+        );
+        if let (Some(photos), Some(bytes)) = (self.photos_never_uploaded, self.bytes_never_uploaded)
+        {
+            text += &format!(", {photos} ({}) never uploaded", megabytes(bytes));
+        }
+        if let Some(cameras) = self.cameras_never_scored {
+            text += &format!(", {cameras} cameras never scored");
+        }
+        if self.scorings + self.scorings_omitted > 0 {
+            let (omitted, all) = (self.scorings_omitted, self.scorings + self.scorings_omitted);
+            text += &format!(", {omitted} of {all} scorings");
+        }
+        for (photos, what) in [
+            (self.lens_maths_omitted_photos, "lens maths"),
+            (self.visibility_tests_omitted_photos, "visibility tests"),
+            (self.mask_tests_omitted_photos, "mask tests"),
+        ] {
+            if photos > 0 {
+                text += &format!(", {what} of {photos} photos");
+            }
+        }
+        text
     }
 }
 

@@ -1,8 +1,10 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
+use super::ledger::{Ledger, Stage};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
+use super::report::Costs;
 use super::surface::{ChosenProxy, ProxyArgs};
 use super::time::{AtArgs, Clock, InWindow, TimeArgs};
 use anyhow::bail;
@@ -33,6 +35,11 @@ pub(super) struct Session {
     /// Where time plays a part.
     pub(super) clock: Option<Clock>,
     pub(super) in_window: InWindow,
+    /// Of the frames that were drawn one after the other.
+    pub(super) ledger: Ledger,
+    pub(super) costs: Costs,
+    /// How much of what the engine has to say was said.
+    notes_said: usize,
     /// Held-out photos, and those found corrupt.
     without: BTreeSet<String>,
     lumigraph: Lumigraph,
@@ -77,6 +84,9 @@ impl Session {
             scene,
             clock,
             in_window: InWindow::default(),
+            ledger: Ledger::new(),
+            costs: Costs::default(),
+            notes_said: 0,
             proxy,
             exposure,
             options: field.options(),
@@ -126,12 +136,14 @@ impl Session {
         engine.map_or_else(|| "nothing yet".to_owned(), Engine::description)
     }
 
+    /// What draws, once it is open.
+    pub(super) fn engine(&self) -> Option<&Engine> {
+        self.engine.as_ref()
+    }
+
     /// What photos took on the graphics processor, where one draws.
     pub(super) fn gpu_residency(&self) -> Option<Residency> {
-        match &self.engine {
-            Some(Engine::Gpu(gpu)) => Some(gpu.residency()),
-            _ => None,
-        }
+        Some(self.engine()?.gpu()?.residency())
     }
 
     /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
@@ -141,10 +153,10 @@ impl Session {
             return Ok(());
         }
         let mut engine = Engine::open(self.device)?;
-        if let Engine::Gpu(gpu) = &mut engine {
+        if let Some(gpu) = engine.gpu_mut() {
             gpu.set_budget(self.gpu_memory);
         }
-        if self.device == DeviceChoice::Auto && matches!(engine, Engine::Cpu(_)) {
+        if self.device == DeviceChoice::Auto && engine.gpu().is_none() {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
         self.engine = Some(engine);
@@ -159,6 +171,13 @@ impl Session {
             }
         }
         Ok(())
+    }
+
+    /// What a frame of [`Self::draw_all`] has cost, for `--json`.
+    pub(super) fn cost_json(&self, frame_idx: usize) -> Value {
+        let mut cost = self.costs.json_of(frame_idx);
+        cost["stages"] = self.ledger.of_frame(frame_idx).json();
+        cost
     }
 
     /// What time had to do with it, for `--json`.
@@ -189,7 +208,9 @@ impl Session {
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
-            match engine.render(&frame, self.method) {
+            let drawn = engine.render(&frame, self.method);
+            say_notes(engine, &mut self.notes_said);
+            match drawn {
                 Ok(picture) => return Ok(picture),
                 Err(RenderError::Photo(error)) => self.leave_out(&error)?,
                 Err(error) => return Err(error.into()),
@@ -230,12 +251,19 @@ impl Session {
         };
         let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
         let no_skip = self.no_skip;
-        let ready = |(view, moment): &(View, Option<Moment>)| {
-            let frame = frame(lumigraph, view, options, moment.as_ref(), no_skip);
-            let prepared = Prepared::new(&frame, method);
+        let ledger = &self.ledger;
+        let ready = |i: usize| {
+            let (view, moment) = &views[i];
+            let frame = ledger.time(i, Stage::Surface, || {
+                frame(lumigraph, view, options, moment.as_ref(), no_skip)
+            });
+            let prepared = match method {
+                Method::Exact => Ok(Prepared::Exact),
+                method => ledger.time(i, Stage::Field, || Prepared::new(&frame, method)),
+            };
             (frame, prepared)
         };
-        let mut next = views.get(*done).map(&ready);
+        let mut next = (*done < views.len()).then(|| ready(*done));
         while let Some((frame, prepared)) = next {
             let prepared = prepared?;
             if views[*done].1.is_some() {
@@ -246,24 +274,35 @@ impl Session {
             let drawn = AtomicBool::new(false);
             // A mask that cannot be decoded must be found by the frame that asks for it.
             let ahead = !lumigraph.photos.any_masked();
-            let coming = views.get(*done + 1).filter(|_| ahead);
+            let coming = Some(*done + 1).filter(|i| ahead && *i < views.len());
             let (picture, coming) = std::thread::scope(|scope| {
-                let prepare = |view| {
-                    let (frame, prepared) = ready(view);
+                let prepare = |i| {
+                    let (frame, prepared) = ready(i);
                     if let Ok(prepared) = &prepared {
-                        decode_ahead(&frame, &prepared.listed(), &without, &drawn);
+                        let listed = prepared.listed();
+                        ledger.time(i, Stage::Ahead, || {
+                            decode_ahead(&frame, &listed, &without, &drawn);
+                        });
                     }
                     (frame, prepared)
                 };
-                let coming = coming.map(|view| scope.spawn(move || prepare(view)));
-                let picture = engine.draw(&frame, &prepared);
+                let coming = coming.map(|i| scope.spawn(move || prepare(i)));
+                let ready = ledger.time(*done, Stage::Load, || engine.ready(&frame, &prepared));
+                let picture = ready.and_then(|ready| {
+                    let draw = || engine.draw_ready(&frame, &prepared, &ready);
+                    let picture = ledger.time(*done, Stage::Draw, draw)?;
+                    Ok((picture, ready))
+                });
                 drawn.store(true, Ordering::Relaxed);
                 (picture, coming.map(ScopedJoinHandle::join))
             });
-            take(*done, picture?)?;
+            say_notes(engine, &mut self.notes_said);
+            let (picture, was_ready) = picture?;
+            self.costs.note(&frame, method, engine, &was_ready);
+            ledger.time(*done, Stage::Write, || take(*done, picture))?;
             *done += 1;
             next = match coming.transpose() {
-                Ok(None) => views.get(*done).map(&ready),
+                Ok(None) => (*done < views.len()).then(|| ready(*done)),
                 Ok(next) => next,
                 Err(panic) => std::panic::resume_unwind(panic),
             };
@@ -329,6 +368,13 @@ impl Session {
         self.lumigraph.photos.set_budget(self.cpu_memory);
         Ok(())
     }
+}
+
+/// Says what the engine has to say, once.
+fn say_notes(engine: &Engine, said: &mut usize) {
+    let new = engine.notes().iter().skip(*said);
+    new.for_each(|note| say!("note: {note}"));
+    *said = engine.notes().len();
 }
 
 /// A view of the lumigraph, at a moment where time plays a part.

@@ -16,6 +16,7 @@ mod memory;
 mod opencv;
 mod render;
 mod repeat;
+mod report;
 mod run;
 mod scene;
 mod surface;

@@ -28,6 +28,9 @@ struct Params {
     facets: u32,
     // The photos' mip level that is the finest of their array.
     finest: f32,
+    // The pixels whose photos are marked.
+    part_origin: vec2u,
+    part_size: vec2u,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.

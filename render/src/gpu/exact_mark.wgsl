@@ -3,12 +3,13 @@
 @group(1) @binding(0) var<storage, read_write> used: array<atomic<u32>>;
 
 @compute @workgroup_size(8, 8)
-fn mark(@builtin(global_invocation_id) pixel: vec3u) {
-    if any(pixel.xy >= params.size) {
+fn mark(@builtin(global_invocation_id) within: vec3u) {
+    if any(within.xy >= params.part_size) {
         return;
     }
-    let ray = ray_through(pixel.xy);
-    let plane = plane_at(pixel.xy);
+    let pixel = params.part_origin + within.xy;
+    let ray = ray_through(pixel);
+    let plane = plane_at(pixel);
     let s = dot(plane.xyz, ray);
     if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
         return;

@@ -1,6 +1,7 @@
 //! The structs that shaders read, byte for byte. A test compares them with what the
 //! shader compiler lays out.
 
+use super::groups::Rect;
 use crate::frame::{Frame, FrameSource};
 use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
@@ -31,6 +32,8 @@ pub(crate) struct Params {
     pub timed: u32,
     pub facets: u32,
     pub finest: f32,
+    pub part_origin: [u32; 2],
+    pub part_size: [u32; 2],
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -67,7 +70,8 @@ pub(crate) struct Source {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Corner {
-    pub pixel: [f32; 2],
+    /// In normalised device coordinates, y upwards.
+    pub at: [f32; 2],
     pub list: [u32; 2],
 }
 
@@ -79,8 +83,10 @@ pub(crate) struct Entry {
     pub values: [f32; 3],
 }
 
+/// Source views of a row of their texture.
+pub(crate) const SOURCES_PER_ROW: u32 = 128;
 /// Texels of a row of the sources' texture, and of the entries'.
-pub(crate) const SOURCE_ROW: u32 = 128 * (size_of::<Source>() / 16) as u32;
+pub(crate) const SOURCE_ROW: u32 = SOURCES_PER_ROW * (size_of::<Source>() / 16) as u32;
 /// See [`SOURCE_ROW`].
 pub(crate) const ENTRY_ROW: u32 = 1024;
 
@@ -99,7 +105,7 @@ pub(super) const LENS_TILTED: f32 = 11.0;
 pub(super) const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
 impl Params {
-    pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2], finest: usize) -> Self {
+    pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2], finest: usize, part: Rect) -> Self {
         let lens = frame.desired.lens;
         Self {
             plane: common_plane(frame).as_vec3().to_array(),
@@ -126,6 +132,8 @@ impl Params {
             timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
             facets: u32::from(matches!(frame.surface, Surface::Facets(_))),
             finest: finest as f32,
+            part_origin: part.origin,
+            part_size: part.size,
         }
     }
 }

@@ -1,31 +1,39 @@
 //! The wgpu engine: the triangulated field in one draw, the exact field in another.
 
+mod device;
+mod groups;
 mod layout;
+mod load;
 mod photos;
 mod pipelines;
 mod room;
 #[cfg(test)]
 mod shader_tests;
+mod tables;
 mod target;
+mod timing;
+
+pub use device::DeviceLimits;
+pub use load::Loaded;
 
 use crate::RenderError;
 use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::options::Method;
 use crate::photos::PhotoStore;
-use crate::rays::RayMap;
 use crate::residency::Residency;
-use crate::surface::Surface;
 use calibrate::Lens;
+use device::Trouble;
+use groups::{Part, Rect};
 use image::RgbaImage;
-use layout::{Corner, Entry, Params, Source, Special};
-use photos::Layers;
+use layout::{Corner, Entry, Special};
+use photos::{Layers, Maker};
 use pipelines::{Pass, Pipelines};
-use room::Content;
 use std::fmt;
-use std::sync::{Arc, Mutex};
+use std::ops::Range;
+use std::time::Duration;
 use target::Target;
-use wgpu::util::DeviceExt;
+use timing::Stopwatch;
 
 /// A graphics device with all that it keeps between frames: pipelines, photos, the last
 /// lens' rays and the picture's buffers.
@@ -34,25 +42,33 @@ pub struct Gpu {
     queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
     description: String,
+    asked: DeviceLimits,
+    /// The device's, within what was asked; fewer layers once memory ran out.
+    limits: wgpu::Limits,
     pipelines: Pipelines,
     sampler: wgpu::Sampler,
     photos: Option<Layers>,
     residency: Residency,
+    /// Of the store whose photos came last, which of them ever did.
+    ever_loaded: (u64, Vec<bool>),
     masks: Option<Layers>,
     distances: Option<Layers>,
     no_layers: wgpu::TextureView,
     rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
     target: Option<Target>,
-    failure: Arc<Mutex<Option<String>>>,
+    timestamps: bool,
+    device_time: Option<Duration>,
+    trouble: Trouble,
+    /// See [`Self::lose`].
+    gone: bool,
 }
 
-/// How the shaders number source views.
+/// Which of a frame's passes.
 #[derive(Clone, Copy)]
-enum Order {
-    /// As the lumigraph does, passing over those that take no part in the frame.
-    AsGiven,
-    /// By their layer of the photos' array, those that have one.
-    ByLayer,
+struct Turn<'a> {
+    pass_idx: usize,
+    /// Where the device tells the time.
+    stopwatch: Option<&'a Stopwatch>,
 }
 
 impl fmt::Debug for Gpu {
@@ -65,32 +81,40 @@ impl Gpu {
     /// Opens the best device there is; a software driver if there is nothing better.
     ///
     /// # Errors
-    /// No driver answers.
+    /// No driver answers, or each lacks something, which the message names.
     pub fn open() -> Result<Self, RenderError> {
-        let instance =
-            wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            ..Default::default()
-        }))
-        .map_err(|e| RenderError::Gpu(format!("no graphics driver answers ({e})")))?;
-        let info = adapter.get_info();
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: Some("lumigraph"),
-            required_limits: adapter.limits(),
-            ..Default::default()
-        }))
-        .map_err(|e| RenderError::Gpu(format!("{}: {e}", info.name)))?;
+        Self::open_within(DeviceLimits::default())
+    }
 
-        // Errors that no call returns are kept for the next one that can.
-        let failure = Arc::new(Mutex::new(None));
-        let first_failure = Arc::clone(&failure);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            if let Ok(mut slot) = first_failure.lock() {
-                slot.get_or_insert(error.to_string());
-            }
-        }));
+    /// As [`Self::open`], but no software driver.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_real() -> Result<Self, RenderError> {
+        Self::open_any(DeviceLimits::default(), true)
+    }
 
+    /// As [`Self::open`], with tighter limits than the device's own. Pictures have the same bytes.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_within(asked: DeviceLimits) -> Result<Self, RenderError> {
+        Self::open_any(asked, false)
+    }
+
+    fn open_any(asked: DeviceLimits, real: bool) -> Result<Self, RenderError> {
+        let device::Opened {
+            device,
+            queue,
+            info,
+            mut limits,
+            timestamps,
+            trouble,
+        } = device::open(&asked, real)?;
+        if info.backend == wgpu::Backend::Gl && limits.max_texture_array_layers.is_multiple_of(6) {
+            // One more would be needed: see `Maker::layers_of_array`.
+            limits.max_texture_array_layers -= 1;
+        }
         let pipelines = Pipelines::new(&device);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("photos"),
@@ -100,23 +124,56 @@ impl Gpu {
             ..Default::default()
         });
         let no_layers = photos::no_layers(&device);
-        let description = format!("{} ({:?})", info.name, info.backend);
         Ok(Self {
+            description: device::describe(&info),
             device,
             queue,
             info,
-            description,
+            asked,
+            limits,
             pipelines,
             sampler,
             photos: None,
             residency: Residency::default(),
+            ever_loaded: (u64::MAX, Vec::new()),
             masks: None,
             distances: None,
             no_layers,
             rays: None,
             target: None,
-            failure,
+            timestamps,
+            device_time: None,
+            trouble,
+            gone: false,
         })
+    }
+
+    /// Opens a device again in place of one that was lost. What was on it is brought again when
+    /// it is needed; budget and counts go on.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn reopen(&mut self) -> Result<(), RenderError> {
+        if self.gone {
+            return Err(RenderError::Gpu("no graphics driver answers".to_owned()));
+        }
+        let fresh = Self::open_within(self.asked)?;
+        let old = std::mem::replace(self, fresh);
+        self.residency = Residency {
+            held: 0,
+            ..old.residency
+        };
+        self.ever_loaded = old.ever_loaded;
+        Ok(())
+    }
+
+    /// Gives the device up, as if its driver had: every drawing fails until [`Self::reopen`], and
+    /// that fails, too, if it is gone `for_good`.
+    pub fn lose(&mut self, for_good: bool) {
+        self.gone = for_good;
+        self.device.destroy();
+        // Tells the callback.
+        let _ = self.device.poll(wgpu::PollType::Poll);
     }
 
     /// Whether the driver imitates a graphics processor in software.
@@ -135,6 +192,11 @@ impl Gpu {
         self.residency
     }
 
+    /// Whether a photo was ever brought to the device.
+    pub fn was_loaded(&self, photos: &PhotoStore, source_idx: usize) -> bool {
+        self.ever_loaded.0 == photos.id() && self.ever_loaded.1[source_idx]
+    }
+
     /// The source views whose photos are on the device, in no order.
     pub fn resident(&self, photos: &PhotoStore) -> Vec<usize> {
         let layers = self.photos.as_ref();
@@ -146,14 +208,28 @@ impl Gpu {
         &self.description
     }
 
+    /// Whether the device tells the time.
+    pub fn tells_time(&self) -> bool {
+        self.timestamps
+    }
+
+    /// How long the device took to draw the last frame; `None` where it does not tell. Marking
+    /// and uploading are not part of it.
+    pub fn device_time(&self) -> Option<Duration> {
+        self.device_time
+    }
+
     /// Draws a frame.
     ///
     /// # Errors
     /// A photo that is needed cannot be decoded; the triangulation refuses the view; the
-    /// device fails or its limits do not suffice.
+    /// device fails, is lost, or its limits do not suffice.
     pub fn render(&mut self, frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
         match method {
-            Method::Exact => self.render_exact(frame),
+            Method::Exact => {
+                let loaded = self.load(frame, None)?;
+                self.draw(frame, None, &loaded)
+            }
             Method::Triangulated { cells_across } => {
                 let field = TriangulatedField::new(frame, cells_across)?;
                 frame.lumigraph.photos.check_masks()?;
@@ -171,327 +247,149 @@ impl Gpu {
         frame: &Frame<'_>,
         field: &TriangulatedField,
     ) -> Result<RgbaImage, RenderError> {
-        let shared = self.prepare(frame, &field.listed(), Order::ByLayer)?;
-
-        let corners_of = |bordered: bool| -> Vec<Corner> {
-            let triangles = field.triangles.iter().filter(|t| t.bordered == bordered);
-            triangles
-                .flat_map(|triangle| {
-                    let list = [triangle.first_entry, triangle.entry_count];
-                    let pixel = |i: u32| field.vertices[i as usize].as_vec2().to_array();
-                    triangle.corners.map(|i| Corner {
-                        pixel: pixel(i),
-                        list,
-                    })
-                })
-                .collect()
-        };
-        let plain = corners_of(false);
-        let bordered = corners_of(true);
-        let photos = self.photos.as_ref().expect("prepared above");
-        let entry = |e: &FieldEntry| Entry {
-            source_idx: photos.layer(e.source_idx as usize).unwrap_or(0) as f32,
-            values: e.values,
-        };
-        let entries: Vec<Entry> = field.entries.iter().map(entry).collect();
-        let plain_buffer = self.buffer("corners", &plain, wgpu::BufferUsages::VERTEX);
-        let bordered_buffer = self.buffer("corners", &bordered, wgpu::BufferUsages::VERTEX);
-        let entries = self.table("entries", bytemuck::cast_slice(&entries), layout::ENTRY_ROW);
-        let photos = self.photos.as_ref().expect("prepared above");
-        let own =
-            self.pipelines
-                .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
-        let special = Special::of(frame);
-        self.pipelines
-            .ensure(&self.device, Pass::Triangles, special);
-        self.pipelines
-            .ensure(&self.device, Pass::BorderedTriangles, special);
-        self.draw(frame, |pass, pipelines| {
-            pass.set_bind_group(0, &shared, &[]);
-            pass.set_bind_group(1, &own, &[]);
-            pass.set_pipeline(pipelines.get(Pass::Triangles, special));
-            pass.set_vertex_buffer(0, plain_buffer.slice(..));
-            pass.draw(0..plain.len() as u32, 0..1);
-            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, special));
-            pass.set_vertex_buffer(0, bordered_buffer.slice(..));
-            pass.draw(0..bordered.len() as u32, 0..1);
-        })
+        let loaded = self.load(frame, Some(field))?;
+        self.draw(frame, Some(field), &loaded)
     }
 
-    /// Draws the exact field. A first pass finds the photos that it samples, unless all
-    /// that take part are on the device already.
-    fn render_exact(&mut self, frame: &Frame<'_>) -> Result<RgbaImage, RenderError> {
-        let store_id = frame.lumigraph.photos.id();
-        let taking_part: Vec<usize> = frame.taking_part().collect();
-        let photos = self.photos.as_ref();
-        // More of them than there is room for are never there in full.
-        let limits = self.device.limits();
-        let fit = room::fit(frame, taking_part.len(), self.residency.budget, &limits);
-        if !fit || !photos.is_some_and(|p| p.holds(store_id, &taking_part)) {
-            let used = self.mark(frame)?;
-            self.prepare(frame, &used, Order::AsGiven)?;
-        }
-        let shared = self.prepare(frame, &[], Order::AsGiven)?;
-        let photos = self.photos.as_ref().expect("prepared above");
-        let own = self
-            .pipelines
-            .exact_group(&self.device, &photos.view, &self.sampler);
-        let special = Special::of(frame);
-        self.pipelines.ensure(&self.device, Pass::Exact, special);
-        self.draw(frame, |pass, pipelines| {
-            pass.set_pipeline(pipelines.get(Pass::Exact, special));
-            pass.set_bind_group(0, &shared, &[]);
-            pass.set_bind_group(1, &own, &[]);
-            pass.draw(0..3, 0..1);
-        })
-    }
-
-    /// The source views that the exact field samples anywhere in the picture.
-    fn mark(&mut self, frame: &Frame<'_>) -> Result<Vec<usize>, RenderError> {
-        let shared = self.prepare(frame, &[], Order::AsGiven)?;
-        let zeros = vec![0_u32; frame.sources.len().max(1)];
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let used = self.buffer("used photos", &zeros, usage);
-        let own = self.pipelines.mark_group(&self.device, &used);
-        let readback = target::readback_buffer(&self.device, used.size());
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(self.pipelines.mark(&self.device, Special::of(frame)));
-            pass.set_bind_group(0, &shared, &[]);
-            pass.set_bind_group(1, &own, &[]);
-            let (width, height) = (frame.desired.width, frame.desired.height);
-            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
-        }
-        encoder.copy_buffer_to_buffer(&used, 0, &readback, 0, used.size());
-        self.queue.submit([encoder.finish()]);
-        let bytes = target::read(&self.device, &readback);
-        self.check()?;
-        let flags: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes?);
-        let flagged = frame.taking_part().zip(flags);
-        Ok(flagged
-            .filter(|(_, flag)| *flag != 0)
-            .map(|(source_idx, _)| source_idx)
-            .collect())
-    }
-
-    /// Brings photos, masks, source views and parameters to the device; returns the bind
-    /// group that all shaders share.
-    fn prepare(
+    /// Draws a frame, or the field of it, that was loaded before.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn draw(
         &mut self,
         frame: &Frame<'_>,
-        wanted: &[usize],
-        order: Order,
-    ) -> Result<wgpu::BindGroup, RenderError> {
-        let (device, queue) = (&self.device, &self.queue);
-        if !wanted.is_empty() {
-            frame.lumigraph.photos.begin_frame();
-        }
-        Layers::ensure(
-            &mut self.photos,
-            &mut self.residency,
-            Content::Photos,
-            device,
-            queue,
-            frame,
-            wanted,
-        )?;
-        // The exact field weighs all views, and asks all masks and distance maps.
-        let store = &frame.lumigraph.photos;
-        let weighed: Vec<usize> = match order {
-            Order::AsGiven => (0..frame.sources.len()).collect(),
-            Order::ByLayer => wanted.to_vec(),
-        };
-        if frame.lumigraph.visibility.is_some() {
-            Layers::ensure(
-                &mut self.distances,
-                &mut Residency::default(),
-                Content::Distances,
-                device,
-                queue,
-                frame,
-                &weighed,
-            )?;
-        } else {
-            self.distances = None;
-        }
-        let mut masked = weighed;
-        masked.retain(|&i| store.is_masked(i));
-        if store.any_masked() {
-            Layers::ensure(
-                &mut self.masks,
-                &mut Residency::default(),
-                Content::Masks,
-                device,
-                queue,
-                frame,
-                &masked,
-            )?;
-        } else {
-            self.masks = None;
-        }
-        let rays = self.rays(frame)?;
-        let photos = self.photos.as_ref().expect("ensured above");
-        let (masks, distances) = (self.masks.as_ref(), self.distances.as_ref());
-        let params = Params::of(frame, photos.size, photos.finest);
-        let source = |i| {
-            let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
-            Source::of(
-                frame,
-                i,
-                [photos.layer(i), layer_of(masks), layer_of(distances)],
-            )
-        };
-        let listed = match order {
-            Order::AsGiven => frame.taking_part().collect(),
-            Order::ByLayer => photos.by_layer(),
-        };
-        let sources: Vec<Source> = listed.into_iter().map(source).collect();
-        let planes = self.planes(frame);
-        let params = self.buffer("params", &[params], wgpu::BufferUsages::STORAGE);
-        let sources = self.table(
-            "sources",
-            bytemuck::cast_slice(&sources),
-            layout::SOURCE_ROW,
-        );
-        let view = |layers: Option<&'_ Layers>| layers.map_or(&self.no_layers, |l| &l.view).clone();
-        Ok(self.pipelines.shared_group(
-            &self.device,
-            &params,
-            &sources,
-            &rays,
-            &planes,
-            &view(masks),
-            &self.sampler,
-            &view(distances),
-        ))
-    }
-
-    /// The table of rays of a lens that is not a pinhole; a single texel otherwise.
-    fn rays(&mut self, frame: &Frame<'_>) -> Result<wgpu::TextureView, RenderError> {
-        let desired = &frame.desired;
-        let size = [desired.width, desired.height];
-        if let Some((lens, of_size, view)) = &self.rays
-            && (*lens, *of_size) == (desired.lens, size)
-        {
-            return Ok(view.clone());
-        }
-        let (width, height, texels) = match RayMap::of(desired) {
-            RayMap::Pinhole { .. } => (1, 1, vec![[0.0; 4]]),
-            RayMap::Table { mut rays, .. } => {
-                // Shaders may assume there are no NaNs: no ray is the zero vector there.
-                rays.iter_mut()
-                    .filter(|r| r[0].is_nan())
-                    .for_each(|r| *r = [0.0; 4]);
-                (size[0], size[1], rays)
-            }
-        };
-        let side = self.device.limits().max_texture_dimension_2d;
-        if size[0] > side || size[1] > side {
-            return Err(RenderError::Gpu(format!(
-                "a picture of {} × {} is more than this device draws ({side} × {side}); \
-                 use --device cpu or a smaller --size",
-                size[0], size[1]
-            )));
-        }
-        let view = self.texels("rays", width, height, &texels);
-        self.rays = Some((desired.lens, size, view.clone()));
-        Ok(view)
-    }
-
-    /// The plane that each pixel sees; a single texel where all see the same.
-    fn planes(&self, frame: &Frame<'_>) -> wgpu::TextureView {
-        let Surface::Facets(map) = &frame.surface else {
-            return self.texels("planes", 1, 1, &[[0.0; 4]]);
-        };
-        let texels: Vec<[f32; 4]> = map
-            .planes()
-            .map(|plane| plane.map_or([0.0; 4], |q| q.as_vec3().extend(1.0).to_array()))
-            .collect();
-        self.texels("planes", frame.desired.width, frame.desired.height, &texels)
-    }
-
-    /// A list of texels as a texture of rows of `row` texels; never empty.
-    fn table(&self, label: &str, texels: &[[f32; 4]], row: u32) -> wgpu::TextureView {
-        let height = (texels.len() as u32).div_ceil(row).max(1);
-        let mut texels = texels.to_vec();
-        texels.resize((row * height) as usize, [0.0; 4]);
-        self.texels(label, row, height, &texels)
-    }
-
-    fn texels(
-        &self,
-        label: &str,
-        width: u32,
-        height: u32,
-        texels: &[[f32; 4]],
-    ) -> wgpu::TextureView {
-        let descriptor = wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        };
-        let order = wgpu::util::TextureDataOrder::LayerMajor;
-        let bytes = bytemuck::cast_slice(texels);
-        let texture = self
-            .device
-            .create_texture_with_data(&self.queue, &descriptor, order, bytes);
-        texture.create_view(&Default::default())
-    }
-
-    fn buffer<T: bytemuck::Pod>(
-        &self,
-        label: &str,
-        contents: &[T],
-        usage: wgpu::BufferUsages,
-    ) -> wgpu::Buffer {
-        // Bindings may not be empty.
-        let empty = [0_u8; 16];
-        let contents: &[u8] = if contents.is_empty() {
-            &empty
-        } else {
-            bytemuck::cast_slice(contents)
-        };
-        let descriptor = wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        };
-        self.device.create_buffer_init(&descriptor)
-    }
-
-    /// One render pass over a cleared picture, and the picture.
-    fn draw(
-        &mut self,
-        frame: &Frame<'_>,
-        record: impl FnOnce(&mut wgpu::RenderPass<'_>, &Pipelines),
+        field: Option<&TriangulatedField>,
+        loaded: &Loaded,
     ) -> Result<RgbaImage, RenderError> {
+        let picture = self.try_draw(frame, field, loaded);
+        self.told(picture)
+    }
+
+    fn try_draw(
+        &mut self,
+        frame: &Frame<'_>,
+        field: Option<&TriangulatedField>,
+        loaded: &Loaded,
+    ) -> Result<RgbaImage, RenderError> {
+        self.device_time = None;
+        let tables = self.tables(frame)?;
         let (width, height) = (frame.desired.width, frame.desired.height);
         if self
             .target
             .as_ref()
             .is_none_or(|t| t.size != [width, height])
         {
-            let bytes = u64::from(width.next_multiple_of(64)) * u64::from(height) * 4;
-            let limit = self.device.limits().max_buffer_size;
-            if bytes > limit {
-                return Err(RenderError::Gpu(format!(
-                    "a picture of {width} × {height} takes {bytes} bytes, more than this device \
-                     reads back at once ({limit}); use --device cpu or a smaller --size"
-                )));
+            let most_bytes = self.limits.max_buffer_size;
+            self.target = Some(Target::new(&self.device, width, height, most_bytes));
+        }
+        let stopwatch = self
+            .timestamps
+            .then(|| Stopwatch::new(&self.device, loaded.groups.len()));
+        for (pass_idx, group) in loaded.groups.iter().enumerate() {
+            let turn = Turn {
+                pass_idx,
+                stopwatch: stopwatch.as_ref(),
+            };
+            self.bring(frame, loaded.room, &group.sources)?;
+            match (&group.part, field) {
+                (Part::Triangles(range), Some(field)) => {
+                    self.draw_triangles(frame, &tables, field, range.clone(), turn)?;
+                }
+                (Part::Pixels(rect), _) => self.draw_pixels(frame, &tables, *rect, turn)?,
+                (Part::Triangles(_), None) => {}
             }
-            self.target = Some(Target::new(&self.device, width, height));
         }
         let target = self.target.as_ref().expect("made above");
+        let picture = target.read(&self.device, &self.queue)?;
+        if let Some(stopwatch) = stopwatch {
+            self.device_time = stopwatch.read(&self.device, &self.queue)?;
+        }
+        Ok(picture)
+    }
+
+    /// Draws some of a field's triangles with photos that are on the device.
+    fn draw_triangles(
+        &mut self,
+        frame: &Frame<'_>,
+        tables: &tables::Tables,
+        field: &TriangulatedField,
+        range: Range<usize>,
+        turn: Turn<'_>,
+    ) -> Result<(), RenderError> {
+        let shared = self.shared_group(frame, tables, load::Order::ByLayer, Rect::whole(0, 0))?;
+        let photos = self.photos.as_ref().expect("brought before");
+        let mut entries: Vec<Entry> = Vec::new();
+        let mut corners: [Vec<Corner>; 2] = Default::default();
+        let size = [frame.desired.width as f32, frame.desired.height as f32];
+        for triangle_idx in range {
+            let triangle = &field.triangles[triangle_idx];
+            let list = [entries.len() as u32, triangle.entry_count];
+            let entry = |e: &FieldEntry| Entry {
+                source_idx: photos.layer(e.source_idx as usize).unwrap_or(0) as f32,
+                values: e.values,
+            };
+            entries.extend(field.entries_of(triangle_idx).iter().map(entry));
+            corners[usize::from(triangle.bordered)].extend(triangle.corners.map(|i| {
+                let [x, y] = field.vertices[i as usize].as_vec2().to_array();
+                Corner {
+                    at: [x / size[0] * 2.0 - 1.0, y / size[1] * -2.0 + 1.0],
+                    list,
+                }
+            }));
+        }
+        let [plain, bordered] = &corners;
+        let buffers = [plain, bordered]
+            .map(|corners| self.buffer("corners", corners, wgpu::BufferUsages::VERTEX));
+        let entries = self.table("entries", bytemuck::cast_slice(&entries), layout::ENTRY_ROW);
+        let own =
+            self.pipelines
+                .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
+        let special = Special::of(frame);
+        for pass in [Pass::Triangles, Pass::BorderedTriangles] {
+            self.pipelines.ensure(&self.device, pass, special);
+        }
+        self.pass(turn, |pass, pipelines| {
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &own, &[]);
+            pass.set_pipeline(pipelines.get(Pass::Triangles, special));
+            pass.set_vertex_buffer(0, buffers[0].slice(..));
+            pass.draw(0..plain.len() as u32, 0..1);
+            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, special));
+            pass.set_vertex_buffer(0, buffers[1].slice(..));
+            pass.draw(0..bordered.len() as u32, 0..1);
+        });
+        self.trouble.take()
+    }
+
+    /// Draws a part of the exact field with photos that are on the device.
+    fn draw_pixels(
+        &mut self,
+        frame: &Frame<'_>,
+        tables: &tables::Tables,
+        rect: Rect,
+        turn: Turn<'_>,
+    ) -> Result<(), RenderError> {
+        let shared = self.shared_group(frame, tables, load::Order::AsGiven, rect)?;
+        let photos = self.photos.as_ref().expect("brought before");
+        let own = self
+            .pipelines
+            .exact_group(&self.device, &photos.view, &self.sampler);
+        let special = Special::of(frame);
+        self.pipelines.ensure(&self.device, Pass::Exact, special);
+        self.pass(turn, |pass, pipelines| {
+            let ([x, y], [width, height]) = (rect.origin, rect.size);
+            pass.set_scissor_rect(x, y, width, height);
+            pass.set_pipeline(pipelines.get(Pass::Exact, special));
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &own, &[]);
+            pass.draw(0..3, 0..1);
+        });
+        self.trouble.take()
+    }
+
+    /// One render pass over the picture, which the first of a frame clears.
+    fn pass(&self, turn: Turn<'_>, record: impl FnOnce(&mut wgpu::RenderPass<'_>, &Pipelines)) {
+        let Some(target) = &self.target else { return };
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -501,24 +399,42 @@ impl Gpu {
                     depth_slice: None,
                     resolve_target: None,
                     ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        load: match turn.pass_idx {
+                            0 => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                            _ => wgpu::LoadOp::Load,
+                        },
                         store: wgpu::StoreOp::Store,
                     },
                 })],
+                timestamp_writes: turn.stopwatch.map(Stopwatch::of_pass),
                 ..Default::default()
             });
             record(&mut pass, &self.pipelines);
         }
-        target.copy_to_readback(&mut encoder);
+        if let Some(stopwatch) = turn.stopwatch {
+            stopwatch.keep(&mut encoder, turn.pass_idx);
+        }
         self.queue.submit([encoder.finish()]);
-        let picture = target.read(&self.device);
-        self.check()?;
-        picture
     }
 
-    /// The first failure that the device has reported, once.
-    fn check(&self) -> Result<(), RenderError> {
-        let failure = self.failure.lock().ok().and_then(|mut slot| slot.take());
-        failure.map_or(Ok(()), |message| Err(RenderError::Gpu(message)))
+    fn maker(&self) -> Maker<'_> {
+        Maker {
+            device: &self.device,
+            queue: &self.queue,
+            opengl: self.info.backend == wgpu::Backend::Gl,
+            array_bytes: self.asked.array_bytes,
+        }
+    }
+
+    /// A result, or what the device said meanwhile: that it is lost before anything else.
+    fn told<T>(&self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        if matches!(result, Err(RenderError::Photo(_))) && self.trouble.lost().is_none() {
+            return result;
+        }
+        match (self.trouble.take(), result) {
+            (Err(lost @ RenderError::DeviceLost(_)), _) => Err(lost),
+            (_, Err(error)) => Err(error),
+            (said, result) => said.and(result),
+        }
     }
 }

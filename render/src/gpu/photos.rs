@@ -42,102 +42,189 @@ struct Slot {
     last_used: u64,
 }
 
+/// Where arrays are made.
+#[derive(Clone, Copy)]
+pub(crate) struct Maker<'a> {
+    pub device: &'a wgpu::Device,
+    pub queue: &'a wgpu::Queue,
+    /// Whether it is OpenGL.
+    pub opengl: bool,
+    /// Bytes that an array of photos may take, if something says so.
+    pub array_bytes: Option<u64>,
+}
+
+impl Maker<'_> {
+    /// How many layers to ask for so that there are as many, and they are an array.
+    ///
+    /// A texture of OpenGL is made as one of a kind, and wgpu guesses which: one layer is no
+    /// array, and six squares, or twelve, are cubes. Sampled as arrays both are black.
+    fn layers_of_array(&self, count: u32, square: bool) -> u32 {
+        let guessed_wrong = count == 1 || (square && count.is_multiple_of(6));
+        count + u32::from(self.opengl && guessed_wrong)
+    }
+}
+
+/// Why photos are not on the device.
+#[derive(Debug)]
+pub(crate) enum Shortage {
+    /// There is no memory for so many layers in one array.
+    Memory { count: u32, message: String },
+    /// Anything else.
+    Render(RenderError),
+}
+
+impl From<Shortage> for RenderError {
+    fn from(shortage: Shortage) -> Self {
+        match shortage {
+            Shortage::Memory { message, .. } => Self::DeviceFull(message),
+            Shortage::Render(error) => error,
+        }
+    }
+}
+
+impl From<RenderError> for Shortage {
+    fn from(error: RenderError) -> Self {
+        Self::Render(error)
+    }
+}
+
 impl Layers {
     /// Makes sure that the photos or masks of the given source views are on the device, within
-    /// the budget and the device's limits. Those that are there already stay if there is room,
-    /// else the least recently used go. Of more photos than there is room for in full, only
-    /// coarser mip levels are there.
+    /// the room that their frame has. Those that are there already stay if there is room, else
+    /// the least recently used go.
+    ///
+    /// # Errors
+    /// A photo or a mask cannot be decoded; there is no memory for so many, which
+    /// [`Shortage::Memory`] counts.
     pub(crate) fn ensure(
         current: &mut Option<Self>,
         residency: &mut Residency,
         content: Content,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        maker: Maker<'_>,
         frame: &Frame<'_>,
+        room: Room,
         wanted: &[usize],
-    ) -> Result<(), RenderError> {
+    ) -> Result<(), Shortage> {
         let store_id = content.id(frame);
         if wanted.is_empty() && current.as_ref().is_some_and(|p| p.store_id == store_id) {
             return Ok(());
         }
         if wanted.is_empty() {
             // Something must be there to be bound, however small.
-            let old = current.take();
-            residency.change(0, old.as_ref().map_or(0, Self::bytes));
+            Self::release(current, residency, maker);
             let finest = content.coarsest();
-            let layers = Self::allocate(content, device, frame, store_id, finest, 1)?;
+            let layers = Self::allocate(content, maker, frame, store_id, finest, 1)?;
             residency.change(layers.bytes(), 0);
             *current = Some(layers);
             return Ok(());
         }
-        let size = array_size(frame);
-        let room = Room::of(
-            content,
-            size,
-            wanted.len() as u32,
-            residency.budget,
-            &device.limits(),
-        )?;
-        residency.note_frame(room.finest);
-        let most = room.most.min(frame.lumigraph.sources.len().max(1) as u32);
+        let mut most = room.most.min(frame.lumigraph.sources.len().max(1) as u32);
+        let size = content.layer_size(array_size(frame));
+        if wanted.len() < most as usize && maker.layers_of_array(most, size[0] == size[1]) > most {
+            // One less rather than one that nothing is in.
+            most -= 1;
+        }
+        if wanted.len() > most as usize {
+            return Err(Shortage::Render(RenderError::Gpu(format!(
+                "{} {} are needed at once, and this device holds {most}; use --device cpu",
+                wanted.len(),
+                content.name()
+            ))));
+        }
         let fits =
             |p: &Self| p.store_id == store_id && p.finest == room.finest && p.capacity <= room.most;
         let missing = |p: &Self| wanted.iter().filter(|&&i| p.layers[i].is_none()).count() as u32;
         let enough = |p: &Self| p.used() + missing(p) <= p.capacity || p.capacity >= most;
         if !current.as_ref().is_some_and(|p| fits(p) && enough(p)) {
             // A new array, with room for what is wanted, what is there and some more.
-            let old = current.take();
+            let old = current.as_ref();
             let keep = old
-                .as_ref()
                 .filter(|p| fits(p))
                 .map_or_else(Vec::new, |p| p.by_age(wanted));
-            let keep_count = keep.len().min(most as usize - wanted.len());
-            residency.change(0, old.as_ref().map_or(0, Self::bytes));
-            residency.evictions += old.map_or(0, |p| p.others(wanted) - keep_count as u64);
+            let mut keep_count = keep.len().min(most as usize - wanted.len());
+            let others = old.map_or(0, |p| p.others(wanted));
+            Self::release(current, residency, maker);
             let needed = (wanted.len() + keep_count).max(1) as u32;
-            let capacity = match residency.budget {
+            let capacity = if residency.budget.is_some() || room.grouped {
                 // Made once, it need not be filled again when more comes.
-                Some(_) => most,
-                None => needed.next_multiple_of(8).min(most),
+                most
+            } else {
+                needed.next_multiple_of(8).min(most)
             };
-            let mut layers =
-                Self::allocate(content, device, frame, store_id, room.finest, capacity)?;
+            let allocate =
+                |count| Self::allocate(content, maker, frame, store_id, room.finest, count);
+            let mut layers = match allocate(capacity) {
+                Err(Shortage::Memory { .. })
+                    if capacity as usize > wanted.len() && !room.grouped =>
+                {
+                    keep_count = 0;
+                    allocate(wanted.len() as u32)?
+                }
+                made => made?,
+            };
+            residency.evictions += others - keep_count as u64;
             residency.change(layers.bytes(), 0);
             let mut all = keep[keep.len() - keep_count..].to_vec();
             all.extend(wanted);
             all.sort_unstable();
-            let filled = layers.fill(device, queue, frame, residency, &all);
+            let filled = layers.fill(maker, frame, residency, &all);
             layers.touch(wanted);
             *current = Some(layers);
-            return filled;
+            return filled.map_err(Shortage::Render);
         }
         let Some(layers) = current else { return Ok(()) };
         layers.touch(wanted);
-        layers.fill(device, queue, frame, residency, wanted)
+        layers
+            .fill(maker, frame, residency, wanted)
+            .map_err(Shortage::Render)
+    }
+
+    /// Gives an array's memory back, at once rather than when nobody can ask for it any more.
+    fn release(current: &mut Option<Self>, residency: &mut Residency, maker: Maker<'_>) {
+        if let Some(old) = current.take() {
+            residency.change(0, old.bytes());
+            old.texture.destroy();
+            // Whatever it says, the next call will hear it, too.
+            let _ = maker.device.poll(wgpu::PollType::Poll);
+        }
     }
 
     fn allocate(
         content: Content,
-        device: &wgpu::Device,
+        maker: Maker<'_>,
         frame: &Frame<'_>,
         store_id: u64,
         finest: usize,
         capacity: u32,
-    ) -> Result<Self, RenderError> {
+    ) -> Result<Self, Shortage> {
+        let Maker { device, .. } = maker;
         let (label, format) = match content {
             Content::Photos => ("photos", wgpu::TextureFormat::Rgba8Unorm),
             Content::Masks => ("masks", wgpu::TextureFormat::R8Unorm),
             Content::Distances => ("distances", wgpu::TextureFormat::R16Float),
         };
         let size = content.layer_size(array_size(frame));
+        let [width, height] = size.map(|side| side >> finest);
+        let short = |why: &str| Shortage::Memory {
+            count: capacity,
+            message: format!(
+                "no room for {capacity} {} of {width} × {height} ({why}); use --gpu-memory or \
+                 --device cpu",
+                content.name()
+            ),
+        };
+        let bytes = content.layer_bytes(size, finest) * u64::from(capacity);
+        if content == Content::Photos && maker.array_bytes.is_some_and(|most| bytes > most) {
+            return Err(short("more bytes than allowed"));
+        }
         let out_of_memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d {
-                width: size[0] >> finest,
-                height: size[1] >> finest,
-                depth_or_array_layers: capacity,
+                width,
+                height,
+                depth_or_array_layers: maker.layers_of_array(capacity, width == height),
             },
             mip_level_count: content.levels(finest),
             sample_count: 1,
@@ -148,12 +235,7 @@ impl Layers {
         });
         let refused = pollster::block_on(refused.pop());
         if let Some(error) = pollster::block_on(out_of_memory.pop()).or(refused) {
-            return Err(RenderError::Gpu(format!(
-                "no room for {capacity} {label} of {} × {} ({error}); use --gpu-memory or \
-                 --device cpu",
-                size[0] >> finest,
-                size[1] >> finest
-            )));
+            return Err(short(&error.to_string()));
         }
         let view = array_view(&texture);
         Ok(Self {
@@ -176,7 +258,8 @@ impl Layers {
 
     /// Bytes on the device.
     fn bytes(&self) -> u64 {
-        self.content.layer_bytes(self.size, self.finest) * u64::from(self.capacity)
+        let layers = u64::from(self.texture.depth_or_array_layers());
+        self.content.layer_bytes(self.size, self.finest) * layers
     }
 
     /// The source views that have a layer and are not wanted, the least recently used first.
@@ -205,8 +288,7 @@ impl Layers {
     /// Uploads what is missing, in place of the least recently used where no layer is free.
     fn fill(
         &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        Maker { device, queue, .. }: Maker<'_>,
         frame: &Frame<'_>,
         residency: &mut Residency,
         wanted: &[usize],
@@ -362,6 +444,13 @@ impl Layers {
         slots.map(|slot| slot.source_idx.unwrap_or(0)).collect()
     }
 
+    /// The source views that were wanted last, in no order.
+    pub(crate) fn recent(&self) -> Vec<usize> {
+        let slots = self.slots.iter();
+        let recent = slots.filter(|slot| slot.last_used == self.clock);
+        recent.filter_map(|slot| slot.source_idx).collect()
+    }
+
     /// The source views of a store that have a layer.
     pub(crate) fn resident(&self, store_id: u64) -> Vec<usize> {
         let slots = self.slots.iter().filter(|_| self.store_id == store_id);
@@ -380,7 +469,11 @@ impl Layers {
 pub(crate) fn no_layers(device: &wgpu::Device) -> wgpu::TextureView {
     array_view(&device.create_texture(&wgpu::TextureDescriptor {
         label: Some("no layers"),
-        size: wgpu::Extent3d::default(),
+        // OpenGL knows no array of one; see `Maker::layers_of_array`.
+        size: wgpu::Extent3d {
+            depth_or_array_layers: 2,
+            ..wgpu::Extent3d::default()
+        },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,

@@ -73,7 +73,8 @@ impl Pipelines {
         let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let table = texture(wgpu::TextureViewDimension::D2, false);
         let writable = buffer(Storage { read_only: false });
-        let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
+        // Not the vertices': some devices have no storage buffers for them.
+        let all = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
         let fragment = ShaderStages::FRAGMENT;
         let shader = |(name, parts): (&str, &[&str])| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -17,6 +17,15 @@ pub(crate) enum Content {
 }
 
 impl Content {
+    /// For people.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Photos => "photos",
+            Self::Masks => "masks",
+            Self::Distances => "distance maps",
+        }
+    }
+
     /// Tells what the layers were made from.
     pub(super) fn id(self, frame: &Frame<'_>) -> u64 {
         match (self, &frame.lumigraph.visibility) {
@@ -81,23 +90,6 @@ pub(super) fn array_size(frame: &Frame<'_>) -> [u32; 2] {
     [largest(|v| v.width), largest(|v| v.height)]
 }
 
-/// Whether all photos that take part in a frame may be on the device in full.
-pub(super) fn fit(
-    frame: &Frame<'_>,
-    count: usize,
-    budget: Option<u64>,
-    limits: &wgpu::Limits,
-) -> bool {
-    let room = Room::of(
-        Content::Photos,
-        array_size(frame),
-        count as u32,
-        budget,
-        limits,
-    );
-    room.is_ok_and(|room| room.finest == 0)
-}
-
 /// What an array may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Room {
@@ -105,12 +97,16 @@ pub(super) struct Room {
     pub(super) finest: usize,
     /// Layers at most.
     pub(super) most: u32,
+    /// Whether they are filled several times for one frame: then the array is made as large as
+    /// it may be.
+    pub(super) grouped: bool,
 }
 
 impl Room {
-    /// For `count` layers at once: from the finest mip level on from which they fit the budget
-    /// and the device, else the coarsest. It depends on nothing else, so that a frame looks
-    /// the same whatever was drawn before.
+    /// For the `count` layers of a frame: from the finest mip level on from which they fit the
+    /// budget and textures of the device, else the coarsest. It depends on nothing else, so that
+    /// a frame looks the same whatever was drawn before. Layers may be fewer than `count`: then
+    /// the frame is drawn in groups.
     pub(super) fn of(
         content: Content,
         photo_size: [u32; 2],
@@ -132,11 +128,12 @@ impl Room {
         let finest = (0..coarsest)
             .find(|&finest| small_enough(finest) && affordable(finest))
             .unwrap_or(coarsest);
-        if !small_enough(finest) || count > layers {
+        if !small_enough(finest) {
             return Err(RenderError::Gpu(format!(
-                "{count} photos of {} × {} do not fit a texture array of this device (at most \
-                 {layers} of {side} × {side}); use --device cpu",
-                size[0], size[1]
+                "{} of {} × {} are more than this device holds ({side} × {side}); use --device cpu",
+                content.name(),
+                size[0],
+                size[1]
             )));
         }
         let affordable = budget.map_or(layers, |budget| {
@@ -144,7 +141,11 @@ impl Room {
             u32::try_from(layers).unwrap_or(u32::MAX)
         });
         let most = affordable.max(count).clamp(1, layers);
-        Ok(Self { finest, most })
+        Ok(Self {
+            finest,
+            most,
+            grouped: count > most,
+        })
     }
 }
 
@@ -163,7 +164,11 @@ mod tests {
         let limits = wgpu::Limits::default();
         assert_eq!(limits.max_texture_array_layers, 256);
         let room = |count, budget| of(count, budget, &limits).unwrap();
-        let expected = |finest, most| Room { finest, most };
+        let expected = |finest, most| Room {
+            finest,
+            most,
+            grouped: false,
+        };
         assert_eq!(room(9, None), expected(0, 256));
         let layer = |finest| Content::Photos.layer_bytes(SIZE, finest);
         assert_eq!(layer(0), 4 * (8192 + 2048 + 512 + 128 + 32 + 8 + 2));
@@ -179,21 +184,26 @@ mod tests {
     }
 
     #[test]
-    fn a_device_takes_levels_or_refuses() {
+    fn a_device_takes_levels_and_groups() {
         let limits = wgpu::Limits {
             max_texture_dimension_2d: 32,
             max_texture_array_layers: 7,
             ..wgpu::Limits::default()
         };
         let room = of(7, None, &limits).unwrap();
-        assert_eq!(room, Room { finest: 2, most: 7 });
-        let error = of(8, None, &limits).unwrap_err().to_string();
-        assert!(error.contains("8 photos of 128 × 64"), "{error}");
-        assert!(error.contains("at most 7 of 32 × 32"), "{error}");
+        assert_eq!((room.finest, room.most, room.grouped), (2, 7, false));
+        // More than it has layers for: in groups.
+        let grouped = Room {
+            grouped: true,
+            ..room
+        };
+        assert_eq!(of(8, None, &limits).unwrap(), grouped);
         // Masks are there in full or not at all.
         let masks = |limits| Room::of(Content::Masks, SIZE, 1, Some(1), limits);
-        assert!(masks(&limits).is_err());
+        let error = masks(&limits).unwrap_err().to_string();
+        assert!(error.contains("masks of 128 × 64 are more"), "{error}");
+        assert!(error.contains("(32 × 32)"), "{error}");
         let whole = masks(&wgpu::Limits::default()).unwrap();
-        assert_eq!(whole, Room { finest: 0, most: 1 });
+        assert_eq!((whole.finest, whole.most, whole.grouped), (0, 1, false));
     }
 }

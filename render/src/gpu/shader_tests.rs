@@ -94,7 +94,7 @@ fn params_lie_where_the_shaders_read_them() {
     let expected = offsets!(
         plane rays_in_table ray_scale ray_offset array_size size source_count
         desired_by_distance beta full_weight k blend resolution plane_seen exposures_differ timed
-        facets finest
+        facets finest part_origin part_size
     );
     for shader in SHADERS {
         let (found, size) = members(&parse(shader), "Params");
@@ -177,7 +177,7 @@ fn corners_and_entries_are_what_the_shaders_take() {
     };
     let expected = [pair(naga::Scalar::F32), pair(naga::Scalar::U32)];
     assert_eq!(inputs, [(0, &expected[0]), (1, &expected[1])]);
-    assert_eq!(offset_of!(Corner, pixel), 0);
+    assert_eq!(offset_of!(Corner, at), 0);
     assert_eq!(offset_of!(Corner, list), 8);
     assert_eq!(size_of::<Corner>(), 16);
 }

@@ -3,7 +3,8 @@
 use crate::RenderError;
 use image::RgbaImage;
 
-/// A picture to draw into and the buffer it is read back through.
+/// A picture to draw into and the buffer it is read back through, as many rows at a time as
+/// that takes.
 #[derive(Debug)]
 pub(crate) struct Target {
     pub size: [u32; 2],
@@ -11,10 +12,12 @@ pub(crate) struct Target {
     texture: wgpu::Texture,
     readback: wgpu::Buffer,
     bytes_per_row: u32,
+    rows: u32,
 }
 
 impl Target {
-    pub(crate) fn new(device: &wgpu::Device, width: u32, height: u32) -> Self {
+    /// `most_bytes` are those of a buffer.
+    pub(crate) fn new(device: &wgpu::Device, width: u32, height: u32, most_bytes: u64) -> Self {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size: wgpu::Extent3d {
@@ -31,37 +34,57 @@ impl Target {
         });
         let view = texture.create_view(&Default::default());
         let bytes_per_row = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let readback = readback_buffer(device, u64::from(bytes_per_row) * u64::from(height));
+        let rows = (most_bytes / u64::from(bytes_per_row)).clamp(1, u64::from(height.max(1)));
+        let readback = readback_buffer(device, u64::from(bytes_per_row) * rows);
         Self {
             size: [width, height],
             view,
             texture,
             readback,
             bytes_per_row,
+            rows: rows as u32,
         }
     }
 
-    pub(crate) fn copy_to_readback(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.copy_texture_to_buffer(
-            self.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &self.readback,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(self.bytes_per_row),
-                    rows_per_image: Some(self.size[1]),
+    /// Waits for the device and reads the picture.
+    pub(crate) fn read(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+    ) -> Result<RgbaImage, RenderError> {
+        let [width, height] = self.size;
+        let row_bytes = width as usize * 4;
+        let mut pixels = Vec::with_capacity(row_bytes * height as usize);
+        for y in (0..height).step_by(self.rows as usize) {
+            let rows = self.rows.min(height - y);
+            let mut encoder = device.create_command_encoder(&Default::default());
+            encoder.copy_texture_to_buffer(
+                wgpu::TexelCopyTextureInfo {
+                    origin: wgpu::Origin3d { x: 0, y, z: 0 },
+                    ..self.texture.as_image_copy()
                 },
-            },
-            self.texture.size(),
-        );
-    }
-
-    pub(crate) fn read(&self, device: &wgpu::Device) -> Result<RgbaImage, RenderError> {
-        let bytes = read(device, &self.readback)?;
-        let row = self.size[0] as usize * 4;
-        let rows = bytes.chunks_exact(self.bytes_per_row as usize);
-        let pixels: Vec<u8> = rows.flat_map(|padded| &padded[..row]).copied().collect();
-        Ok(RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("one row each"))
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &self.readback,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(self.bytes_per_row),
+                        rows_per_image: Some(rows),
+                    },
+                },
+                wgpu::Extent3d {
+                    width,
+                    height: rows,
+                    depth_or_array_layers: 1,
+                },
+            );
+            queue.submit([encoder.finish()]);
+            let bytes = read(device, &self.readback)?;
+            let padded = bytes.chunks_exact(self.bytes_per_row as usize);
+            for row in padded.take(rows as usize) {
+                pixels.extend_from_slice(&row[..row_bytes]);
+            }
+        }
+        Ok(RgbaImage::from_raw(width, height, pixels).expect("one row each"))
     }
 }
 
@@ -85,9 +108,10 @@ pub(crate) fn read(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u
     device
         .poll(wgpu::PollType::wait_indefinitely())
         .map_err(|e| failed(e.to_string()))?;
+    // The device has called back by now, unless it is gone.
     receiver
-        .recv()
-        .map_err(|e| failed(e.to_string()))?
+        .try_recv()
+        .map_err(|_| failed("the device does not answer".to_owned()))?
         .map_err(|e| failed(e.to_string()))?;
     let bytes = buffer
         .get_mapped_range(..)

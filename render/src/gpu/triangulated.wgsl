@@ -22,13 +22,13 @@ struct Corner {
 @vertex
 fn corner(
     @builtin(vertex_index) vertex_idx: u32,
-    @location(0) pixel: vec2f,
+    // In normalised device coordinates: not every device lets this stage read buffers.
+    @location(0) at: vec2f,
     @location(1) list: vec2u,
 ) -> Corner {
-    let ndc = pixel / vec2f(params.size) * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
     let which = vertex_idx % 3u;
     let shares = vec3f(vec3u(0u, 1u, 2u) == vec3u(which));
-    return Corner(vec4f(ndc, 0.0, 1.0), shares, list);
+    return Corner(vec4f(at, 0.0, 1.0), shares, list);
 }
 
 fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, texel: vec3f) {

@@ -112,7 +112,7 @@ impl<'a> Projector<'a> {
         encoder.copy_buffer_to_buffer(&output, 0, &readback, 0, output.size());
         gpu.queue.submit([encoder.finish()]);
         let bytes = target::read(device, &readback);
-        gpu.check().unwrap();
+        gpu.trouble.take().unwrap();
         bytemuck::pod_collect_to_vec(&bytes.unwrap())
     }
 }

@@ -1,0 +1,188 @@
+//! What shaders read besides photos: parameters and tables, made for each frame or part of one.
+
+use super::Gpu;
+use super::groups::Rect;
+use super::layout::{self, Params, Source};
+use super::load::Order;
+use super::photos::Layers;
+use crate::RenderError;
+use crate::frame::Frame;
+use crate::rays::RayMap;
+use crate::surface::Surface;
+use wgpu::util::DeviceExt;
+
+/// The tables that all parts of a frame share.
+pub(super) struct Tables {
+    rays: wgpu::TextureView,
+    planes: wgpu::TextureView,
+}
+
+impl Gpu {
+    pub(super) fn tables(&mut self, frame: &Frame<'_>) -> Result<Tables, RenderError> {
+        let size = [frame.desired.width, frame.desired.height];
+        let side = self.limits.max_texture_dimension_2d;
+        if size[0] > side || size[1] > side {
+            return Err(RenderError::Gpu(format!(
+                "a picture of {} × {} is more than this device draws ({side} × {side}); \
+                 use --device cpu or a smaller --size",
+                size[0], size[1]
+            )));
+        }
+        let rows = frame
+            .sources
+            .len()
+            .div_ceil(layout::SOURCES_PER_ROW as usize);
+        if rows > side as usize {
+            return Err(RenderError::Gpu(format!(
+                "{} photos are more than this device weighs; use --device cpu",
+                frame.sources.len()
+            )));
+        }
+        Ok(Tables {
+            rays: self.rays(frame),
+            planes: self.planes(frame),
+        })
+    }
+
+    /// The bind group that all shaders share, with the photos on the device and what lies beside
+    /// them. `rect` is the part whose photos are marked.
+    pub(super) fn shared_group(
+        &mut self,
+        frame: &Frame<'_>,
+        tables: &Tables,
+        order: Order,
+        rect: Rect,
+    ) -> Result<wgpu::BindGroup, RenderError> {
+        self.bring_beside(frame, order)?;
+        let photos = self.photos.as_ref().expect("brought before");
+        let (masks, distances) = (self.masks.as_ref(), self.distances.as_ref());
+        let params = Params::of(frame, photos.size, photos.finest, rect);
+        let source = |i| {
+            let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
+            Source::of(
+                frame,
+                i,
+                [photos.layer(i), layer_of(masks), layer_of(distances)],
+            )
+        };
+        let listed = match order {
+            Order::AsGiven => frame.taking_part().collect(),
+            Order::ByLayer => photos.by_layer(),
+        };
+        let sources: Vec<Source> = listed.into_iter().map(source).collect();
+        let params = self.buffer("params", &[params], wgpu::BufferUsages::STORAGE);
+        let sources = self.table(
+            "sources",
+            bytemuck::cast_slice(&sources),
+            layout::SOURCE_ROW,
+        );
+        let view = |layers: Option<&'_ Layers>| layers.map_or(&self.no_layers, |l| &l.view).clone();
+        Ok(self.pipelines.shared_group(
+            &self.device,
+            &params,
+            &sources,
+            &tables.rays,
+            &tables.planes,
+            &view(masks),
+            &self.sampler,
+            &view(distances),
+        ))
+    }
+
+    /// The table of rays of a lens that is not a pinhole; a single texel otherwise.
+    fn rays(&mut self, frame: &Frame<'_>) -> wgpu::TextureView {
+        let desired = &frame.desired;
+        let size = [desired.width, desired.height];
+        if let Some((lens, of_size, view)) = &self.rays
+            && (*lens, *of_size) == (desired.lens, size)
+        {
+            return view.clone();
+        }
+        let (width, height, texels) = match RayMap::of(desired) {
+            RayMap::Pinhole { .. } => (1, 1, vec![[0.0; 4]]),
+            RayMap::Table { mut rays, .. } => {
+                // Shaders may assume there are no NaNs: no ray is the zero vector there.
+                rays.iter_mut()
+                    .filter(|r| r[0].is_nan())
+                    .for_each(|r| *r = [0.0; 4]);
+                (size[0], size[1], rays)
+            }
+        };
+        let view = self.texels("rays", width, height, &texels);
+        self.rays = Some((desired.lens, size, view.clone()));
+        view
+    }
+
+    /// The plane that each pixel sees; a single texel where all see the same.
+    fn planes(&self, frame: &Frame<'_>) -> wgpu::TextureView {
+        let Surface::Facets(map) = &frame.surface else {
+            return self.texels("planes", 1, 1, &[[0.0; 4]]);
+        };
+        let texels: Vec<[f32; 4]> = map
+            .planes()
+            .map(|plane| plane.map_or([0.0; 4], |q| q.as_vec3().extend(1.0).to_array()))
+            .collect();
+        self.texels("planes", frame.desired.width, frame.desired.height, &texels)
+    }
+
+    /// A list of texels as a texture of rows of `row` texels; never empty.
+    pub(super) fn table(&self, label: &str, texels: &[[f32; 4]], row: u32) -> wgpu::TextureView {
+        let height = (texels.len() as u32).div_ceil(row).max(1);
+        let mut texels = texels.to_vec();
+        texels.resize((row * height) as usize, [0.0; 4]);
+        self.texels(label, row, height, &texels)
+    }
+
+    fn texels(
+        &self,
+        label: &str,
+        width: u32,
+        height: u32,
+        texels: &[[f32; 4]],
+    ) -> wgpu::TextureView {
+        let descriptor = wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let order = wgpu::util::TextureDataOrder::LayerMajor;
+        let bytes = bytemuck::cast_slice(texels);
+        let texture = self
+            .device
+            .create_texture_with_data(&self.queue, &descriptor, order, bytes);
+        texture.create_view(&Default::default())
+    }
+
+    pub(super) fn buffer<T: bytemuck::Pod>(
+        &self,
+        label: &str,
+        contents: &[T],
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
+        // Bindings may not be empty.
+        let empty = [0_u8; 16];
+        let contents: &[u8] = if contents.is_empty() {
+            &empty
+        } else {
+            bytemuck::cast_slice(contents)
+        };
+        // Written rather than mapped: mapping panics on a device that is lost.
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: contents.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
+    }
+}

@@ -1,0 +1,127 @@
+//! What a run says of its cost.
+
+use crate::run::{lumigraph, with_wall};
+use serde_json::Value;
+
+/// A report's counts: all but times and memory.
+fn counts(ran: &Value) -> Vec<Value> {
+    let of_frames = ran["frames"].as_array().unwrap().iter().map(|frame| {
+        let mut cost = frame["cost"].clone();
+        for time in ["stages", "device_seconds"] {
+            cost.as_object_mut().unwrap().remove(time).unwrap();
+        }
+        cost
+    });
+    let report = &ran["report"];
+    let of_all = ["skipped", "photos_used_per_frame", "frames_by_cpu", "notes"];
+    of_frames
+        .chain(of_all.map(|name| report[name].clone()))
+        .collect()
+}
+
+#[test]
+fn a_frame_says_what_it_took_and_the_run_what_all_did() {
+    let folder = with_wall();
+    for renderer in ["triangulated", "exact"] {
+        let render = |options: &str, out: &str| {
+            let line = format!(
+                "render wall --proxy plane --path sweep --frames 3 --k 2 --renderer {renderer} \
+                 --json -o {out}{options}"
+            );
+            lumigraph(folder.path(), &line).ok().json()
+        };
+        let ran = render("", renderer);
+        let report = &ran["report"];
+        let mut sums = [0.0; 6];
+        for frame in ran["frames"].as_array().unwrap() {
+            let cost = &frame["cost"];
+            let stages = ["surface", "field", "ahead", "load", "draw", "write"];
+            for (sum, stage) in sums.iter_mut().zip(stages) {
+                *sum += cost["stages"][stage]["seconds"].as_f64().unwrap();
+                assert!(cost["stages"][stage]["cpu_seconds"].as_f64().unwrap() >= 0.0);
+            }
+            assert!(cost["stages"]["draw"]["seconds"].as_f64() > Some(0.0));
+            let used = cost["photos_used"].as_u64().unwrap();
+            assert!((1..=9).contains(&used), "{used}");
+            let scored = cost["cameras_scored"].as_u64().unwrap();
+            assert!(used <= scored, "{cost}");
+            assert_eq!(scored + cost["cameras_never_scored"].as_u64().unwrap(), 9);
+            assert_eq!(
+                (&cost["parts"], &cost["drawn_by_cpu"]),
+                (&1.into(), &true.into())
+            );
+            assert!(cost["device_seconds"].is_null());
+        }
+        let draw = report["stages"]["draw"]["seconds"].as_f64().unwrap();
+        assert!((draw - sums[4]).abs() < 1e-6, "{draw}, {sums:?}");
+        let skipped = &report["skipped"];
+        let decoded = report["photos_decoded"].as_u64().unwrap();
+        let never = skipped["photos_never_decoded"].as_u64().unwrap();
+        assert_eq!(never + decoded, 9);
+        // With 7 mip levels.
+        let photo = 4 * (96 * 72 + 48 * 36 + 24 * 18 + 12 * 9 + 6 * 5 + 3 * 3 + 2 * 2);
+        assert_eq!(skipped["bytes_never_decoded"], never * photo);
+        assert!(skipped["photos_never_uploaded"].is_null());
+        assert!(skipped["scorings_omitted"].as_u64() > Some(0), "{skipped}");
+        assert_eq!(skipped["visibility_tests_omitted_photos"], 9);
+        assert_eq!(skipped["mask_tests_omitted_photos"], 9);
+
+        // Counts do not depend on the threads.
+        for threads in [1, 3] {
+            let again = render(
+                &format!(" --threads {threads}"),
+                &format!("{renderer}-{threads}"),
+            );
+            assert_eq!(
+                counts(&again),
+                counts(&ran),
+                "{renderer}, {threads} threads"
+            );
+        }
+        let all = render(" --no-skip", &format!("{renderer}-all"));
+        let skipped = &all["report"]["skipped"];
+        assert_eq!(skipped["photos_never_decoded"], 0);
+        assert_eq!(skipped["bytes_never_decoded"], 0);
+    }
+    let line = "render wall --proxy plane --path sweep --frames 2 -o text";
+    let said = lumigraph(folder.path(), line).ok().stderr;
+    for what in [
+        "seconds (CPU) by stage: surface ",
+        "draw ",
+        "; no graphics device draws; ",
+        "skipped: ",
+        "visibility tests of 9 photos",
+    ] {
+        assert!(said.contains(what), "{what}: {said}");
+    }
+}
+
+#[test]
+fn a_graphics_device_says_what_it_never_got() {
+    let folder = with_wall();
+    let line = "render wall --proxy plane --path sweep --frames 3 --k 2 --device gpu --json -o out";
+    let ran = lumigraph(folder.path(), line);
+    if ran.code == 1 && ran.stderr.contains("graphics device") {
+        assert!(
+            std::env::var_os("LUMIGRAPH_REQUIRE_GPU").is_none(),
+            "a graphics device is required: {}",
+            ran.stderr
+        );
+        eprintln!("SKIPPED: no graphics device: {}", ran.stderr);
+        return;
+    }
+    let ran = ran.ok().json();
+    let report = &ran["report"];
+    println!("{report}");
+    let skipped = &report["skipped"];
+    let loads = report["gpu_memory"]["loads"].as_u64().unwrap();
+    assert_eq!(skipped["photos_never_uploaded"], 9 - loads);
+    assert_eq!(report["frames_by_cpu"], 0);
+    assert!(report["notes"].as_array().unwrap().is_empty());
+    for frame in ran["frames"].as_array().unwrap() {
+        let device = &frame["cost"]["device_seconds"];
+        assert!(device.is_null() || device.as_f64() > Some(0.0), "{device}");
+        assert_eq!(frame["cost"]["drawn_by_cpu"], false);
+        assert!(frame["cost"]["photos_used"].as_u64() <= Some(loads));
+    }
+}
