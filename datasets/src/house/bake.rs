@@ -11,10 +11,10 @@ use rayon::prelude::*;
 const LAMP_HEIGHT: f64 = HEIGHT - 0.5;
 const LAMP_HALF: f64 = 0.18;
 /// Light of a lamp on a floor straight below, for each square metre of its room.
-const LAMP_POWER: f64 = 0.19;
+const LAMP_POWER: f64 = 0.27;
 const LAMP_COLOR: DVec3 = DVec3::new(1.0, 0.94, 0.84);
 /// Light from everywhere.
-const AMBIENT: DVec3 = DVec3::new(0.33, 0.35, 0.37);
+const AMBIENT: DVec3 = DVec3::new(0.24, 0.26, 0.28);
 /// Corners darken where something is nearer than this.
 const REACH: f64 = 0.8;
 /// A ray's start is off the surface.

@@ -125,7 +125,7 @@ fn bookshelf(b: &mut Builder, width: f64, seed: u32) {
                 b.lathe(foot, &profile, plain(CLOTHS[k as usize % 6]));
                 x += 0.16;
             } else {
-                let color = hash(seed, board, k, 7) & 0x7f7f7f;
+                let color = CLOTHS[hash(seed, board, k, 7) as usize % 6] >> 1 & 0x7f7f7f;
                 let deep = 0.2 + 0.06 * r(3);
                 let corner = v(x + 0.9 * thick, y + 0.03 + tall, 0.03 + deep);
                 b.cuboid(v(x, y + 0.03, 0.03), corner, plain(color + 0x302820));

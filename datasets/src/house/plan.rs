@@ -37,6 +37,8 @@ pub(super) enum Kind {
     Door,
     Doorway,
     Window,
+    /// To pass plates through.
+    Hatch,
 }
 
 impl Kind {
@@ -45,6 +47,7 @@ impl Kind {
             Self::Door => "door",
             Self::Doorway => "doorway",
             Self::Window => "window",
+            Self::Hatch => "hatch",
         }
     }
 
@@ -54,6 +57,7 @@ impl Kind {
             Self::Door => (0.875, 0.0, 2.0625),
             Self::Doorway => (1.5, 0.0, 2.25),
             Self::Window => (1.125, 0.9375, 2.0),
+            Self::Hatch => (0.5, 1.0625, 1.625),
         }
     }
 }
@@ -194,9 +198,10 @@ fn openings(rooms: &[Rect], seed: u32) -> Vec<Opening> {
             if found.len() >= wanted {
                 break;
             }
-            let kinds = match hash(seed, i as i32, 5, round) % 3 {
-                0 => [Kind::Window, Kind::Door],
-                1 => [Kind::Door, Kind::Window],
+            let kinds = match (round, hash(seed, i as i32, 5, round) % 3) {
+                (2.., _) => [Kind::Hatch, Kind::Hatch],
+                (_, 0) => [Kind::Window, Kind::Door],
+                (_, 1) => [Kind::Door, Kind::Window],
                 _ => [Kind::Doorway, Kind::Window],
             };
             let jitter = unit(seed, i as i32, 6, round);
@@ -228,4 +233,50 @@ fn walls(rooms: &[Rect]) -> Vec<Wall> {
         }
     }
     walls
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn houses_are_connected_and_have_the_openings_they_should() {
+        for seed in 0..40 {
+            for count in [2, 3, 5, 8, 13, 19, 40] {
+                let Plan { rooms, openings } = plan(count, seed);
+                assert_eq!(rooms.len(), count);
+                let wanted = (OPENINGS_PER_ROOM * count as f64).round() as usize;
+                assert_eq!(openings.len(), wanted, "{count} rooms, seed {seed}");
+                assert!(
+                    rooms.iter().all(|r| r.size().min_element() >= 2.5),
+                    "{rooms:?}"
+                );
+                for (i, a) in rooms.iter().enumerate() {
+                    assert!(!rooms[..i].iter().any(|b| a.overlaps(b)));
+                }
+                // One walks through doors to every room.
+                let mut reached = vec![0];
+                let mut next = 0;
+                while let Some(room) = reached.get(next).copied() {
+                    for opening in openings.iter().filter(|o| o.sill == 0.0) {
+                        let [a, b] = opening.rooms;
+                        for (from, to) in [(a, b), (b, a)] {
+                            if from == room && !reached.contains(&to) {
+                                reached.push(to);
+                            }
+                        }
+                    }
+                    next += 1;
+                }
+                assert_eq!(reached.len(), count, "seed {seed}");
+                // Openings in a wall keep apart.
+                for (i, a) in openings.iter().enumerate() {
+                    for b in &openings[..i] {
+                        let same = (a.axis, a.at) == (b.axis, b.at);
+                        assert!(!same || a.to < b.from || b.to < a.from);
+                    }
+                }
+            }
+        }
+    }
 }

@@ -23,6 +23,8 @@ pub struct Region {
 const MARGIN: f64 = 1e-9;
 /// Corners nearer to one another than this, in radians, are one.
 const SAME: f64 = 1e-10;
+/// Cones of less than this, in radians across, are seen edge on but for rounding.
+const FLAT: f64 = 1e-15;
 
 impl Region {
     /// All directions.
@@ -115,7 +117,10 @@ impl Region {
         let n = corners.len();
         let side = |i: usize| corners[(i + 1) % n].cross(corners[i]).try_normalize();
         let sides: Vec<DVec3> = (0..n).filter_map(side).collect();
-        (sides.len() >= 3).then_some(Self { corners, sides })
+        // Seen edge on it is flat, and its sides' planes are all the same.
+        let middle: DVec3 = corners.iter().sum();
+        let is_open = |side: &DVec3| side.dot(middle) > FLAT * middle.length();
+        (sides.len() >= 3 && sides.iter().all(is_open)).then_some(Self { corners, sides })
     }
 
     /// The part of a convex polygon, relative to the eye, that lies within.
@@ -317,13 +322,13 @@ impl Search<'_> {
         let margin = tolerance(portal);
         let is_front = portal.cells[0] == Some(cell);
         let height = (self.eye - portal.polygon.center()).dot(portal.normal_into(Some(cell)));
-        // From behind it one does not look out of this cell.
-        if !(height >= -margin) {
-            return Vec::new();
-        }
         // In the doorway: all that one sees may be on either side.
-        if height <= margin && portal.polygon.covers(self.eye, margin) {
+        if height.abs() <= margin && portal.polygon.covers(self.eye, margin) {
             return vec![region.clone()];
+        }
+        // From behind it one does not look out of this cell.
+        if !(height > 0.0) {
+            return Vec::new();
         }
         let pieces = self.pieces[id.0 as usize].iter();
         pieces
