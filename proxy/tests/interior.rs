@@ -407,6 +407,7 @@ fn cameras_stand_on_semicircles_before_portals() {
             let height = portal.polygon.height(eye);
             assert_eq!(height > 0.0, portal.cells[0] == view.from);
             assert!(height.abs() > 0.49 * radius);
+            assert!(view.is_inside);
             // Aimed at the portal's centre, upright.
             let target = view.camera_from_world * center;
             assert!(target.truncate().length() < 1e-9 && target.z > 0.0);
@@ -425,6 +426,11 @@ fn cameras_stand_on_semicircles_before_portals() {
         span: 1.0,
     };
     assert_eq!(semicircles(&interior, &few).len(), 3);
+    let mut large = interior.clone();
+    large.portals[0].radius = Some(5.0);
+    let views = semicircles(&large, &few);
+    let inside: Vec<bool> = views.iter().map(|v| v.is_inside).collect();
+    assert_eq!(inside, [false, false, true]);
 }
 
 #[test]

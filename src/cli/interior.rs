@@ -3,9 +3,7 @@
 use super::Usage;
 use super::output::{print, say};
 use anyhow::{Context, bail};
-use proxy::interior::{
-    Contents, Interior, interior_from_nodes, read_rooms, write_interior,
-};
+use proxy::interior::{Contents, Interior, interior_from_nodes, read_rooms, write_interior};
 use proxy::mesh::read_model;
 use std::path::{Path, PathBuf};
 
@@ -84,7 +82,9 @@ fn write(args: &Args, interior: &Interior) -> anyhow::Result<()> {
     let filled = || -> anyhow::Result<()> {
         std::fs::create_dir_all(&partial).with_context(cannot)?;
         let beside = partial.join(args.model.file_name().unwrap_or_default());
-        std::fs::copy(&args.model, beside).with_context(cannot)?;
+        // Its bytes alone: not that it is read-only, say.
+        let bytes = std::fs::read(&args.model).with_context(cannot)?;
+        std::fs::write(beside, bytes).with_context(cannot)?;
         write_interior(&partial.join(INTERIOR), interior)?;
         if folder.exists() {
             std::fs::remove_dir_all(folder).with_context(cannot)?;

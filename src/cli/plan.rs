@@ -37,6 +37,8 @@ struct Pose<'a> {
     from: Option<&'a str>,
     into: &'a str,
     angle_degrees: f64,
+    /// Whether it stands in the cell `from`.
+    inside: bool,
     center: [f64; 3],
     camera_from_world: [f64; 16],
 }
@@ -44,11 +46,17 @@ struct Pose<'a> {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.views % 2 == 0 || args.views > 999 {
         let found = args.views;
-        return Err(Usage(format!("--views is {found}; expected an odd number up to 999")).into());
+        return Err(Usage(format!(
+            "--views is {found}; expected an odd number up to 999"
+        ))
+        .into());
     }
     if !(args.span > 0.0 && args.span < 180.0) {
         let found = args.span;
-        return Err(Usage(format!("--span is {found}; expected more than 0 and less than 180")).into());
+        return Err(Usage(format!(
+            "--span is {found}; expected more than 0 and less than 180"
+        ))
+        .into());
     }
     let path = match args.interior.is_dir() {
         true => args.interior.join(INTERIOR),
@@ -63,6 +71,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         span: args.span.to_radians(),
     };
     let poses = poses(&interior, &options);
+    let outside = poses.iter().filter(|pose| !pose.inside).count();
+    if outside > 0 {
+        say!(
+            "warning: {outside} of {} cameras stand outside their cell; give portals a smaller \
+             `radius` in {}",
+            poses.len(),
+            path.display()
+        );
+    }
     if args.json {
         return print_json(&poses);
     }
@@ -95,6 +112,7 @@ fn poses<'a>(interior: &'a Interior, options: &SemicircleOptions) -> Vec<Pose<'a
                 from: view.from.map(name),
                 into: name(view.into),
                 angle_degrees: view.angle.to_degrees(),
+                inside: view.is_inside,
                 center: pose.center().to_array(),
                 // Row by row.
                 camera_from_world: matrix.transpose().to_cols_array(),

@@ -12,6 +12,8 @@ pub(super) struct Item {
     pub(super) name: &'static str,
     pub(super) width: f64,
     pub(super) depth: f64,
+    /// Whether it fits under a window.
+    pub(super) is_low: bool,
     pub(super) build: fn(&mut Builder, f64, u32),
 }
 
@@ -25,14 +27,22 @@ const fn item(
         name,
         width,
         depth,
+        is_low: false,
         build,
     }
 }
 
-const SOFA: Item = item("sofa", 2.1, 0.95, sofa);
+const fn low(item: Item) -> Item {
+    Item {
+        is_low: true,
+        ..item
+    }
+}
+
+const SOFA: Item = low(item("sofa", 2.1, 0.95, sofa));
 const SHELF: Item = item("bookshelf", 1.2, 0.32, bookshelf);
 const CABINET: Item = item("cabinet", 1.6, 0.45, cabinet);
-const BED: Item = item("bed", 1.6, 2.1, bed);
+const BED: Item = low(item("bed", 1.6, 2.1, bed));
 const WARDROBE: Item = item("wardrobe", 1.5, 0.62, wardrobe);
 const DESK: Item = item("desk", 1.4, 1.15, desk);
 const COUNTER: Item = item("counter", 2.2, 0.62, counter);
@@ -192,7 +202,7 @@ fn cabinet(b: &mut Builder, width: f64, seed: u32) {
 fn bed(b: &mut Builder, width: f64, seed: u32) {
     let (half, look) = (0.5 * width, wood(seed));
     b.cuboid(v(-half, 0.12, 0.06), v(half, 0.32, 2.05), look);
-    b.cuboid(v(-half, 0.0, 0.01), v(half, 1.0, 0.06), look);
+    b.cuboid(v(-half, 0.0, 0.01), v(half, 0.85, 0.06), look);
     for (x, z) in [(-half + 0.08, 1.95), (half - 0.08, 1.95)] {
         b.lathe(v(x, 0.0, z), &[(0.04, 0.0), (0.04, 0.12)], look);
     }

@@ -30,7 +30,7 @@ use crate::noise::{hash, unit};
 use builder::{Builder, Look, Stand, plain};
 use furniture::ROOMS;
 use glam::{DVec2, DVec3};
-use plan::{HEIGHT, Kind, Plan, Rect};
+use plan::{HEIGHT, Plan, Rect};
 use proxy::interior::{
     Cell, CellId, Content, Extra, Interior, Polygon, Portal, RoomBox, interior_from_rooms,
 };
@@ -198,7 +198,7 @@ fn footprint(side: &Side, from: f64, to: f64, depth: f64) -> Rect {
 }
 
 /// A free place of some width along a wall, the nearest to its middle.
-fn free_place(side: &Side, [width, depth]: [f64; 2], taken: &[Rect]) -> Option<f64> {
+fn free_place(side: &Side, [width, depth]: [f64; 2], taken: &[&[Rect]]) -> Option<f64> {
     let middle = 0.5 * (side.from + side.to);
     let reach = 0.5 * (side.to - side.from - width) - 0.03;
     let steps = (reach / 0.1).floor();
@@ -208,7 +208,9 @@ fn free_place(side: &Side, [width, depth]: [f64; 2], taken: &[Rect]) -> Option<f
     let offsets = (0..=steps as i32).flat_map(|i| [0.1 * f64::from(i), -0.1 * f64::from(i)]);
     offsets.map(|offset| middle + offset).find(|at| {
         let place = footprint(side, at - 0.5 * width, at + 0.5 * width, depth);
-        !taken.iter().any(|t| t.overlaps(&place))
+        !taken
+            .iter()
+            .any(|list| list.iter().any(|t| t.overlaps(&place)))
     })
 }
 
@@ -217,21 +219,16 @@ fn furnish(b: &mut Builder, plan: &Plan, room: usize, kind: usize, parent: u32, 
     let seed = hash(seed, room as i32, 60, 0);
     let mut sides = Side::all(plan, room);
     sides.rotate_left(seed as usize % 4);
-    let mut taken: Vec<Rect> = Vec::new();
+    // What is taken by anything, and what is by windows.
+    let (mut taken, mut windows): (Vec<Rect>, Vec<Rect>) = (Vec::new(), Vec::new());
     // 1. One must get through doors, and see out of windows.
     for side in &sides {
         for opening in side.openings(plan, room) {
-            let depth = if opening.kind == Kind::Window {
-                0.35
-            } else {
-                0.9
-            };
-            taken.push(footprint(
-                side,
-                opening.from - 0.08,
-                opening.to + 0.08,
-                depth,
-            ));
+            let (from, to) = (opening.from - 0.08, opening.to + 0.08);
+            match opening.sill > 0.0 {
+                true => windows.push(footprint(side, from, to, 0.35)),
+                false => taken.push(footprint(side, from, to, 0.75)),
+            }
         }
     }
     // 2. The middle.
@@ -264,23 +261,34 @@ fn furnish(b: &mut Builder, plan: &Plan, room: usize, kind: usize, parent: u32, 
     }
     // 3. Windows to the outside, that are but pictures.
     for side in sides.iter().filter(|side| !side.is_shared(plan)) {
-        if let Some(at) = free_place(side, [1.6, 0.2], &taken) {
+        if let Some(at) = free_place(side, [1.6, 0.2], &[&taken, &windows]) {
             b.node("window".to_owned(), Some(parent));
             b.stand = Stand {
                 origin: side.point(at, 0.0, 0.0),
                 front: side.normal(),
             };
             furniture::painting(b, [1.3, 1.15], Picture::Outside, true);
-            taken.push(footprint(side, at - 0.75, at + 0.75, 0.2));
+            windows.push(footprint(side, at - 0.75, at + 0.75, 0.2));
         }
     }
     // 4. Along the walls.
     for (i, item) in ROOMS[kind].1.iter().enumerate() {
-        let place = sides.iter().find_map(|side| {
-            let at = free_place(side, [item.width, item.depth], &taken)?;
-            Some((*side, at))
-        });
-        let Some((side, at)) = place else {
+        let clear: &[&[Rect]] = match item.is_low {
+            true => &[&taken],
+            false => &[&taken, &windows],
+        };
+        // Wide things come in a narrower size, too.
+        let narrower = if item.width > 1.0 { 0.65 } else { 1.0 };
+        let place = [item.width, narrower * item.width]
+            .into_iter()
+            .find_map(|width| {
+                let at = |side: &Side| {
+                    let at = free_place(side, [width, item.depth], clear)?;
+                    Some((*side, at, width))
+                };
+                sides.iter().find_map(at)
+            });
+        let Some((side, at, width)) = place else {
             continue;
         };
         b.node(item.name.to_owned(), Some(parent));
@@ -288,8 +296,8 @@ fn furnish(b: &mut Builder, plan: &Plan, room: usize, kind: usize, parent: u32, 
             origin: side.point(at, 0.0, 0.0),
             front: side.normal(),
         };
-        (item.build)(b, item.width, seed.wrapping_add(i as u32));
-        let half = 0.5 * item.width + 0.04;
+        (item.build)(b, width, seed.wrapping_add(i as u32));
+        let half = 0.5 * width + 0.04;
         taken.push(footprint(&side, at - half, at + half, item.depth + 0.02));
         // The next wall next.
         sides.rotate_left(1);
@@ -298,7 +306,7 @@ fn furnish(b: &mut Builder, plan: &Plan, room: usize, kind: usize, parent: u32, 
     for k in 0..2 {
         let [w, h] = [0, 1].map(|i| 0.5 + 0.4 * unit(seed, k, i, 70));
         let place = sides.iter().find_map(|side| {
-            let at = free_place(side, [w + 0.2, 0.1], &taken)?;
+            let at = free_place(side, [w + 0.2, 0.1], &[&taken, &windows])?;
             Some((*side, at))
         });
         if let Some((side, at)) = place {

@@ -39,6 +39,9 @@ pub struct SemicircleView {
     /// From the portal's normal, in radians; 0 is the middle, positive to the right of who looks
     /// at the portal.
     pub angle: f64,
+    /// Whether it stands in the viewer's cell, as far as that is known; else the radius is too
+    /// large for the room.
+    pub is_inside: bool,
     /// Aimed at the portal's centre, upright.
     pub camera_from_world: Rigid3,
 }
@@ -103,10 +106,26 @@ fn before(
             from,
             into,
             angle,
+            is_inside: is_inside(interior, from, place),
             camera_from_world: Rigid3::looking_at(place, target, up),
         }
     };
     (-each_side..=each_side).map(camera).collect()
+}
+
+fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
+    let Some(cell) = cell.and_then(|id| interior.cells.get(id.0 as usize)) else {
+        return true;
+    };
+    let in_box = match cell.content {
+        super::Content::Box(room) => room.contains(place),
+        _ => true,
+    };
+    in_box
+        && cell
+            .floor
+            .as_ref()
+            .is_none_or(|floor| floor.covers(place, 0.0))
 }
 
 /// How high the floor is on the viewer's side, along `up`.
