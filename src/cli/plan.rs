@@ -44,7 +44,7 @@ struct Pose<'a> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    if args.views % 2 == 0 || args.views > 999 {
+    if args.views.is_multiple_of(2) || args.views > 999 {
         let found = args.views;
         return Err(Usage(format!(
             "--views is {found}; expected an odd number up to 999"

@@ -172,7 +172,7 @@ fn cabinet(b: &mut Builder, width: f64, seed: u32) {
             plain(0x2a211b),
         );
     }
-    if hash(seed, 5, 0, 0) % 2 == 0 {
+    if hash(seed, 5, 0, 0) & 1 == 0 {
         b.cuboid(v(-0.55, 0.7, 0.12), v(0.55, 1.32, 0.16), plain(0x15171a));
         b.cuboid(v(-0.2, 0.62, 0.08), v(0.2, 0.7, 0.24), plain(0x202326));
     } else {

@@ -6,6 +6,8 @@ use std::collections::BTreeSet;
 
 /// What may be due to rounding, in shares of a box's or polygon's size.
 const ROUNDING: f64 = 1e-6;
+/// Overlaps that are told: of many boxes in one place, there would be their number squared.
+const MAX_OVERLAPS: usize = 64;
 
 impl Interior {
     /// Checks an interior that was made or changed in memory, as reading one from a file does.
@@ -80,7 +82,7 @@ impl Interior {
             for (other, b) in &boxes[..i] {
                 let shared = a.max.min(b.max) - a.min.max(b.min);
                 let size = (a.max - a.min).min(b.max - b.min);
-                if shared.cmpgt(ROUNDING * size).all() {
+                if found.len() < MAX_OVERLAPS && shared.cmpgt(ROUNDING * size).all() {
                     let names = ((*other).to_owned(), (*name).to_owned());
                     found.push(InteriorWarning::Overlap(names.0, names.1));
                 }
