@@ -1,5 +1,7 @@
 //! Portal culling: whatever a ray meets first is in a cell that is visible, and where it is.
 
+mod common;
+
 use calibrate::{Lens, Pixel, Rigid3, View};
 use datasets::house::{House, HouseOptions, house};
 use glam::{DVec2, DVec3};
@@ -157,6 +159,40 @@ fn in_nine_rooms_whatever_is_met_first_is_drawn() {
 #[test]
 fn in_nineteen_rooms_whatever_is_met_first_is_drawn() {
     assert!(drawn(19, 4, 550) < 0.3);
+}
+
+#[test]
+fn in_the_captured_house_whatever_is_met_first_is_drawn() {
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
+    let rooms = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/interior-house-rooms.json");
+    let (interior, _) = proxy::interior::read_rooms(&rooms, "house.glb").unwrap();
+    let (contents, _) = Contents::new(&interior, &model).unwrap();
+    let solid = Solid::new(MeshKind::Mesh, model.mesh.clone());
+    let missed = |seed: u64| {
+        let mut r = random(seed);
+        let room = room(&interior, seed as usize % 3);
+        // Within the walls: their boxes are somewhat larger.
+        let (low, high) = (
+            room.min.max(DVec3::new(-9.2, 0.4, -3.0)),
+            room.max.min(DVec3::new(9.2, 2.2, 5.3)),
+        );
+        let eye = low + (high - low) * DVec3::new(r(), r(), r());
+        let target = eye + DVec3::new(r() - 0.5, 0.3 * (r() - 0.5), r() - 0.5);
+        let view = view(eye, target, [64, 48]);
+        let cell = contents.locate(&interior, eye);
+        assert_eq!(cell, Some(CellId(seed as u32 % 3)));
+        let drawn = contents.visible_triangles(&visible(&interior, cell, &view));
+        let hits = rays(&view)
+            .into_iter()
+            .filter_map(|ray| solid.first_hit(eye, ray));
+        hits.filter(|hit| drawn.binary_search(&hit.triangle_idx).is_err())
+            .count()
+    };
+    let missed: usize = (0..150_u64).into_par_iter().map(missed).sum();
+    assert_eq!(missed, 0);
 }
 
 #[test]
