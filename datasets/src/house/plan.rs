@@ -260,7 +260,7 @@ mod tests {
                     openings.len()
                 );
                 assert!(
-                    rooms.iter().all(|r| r.size().min_element() >= 2.5),
+                    rooms.iter().all(|r| r.size().min_element() >= 2.0),
                     "{rooms:?}"
                 );
                 for (i, a) in rooms.iter().enumerate() {
