@@ -79,6 +79,10 @@ fn message(text: &str) -> String {
     }
 }
 
+const TWO_PORTALS: &str = r#"
+    {"name": "p", "cells": ["a", null], "polygon": [[1, 0, 0], [1, 1, 0], [1, 1, 1]]},
+    {"name": "q", "cells": [null, "a"], "polygon": [[0, 0, 0], [0, 1, 0], [0, 1, 1]]}"#;
+
 /// One cell and what is given.
 fn with(cells: &str, portals: &str) -> String {
     format!(
@@ -455,6 +459,27 @@ fn the_captured_house_has_three_cells() {
 }
 
 proptest! {
+    #[test]
+    fn broken_files_are_errors_and_no_panics(
+        changes in prop::collection::vec((0_usize..2000, prop::sample::select(b"0-9e[]{},:\"na.".to_vec())), 1..4),
+    ) {
+        for text in [TWO_ROOMS.to_owned(), with("", TWO_PORTALS)] {
+            let mut bytes = text.into_bytes();
+            for (at, byte) in &changes {
+                let at = at % bytes.len();
+                bytes[at] = *byte;
+            }
+            if let Ok((interior, _)) = parse_rooms(Path::new("r.json"), &bytes, "m.glb") {
+                prop_assert!(interior.check().is_ok());
+                let views = semicircles(&interior, &SemicircleOptions::default());
+                prop_assert!(views.iter().all(|v| v.camera_from_world.is_finite()));
+            }
+            if let Err(error) = parse_interior(Path::new("i.json"), &bytes) {
+                prop_assert!(error.to_string().starts_with("i.json: "));
+            }
+        }
+    }
+
     #[test]
     fn anything_that_is_read_is_written_and_read_the_same(
         x in -1e7..1e7, y in 0.1..1e3, tilt in -1.0..1.0, eye in 1e-3..1e3,

@@ -94,7 +94,11 @@ fn before(
     };
     // 2. The cameras.
     let each_side = (options.views / 2) as i64;
-    let span = options.span.clamp(0.0, std::f64::consts::PI);
+    // A NaN is as good as nothing given.
+    let span = match options.span.is_nan() {
+        true => SemicircleOptions::default().span,
+        false => options.span.clamp(0.0, std::f64::consts::PI),
+    };
     let camera = |i: i64| {
         let angle = match each_side {
             0 => 0.0,
