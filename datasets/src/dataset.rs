@@ -73,7 +73,7 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// No dataset has this name.
-    #[error("no dataset is called {name:?}; there are: {}", names().join(", "))]
+    #[error("no dataset is called {name:?}; there are: {}, house", names().join(", "))]
     UnknownName {
         /// What was asked for.
         name: String,
@@ -110,6 +110,17 @@ pub enum DatasetError {
         /// What went wrong.
         source: image::ImageError,
     },
+    /// A model could not be written.
+    #[error("{}: {source}", path.display())]
+    Model {
+        /// Which one.
+        path: PathBuf,
+        /// What went wrong.
+        source: proxy::mesh::ExportError,
+    },
+    /// An interior could not be written.
+    #[error(transparent)]
+    Interior(#[from] proxy::interior::InteriorFileError),
     /// The COLMAP model could not be written.
     #[error(transparent)]
     Colmap(#[from] calibrate::colmap::ColmapError),

@@ -13,6 +13,9 @@
 //! | `knick-knacks` | small things in rows on a table, close by: chess pieces, a bird cage, pencils, an arch of blocks, books | 25 hand-held views in a 5 × 5 grid, neighbours 7 % of the distance apart, 480 × 360, SIMPLE_RADIAL with k = −0.05 | depths from one to three with gaps in front of things behind: no plane is fair (Buehler et al. 2001, Knick-knacks) |
 //! | `hallway` | a hallway 14 m long: doors, pictures, cabinets, lamps | 28 views walking down it, looking ahead, 480 × 360, SIMPLE_PINHOLE | epipoles in the image, near and far views of the same wall: resolution counts (Figure 10); a tunnel is a fair proxy, and [`HALLWAY`] the true one |
 //!
+//! [`house`] is another kind of dataset: no photos but an interior of many rooms, its model and
+//! its portals, and the truth for any camera in it.
+//!
 //! ```
 //! use datasets::{Options, by_name, render_view};
 //!
@@ -28,6 +31,7 @@ mod dataset;
 mod hallway;
 mod hand_held;
 mod helicopter;
+pub mod house;
 mod knick_knacks;
 mod motion;
 mod noise;

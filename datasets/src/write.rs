@@ -34,6 +34,22 @@ pub struct Written {
 /// `folder` exists and is not empty, or something cannot be written; then nothing stays
 /// behind.
 pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> {
+    in_new_folder(folder, |partial| fill(dataset, partial))?;
+    let points = &dataset.reconstruction.points;
+    Ok(Written {
+        folder: folder.to_owned(),
+        photos: dataset.photos.len(),
+        held_out: dataset.held_out.len(),
+        points: points.len(),
+        observations: points.values().map(|point| point.track.len()).sum(),
+    })
+}
+
+/// Fills a folder that takes its name only when it is complete.
+pub(crate) fn in_new_folder(
+    folder: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), DatasetError>,
+) -> Result<(), DatasetError> {
     // 1. A place to work, next to the destination: renaming must not cross disks.
     if folder.exists() && !is_empty(folder)? {
         return Err(DatasetError::NotEmpty {
@@ -43,7 +59,7 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
     let partial = partial_name(folder);
     make_folder(&partial)?;
     // 2. Fill it, and let it take the destination's place.
-    let done = fill(dataset, &partial).and_then(|()| {
+    let done = fill(&partial).and_then(|()| {
         if folder.exists() {
             std::fs::remove_dir(folder).map_err(|source| io(folder, source))?;
         }
@@ -54,14 +70,7 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
         let _ = std::fs::remove_dir_all(&partial);
         return Err(error);
     }
-    let points = &dataset.reconstruction.points;
-    Ok(Written {
-        folder: folder.to_owned(),
-        photos: dataset.photos.len(),
-        held_out: dataset.held_out.len(),
-        points: points.len(),
-        observations: points.values().map(|point| point.track.len()).sum(),
-    })
+    Ok(())
 }
 
 fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
@@ -205,7 +214,7 @@ fn save(picture: DynamicImage, path: &Path) -> Result<(), DatasetError> {
     })
 }
 
-fn io(path: &Path, source: std::io::Error) -> DatasetError {
+pub(crate) fn io(path: &Path, source: std::io::Error) -> DatasetError {
     DatasetError::Io {
         path: path.to_owned(),
         source,

@@ -15,6 +15,7 @@ mod file;
 mod fit;
 mod glb;
 pub mod hull;
+pub mod interior;
 pub mod mesh;
 mod plane;
 mod planes;

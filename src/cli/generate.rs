@@ -4,18 +4,21 @@ use super::Usage;
 use super::options::size;
 use super::output::print;
 use super::session::spinner;
+use datasets::house::{self, HouseOptions};
 use datasets::{DatasetError, Options};
 use std::path::PathBuf;
 
 /// Write a synthetic scene with exact truth, in users' formats
 ///
-/// Photos, a COLMAP model, depth maps and a split, as a capture of real photos would have.
+/// Photos, a COLMAP model, depth maps and a split, as a capture of real photos would have; of
+/// `house`, a textured model of many rooms (.glb) and its cells and portals (interior.json).
 ///
 ///     lumigraph generate shelf -o shelf
+///     lumigraph generate house --rooms 19 -o house
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// Which: shelf, wall, helicopter, knick-knacks, hallway or car
+    /// Which: shelf, wall, helicopter, knick-knacks, hallway, car or house
     name: String,
     /// Size of the photos in pixels [default: the scene's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -23,24 +26,34 @@ pub(super) struct Args {
     /// How many photos [default: the scene's own]
     #[arg(long, value_name = "N")]
     photos: Option<usize>,
-    /// The capture's folder
+    /// How many rooms a house has [default: 6]
+    #[arg(long, value_name = "N")]
+    rooms: Option<usize>,
+    /// At least so many triangles for a house [default: 12000 for each room]
+    #[arg(long, value_name = "N")]
+    triangles: Option<usize>,
+    /// Another number is another house [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// The capture's folder, or the interior's
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.name == "house" {
+        return house(args);
+    }
+    if args.rooms.is_some() || args.triangles.is_some() || args.seed.is_some() {
+        let text = "--rooms, --triangles and --seed belong to `house`";
+        return Err(Usage(text.to_owned()).into());
+    }
     let options = Options {
         size: args.size,
         views: args.photos,
         ..Options::default()
     };
-    let dataset = datasets::by_name(&args.name, &options).map_err(|error| match error {
-        // What was typed, not what was found.
-        DatasetError::UnknownName { .. } | DatasetError::Option { .. } => {
-            Usage(error.to_string()).into()
-        }
-        error => anyhow::Error::new(error),
-    })?;
+    let dataset = datasets::by_name(&args.name, &options).map_err(usage)?;
     let bar = spinner("rendering the photos");
     let written = datasets::write(&dataset, &args.output);
     bar.finish_and_clear();
@@ -52,4 +65,42 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         written.held_out,
         written.points
     ))
+}
+
+fn house(args: &Args) -> anyhow::Result<()> {
+    if args.size.is_some() || args.photos.is_some() {
+        let text = "--size and --photos do not belong to `house`, which has no photos";
+        return Err(Usage(text.to_owned()).into());
+    }
+    let default = HouseOptions::default();
+    let options = HouseOptions {
+        rooms: args.rooms.unwrap_or(default.rooms),
+        triangles: args.triangles,
+        seed: args.seed.unwrap_or(default.seed),
+    };
+    let bar = spinner("building the house");
+    let house = house::house(&options).map_err(usage);
+    let written = house.and_then(|house| {
+        house::write(&house, &args.output)?;
+        Ok(house)
+    });
+    bar.finish_and_clear();
+    let house = written?;
+    print(&format!(
+        "{}: {} cells, {} portals, {} triangles\n",
+        args.output.display(),
+        house.interior.cells.len(),
+        house.interior.portals.len(),
+        house.model.mesh.triangles.len()
+    ))
+}
+
+fn usage(error: DatasetError) -> anyhow::Error {
+    match error {
+        // What was typed, not what was found.
+        DatasetError::UnknownName { .. } | DatasetError::Option { .. } => {
+            Usage(error.to_string()).into()
+        }
+        error => anyhow::Error::new(error),
+    }
 }

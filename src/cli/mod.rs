@@ -11,10 +11,12 @@ mod generate;
 mod import;
 mod info;
 mod info_of_file;
+mod interior;
 mod ledger;
 mod npz;
 mod options;
 mod output;
+mod plan;
 mod proxy;
 mod render;
 mod report;
@@ -51,6 +53,8 @@ enum Command {
     Field(field::Args),
     Evaluate(evaluate::Args),
     Export(export::Args),
+    Interior(interior::Args),
+    Plan(plan::Args),
     Generate(generate::Args),
 }
 
@@ -94,6 +98,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Field(args) => field::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Interior(args) => interior::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Generate(args) => generate::run(&args),
     }
 }

@@ -11,6 +11,7 @@ mod formats;
 mod gpu;
 mod help;
 mod hull;
+mod interior;
 mod masks;
 mod memory;
 mod opencv;

@@ -13,6 +13,12 @@ pub enum MeshFileError {
         path = .0.display()
     )]
     Extension(PathBuf),
+    /// A format that has no looks.
+    #[error(
+        "{path}: textured models are read from .glb and .gltf; convert it, with Blender, say",
+        path = .0.display()
+    )]
+    Looks(PathBuf),
     /// A line of a text file.
     #[error("{path}, line {line}: {problem}", path = .path.display())]
     Line {
@@ -68,4 +74,7 @@ pub enum ExportError {
     /// The extras are no JSON.
     #[error("the extras of a GLB must be JSON: {0}")]
     Extras(serde_json::Error),
+    /// A texture could not be encoded.
+    #[error("a texture cannot be encoded: {0}")]
+    Picture(image::ImageError),
 }

@@ -1,6 +1,6 @@
 //! Mesh files by their extension.
 
-use super::{ExportError, Mesh, MeshFileError, gltf, obj, ply, to_glb, to_ply};
+use super::{ExportError, Mesh, MeshFileError, Model, gltf, obj, ply, to_glb, to_ply};
 use calibrate::View;
 use std::path::Path;
 
@@ -36,6 +36,32 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
         ));
     }
     Ok(mesh)
+}
+
+/// Reads a .glb or .gltf file with its looks: textures, colours and the names of its nodes. What
+/// could not be had of the looks, and is a plain colour now, is told beside the model.
+///
+/// # Errors
+/// As for [`read()`]; a picture that cannot be decoded.
+pub fn read_model(path: &Path) -> Result<(Model, Vec<String>), MeshFileError> {
+    if !["glb", "gltf"].contains(&extension(path).as_str()) {
+        return Err(MeshFileError::Looks(path.to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|e| MeshFileError::Io(path.to_owned(), e))?;
+    parse_model(path, &bytes)
+}
+
+/// Reads the content of a .glb or .gltf file as [`read_model`] does.
+///
+/// # Errors
+/// As for [`read_model`].
+pub fn parse_model(path: &Path, bytes: &[u8]) -> Result<(Model, Vec<String>), MeshFileError> {
+    let (model, warnings) = gltf::parse_model(path, bytes)?;
+    if model.mesh.triangles.is_empty() {
+        let corners = model.mesh.positions.len();
+        return Err(MeshFileError::NoTriangles(path.to_owned(), corners));
+    }
+    Ok((model, warnings))
 }
 
 /// Writes a mesh as .glb, for looking at, with cameras and extras, or as .ply, which keeps

@@ -5,6 +5,8 @@ mod file;
 mod glb;
 mod gltf;
 mod look;
+mod model;
+mod model_glb;
 mod obj;
 mod pieces;
 mod ply;
@@ -13,9 +15,11 @@ mod quadric;
 mod simplify;
 
 pub use error::{ExportError, MeshFileError};
-pub use file::{parse, read, write};
+pub use file::{parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
+pub use model::{Material, Model, ModelNode, Part, Wrap};
+pub use model_glb::model_to_glb;
 pub use ply::to_ply;
 
 use glam::{DMat4, DVec3};

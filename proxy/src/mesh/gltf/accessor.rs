@@ -25,9 +25,22 @@ pub(super) struct Accessor {
 #[serde(rename_all = "UPPERCASE")]
 enum Kind {
     Scalar,
+    Vec2,
     Vec3,
+    Vec4,
     #[serde(other)]
     Other,
+}
+
+impl Kind {
+    fn components(&self) -> usize {
+        match self {
+            Self::Vec2 => 2,
+            Self::Vec3 => 3,
+            Self::Vec4 => 4,
+            Self::Scalar | Self::Other => 1,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -89,7 +102,7 @@ impl Accessors<'_> {
         let Some(view) = view else {
             return Err(self.failed(number, "it has no numbers in the file (no buffer view)"));
         };
-        let components = if accessor.kind == Kind::Vec3 { 3 } else { 1 };
+        let components = accessor.kind.components();
         let Some(size) = size(accessor.component_type).map(|size| components * size) else {
             let problem = format!("unknown component type {}", accessor.component_type);
             return Err(self.failed(number, problem));
@@ -158,6 +171,40 @@ impl Accessors<'_> {
             let component = |k: usize| real(elements.at(i), kind, is_normalized, k);
             DVec3::new(component(0), component(1), component(2))
         }))
+    }
+
+    /// Two to four numbers each; those that an accessor lacks are 1.
+    pub(super) fn vectors(
+        &mut self,
+        number: usize,
+    ) -> Result<impl Iterator<Item = [f64; 4]>, MeshFileError> {
+        let elements = self.elements(number)?;
+        let accessor = elements.accessor;
+        let components = accessor.kind.components();
+        let (kind, is_normalized) = (accessor.component_type, accessor.normalized);
+        Ok((0..accessor.count).map(move |i| {
+            let component = |k: usize| match k < components {
+                true => real(elements.at(i), kind, is_normalized, k),
+                false => 1.0,
+            };
+            [0, 1, 2, 3].map(component)
+        }))
+    }
+
+    /// The bytes of a buffer view, as a picture has them.
+    pub(super) fn view_bytes(&mut self, number: usize) -> Result<&[u8], MeshFileError> {
+        let failed = |problem: &str| MeshFileError::Record {
+            path: self.path.to_owned(),
+            record: format!("buffer view {number}"),
+            problem: problem.to_owned(),
+        };
+        let view = self.views.get(number);
+        let view = view.ok_or_else(|| failed("there is no such buffer view"))?;
+        let end = view.byte_offset.checked_add(view.byte_length);
+        let beyond = failed("it lies beyond its buffer; is the file cut off?");
+        let bytes = self.buffers.bytes(view.buffer)?;
+        let range = end.map(|end| view.byte_offset..end);
+        range.and_then(|r| bytes.get(r)).ok_or(beyond)
     }
 
     /// Whole numbers.

@@ -64,35 +64,42 @@ impl<'a> Buffers<'a> {
                 return Err(self.failed(number, problem.to_owned()));
             }
         };
-        if let Some(data) = uri.strip_prefix("data:") {
-            let text = data.split_once(";base64,").map(|(_, text)| text);
-            let decode = |text: &str| base64::engine::general_purpose::STANDARD.decode(text).ok();
-            return match text.and_then(decode) {
-                Some(bytes) => Ok(Cow::Owned(bytes)),
-                None => Err(self.failed(number, "its data: uri is not base64".to_owned())),
-            };
-        }
-        let Some(beside) = percent_decoded(uri).filter(|p| is_beside(p)) else {
-            return Err(self.failed(
-                number,
-                format!(
-                    "its bytes are at `{}`; put them into a file beside this one, or export \
-                     the mesh as .glb",
-                    super::super::obj::shown(uri)
-                ),
-            ));
-        };
-        let path = self.path.parent().unwrap_or(Path::new("")).join(beside);
-        // Nothing that has no end.
-        let is_file = std::fs::metadata(&path).map(|m| m.is_file());
-        let read = is_file.and_then(|is_file| match is_file {
-            true => std::fs::read(&path),
-            false => Err(std::io::Error::other("not a file")),
-        });
-        let bytes = read.map_err(|e| MeshFileError::Io(path, e))?;
-        self.external_size += bytes.len();
+        let (bytes, is_external) = fetch(self.path, uri, |e| self.failed(number, e))?;
+        self.external_size += if is_external { bytes.len() } else { 0 };
         Ok(Cow::Owned(bytes))
     }
+}
+
+/// The bytes that a uri stands for, and whether they came from a file beside this one.
+pub(super) fn fetch(
+    path: &Path,
+    uri: &str,
+    failed: impl Fn(String) -> MeshFileError,
+) -> Result<(Vec<u8>, bool), MeshFileError> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let text = data.split_once(";base64,").map(|(_, text)| text);
+        let decode = |text: &str| base64::engine::general_purpose::STANDARD.decode(text).ok();
+        return match text.and_then(decode) {
+            Some(bytes) => Ok((bytes, false)),
+            None => Err(failed("its data: uri is not base64".to_owned())),
+        };
+    }
+    let Some(beside) = percent_decoded(uri).filter(|p| is_beside(p)) else {
+        return Err(failed(format!(
+            "its bytes are at `{}`; put them into a file beside this one, or export the mesh \
+             as .glb",
+            super::super::obj::shown(uri)
+        )));
+    };
+    let path = path.parent().unwrap_or(Path::new("")).join(beside);
+    // Nothing that has no end.
+    let is_file = std::fs::metadata(&path).map(|m| m.is_file());
+    let read = is_file.and_then(|is_file| match is_file {
+        true => std::fs::read(&path),
+        false => Err(std::io::Error::other("not a file")),
+    });
+    let bytes = read.map_err(|e| MeshFileError::Io(path, e))?;
+    Ok((bytes, true))
 }
 
 /// Whether a path leads to a file in the same folder or below it.

@@ -6,12 +6,16 @@
 
 mod accessor;
 mod buffers;
+mod looks;
+
+pub(super) use looks::parse_model;
 
 use super::{Mesh, MeshFileError};
 use accessor::Accessors;
 use buffers::Buffers;
 use glam::{DMat4, DQuat, DVec3};
 use serde::Deserialize;
+use std::ops::Range;
 use std::path::Path;
 
 #[derive(Deserialize)]
@@ -89,13 +93,61 @@ const HARMLESS: [&str; 5] = [
 /// Bytes of mesh for each byte of the file, where nodes repeat meshes.
 const MAX_GROWTH: usize = 64;
 
+/// Who wants to know more of the file than where its triangles are.
+trait Visitor {
+    /// A node of the scene, after its parent.
+    fn node(&mut self, _number: usize, _parent: Option<usize>) {}
+
+    /// A primitive whose triangles have been read.
+    fn primitive(
+        &mut self,
+        _accessors: &mut Accessors<'_>,
+        _place: Place,
+    ) -> Result<(), MeshFileError> {
+        Ok(())
+    }
+
+    /// The end of the scene.
+    fn end(&mut self, _accessors: &mut Accessors<'_>) -> Result<(), MeshFileError> {
+        Ok(())
+    }
+}
+
+/// Where a primitive is in the file and in the mesh.
+struct Place {
+    node: usize,
+    mesh: usize,
+    primitive: usize,
+    corners: Range<usize>,
+    triangles: Range<usize>,
+}
+
+/// To know where the triangles are is enough.
+impl Visitor for () {}
+
 /// Reads a .glb or a .gltf file.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let (json, blob) = split(path, bytes)?;
+    read(path, bytes.len(), json, blob, &mut ())
+}
+
+/// The JSON and the binary chunk of a GLB; of a .gltf file, all of it is JSON.
+fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), MeshFileError> {
+    match bytes.starts_with(b"glTF") {
+        true => container(bytes).map_err(|e| MeshFileError::File(path.to_owned(), e)),
+        false => Ok((bytes, None)),
+    }
+}
+
+/// The triangles; the visitor hears of each primitive.
+fn read(
+    path: &Path,
+    file_size: usize,
+    json: &[u8],
+    blob: Option<&[u8]>,
+    visitor: &mut impl Visitor,
+) -> Result<Mesh, MeshFileError> {
     let whole = |problem: String| MeshFileError::File(path.to_owned(), problem);
-    let (json, blob) = match bytes.starts_with(b"glTF") {
-        true => container(bytes).map_err(whole)?,
-        false => (bytes, None),
-    };
     let root: Root =
         serde_json::from_slice(json).map_err(|e| whole(format!("not a glTF file: {e}")))?;
     if !root.asset.version.starts_with("2.") {
@@ -120,9 +172,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
             buffers: Buffers::new(path, &root.buffers, blob),
         },
         mesh: Mesh::default(),
-        file_size: bytes.len(),
+        file_size,
     };
-    for (node, world_from_node) in world_from_nodes(path, &root)? {
+    for (node, parent, world_from_node) in world_from_nodes(path, &root)? {
+        visitor.node(node, parent);
         if let Some(number) = root.nodes[node].mesh {
             let record = |problem: String| MeshFileError::Record {
                 path: path.to_owned(),
@@ -133,10 +186,22 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
             let entry = entry.ok_or_else(|| record(format!("there is no mesh {number}")))?;
             for (i, primitive) in entry.primitives.iter().enumerate() {
                 let name = format!("mesh {number}, primitive {i}");
+                let (corner, triangle) = (reader.mesh.positions.len(), reader.mesh.triangles.len());
                 reader.primitive(primitive, &name, &world_from_node)?;
+                let place = Place {
+                    node,
+                    mesh: number as usize,
+                    primitive: i,
+                    corners: corner..reader.mesh.positions.len(),
+                    triangles: triangle..reader.mesh.triangles.len(),
+                };
+                if !place.triangles.is_empty() {
+                    visitor.primitive(&mut reader.accessors, place)?;
+                }
             }
         }
     }
+    visitor.end(&mut reader.accessors)?;
     Ok(reader.mesh)
 }
 
@@ -176,8 +241,12 @@ fn container(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     Ok((json, chunks[1]))
 }
 
-/// The default scene's nodes in the order of the file's trees, with their transforms.
-fn world_from_nodes(path: &Path, root: &Root) -> Result<Vec<(usize, DMat4)>, MeshFileError> {
+/// The default scene's nodes in the order of the file's trees, each with its parent and its
+/// transform.
+fn world_from_nodes(
+    path: &Path,
+    root: &Root,
+) -> Result<Vec<(usize, Option<usize>, DMat4)>, MeshFileError> {
     let record = |record: String, problem: String| MeshFileError::Record {
         path: path.to_owned(),
         record,
@@ -205,9 +274,14 @@ fn world_from_nodes(path: &Path, root: &Root) -> Result<Vec<(usize, DMat4)>, Mes
     };
     let mut found = Vec::new();
     let mut is_found = vec![false; root.nodes.len()];
-    let mut open: Vec<(usize, DMat4)> = Vec::new();
-    open.extend(roots.iter().rev().map(|node| (*node, DMat4::IDENTITY)));
-    while let Some((number, world_from_parent)) = open.pop() {
+    let mut open: Vec<(usize, Option<usize>, DMat4)> = Vec::new();
+    open.extend(
+        roots
+            .iter()
+            .rev()
+            .map(|node| (*node, None, DMat4::IDENTITY)),
+    );
+    while let Some((number, parent, world_from_parent)) = open.pop() {
         let here = || format!("node {number}");
         let Some(node) = root.nodes.get(number) else {
             return Err(record(here(), "there is no such node".to_owned()));
@@ -221,8 +295,9 @@ fn world_from_nodes(path: &Path, root: &Root) -> Result<Vec<(usize, DMat4)>, Mes
             return Err(record(here(), "its transform is not finite".to_owned()));
         }
         let children = node.children.as_deref().unwrap_or_default();
-        open.extend(children.iter().rev().map(|child| (*child, world_from_node)));
-        found.push((number, world_from_node));
+        let below = |child: &usize| (*child, Some(number), world_from_node);
+        open.extend(children.iter().rev().map(below));
+        found.push((number, parent, world_from_node));
     }
     Ok(found)
 }

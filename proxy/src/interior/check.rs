@@ -1,0 +1,157 @@
+//! What must hold of an interior, and what is odd about one.
+
+use super::{CellId, Content, Interior, InteriorError, InteriorWarning, Polygon, RoomBox};
+use glam::DVec3;
+use std::collections::BTreeSet;
+
+/// What may be due to rounding, in shares of a box's or polygon's size.
+const ROUNDING: f64 = 1e-6;
+/// Overlaps that are told: of many boxes in one place, there would be their number squared.
+const MAX_OVERLAPS: usize = 64;
+
+impl Interior {
+    /// Checks an interior that was made or changed in memory, as reading one from a file does.
+    ///
+    /// # Errors
+    /// The first contradiction found.
+    pub fn check(&self) -> Result<Vec<InteriorWarning>, InteriorError> {
+        if !(self.eye_height > 0.0 && self.eye_height.is_finite()) {
+            let what = "`eye_height`".to_owned();
+            return Err(InteriorError::Length(what, self.eye_height));
+        }
+        if !((self.up.length() - 1.0).abs() < 1e-6) {
+            return Err(InteriorError::Up(self.up.to_array()));
+        }
+        if self.cells.is_empty() {
+            return Err(InteriorError::NoCells);
+        }
+        unique("cell", "cells", self.cells.iter().map(|c| c.name.as_str()))?;
+        let names = self.portals.iter().map(|p| p.name.as_str());
+        unique("portal", "portals", names)?;
+        for cell in &self.cells {
+            if let Content::Box(RoomBox { min, max }) = cell.content
+                && !(min.cmplt(max).all() && min.is_finite() && max.is_finite())
+            {
+                return Err(InteriorError::Box(cell.name.clone()));
+            }
+            if self.model.is_none() && !matches!(cell.content, Content::Scene(_)) {
+                return Err(InteriorError::NoModel(cell.name.clone()));
+            }
+        }
+        for portal in &self.portals {
+            if let Some(radius) = portal.radius
+                && !(radius > 0.0 && radius.is_finite())
+            {
+                let what = format!("the radius of portal `{}`", portal.name);
+                return Err(InteriorError::Length(what, radius));
+            }
+            if portal.cells[0] == portal.cells[1] {
+                let side = portal.cells[0].and_then(|id| self.cells.get(id.0 as usize));
+                let side = side.map_or("null".to_owned(), |cell| format!("`{}`", cell.name));
+                return Err(InteriorError::SameCell(portal.name.clone(), side));
+            }
+            let is_unknown = |id: &CellId| id.0 as usize >= self.cells.len();
+            if let Some(id) = portal.cells.into_iter().flatten().find(is_unknown) {
+                return Err(InteriorError::UnknownCell {
+                    portal: portal.name.clone(),
+                    cell: id.0.to_string(),
+                    known: self.cell_names(),
+                });
+            }
+        }
+        Ok(self.oddities())
+    }
+
+    /// For messages.
+    pub(super) fn cell_names(&self) -> String {
+        let names: Vec<&str> = self.cells.iter().map(|c| c.name.as_str()).collect();
+        names.join(", ")
+    }
+
+    fn oddities(&self) -> Vec<InteriorWarning> {
+        let mut found = Vec::new();
+        let boxes: Vec<(&str, RoomBox)> = self
+            .cells
+            .iter()
+            .filter_map(|cell| match cell.content {
+                Content::Box(room) if cell.floor.is_none() => Some((cell.name.as_str(), room)),
+                _ => None,
+            })
+            .collect();
+        for (i, (name, a)) in boxes.iter().enumerate() {
+            for (other, b) in &boxes[..i] {
+                let shared = a.max.min(b.max) - a.min.max(b.min);
+                let size = (a.max - a.min).min(b.max - b.min);
+                if found.len() < MAX_OVERLAPS && shared.cmpgt(ROUNDING * size).all() {
+                    let names = ((*other).to_owned(), (*name).to_owned());
+                    found.push(InteriorWarning::Overlap(names.0, names.1));
+                }
+            }
+        }
+        for (id, cell) in (0..).map(CellId).zip(&self.cells) {
+            let has_portal = self.portals_of(Some(id)).next().is_some();
+            if !has_portal && self.cells.len() > 1 {
+                found.push(InteriorWarning::NoPortal(cell.name.clone()));
+            }
+        }
+        for portal in &self.portals {
+            let center = portal.polygon.center();
+            for id in portal.cells.into_iter().flatten() {
+                let cell = self.cell(id);
+                let Content::Box(room) = cell.content else {
+                    continue;
+                };
+                let distance = room.distance(center);
+                if distance > 0.5 * portal.polygon.size() {
+                    found.push(InteriorWarning::Away {
+                        portal: portal.name.clone(),
+                        cell: cell.name.clone(),
+                        distance,
+                    });
+                }
+            }
+            if is_turned(&portal.polygon, portal.cells.map(|id| self.middle(id))) {
+                found.push(InteriorWarning::Turned(portal.name.clone()));
+            }
+        }
+        found
+    }
+
+    /// About where a cell is, by its own words.
+    pub(super) fn middle(&self, id: Option<CellId>) -> Option<DVec3> {
+        let cell = self.cells.get(id?.0 as usize)?;
+        match (&cell.content, &cell.floor) {
+            (_, Some(floor)) => Some(floor.center()),
+            (Content::Box(room), None) => Some(room.min.midpoint(room.max)),
+            _ => None,
+        }
+    }
+}
+
+/// Whether the middles of the cells in front and behind say that an outline goes the other way
+/// round.
+pub(super) fn is_turned(polygon: &Polygon, middles: [Option<DVec3>; 2]) -> bool {
+    match middles.map(|m| m.map(|m| polygon.height(m))) {
+        [Some(front), Some(back)] => front < back,
+        [Some(front), None] => front < 0.0,
+        [None, Some(back)] => back > 0.0,
+        [None, None] => false,
+    }
+}
+
+fn unique<'a>(
+    one: &'static str,
+    several: &'static str,
+    names: impl Iterator<Item = &'a str>,
+) -> Result<(), InteriorError> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        if name.is_empty() {
+            return Err(InteriorError::NoName(one));
+        }
+        if !seen.insert(name) {
+            return Err(InteriorError::DuplicateName(several, name.to_owned()));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,119 @@
+use super::PolygonError;
+use std::path::PathBuf;
+
+/// What makes an interior contradict itself.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InteriorError {
+    /// A portal's outline.
+    #[error("portal `{0}`: {1}")]
+    Portal(String, PolygonError),
+    /// A floor's outline.
+    #[error("the floor of cell `{0}`: {1}")]
+    Floor(String, PolygonError),
+    /// A portal leads to a cell that is not there.
+    #[error("portal `{portal}` leads to the cell `{cell}`; there are: {known}")]
+    UnknownCell {
+        /// The portal.
+        portal: String,
+        /// What it calls the cell.
+        cell: String,
+        /// The cells' names.
+        known: String,
+    },
+    /// Both sides of a portal are the same.
+    #[error("portal `{0}` leads from {1} to {1}; a portal joins two cells, or one and null")]
+    SameCell(String, String),
+    /// Two of a kind share a name.
+    #[error("two {0} are called `{1}`; give each its own name")]
+    DuplicateName(&'static str, String),
+    /// A name is empty.
+    #[error("a {0} has no name; give it one")]
+    NoName(&'static str),
+    /// A box encloses nothing.
+    #[error(
+        "the box of cell `{0}` is empty or not finite: min must be less than max on every axis"
+    )]
+    Box(String),
+    /// A cell says nothing, or too much, about what is in it.
+    #[error("cell `{0}` must have one of `box`, `nodes` and `scene`, and has {1}")]
+    Content(String, usize),
+    /// A length that is none.
+    #[error("{0} is {1}; expected a positive number")]
+    Length(String, f64),
+    /// No direction.
+    #[error("`up` is {0:?}; expected a direction such as [0, 1, 0]")]
+    Up([f64; 3]),
+    /// Nowhere to be.
+    #[error("there are no cells; give at least one")]
+    NoCells,
+    /// The cells' content is in a model, but none is named.
+    #[error("cell `{0}` shows a part of a model, but no `model` is named")]
+    NoModel(String),
+    /// A node that is not in the model.
+    #[error("cell `{cell}` shows the node `{node}`, which the model does not have")]
+    UnknownNode {
+        /// The cell.
+        cell: String,
+        /// The node's name.
+        node: String,
+    },
+    /// Nothing in a model says where its cells are.
+    #[error(
+        "no node is called `cell:NAME`; name the rooms' nodes so, and those of openings \
+         `portal:A|B`, or give the rooms with --rooms"
+    )]
+    NoCellNodes,
+    /// A node that stands for a portal has no outline.
+    #[error("node `{0}`: {1}")]
+    PortalNode(String, String),
+}
+
+/// What is wrong with an interior's file.
+#[derive(Debug, thiserror::Error)]
+pub enum InteriorFileError {
+    /// It cannot be read or written.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Io(PathBuf, std::io::Error),
+    /// It is not the JSON that was expected.
+    #[error("{path}: not {what}: {error}", path = .0.display(), what = .1, error = .2)]
+    Json(PathBuf, &'static str, serde_json::Error),
+    /// It is from a later version.
+    #[error("{path}: version {found}; this program reads version 1", path = .0.display(), found = .1)]
+    Version(PathBuf, u64),
+    /// It contradicts itself.
+    #[error("{path}: {error}", path = .0.display(), error = .1)]
+    Interior(PathBuf, InteriorError),
+}
+
+/// What is odd about an interior, and can be worked with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InteriorWarning {
+    /// Two boxes share space.
+    #[error("the boxes of cells `{0}` and `{1}` overlap: what is in both is drawn for either")]
+    Overlap(String, String),
+    /// A cell that nobody sees from elsewhere.
+    #[error("cell `{0}` has no portal: it cannot be seen from elsewhere")]
+    NoPortal(String),
+    /// A portal is not at its cell's box.
+    #[error("portal `{portal}` is {distance} away from the box of its cell `{cell}`")]
+    Away {
+        /// The portal.
+        portal: String,
+        /// The cell.
+        cell: String,
+        /// In world units, from the portal's centre.
+        distance: f64,
+    },
+    /// A portal's outline goes the other way round.
+    #[error(
+        "portal `{0}` seems to be turned round: its corners are to be counter-clockwise as seen \
+         from the first of its cells"
+    )]
+    Turned(String),
+    /// A cell without a triangle.
+    #[error("nothing of the model is in cell `{0}`")]
+    Empty(String),
+    /// Triangles that no cell has.
+    #[error("{0} triangles are in no cell; they are drawn whatever is visible")]
+    Elsewhere(usize),
+}

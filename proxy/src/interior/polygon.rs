@@ -1,0 +1,324 @@
+//! Flat polygons in space.
+
+use glam::{DVec2, DVec3};
+
+/// A flat, simple polygon of three corners or more, convex or not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polygon {
+    corners: Vec<DVec3>,
+    center: DVec3,
+    normal: DVec3,
+    size: f64,
+}
+
+/// Why corners make no polygon.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PolygonError {
+    /// Too few to enclose anything, or absurdly many.
+    #[error("it has {0} corners; give 3 to {MAX_CORNERS}")]
+    Corners(usize),
+    /// NaN or infinite.
+    #[error("corner {0} is not finite")]
+    NotFinite(usize),
+    /// It encloses nothing.
+    #[error("its corners lie on a line; give the outline of the opening")]
+    Flat,
+    /// A corner lies off the plane of the others.
+    #[error(
+        "corner {corner} lies {off} off the plane of the others, of an extent of {size}; a polygon \
+         must be flat: split it, or move the corner"
+    )]
+    NotPlanar {
+        /// From 0.
+        corner: usize,
+        /// In world units.
+        off: f64,
+        /// In world units.
+        size: f64,
+    },
+    /// It is no simple polygon.
+    #[error("its sides {0} and {1} cross; list its corners in order around it")]
+    Crossing(usize, usize),
+}
+
+/// Checks take time with the square of their number.
+const MAX_CORNERS: usize = 256;
+/// How far corners may lie off their plane, in shares of the extent.
+const FLATNESS: f64 = 1e-3;
+/// What counts as nothing, in shares of the extent.
+const NOTHING: f64 = 1e-9;
+
+impl Polygon {
+    /// A polygon of corners in order around it.
+    ///
+    /// # Errors
+    /// Corners that are too few, not finite, on a line or off their plane, and sides that cross.
+    pub fn new(corners: Vec<DVec3>) -> Result<Self, PolygonError> {
+        let count = corners.len();
+        if !(3..=MAX_CORNERS).contains(&count) {
+            return Err(PolygonError::Corners(count));
+        }
+        if let Some(i) = corners.iter().position(|p| !p.is_finite()) {
+            return Err(PolygonError::NotFinite(i));
+        }
+        // Relative to a corner: digits far from the world's origin.
+        let origin = corners[0];
+        let offsets: Vec<DVec3> = corners.iter().map(|p| *p - origin).collect();
+        let low = offsets
+            .iter()
+            .copied()
+            .reduce(DVec3::min)
+            .unwrap_or_default();
+        let high = offsets
+            .iter()
+            .copied()
+            .reduce(DVec3::max)
+            .unwrap_or_default();
+        let size = (high - low).length();
+        if !(size > 0.0 && size.is_finite()) {
+            return Err(PolygonError::Flat);
+        }
+        // Newell's normal, twice the area long; in shares of the extent.
+        let scaled: Vec<DVec3> = offsets.iter().map(|p| *p / size).collect();
+        let next = |i: usize| (i + 1) % count;
+        let newell: DVec3 = (0..count).map(|i| scaled[i].cross(scaled[next(i)])).sum();
+        let normal = newell.normalize_or_zero();
+        if !(newell.length() > NOTHING) || normal == DVec3::ZERO {
+            // Of a figure of eight, too.
+            return Err(crossing(&scaled).unwrap_or(PolygonError::Flat));
+        }
+        let center = offsets.iter().sum::<DVec3>() / count as f64;
+        for (corner, p) in offsets.iter().enumerate() {
+            let off = (*p - center).dot(normal).abs();
+            if !(off <= FLATNESS * size) {
+                return Err(PolygonError::NotPlanar { corner, off, size });
+            }
+        }
+        let polygon = Self {
+            center: origin + center,
+            normal,
+            size,
+            corners,
+        };
+        match crossing_sides(&polygon.flattened()) {
+            Some((a, b)) => Err(PolygonError::Crossing(a, b)),
+            None => Ok(polygon),
+        }
+    }
+
+    /// Its corners, counter-clockwise around the normal.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners
+    }
+
+    /// The mean of its corners.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Unit length; whoever it points to sees the corners counter-clockwise.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// The diagonal of its bounds.
+    pub fn size(&self) -> f64 {
+        self.size
+    }
+
+    /// The same seen from behind.
+    pub fn reversed(mut self) -> Self {
+        self.corners.reverse();
+        self.normal = -self.normal;
+        self
+    }
+
+    /// How far a point is in front of its plane.
+    pub fn height(&self, point: DVec3) -> f64 {
+        (point - self.center).dot(self.normal)
+    }
+
+    /// Whether a point's foot on its plane is inside, or within `margin` of its outline.
+    pub fn covers(&self, point: DVec3, margin: f64) -> bool {
+        let (x, y) = self.axes();
+        let at = DVec2::new((point - self.center).dot(x), (point - self.center).dot(y));
+        let corners = self.flattened();
+        is_inside(&corners, at) || distance_to_outline(&corners, at) <= margin
+    }
+
+    /// Convex pieces, each counter-clockwise around the normal: itself, or triangles.
+    pub fn convex_pieces(&self) -> Vec<Vec<DVec3>> {
+        let flat = self.flattened();
+        let count = flat.len();
+        let turn = |i: usize| cross(flat[i], flat[(i + 1) % count], flat[(i + 2) % count]);
+        if (0..count).all(|i| turn(i) >= 0.0) {
+            return vec![self.corners.clone()];
+        }
+        // Ears, one after the other.
+        let mut left: Vec<usize> = (0..count).collect();
+        let mut pieces = Vec::new();
+        while left.len() > 3 {
+            let n = left.len();
+            let ear = |i: usize| {
+                let [a, b, c] = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
+                let (p, q, r) = (flat[a], flat[b], flat[c]);
+                let others = left.iter().filter(|o| ![a, b, c].contains(o));
+                cross(p, q, r) > 0.0
+                    && others.clone().all(|o| {
+                        let o = flat[*o];
+                        let is_outside =
+                            cross(p, q, o) < 0.0 || cross(q, r, o) < 0.0 || cross(r, p, o) < 0.0;
+                        is_outside || o == p || o == q || o == r
+                    })
+            };
+            // A simple polygon has one; rounding may hide it in a sliver, which then goes.
+            let i = (0..n).find(|i| ear(*i)).unwrap_or(0);
+            let triangle = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
+            pieces.push(triangle.map(|k| self.corners[k]).to_vec());
+            left.remove(i);
+        }
+        pieces.push(left.iter().map(|k| self.corners[*k]).collect());
+        pieces
+    }
+
+    /// Two axes of its plane, right-handed with the normal.
+    fn axes(&self) -> (DVec3, DVec3) {
+        let x = self.normal.any_orthonormal_vector();
+        (x, self.normal.cross(x))
+    }
+
+    /// The corners on its plane, from its centre.
+    fn flattened(&self) -> Vec<DVec2> {
+        let (x, y) = self.axes();
+        let flat = |p: &DVec3| {
+            let offset = *p - self.center;
+            DVec2::new(offset.dot(x), offset.dot(y))
+        };
+        self.corners.iter().map(flat).collect()
+    }
+}
+
+/// Twice the signed area of a triangle.
+fn cross(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+/// Even–odd.
+fn is_inside(corners: &[DVec2], at: DVec2) -> bool {
+    let mut inside = false;
+    for (i, a) in corners.iter().enumerate() {
+        let b = corners[(i + 1) % corners.len()];
+        if (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x) {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+fn distance_to_outline(corners: &[DVec2], at: DVec2) -> f64 {
+    let side = |(i, a): (usize, &DVec2)| {
+        let along = corners[(i + 1) % corners.len()] - *a;
+        let squared = along.length_squared();
+        let share = match squared > 0.0 {
+            true => ((at - *a).dot(along) / squared).clamp(0.0, 1.0),
+            false => 0.0,
+        };
+        at.distance(*a + share * along)
+    };
+    corners
+        .iter()
+        .enumerate()
+        .map(side)
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Two sides that cross, and share no corner.
+fn crossing_sides(corners: &[DVec2]) -> Option<(usize, usize)> {
+    let n = corners.len();
+    for i in 0..n {
+        for j in i + 1..n {
+            let (a, b) = (corners[i], corners[(i + 1) % n]);
+            let (c, d) = (corners[j], corners[(j + 1) % n]);
+            let splits = |p, q, r, s| cross(p, q, r) * cross(p, q, s) < 0.0;
+            if splits(a, b, c, d) && splits(c, d, a, b) {
+                return Some((i, j));
+            }
+        }
+    }
+    None
+}
+
+/// The same of a polygon without a normal, as its longest axes show it.
+fn crossing(corners: &[DVec3]) -> Option<PolygonError> {
+    let count = corners.len();
+    let normal = (0..count)
+        .flat_map(|i| (i + 1..count).map(move |j| (i, j)))
+        .map(|(i, j)| (corners[i] - corners[0]).cross(corners[j] - corners[0]))
+        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+    if !(normal.length() > NOTHING) {
+        return None;
+    }
+    let x = normal.normalize().any_orthonormal_vector();
+    let y = normal.normalize().cross(x);
+    let flat: Vec<DVec2> = corners
+        .iter()
+        .map(|p| DVec2::new(p.dot(x), p.dot(y)))
+        .collect();
+    let (a, b) = crossing_sides(&flat)?;
+    Some(PolygonError::Crossing(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(corners: &[[f64; 3]]) -> Result<Polygon, PolygonError> {
+        Polygon::new(corners.iter().map(|p| DVec3::from_array(*p)).collect())
+    }
+
+    #[test]
+    fn what_is_no_polygon_is_told() {
+        let message = |corners: &[[f64; 3]]| polygon(corners).unwrap_err().to_string();
+        assert_eq!(
+            message(&[[0.0; 3], [1.0; 3]]),
+            "it has 2 corners; give 3 to 256"
+        );
+        assert_eq!(
+            message(&[[0.0; 3], [1.0; 3], [0.0, f64::NAN, 0.0]]),
+            "corner 2 is not finite"
+        );
+        let line = "its corners lie on a line; give the outline of the opening";
+        assert_eq!(message(&[[0.0; 3], [1.0; 3], [2.0; 3]]), line);
+        assert_eq!(message(&[[1.0; 3], [1.0; 3], [1.0; 3]]), line);
+        let bent = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.3], [0.0, 1.0, 0.0]];
+        assert!(message(&bent).contains("off the plane of the others"));
+        let eight = [[0.0; 3], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        assert!(message(&eight).contains("cross"), "{}", message(&eight));
+    }
+
+    #[test]
+    fn pieces_are_convex_and_cover_it() {
+        // An L, far from the origin.
+        let far = DVec3::new(5e5, 5e6, 100.0);
+        let l = [
+            [0.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [2.0, 1.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [1.0, 3.0, 0.0],
+            [0.0, 3.0, 0.0],
+        ];
+        let l = Polygon::new(l.iter().map(|p| far + DVec3::from_array(*p)).collect()).unwrap();
+        assert!((l.normal() - DVec3::Z).length() < 1e-12);
+        let pieces = l.convex_pieces();
+        assert_eq!(pieces.len(), 4);
+        let area = |p: &Vec<DVec3>| {
+            let fan = (1..p.len() - 1).map(|i| (p[i] - p[0]).cross(p[i + 1] - p[0]).z / 2.0);
+            fan.inspect(|a| assert!(*a > 0.0)).sum::<f64>()
+        };
+        assert!((pieces.iter().map(area).sum::<f64>() - 4.0).abs() < 1e-9);
+        let covers = |x, y| l.covers(far + DVec3::new(x, y, 7.0), 0.0);
+        assert!(covers(0.5, 2.0) && covers(1.5, 0.5) && !covers(1.5, 1.5));
+        assert!(l.covers(far + DVec3::new(1.1, 2.0, 0.0), 0.2));
+    }
+}

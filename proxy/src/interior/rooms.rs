@@ -1,0 +1,271 @@
+//! Interiors out of models: rooms given by hand (`rooms.json`), or named in the model.
+//!
+//! ```json
+//! {
+//!   "version": 1,
+//!   "up": [0, 1, 0],
+//!   "eye_height": 1.6,
+//!   "rooms": [
+//!     {"name": "hall", "min": [0, 0, 0], "max": [4, 2.5, 3]},
+//!     {"name": "study", "min": [4, 0, 0], "max": [8, 2.5, 3], "floor": [[4, 0, 0], …]}
+//!   ],
+//!   "openings": [
+//!     {"name": "door", "between": ["hall", "study"],
+//!      "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]], "radius": 1.5},
+//!     {"name": "window", "between": ["hall", null], "polygon": […]}
+//!   ]
+//! }
+//! ```
+//!
+//! `up` is y and `eye_height` 1.6 where they are not given; `floor` and `radius` need not be. An
+//! outline may go either way round. Boxes should meet in the plane of the opening between
+//! them: triangles between boxes are in no cell, and drawn always.
+//!
+//! In a model, the node `cell:NAME` and all below it are a cell, and the node `portal:A|B`, a
+//! flat mesh, is the opening between two of them; `portal:A|` leads outside. What follows
+//! another `|` tells openings between the same cells apart.
+
+use super::check::is_turned;
+use super::contents::{PORTAL_NODE, below};
+use super::file::{direction, parse_version_1, polygon, sides};
+use super::{
+    Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
+    InteriorWarning, Polygon, Portal, RoomBox,
+};
+use crate::mesh::Model;
+use glam::DVec3;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Where eyes are over the floor, in metres.
+const EYE_HEIGHT: f64 = 1.6;
+
+#[derive(Deserialize)]
+struct Rooms {
+    #[serde(default = "y")]
+    up: [f64; 3],
+    #[serde(default = "eye_height")]
+    eye_height: f64,
+    rooms: Vec<Room>,
+    #[serde(default)]
+    openings: Vec<Opening>,
+}
+
+#[derive(Deserialize)]
+struct Room {
+    name: String,
+    min: [f64; 3],
+    max: [f64; 3],
+    floor: Option<Vec<[f64; 3]>>,
+}
+
+#[derive(Deserialize)]
+struct Opening {
+    name: String,
+    between: [Option<String>; 2],
+    polygon: Vec<[f64; 3]>,
+    radius: Option<f64>,
+}
+
+fn y() -> [f64; 3] {
+    DVec3::Y.to_array()
+}
+
+fn eye_height() -> f64 {
+    EYE_HEIGHT
+}
+
+/// Reads rooms and openings; `model` is the model's file, beside the `interior.json` to be.
+///
+/// # Errors
+/// The file, and what is wrong with it.
+pub fn read_rooms(
+    path: &Path,
+    model: &str,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+    let bytes = std::fs::read(path).map_err(|e| InteriorFileError::Io(path.to_owned(), e))?;
+    parse_rooms(path, &bytes, model)
+}
+
+/// Reads the content of a file as [`read_rooms`] does.
+///
+/// # Errors
+/// As for [`read_rooms`].
+pub fn parse_rooms(
+    path: &Path,
+    bytes: &[u8],
+    model: &str,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+    let rooms: Rooms = parse_version_1(path, "a list of rooms", bytes)?;
+    let failed = |e| InteriorFileError::Interior(path.to_owned(), e);
+    interior_of(rooms, model).map_err(failed)
+}
+
+fn interior_of(
+    rooms: Rooms,
+    model: &str,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
+    let mut cells = Vec::with_capacity(rooms.rooms.len());
+    for room in rooms.rooms {
+        let floor = room.floor.map(|corners| polygon(&corners)).transpose();
+        cells.push(Cell {
+            floor: floor.map_err(|e| InteriorError::Floor(room.name.clone(), e))?,
+            name: room.name,
+            content: Content::Box(RoomBox {
+                min: DVec3::from_array(room.min),
+                max: DVec3::from_array(room.max),
+            }),
+            other: Extra::new(),
+        });
+    }
+    let names = cells.iter().map(|c| c.name.as_str());
+    let ids: BTreeMap<&str, CellId> = names.zip((0..).map(CellId)).collect();
+    let mut portals = Vec::with_capacity(rooms.openings.len());
+    for opening in rooms.openings {
+        let outline = polygon(&opening.polygon);
+        portals.push(Portal {
+            cells: sides(&opening.name, &opening.between, &ids)?,
+            polygon: outline.map_err(|e| InteriorError::Portal(opening.name.clone(), e))?,
+            name: opening.name,
+            radius: opening.radius,
+            other: Extra::new(),
+        });
+    }
+    let interior = Interior {
+        model: Some(model.to_owned()),
+        up: direction(rooms.up)?,
+        eye_height: rooms.eye_height,
+        cells,
+        portals,
+        other: Extra::new(),
+    };
+    interior_from_rooms(interior)
+}
+
+/// Turns the outlines round that go the other way, by where the cells are, and checks the whole.
+///
+/// # Errors
+/// As for [`Interior::check`].
+pub fn interior_from_rooms(
+    mut interior: Interior,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
+    interior.check()?;
+    for i in 0..interior.portals.len() {
+        let middles = interior.portals[i].cells.map(|id| interior.middle(id));
+        turn(&mut interior.portals[i], middles);
+    }
+    let warnings = interior.check()?;
+    Ok((interior, warnings))
+}
+
+fn turn(portal: &mut Portal, middles: [Option<DVec3>; 2]) {
+    if is_turned(&portal.polygon, middles) {
+        portal.polygon = portal.polygon.clone().reversed();
+    }
+}
+
+/// What the names of nodes begin with that hold a cell.
+const CELL_NODE: &str = "cell:";
+
+/// Cells and portals by the names of a model's nodes; `file` is the model's, beside the
+/// `interior.json` to be. Up is y, as glTF has it.
+///
+/// # Errors
+/// No such nodes, outlines that are none, and what [`Interior::check`] finds.
+pub fn interior_from_nodes(
+    model: &Model,
+    file: &str,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
+    // 1. Cells.
+    let names = model.nodes.iter().map(|n| n.name.as_str());
+    let cells: Vec<Cell> = names
+        .clone()
+        .filter_map(|name| name.strip_prefix(CELL_NODE))
+        .map(|name| Cell {
+            name: name.to_owned(),
+            content: Content::Nodes(vec![format!("{CELL_NODE}{name}")]),
+            floor: None,
+            other: Extra::new(),
+        })
+        .collect();
+    if cells.is_empty() {
+        return Err(InteriorError::NoCellNodes);
+    }
+    let mut interior = Interior {
+        model: Some(file.to_owned()),
+        up: DVec3::Y,
+        eye_height: EYE_HEIGHT,
+        cells,
+        portals: Vec::new(),
+        other: Extra::new(),
+    };
+    interior.check()?;
+    // 2. Where they are, to tell their sides of a portal.
+    let (contents, _) = Contents::new(&interior, model)?;
+    let middle = |id: Option<CellId>| {
+        let bounds = contents.bounds[id?.0 as usize]?;
+        Some(bounds.min.midpoint(bounds.max))
+    };
+    // 3. Portals.
+    for name in names {
+        let Some(between) = name.strip_prefix(PORTAL_NODE) else {
+            continue;
+        };
+        let mut parts = between.splitn(3, '|');
+        let mut side = || {
+            let part = parts.next().filter(|part| !part.is_empty());
+            part.map(str::to_owned)
+        };
+        let between_cells = [side(), side()];
+        let ids = interior.cells.iter().map(|c| c.name.as_str());
+        let ids: BTreeMap<&str, CellId> = ids.zip((0..).map(CellId)).collect();
+        let failed = |problem: String| InteriorError::PortalNode(name.to_owned(), problem);
+        let corners = outline(model, &below(model, |n| n == name)).map_err(failed)?;
+        let polygon =
+            Polygon::new(corners).map_err(|e| InteriorError::Portal(between.to_owned(), e))?;
+        let mut portal = Portal {
+            cells: sides(between, &between_cells, &ids)?,
+            name: between.to_owned(),
+            polygon,
+            radius: None,
+            other: Extra::new(),
+        };
+        let middles = portal.cells.map(middle);
+        turn(&mut portal, middles);
+        interior.portals.push(portal);
+    }
+    let warnings = interior.check()?;
+    Ok((interior, warnings))
+}
+
+/// The one loop of sides that only one triangle has.
+fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
+    // Corners are the same where their positions are.
+    let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
+    let mut sides: BTreeMap<_, DVec3> = BTreeMap::new();
+    for i in triangles {
+        let corners = model.mesh.corners(*i as usize);
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            if sides.remove(&(key(b), key(a))).is_none() {
+                sides.insert((key(a), key(b)), b);
+            }
+        }
+    }
+    let next: BTreeMap<_, DVec3> = sides.iter().map(|((a, _), b)| (*a, *b)).collect();
+    if next.len() != sides.len() {
+        return Err("its outline is no simple loop".to_owned());
+    }
+    let Some(first) = next.values().next().copied() else {
+        return Err("it has no triangles, or no outline; give it a flat mesh".to_owned());
+    };
+    let mut corners = vec![first];
+    while corners.len() < next.len() {
+        match next.get(&key(corners[corners.len() - 1])) {
+            Some(corner) if key(*corner) != key(first) => corners.push(*corner),
+            _ => return Err("its outline is more than one loop".to_owned()),
+        }
+    }
+    Ok(corners)
+}

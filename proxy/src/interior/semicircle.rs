@@ -1,0 +1,155 @@
+//! Where to look into a cell from: semicircles before its portals.
+//!
+//! Rafferty et al. 1998, "Images for accelerating architectural walkthroughs", §2.2 and 4.1 and
+//! Figure 2: reference images from a semicircle before each portal at eye height.
+
+use super::{CellId, Interior, Portal, PortalId};
+use calibrate::Rigid3;
+use glam::DVec3;
+
+/// How the cameras stand before a portal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SemicircleOptions {
+    /// How many cameras for each portal and direction: odd, 2n + 1, so that one is in the
+    /// middle. An even number is taken as the next odd one.
+    pub views: usize,
+    /// The angle at the portal that they span, in radians, more than 0 and less than π: at π
+    /// the outermost would stand in the portal's plane.
+    pub span: f64,
+}
+
+impl Default for SemicircleOptions {
+    fn default() -> Self {
+        Self {
+            views: 13,
+            span: 120_f64.to_radians(),
+        }
+    }
+}
+
+/// A camera before a portal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SemicircleView {
+    /// The portal, which is looked through.
+    pub portal: PortalId,
+    /// The viewer's side; none is the outside.
+    pub from: Option<CellId>,
+    /// The cell beyond, which is to be seen.
+    pub into: CellId,
+    /// From the portal's normal, in radians; 0 is the middle, positive to the right of who looks
+    /// at the portal.
+    pub angle: f64,
+    /// Whether it stands in the viewer's cell, as far as that is known; else the radius is too
+    /// large for the room.
+    pub is_inside: bool,
+    /// Aimed at the portal's centre, upright.
+    pub camera_from_world: Rigid3,
+}
+
+/// The cameras before every portal and on each of its sides from which a cell can be seen, in
+/// the portals' order, from left to right.
+///
+/// They stand on the viewer's side at eye height over its floor: the lowest point of the
+/// viewer's cell, or where it has neither a box nor a floor, of the portal. Before a portal that
+/// lies flat (a hatch), they stand on a semicircle across it whatever the floor.
+pub fn semicircles(interior: &Interior, options: &SemicircleOptions) -> Vec<SemicircleView> {
+    let ids = (0..).map(PortalId);
+    let portals = ids.zip(&interior.portals);
+    let sides = portals.flat_map(|(id, portal)| {
+        let [front, back] = portal.cells;
+        [(id, portal, front, back), (id, portal, back, front)]
+    });
+    sides
+        .filter_map(|(id, portal, from, into)| Some((id, portal, from, into?)))
+        .flat_map(|(id, portal, from, into)| before(interior, id, portal, from, into, options))
+        .collect()
+}
+
+fn before(
+    interior: &Interior,
+    id: PortalId,
+    portal: &Portal,
+    from: Option<CellId>,
+    into: CellId,
+    options: &SemicircleOptions,
+) -> Vec<SemicircleView> {
+    let up = interior.up;
+    let target = portal.polygon.center();
+    let normal = match portal.cells[1] == Some(into) {
+        true => portal.polygon.normal(),
+        false => -portal.polygon.normal(),
+    };
+    let radius = portal.semicircle_radius(up);
+    // 1. The semicircle's axes. Whoever looks against `ahead` has `right` on the right.
+    let level = normal - up * normal.dot(up);
+    let (center, ahead) = if level.length() > 1e-3 {
+        let height = floor_height(interior, portal, from) + interior.eye_height;
+        (target + up * (height - target.dot(up)), level.normalize())
+    } else {
+        (target, normal)
+    };
+    let right = match up.cross(ahead).try_normalize() {
+        Some(right) if level.length() > 1e-3 => right,
+        _ => ahead.any_orthonormal_vector(),
+    };
+    // 2. The cameras.
+    let each_side = (options.views / 2) as i64;
+    // A NaN is as good as nothing given.
+    let span = match options.span.is_nan() {
+        true => SemicircleOptions::default().span,
+        false => options.span.clamp(0.0, std::f64::consts::PI),
+    };
+    let camera = |i: i64| {
+        let angle = match each_side {
+            0 => 0.0,
+            n => 0.5 * span * i as f64 / n as f64,
+        };
+        let place = center + radius * (angle.cos() * ahead + angle.sin() * right);
+        SemicircleView {
+            portal: id,
+            from,
+            into,
+            angle,
+            is_inside: is_inside(interior, from, place),
+            camera_from_world: Rigid3::looking_at(place, target, up),
+        }
+    };
+    (-each_side..=each_side).map(camera).collect()
+}
+
+fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
+    let Some(cell) = cell.and_then(|id| interior.cells.get(id.0 as usize)) else {
+        return true;
+    };
+    let in_box = match cell.content {
+        super::Content::Box(room) => room.contains(place),
+        _ => true,
+    };
+    in_box
+        && cell
+            .floor
+            .as_ref()
+            .is_none_or(|floor| floor.covers(place, 0.0))
+}
+
+/// How high the floor is on the viewer's side, along `up`.
+fn floor_height(interior: &Interior, portal: &Portal, from: Option<CellId>) -> f64 {
+    let up = interior.up;
+    let cell = from.and_then(|id| interior.cells.get(id.0 as usize));
+    let lowest = |corners: &[DVec3]| {
+        let heights = corners.iter().map(|p| p.dot(up));
+        heights.fold(f64::INFINITY, f64::min)
+    };
+    match cell.map(|cell| (&cell.floor, &cell.content)) {
+        Some((Some(floor), _)) => lowest(floor.corners()),
+        Some((None, super::Content::Box(room))) => {
+            // The corner farthest down.
+            let corner = |k: usize| match up[k] > 0.0 {
+                true => room.min[k],
+                false => room.max[k],
+            };
+            DVec3::new(corner(0), corner(1), corner(2)).dot(up)
+        }
+        _ => lowest(portal.polygon.corners()),
+    }
+}

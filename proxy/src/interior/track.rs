@@ -1,0 +1,104 @@
+//! Which cell a viewer is in: followed through portals, or found anew.
+
+use super::{CellId, Contents, Interior, Portal, PortalId};
+use glam::DVec3;
+
+/// How near to a portal's plane counts as on it, in shares of its size.
+const ON_PLANE: f64 = 1e-9;
+/// What positions in the world are rounded to, in shares of their distance from its origin.
+const ROUNDING: f64 = 1e-14;
+
+/// How near to a portal's plane counts as on it, in world units.
+pub(super) fn tolerance(portal: &Portal) -> f64 {
+    let center = portal.polygon.center().abs().max_element();
+    ON_PLANE * portal.polygon.size() + ROUNDING * center
+}
+
+impl Interior {
+    /// The cell of a viewer who was in `cell` (none: outside) and moved in a straight line:
+    /// each portal crossed leads on; walls are no matter, so a step should be short. After a
+    /// jump, [`Contents::locate`] finds the cell.
+    ///
+    /// On a portal's plane one still is in the cell that one came from.
+    pub fn track(&self, cell: Option<CellId>, from: DVec3, to: DVec3) -> Option<CellId> {
+        if !from.is_finite() || !to.is_finite() {
+            return cell;
+        }
+        let mut cell = cell;
+        let mut along = 0.0;
+        let mut crossed: Vec<PortalId> = Vec::new();
+        // A straight line crosses a plane once.
+        loop {
+            let open = self.portals_of(cell);
+            let crossings = open
+                .filter(|(id, _)| !crossed.contains(id))
+                .filter_map(|(id, portal)| Some((crossing(portal, cell, from, to)?, id, portal)))
+                .filter(|(t, ..)| *t >= along);
+            let Some((t, id, portal)) = crossings.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                return cell;
+            };
+            (along, cell) = (t, portal.beyond(cell).unwrap_or(cell));
+            crossed.push(id);
+        }
+    }
+}
+
+/// Where on the way, 0 to 1, it crosses a portal out of the cell.
+fn crossing(portal: &Portal, cell: Option<CellId>, from: DVec3, to: DVec3) -> Option<f64> {
+    let normal = portal.normal_into(cell);
+    let height = |p: DVec3| (p - portal.polygon.center()).dot(normal);
+    let (before, after) = (height(from), height(to));
+    let margin = tolerance(portal);
+    if !(before >= -margin && after < 0.0 && before > after) {
+        return None;
+    }
+    let t = (before / (before - after)).max(0.0);
+    portal.polygon.covers(from.lerp(to, t), margin).then_some(t)
+}
+
+impl Contents {
+    /// The cell that a point is in, if any. Of several, it is the smallest. In a doorway as
+    /// deep as a wall, between two boxes, it is the one on the same side of the portal.
+    pub fn locate(&self, interior: &Interior, point: DVec3) -> Option<CellId> {
+        if !point.is_finite() {
+            return None;
+        }
+        let ids = (0..interior.cells.len() as u32).map(CellId);
+        let inside = ids.filter_map(|id| Some((self.room_around(interior, id, point)?, id)));
+        // The first of those that are alike.
+        if let Some((_, id)) = inside.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            return Some(id);
+        }
+        let doorways = interior.portals.iter().filter_map(|portal| {
+            let height = portal.polygon.height(point);
+            let cell = portal.cells[usize::from(height < 0.0)]?;
+            let bounds = self.bounds.get(cell.0 as usize).copied().flatten()?;
+            let foot = point - height * portal.polygon.normal();
+            let is_between = bounds.distance(point) <= bounds.distance(foot);
+            let is_in = is_between && portal.polygon.covers(point, tolerance(portal));
+            is_in.then_some((height.abs(), cell))
+        });
+        let nearest = doorways.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map(|(_, cell)| cell)
+    }
+
+    /// Something that grows with a cell's size, if the point is in it.
+    fn room_around(&self, interior: &Interior, id: CellId, point: DVec3) -> Option<f64> {
+        let bounds = self.bounds.get(id.0 as usize).copied().flatten();
+        let floor = interior.cell(id).floor.as_ref();
+        if bounds.is_some_and(|room| !room.contains(point)) {
+            return None;
+        }
+        let Some(floor) = floor else {
+            return Some(bounds?.volume());
+        };
+        // Of floors one over the other, the next below.
+        let along_up = interior.up * floor.normal().dot(interior.up).signum();
+        let steepness = floor.normal().dot(along_up);
+        let height = floor.height(point) / steepness.abs().max(1e-6);
+        let over = point - height * along_up;
+        let height = height * floor.normal().dot(interior.up).signum();
+        let is_over = height >= -ON_PLANE * floor.size() && floor.covers(over, 0.0);
+        is_over.then(|| bounds.map_or(height.max(0.0), |room| room.volume()))
+    }
+}

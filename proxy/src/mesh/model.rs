@@ -1,0 +1,213 @@
+//! A textured model: a mesh and how it looks.
+
+use super::Mesh;
+use image::RgbaImage;
+use std::ops::Range;
+
+/// A mesh, the colours of its surface and the names of its parts.
+///
+/// Its colour at a place is the product of its material's base colour, its texture there and
+/// its corners' colours, all as sRGB codes: no light is added, because baked light is part of
+/// the corners' colours. Everything is opaque.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// The triangles, in the world.
+    pub mesh: Mesh,
+    /// Texture coordinates of each corner, (0, 0) at the picture's top left; finite.
+    pub uvs: Vec<[f32; 2]>,
+    /// Colour of each corner, sRGB; white where it has none. The fourth is always 255.
+    pub colors: Vec<[u8; 4]>,
+    /// Runs of triangles, one after the other, that cover all of them.
+    pub parts: Vec<Part>,
+    /// The nodes of the file's scene, parents first.
+    pub nodes: Vec<ModelNode>,
+    /// What the parts refer to.
+    pub materials: Vec<Material>,
+    /// What the materials refer to; sRGB.
+    pub textures: Vec<RgbaImage>,
+}
+
+/// A run of triangles of one node and one material.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Indices into the mesh's triangles.
+    pub triangles: Range<u32>,
+    /// Index into [`Model::nodes`].
+    pub node_idx: u32,
+    /// Index into [`Model::materials`].
+    pub material_idx: u32,
+}
+
+/// A node of the file's scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ModelNode {
+    /// Empty where the file gives none.
+    pub name: String,
+    /// Index into [`Model::nodes`].
+    pub parent_idx: Option<u32>,
+}
+
+/// The colour of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Red, green and blue as sRGB codes, 0 to 1.
+    pub base_color: [f32; 3],
+    /// Index into [`Model::textures`].
+    pub texture_idx: Option<u32>,
+    /// What lies beyond the texture's sides, across and down.
+    pub wrap: [Wrap; 2],
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            base_color: [1.0; 3],
+            texture_idx: None,
+            wrap: [Wrap::Repeat; 2],
+        }
+    }
+}
+
+/// What lies beyond a texture's sides.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The texture again.
+    #[default]
+    Repeat,
+    /// Its mirror image.
+    Mirror,
+    /// Its outermost pixels.
+    Clamp,
+}
+
+impl Wrap {
+    /// The column (or row) of a texture of that many.
+    fn texel(self, i: f64, count: u32) -> u32 {
+        let n = f64::from(count);
+        let within = match self {
+            Self::Repeat => i.rem_euclid(n),
+            Self::Clamp => i,
+            Self::Mirror => {
+                let twice = i.rem_euclid(2.0 * n);
+                twice.min(2.0 * n - 1.0 - twice)
+            }
+        };
+        within.clamp(0.0, n - 1.0) as u32
+    }
+}
+
+impl Model {
+    /// The part that a triangle belongs to. A model whose parts do not cover its triangles has
+    /// none for some.
+    pub fn part_of(&self, triangle_idx: u32) -> Option<&Part> {
+        let after = self
+            .parts
+            .partition_point(|part| part.triangles.start <= triangle_idx);
+        let part = self.parts.get(after.checked_sub(1)?)?;
+        part.triangles.contains(&triangle_idx).then_some(part)
+    }
+
+    /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the texture
+    /// bilinear at its finest level, the product of all that colours it. `shares` are the
+    /// corners' barycentric weights, and sum to 1.
+    pub fn color(&self, triangle_idx: u32, shares: [f64; 3]) -> [f64; 3] {
+        let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
+        let mut color = [0.0; 3];
+        let mut uv = [0.0; 2];
+        for (share, corner) in shares.iter().zip(corners) {
+            for (sum, x) in color.iter_mut().zip(self.colors[corner]) {
+                *sum += share * f64::from(x);
+            }
+            for (sum, x) in uv.iter_mut().zip(self.uvs[corner]) {
+                *sum += share * f64::from(x);
+            }
+        }
+        let part = self.part_of(triangle_idx);
+        let Some(material) = part.and_then(|p| self.materials.get(p.material_idx as usize)) else {
+            return color;
+        };
+        let texture = material
+            .texture_idx
+            .and_then(|i| self.textures.get(i as usize));
+        let texel = texture.map_or([255.0; 3], |t| sample(t, uv, material.wrap));
+        [0, 1, 2].map(|k| color[k] * f64::from(material.base_color[k]) * texel[k] / 255.0)
+    }
+
+    /// The name of a node and of all above it, the node's own first.
+    pub fn names_up(&self, node_idx: u32) -> impl Iterator<Item = &str> {
+        let above = |node: &&ModelNode| self.nodes.get(node.parent_idx? as usize);
+        std::iter::successors(self.nodes.get(node_idx as usize), above).map(|n| n.name.as_str())
+    }
+}
+
+/// A texture's colour, bilinear between the pixels' centres.
+fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
+    let (width, height) = texture.dimensions();
+    if width == 0 || height == 0 {
+        return [255.0; 3];
+    }
+    let x = uv[0] * f64::from(width) - 0.5;
+    let y = uv[1] * f64::from(height) - 0.5;
+    let (left, top) = (x.floor(), y.floor());
+    let (right_share, bottom_share) = (x - left, y - top);
+    let mut color = [0.0; 3];
+    for (dx, dy, share) in [
+        (0.0, 0.0, (1.0 - right_share) * (1.0 - bottom_share)),
+        (1.0, 0.0, right_share * (1.0 - bottom_share)),
+        (0.0, 1.0, (1.0 - right_share) * bottom_share),
+        (1.0, 1.0, right_share * bottom_share),
+    ] {
+        let column = wrap[0].texel(left + dx, width);
+        let row = wrap[1].texel(top + dy, height);
+        let texel = texture.get_pixel(column, row).0;
+        for k in 0..3 {
+            color[k] += share * f64::from(texel[k]);
+        }
+    }
+    color
+}
+
+/// The sRGB code, 0 to 1, of linear light; what is beyond is clipped.
+pub(super) fn srgb_from_linear(linear: f64) -> f64 {
+    let linear = linear.clamp(0.0, 1.0);
+    match linear <= 0.003_130_8 {
+        true => 12.92 * linear,
+        false => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
+    }
+}
+
+/// Linear light of an sRGB code, 0 to 1.
+pub(super) fn linear_from_srgb(code: f64) -> f64 {
+    let code = code.clamp(0.0, 1.0);
+    match code <= 0.040_45 {
+        true => code / 12.92,
+        false => ((code + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_go_on_beyond_their_sides_as_they_should() {
+        let texels = |wrap: Wrap| [-2.0, -1.0, 0.0, 2.0, 3.0, 4.0].map(|i| wrap.texel(i, 3));
+        assert_eq!(texels(Wrap::Repeat), [1, 2, 0, 2, 0, 1]);
+        assert_eq!(texels(Wrap::Mirror), [1, 0, 0, 2, 2, 1]);
+        assert_eq!(texels(Wrap::Clamp), [0, 0, 0, 2, 2, 2]);
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            assert!(wrap.texel(1e300, 3) < 3 && wrap.texel(-1e300, 3) < 3);
+        }
+        let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
+        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
+        assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
+    }
+
+    #[test]
+    fn codes_and_light_are_inverse() {
+        for code in 0..=255 {
+            let code = f64::from(code) / 255.0;
+            assert!((srgb_from_linear(linear_from_srgb(code)) - code).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! `lumigraph plan`
+
+use super::Usage;
+use super::interior::INTERIOR;
+use super::output::{print, print_json, say};
+use glam::DMat4;
+use proxy::interior::{CellId, Interior, SemicircleOptions, read_interior, semicircles};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Where to photograph an interior from: cameras on semicircles before its portals
+///
+/// For every portal and each side of it, 2n + 1 cameras at eye height that aim at the portal's
+/// centre and look into the cell beyond.
+///
+///     lumigraph plan house --json
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    /// The interior: a folder with interior.json, or that file
+    interior: PathBuf,
+    /// Cameras before each side of a portal: an odd number
+    #[arg(long, value_name = "N", default_value_t = 13)]
+    views: usize,
+    /// Degrees between the outermost of them, as the portal sees them
+    #[arg(long, value_name = "DEGREES", default_value_t = 120.0)]
+    span: f64,
+    /// Print poses as JSON: camera_from_world, 16 numbers row by row
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Pose<'a> {
+    portal: &'a str,
+    /// None is the outside.
+    from: Option<&'a str>,
+    into: &'a str,
+    angle_degrees: f64,
+    /// Whether it stands in the cell `from`.
+    inside: bool,
+    center: [f64; 3],
+    camera_from_world: [f64; 16],
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.views.is_multiple_of(2) || args.views > 999 {
+        let found = args.views;
+        return Err(Usage(format!(
+            "--views is {found}; expected an odd number up to 999"
+        ))
+        .into());
+    }
+    if !(args.span > 0.0 && args.span < 180.0) {
+        let found = args.span;
+        return Err(Usage(format!(
+            "--span is {found}; expected more than 0 and less than 180"
+        ))
+        .into());
+    }
+    let path = match args.interior.is_dir() {
+        true => args.interior.join(INTERIOR),
+        false => args.interior.clone(),
+    };
+    let (interior, warnings) = read_interior(&path)?;
+    for warning in warnings {
+        say!("warning: {warning}");
+    }
+    let options = SemicircleOptions {
+        views: args.views,
+        span: args.span.to_radians(),
+    };
+    let poses = poses(&interior, &options);
+    let outside = poses.iter().filter(|pose| !pose.inside).count();
+    if outside > 0 {
+        say!(
+            "warning: {outside} of {} cameras stand outside their cell; give portals a smaller \
+             `radius` in {}",
+            poses.len(),
+            path.display()
+        );
+    }
+    if args.json {
+        return print_json(&poses);
+    }
+    let mut text = format!(
+        "{:<20} {:<20} {:<20} {:>7} {:>9} {:>9} {:>9}\n",
+        "portal", "from", "into", "angle", "x", "y", "z"
+    );
+    for pose in &poses {
+        let [x, y, z] = pose.center;
+        text += &format!(
+            "{:<20} {:<20} {:<20} {:>6.1}° {x:>9.3} {y:>9.3} {z:>9.3}\n",
+            pose.portal,
+            pose.from.unwrap_or("(outside)"),
+            pose.into,
+            pose.angle_degrees,
+        );
+    }
+    print(&text)
+}
+
+fn poses<'a>(interior: &'a Interior, options: &SemicircleOptions) -> Vec<Pose<'a>> {
+    let name = |id: CellId| interior.cell(id).name.as_str();
+    let views = semicircles(interior, options).into_iter();
+    views
+        .map(|view| {
+            let pose = view.camera_from_world;
+            let matrix = DMat4::from_rotation_translation(pose.rotation, pose.translation);
+            Pose {
+                portal: &interior.portal(view.portal).name,
+                from: view.from.map(name),
+                into: name(view.into),
+                angle_degrees: view.angle.to_degrees(),
+                inside: view.is_inside,
+                center: pose.center().to_array(),
+                // Row by row.
+                camera_from_world: matrix.transpose().to_cols_array(),
+            }
+        })
+        .collect()
+}

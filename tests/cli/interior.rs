@@ -1,0 +1,152 @@
+//! Interiors: a house is generated, made an interior of anew, and planned.
+
+use crate::run::lumigraph;
+use serde_json::Value;
+
+#[test]
+fn a_house_is_generated_and_planned() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let ran = lumigraph(here, "generate house --rooms 2 --triangles 1 -o house");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.starts_with("house: 2 cells, "), "{}", ran.stdout);
+    // Again, byte for byte, on one thread.
+    let again = "--threads 1 generate house --rooms 2 --triangles 1 -o again";
+    assert_eq!(lumigraph(here, again).code, 0);
+    for file in ["house.glb", "interior.json"] {
+        let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
+        assert!(read("house") == read("again"), "{file}");
+    }
+    // Another is another.
+    assert_eq!(
+        lumigraph(
+            here,
+            "generate house --rooms 2 --triangles 1 --seed 2 -o other"
+        )
+        .code,
+        0
+    );
+    let read = |folder: &str| std::fs::read(here.join(folder).join("interior.json")).unwrap();
+    assert!(read("house") != read("other"));
+    // Where to photograph it from.
+    let file: Value = serde_json::from_slice(&read("house")).unwrap();
+    let portals = file["portals"].as_array().unwrap().len();
+    assert!((3..=5).contains(&portals), "{portals}");
+    let ran = lumigraph(here, "plan house --json").ok();
+    let poses: Vec<Value> = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!(poses.len(), portals * 2 * 13);
+    for pose in &poses {
+        let numbers = |key: &str| -> Vec<f64> {
+            let list = pose[key].as_array().unwrap();
+            list.iter().map(|x| x.as_f64().unwrap()).collect()
+        };
+        let (matrix, center) = (numbers("camera_from_world"), numbers("center"));
+        assert_eq!(matrix[12..], [0.0, 0.0, 0.0, 1.0]);
+        for row in 0..3 {
+            let at: f64 = (0..3).map(|k| matrix[4 * row + k] * center[k]).sum();
+            assert!((at + matrix[4 * row + 3]).abs() < 1e-9);
+        }
+        assert!((center[1] - 1.6).abs() < 1e-9);
+    }
+    let ran = lumigraph(here, "plan house/interior.json --views 3 --span 90");
+    assert_eq!(ran.code, 0);
+    assert_eq!(ran.stdout.lines().count(), 1 + portals * 2 * 3);
+    assert!(ran.stdout.contains("-45.0°"), "{}", ran.stdout);
+}
+
+const ROOMS: &str = r#"{"version": 1,
+    "rooms": [{"name": "all", "min": [-1, -1, -1], "max": [60, 5, 60]}]}"#;
+
+#[test]
+fn an_interior_is_made_of_a_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let ran = lumigraph(here, "generate house --rooms 2 --triangles 1 -o house");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
+    let line = "interior house/house.glb --rooms rooms.json -o one";
+    // The second time it takes the first one's place.
+    for _ in 0..2 {
+        let ran = lumigraph(here, line);
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        assert!(
+            ran.stdout.contains("one: 1 cells, 0 portals, "),
+            "{}",
+            ran.stdout
+        );
+    }
+    let names = |folder: &str| {
+        let entries = std::fs::read_dir(here.join(folder)).unwrap();
+        let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names("one"), ["house.glb", "interior.json"]);
+    assert_eq!(lumigraph(here, "plan one --json").stdout, "[]\n");
+    // What is there and no interior stays.
+    std::fs::create_dir(here.join("mine")).unwrap();
+    std::fs::write(here.join("mine/thesis.txt"), "…").unwrap();
+    let ran = lumigraph(here, "interior house/house.glb --rooms rooms.json -o mine");
+    assert_eq!(ran.code, 1);
+    assert!(
+        ran.stderr.contains("mine: the folder is not empty"),
+        "{}",
+        ran.stderr
+    );
+    // What is wrong is said, and nothing is left behind.
+    for (rooms, said) in [
+        ("{", "rooms.json: not a list of rooms"),
+        (
+            r#"{"version": 1, "rooms": []}"#,
+            "rooms.json: there are no cells",
+        ),
+    ] {
+        std::fs::write(here.join("rooms.json"), rooms).unwrap();
+        let ran = lumigraph(here, "interior house/house.glb --rooms rooms.json -o two");
+        assert_eq!(ran.code, 1);
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    let ran = lumigraph(here, "interior house/house.glb -o two");
+    assert_eq!(ran.code, 1);
+    assert!(
+        ran.stderr.contains("no node is called `cell:NAME`"),
+        "{}",
+        ran.stderr
+    );
+    std::fs::write(here.join("empty.glb"), "").unwrap();
+    let ran = lumigraph(here, "interior empty.glb -o two");
+    assert_eq!(ran.code, 1);
+    assert!(
+        ran.stderr.contains("empty.glb: not a glTF file"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(
+        names(""),
+        ["empty.glb", "house", "mine", "one", "rooms.json"]
+    );
+    let ran = lumigraph(here, "plan nowhere");
+    assert_eq!(ran.code, 1);
+    assert!(ran.stderr.contains("nowhere: "), "{}", ran.stderr);
+}
+
+#[test]
+fn usage_errors_exit_with_2() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, said) in [
+        (
+            "interior house.ply -o x",
+            "interiors are made of .glb models",
+        ),
+        ("plan house --views 4", "an odd number"),
+        ("plan house --span 180", "less than 180"),
+        ("generate house --rooms 1 -o x", "2 to 64"),
+        ("generate house --size 8x8 -o x", "no photos"),
+        ("generate shelf --rooms 3 -o x", "belong to `house`"),
+    ] {
+        let ran = lumigraph(folder.path(), line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains(said), "{line}: {}", ran.stderr);
+    }
+}
