@@ -1,5 +1,5 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --proxies NAME,NAME… --field --json FILE --gpu]`; see README.md.
+//! [-- --photos N,N… --proxies NAME,NAME… --alone field|cpu|exact --json FILE --gpu]`; see README.md.
 
 use calibrate::{Lens, Pixel, Rigid3, View};
 use cpu_time::ProcessTime;
@@ -65,8 +65,8 @@ fn main() {
                 }
                 let lumigraph = lumigraph(kind, count);
                 let desired = desired(kind, size);
-                if arguments.iter().any(|a| a == "--field") {
-                    field_alone(kind, &lumigraph, &desired);
+                if let Some(stage) = value("--alone") {
+                    alone(&stage, kind, &lumigraph, &desired);
                     continue;
                 }
                 lines.push(measure(kind, &lumigraph, &desired, &mut gpu));
@@ -309,16 +309,19 @@ fn measure(
     })
 }
 
-/// Prints the time of the field over and over, for profiles.
-fn field_alone(kind: &str, lumigraph: &Lumigraph, desired: &View) {
-    const FRAMES: u32 = 60;
+/// Prints the time of one stage, over and over, for profiles.
+fn alone(stage: &str, kind: &str, lumigraph: &Lumigraph, desired: &View) {
+    const FRAMES: u32 = 40;
     let Method::Triangulated { cells_across } = Method::TRIANGULATED else {
         unreachable!("the default method is triangulated")
     };
-    let work = || {
+    let mut cpu = Cpu::default();
+    let mut work = || {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
-        let (cpu, wall) = timed(|| {
-            drop(TriangulatedField::new(&frame, cells_across).expect("the grid fits"));
+        let (cpu, wall) = timed(|| match stage {
+            "field" => drop(TriangulatedField::new(&frame, cells_across).expect("it fits")),
+            "exact" => drop(cpu.render(&frame, Method::Exact).expect("made up")),
+            _ => drop(cpu.render(&frame, Method::TRIANGULATED).expect("made up")),
         });
         (ms(cpu), ms(wall))
     };
@@ -328,7 +331,7 @@ fn field_alone(kind: &str, lumigraph: &Lumigraph, desired: &View) {
     let (cpu, wall) = times[times.len() / 2];
     let size = format!("{} × {}", desired.width, desired.height);
     let count = lumigraph.sources.len();
-    println!("{kind:8}{size:>12}{count:>9}  field {cpu:.1} / {wall:.1}");
+    println!("{kind:8}{size:>12}{count:>9}  {stage} {cpu:.1} / {wall:.1}");
 }
 
 fn timed(work: impl FnOnce()) -> (Duration, Duration) {

@@ -1,11 +1,23 @@
 //! A row of pixels at a time: plain loops over fixed arrays, which the compiler turns into
-//! vector instructions. No fused multiply-adds, so every machine computes the same bytes.
+//! vector instructions: the widest that the machine has, found when the program runs. No fused
+//! multiply-adds, so every machine computes the same bytes.
+
+use pulp::Arch;
+use std::sync::LazyLock;
 
 /// Neighbouring pixels worked on together.
 pub(crate) const LANES: usize = 32;
 
 /// One number a pixel.
 pub(crate) type Lane = [f32; LANES];
+
+/// Runs a function, which and all it calls should be `inline(always)`, with the widest vector
+/// instructions that there are.
+#[inline]
+pub(crate) fn vectorised<R>(f: impl FnOnce() -> R) -> R {
+    static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
+    ARCH.dispatch(f)
+}
 
 /// One number a pixel, computed from its index.
 #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::asked::Asked;
 use super::lanes::LANES;
-use super::{BAND, Engine};
+use super::{BAND, Engine, Seen};
 use crate::held::Held;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,21 +22,23 @@ fn marked(engine: &Engine<'_>) -> Vec<usize> {
     let used: Vec<AtomicBool> = sources.map(|_| AtomicBool::new(false)).collect();
     let desired = &engine.frame.desired;
     let (width, height) = (desired.width as usize, desired.height as usize);
-    let of_band = |asked: &mut Asked, band: usize| {
+    let of_band = |(asked, seen): &mut (Asked, Seen), band: usize| {
         for row in band * BAND..((band + 1) * BAND).min(height) {
             for (tile_idx, x0) in (0..width).step_by(LANES).enumerate() {
                 let count = LANES.min(width - x0);
-                let (seeing, terms) = engine.weigh_tile(asked, tile_idx, row);
-                for ((i, _), term) in seeing.iter().zip(&terms) {
+                engine.weigh_tile(asked, tile_idx, row, seen);
+                for (i, _, term) in seen.iter() {
                     if term.weight[..count].iter().any(|w| *w > 0.0) {
-                        used[*i].store(true, Ordering::Relaxed);
+                        used[i].store(true, Ordering::Relaxed);
                     }
                 }
             }
         }
     };
     let bands = 0..height.div_ceil(BAND);
-    bands.into_par_iter().for_each_init(Asked::default, of_band);
+    bands
+        .into_par_iter()
+        .for_each_init(Default::default, of_band);
     let used = used.iter().enumerate();
     used.filter(|(_, used)| used.load(Ordering::Relaxed))
         .map(|(i, _)| i)

@@ -14,14 +14,14 @@ use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
-use crate::image_out::straight_rgba8;
 use crate::options::Method;
 use crate::photos::PhotoError;
 use crate::raster::{Raster, Span};
 use crate::rays::{RayCache, RayMap};
 use asked::Asked;
+use glam::Vec4;
 use image::RgbaImage;
-use lanes::{LANES, Lane, each};
+use lanes::{LANES, Lane, each, vectorised};
 use rayon::prelude::*;
 use source::{Sight, Source, Tile};
 use std::sync::OnceLock;
@@ -78,16 +78,12 @@ fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError>
     let engine = Engine::new(frame, rays);
     let sources: Vec<usize> = frame.taking_part().collect();
     let photos = mark::hold(&engine, &sources);
-    draw(frame, |row, asked: &mut Asked, pixels| {
+    draw(frame, |row, (asked, seen): &mut (Asked, Seen), pixels| {
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             // 1. Who sees the tile, and what that weighs.
-            let (seeing, terms) = engine.weigh_tile(asked, tile_idx, row);
+            engine.weigh_tile(asked, tile_idx, row, seen);
             // 2. The photos' colours.
-            let seen = seeing
-                .iter()
-                .zip(&terms)
-                .map(|((i, sight), term)| (*i, sight, &term.weight));
-            engine.shade(&photos, seen, out)?;
+            engine.shade(&photos, seen, |_, term| &term.weight, out)?;
         }
         Ok(())
     })
@@ -103,7 +99,13 @@ fn draw_field(
     let engine = Engine::new(frame, rays);
     let raster = Raster::new(field);
     let photos = Held::new(frame, &field.listed());
-    draw(frame, |row, spans: &mut Vec<Span>, pixels| {
+    draw(frame, |row, scratch: &mut Scratch, pixels| {
+        let Scratch {
+            spans,
+            active,
+            order,
+            seen,
+        } = scratch;
         raster.spans(row, spans);
         let mut triangle_of = [None; LANES];
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
@@ -111,7 +113,7 @@ fn draw_field(
             // 1. The interpolated weights, or differences, of the triangles that cross the
             // tile.
             triangle_of.fill(None);
-            let mut active: Vec<Interpolated> = Vec::with_capacity(16);
+            active.clear();
             let mut any_bordered = false;
             for span in spans.iter().filter(|s| s.start < x0 + LANES && s.end > x0) {
                 let (start, end) = (span.start.max(x0), span.end.min(x0 + LANES));
@@ -150,37 +152,85 @@ fn draw_field(
             // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
             // triangle, with the mask, a term of the blend.
             let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
-            active.sort_by_key(|s| s.source_idx);
-            let mut seen: Vec<(usize, Sight)> = Vec::with_capacity(active.len());
-            let mut terms: Vec<Term> = Vec::new();
-            for source in active {
-                let Some(mut sight) = engine.source(source.source_idx).see(&tile) else {
+            order.clear();
+            order.extend(0..active.len());
+            order.sort_unstable_by_key(|&i| active[i].source_idx);
+            seen.clear();
+            for source in order.iter().map(|&i| &active[i]) {
+                let (sight, term) = seen.next();
+                if !engine.source(source.source_idx).see(&tile, sight) {
                     continue;
-                };
+                }
                 if any_bordered {
                     // Elsewhere the masks of all that is listed are one.
-                    engine.mask(source.source_idx, &mut sight, |k| source.blended[k] > 0.0);
-                    let a = each(|k| sight.a[k] * source.blended[k]);
-                    terms.push(Term {
-                        diff: source.diff,
-                        a,
-                        weight: [0.0; LANES],
-                    });
+                    engine.mask(source.source_idx, sight, |k| source.blended[k] > 0.0);
+                    term.diff = source.diff;
+                    term.a = each(|k| sight.a[k] * source.blended[k]);
                 }
                 sight.a = each(|k| sight.a[k] * source.weight[k]);
-                seen.push((source.source_idx, sight));
+                seen.keep(source.source_idx);
             }
             if any_bordered {
-                weigh(&mut terms, &frame.options);
-                for ((_, sight), term) in seen.iter_mut().zip(&terms) {
+                let (sights, terms) = seen.kept();
+                weigh(terms, &frame.options);
+                for (sight, term) in sights.iter_mut().zip(terms) {
                     sight.a = each(|k| sight.a[k] + term.weight[k]);
                 }
             }
-            let shares = seen.iter().map(|(i, sight)| (*i, sight, &sight.a));
-            engine.shade(&photos, shares, out)?;
+            engine.shade(&photos, seen, |sight, _| &sight.a, out)?;
         }
         Ok(())
     })
+}
+
+/// What a thread uses again for every tile that it draws of a triangulated field.
+#[derive(Default)]
+struct Scratch {
+    spans: Vec<Span>,
+    active: Vec<Interpolated>,
+    /// Indices of what is active, by source view.
+    order: Vec<usize>,
+    seen: Seen,
+}
+
+/// The source views that see something of a tile, in order.
+#[derive(Default)]
+struct Seen {
+    source_idxs: Vec<usize>,
+    /// At least one for each of them.
+    sights: Vec<Sight>,
+    terms: Vec<Term>,
+}
+
+impl Seen {
+    fn clear(&mut self) {
+        self.source_idxs.clear();
+    }
+
+    /// Where to put what is found out about the next source view.
+    fn next(&mut self) -> (&mut Sight, &mut Term) {
+        let at = self.source_idxs.len();
+        if self.sights.len() <= at {
+            self.sights.push(Sight::nothing());
+            self.terms.push(Term::nothing());
+        }
+        (&mut self.sights[at], &mut self.terms[at])
+    }
+
+    /// Keeps what was put there.
+    fn keep(&mut self, source_idx: usize) {
+        self.source_idxs.push(source_idx);
+    }
+
+    fn kept(&mut self) -> (&mut [Sight], &mut [Term]) {
+        let count = self.source_idxs.len();
+        (&mut self.sights[..count], &mut self.terms[..count])
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (usize, &Sight, &Term)> {
+        let each = self.source_idxs.iter().zip(&self.sights).zip(&self.terms);
+        each.map(|((i, sight), term)| (*i, sight, term))
+    }
 }
 
 /// What a field says of one source view over a tile.
@@ -259,34 +309,26 @@ impl<'a> Engine<'a> {
 
     /// The exact field of a tile: the source views that see it, and what they weigh; of more views
     /// where those asked first don't settle it.
-    fn weigh_tile(
-        &self,
-        asked: &mut Asked,
-        tile_idx: usize,
-        row: usize,
-    ) -> (Vec<(usize, Sight)>, Vec<Term>) {
+    fn weigh_tile(&self, asked: &mut Asked, tile_idx: usize, row: usize, seen: &mut Seen) {
         let tile = self.tile(tile_idx * LANES, row, |_| true);
         loop {
-            let views = asked.views(self, tile_idx, row);
-            let (seeing, mut terms): (Vec<_>, Vec<_>) = views
-                .iter()
-                .filter_map(|&i| {
-                    let source_idx = i as usize;
-                    let source = self.source(source_idx);
-                    let mut sight = source.see(&tile)?;
-                    self.mask(source_idx, &mut sight, |_| true);
-                    let term = Term {
-                        diff: source.difference(&tile),
-                        a: sight.a,
-                        weight: [0.0; LANES],
-                    };
-                    Some(((source_idx, sight), term))
-                })
-                .unzip();
-            let reach = weigh(&mut terms, &self.frame.options);
+            seen.clear();
+            for &i in asked.views(self, tile_idx, row) {
+                let source_idx = i as usize;
+                let source = self.source(source_idx);
+                let (sight, term) = seen.next();
+                if !source.see(&tile, sight) {
+                    continue;
+                }
+                self.mask(source_idx, sight, |_| true);
+                term.diff = source.difference(&tile);
+                term.a = sight.a;
+                seen.keep(source_idx);
+            }
+            let reach = weigh(seen.kept().1, &self.frame.options);
             let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
             if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
-                return (seeing, terms);
+                return;
             }
         }
     }
@@ -318,38 +360,40 @@ impl<'a> Engine<'a> {
     }
 
     /// Blends the photos of a tile and writes its pixels.
-    fn shade<'s>(
+    fn shade(
         &self,
         photos: &Held<'_>,
-        seen: impl Iterator<Item = (usize, &'s Sight, &'s Lane)>,
+        seen: &Seen,
+        weight: impl for<'s> Fn(&'s Sight, &'s Term) -> &'s Lane,
         out: &mut [u8],
     ) -> Result<(), PhotoError> {
         let count = out.len() / 4;
-        let mut color = [glam::Vec4::ZERO; LANES];
+        let mut color = [Vec4::ZERO; LANES];
         let mut sum = [0.0_f32; LANES];
-        for (i, sight, weight) in seen {
+        for (i, sight, term) in seen.iter() {
+            let weight = weight(sight, term);
             if weight[..count].iter().all(|w| *w == 0.0) {
                 continue;
             }
             let photo = photos.get(i)?;
             let exposure = self.source(i).exposure;
-            let as_it_is = exposure == glam::Vec4::ONE;
-            for k in 0..count {
-                let w = weight[k];
-                if w > 0.0 {
-                    let mut sample = shade::sample(photo, sight.u[k], sight.v[k], sight.level[k]);
-                    if !as_it_is {
-                        sample = shade::exposed(sample, exposure);
-                    }
-                    color[k] += sample * w;
-                    sum[k] += w;
-                }
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    shade::add(
+                        photo,
+                        exposure,
+                        sight,
+                        &weight[..count],
+                        &mut color,
+                        &mut sum,
+                    )
+                },
+            );
         }
         for (k, out) in out.chunks_exact_mut(4).enumerate() {
             if sum[k] > 0.0 {
-                let rgba = color[k] / (sum[k] * 255.0);
-                out.copy_from_slice(&straight_rgba8(rgba.to_array().map(f64::from)));
+                out.copy_from_slice(&shade::straight_rgba8(color[k], sum[k]));
             }
         }
         Ok(())

@@ -1,5 +1,7 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
+use super::lanes::{LANES, Lane};
+use super::source::Sight;
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
@@ -8,8 +10,31 @@ use glam::Vec4;
 use image::{ImageBuffer, Pixel};
 use std::ops::{Add, Mul, Sub};
 
+/// Adds a photo's colours, by its weights, to those of a tile and to their sum.
+#[inline(always)]
+pub(super) fn add(
+    photo: &Pyramid,
+    exposure: Vec4,
+    sight: &Sight,
+    weights: &[f32],
+    color: &mut [Vec4; LANES],
+    sum: &mut Lane,
+) {
+    let as_it_is = exposure == Vec4::ONE;
+    for (k, &w) in weights.iter().enumerate().take(LANES) {
+        if w > 0.0 {
+            let mut seen = sample(photo, sight.u[k], sight.v[k], sight.level[k]);
+            if !as_it_is {
+                seen = exposed(seen, exposure);
+            }
+            color[k] += seen * w;
+            sum[k] += w;
+        }
+    }
+}
+
 /// Trilinear; premultiplied, 0…255.
-#[inline]
+#[inline(always)]
 pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
     let texel =
         |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
@@ -17,11 +42,23 @@ pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
 }
 
 /// [`crate::frame::exposed`] for a colour of 0…255.
-#[inline]
+#[inline(always)]
 pub(crate) fn exposed(color: Vec4, exposure: Vec4) -> Vec4 {
     let white = ((1.0 - SHOULDER) as f32 * color.w).max(f32::MIN_POSITIVE);
     let share = (Vec4::splat(color.w) - color) / white;
     color + (exposure - 1.0) * color * share.clamp(Vec4::ZERO, Vec4::ONE)
+}
+
+/// Straight 8-bit RGBA of a sum of premultiplied colours of 0…255, over the sum of their weights;
+/// see [`crate::image_out::straight_rgba8`].
+#[inline]
+pub(crate) fn straight_rgba8(color: Vec4, weights: f32) -> [u8; 4] {
+    let alpha = (color.w / weights + 0.5) as u8;
+    if alpha == 0 {
+        return [0; 4];
+    }
+    let straight = (color * (255.0 / color.w) + 0.5).min(Vec4::splat(255.0));
+    [straight.x as u8, straight.y as u8, straight.z as u8, alpha]
 }
 
 /// What a mask leaves of its photo, 0…1; trilinear.
@@ -33,7 +70,7 @@ pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
 }
 
 /// `texel` makes a number or several of a texel's bytes.
-#[inline]
+#[inline(always)]
 fn trilinear<P, T, const CHANNELS: usize>(
     levels: &[ImageBuffer<P, Vec<u8>>],
     u: f32,
@@ -59,7 +96,7 @@ where
     }
 }
 
-#[inline]
+#[inline(always)]
 fn bilinear<P, T, const CHANNELS: usize>(
     levels: &[ImageBuffer<P, Vec<u8>>],
     u: f32,

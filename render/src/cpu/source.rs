@@ -2,7 +2,7 @@
 
 mod lens;
 
-use super::lanes::{LANES, Lane, angle, each, log2};
+use super::lanes::{LANES, Lane, angle, each, log2, vectorised};
 use crate::frame::{Frame, LEVEL_BIAS};
 use crate::options::Resolution;
 use glam::DVec3;
@@ -56,6 +56,19 @@ pub(crate) struct Sight {
     pub inverse_distance: Lane,
 }
 
+impl Sight {
+    /// Room for one.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            u: [0.0; LANES],
+            v: [0.0; LANES],
+            a: [0.0; LANES],
+            level: [0.0; LANES],
+            inverse_distance: [0.0; LANES],
+        }
+    }
+}
+
 /// What keeps a view on its image's very edge in play when there is no other: too little
 /// to be seen beside any.
 const EDGE: f32 = 1e-12;
@@ -85,8 +98,16 @@ impl Source {
         }
     }
 
-    /// Projects a tile into the photo; `None` where it sees nothing of it.
-    pub(crate) fn see(&self, tile: &Tile) -> Option<Sight> {
+    /// Projects a tile into the photo; false where it sees nothing of it.
+    pub(crate) fn see(&self, tile: &Tile, sight: &mut Sight) -> bool {
+        vectorised(
+            #[inline(always)]
+            || self.see_by_lanes(tile, sight),
+        )
+    }
+
+    #[inline(always)]
+    fn see_by_lanes(&self, tile: &Tile, sight: &mut Sight) -> bool {
         let [rx, ry, rz] = self.rotation;
         let [tx, ty, tz] = self.translation;
         let turn = |r: [f32; 3], t: f32| {
@@ -100,23 +121,22 @@ impl Source {
         // 2. fovBlend.
         let [width, height] = self.size;
         let mut seen = false;
-        let mut a = [0.0; LANES];
         for k in 0..LANES {
             let border = u[k].min(width - u[k]).min(v[k].min(height - v[k]));
             let f = (border * self.inverse_feather).clamp(0.0, 1.0);
             let fov = (f * f * (3.0 - 2.0 * f)).max(EDGE);
             let inside = (border >= 0.0) & (tile.s[k] >= 0.0);
-            a[k] = if inside { fov } else { 0.0 };
+            sight.a[k] = if inside { fov } else { 0.0 };
             seen |= inside;
         }
         if !seen {
-            return None;
+            return false;
         }
 
         // 3. Mip level; see [`Frame::level_of_detail`].
         let [cx, cy, cz] = self.center;
         let [qx, qy, qz] = &tile.q;
-        let level = each(|k| {
+        sight.level = each(|k| {
             let there = if self.by_distance {
                 (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt()
             } else {
@@ -132,22 +152,24 @@ impl Source {
             let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
             (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
         });
-        let mut inverse_distance = [0.0; LANES];
         if self.occluded {
-            inverse_distance =
+            sight.inverse_distance =
                 each(|k| tile.s[k] / (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt());
         }
-        Some(Sight {
-            u,
-            v,
-            a,
-            level,
-            inverse_distance,
-        })
+        (sight.u, sight.v) = (u, v);
+        true
     }
 
     /// angDiff + β·resDiff and what time adds; see [`Frame::difference`].
     pub(crate) fn difference(&self, tile: &Tile) -> Lane {
+        vectorised(
+            #[inline(always)]
+            || self.difference_by_lanes(tile),
+        )
+    }
+
+    #[inline(always)]
+    fn difference_by_lanes(&self, tile: &Tile) -> Lane {
         let [cx, cy, cz] = self.center;
         let center_squared = cx * cx + cy * cy + cz * cz;
         let g = self.footprint_ratio;

@@ -1,6 +1,6 @@
 //! The weights of [`crate::blend::blend`], for a tile of pixels at once.
 
-use super::lanes::{LANES, Lane, each};
+use super::lanes::{LANES, Lane, each, vectorised};
 use crate::blend::SAME_RAY;
 use crate::options::{Blend, FieldOptions, MAX_CONTRIBUTORS};
 
@@ -12,6 +12,17 @@ pub(crate) struct Term {
     pub weight: Lane,
 }
 
+impl Term {
+    /// Room for one.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            diff: [0.0; LANES],
+            a: [0.0; LANES],
+            weight: [0.0; LANES],
+        }
+    }
+}
+
 /// Below this, f32 differences are noise: they count as equal to it, and share.
 const SMALLEST: f32 = SAME_RAY as f32;
 /// Keeps diff/t defined where every diff is zero.
@@ -20,6 +31,14 @@ const SMALLEST_THRESHOLD: f32 = 1e-30;
 /// Fills in the weights. For each pixel the difference beyond which no further view could change
 /// them; infinite while any could.
 pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) -> Lane {
+    vectorised(
+        #[inline(always)]
+        || weigh_by_lanes(terms, options),
+    )
+}
+
+#[inline(always)]
+fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
     let t = match options.blend {
         Blend::Consistent => consistent_threshold(terms, options.full_weight() as f32),
         Blend::Paper => each(|k| nth_smallest(terms, k, options.k)),
@@ -64,6 +83,7 @@ pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) -> Lane {
 ///
 /// The sum is convex and piecewise linear in 1/t, so from t = ∞ the steps come down on
 /// the root from above and land on it exactly: no sorting.
+#[inline(always)]
 fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
     let mut t = [f32::INFINITY; LANES];
     let mut contributors = [0.0_f32; LANES];
