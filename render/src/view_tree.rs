@@ -364,6 +364,18 @@ impl Bounds {
         if !(near > 0.0 && least_here > 0.0) {
             return true;
         }
+        let across = ball.center.cross(away).length_squared();
+        let along = ball.center.dot(away);
+        // Most are too far aside, and for a point that takes no division: the angle is more than
+        // its sine, and what they subtend less than 1.011 of its sine.
+        let aside = query.here * (distance * (query.most + SLACK) + 1.011 * own);
+        if ball.radius == 0.0
+            && along > 0.0
+            && own < 0.25 * distance
+            && across > (aside * aside) * (1.0 + SLACK)
+        {
+            return false;
+        }
         // How little any of them can differ from the ball's middle, and by how much less from
         // elsewhere in it: the gradients of both the angle between viewer and view and the
         // logarithm of the ratio of their distances are as long as their distance over the
