@@ -158,7 +158,8 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let share = drawn as f64 / args.frames as f64;
         let share = share.max(start.elapsed().as_secs_f64() / args.seconds);
         if drawn % tenth == 0 || drawn == args.frames {
-            let last = resident_mib();
+            let last = without_photos(&mut scenes);
+            scenes[scene].lumigraph.photos.set_budget(budgets[0]);
             if warm.is_none() && share >= WARM_UP {
                 warm = last;
             }
@@ -169,7 +170,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     }
     println!("\n{drawn} frames, {capped} of them from coarser mip levels for lack of room");
     let mut well = unlike == 0;
-    let last = resident_mib();
+    let last = without_photos(&mut scenes);
     if let (Some(warm), Some(last)) = (warm, last) {
         let growth = last / warm - 1.0;
         println!(
@@ -216,6 +217,14 @@ fn set_budget(engine: &mut Engine, budget: Option<u64>) {
     if let Some(gpu) = engine.gpu_mut() {
         gpu.set_budget(budget);
     }
+}
+
+/// Memory held once no photo is decoded: how many are is a matter of the last budgets.
+fn without_photos(scenes: &mut [Subject]) -> Option<f64> {
+    for subject in scenes {
+        subject.lumigraph.photos.set_budget(Some(0));
+    }
+    resident_mib()
 }
 
 /// How many drawings lacked room for the finest mip levels so far.

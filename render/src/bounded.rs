@@ -25,14 +25,14 @@ pub const GRIDS: [u32; 3] = [32, 64, 128];
 /// Pixels that are measured, about.
 const SAMPLES: f64 = 4096.0;
 /// Standard errors of the mean squared error that are added to it.
-const MARGIN: f64 = 3.0;
+const MARGIN: f64 = 6.0;
 /// Steps of 255 that fast engines' f32 may be off.
 const ROUNDING: f64 = 1e-4;
 /// Steps of 255 by which one more pixel is taken to be off, as if it had been missed: where a mesh
 /// can hide something from photos, a wrong outline of a few pixels is far off. Chosen so
 /// that more than 95 % of frames keep within their bounds; see benches/README.md, `error_bound`.
 const MISSED: f64 = 5.0;
-const MISSED_BEHIND: f64 = 20.0;
+const MISSED_BEHIND: f64 = 50.0;
 
 /// What [`prepare_within`] chose for a frame.
 #[derive(Clone, Debug)]
