@@ -7,6 +7,7 @@
 //! the same.
 
 use crate::RenderError;
+use crate::blend::Contributor;
 use crate::engine::Prepared;
 use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint};
@@ -135,6 +136,9 @@ struct Sample {
     exact: [f64; 4],
 }
 
+/// A column, what is seen there, and who paints it.
+type Painted = (u32, Option<ProxyPoint>, Vec<Contributor>);
+
 /// How far a picture is from the exact one, in steps of 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
@@ -160,44 +164,37 @@ impl<'a> Samples<'a> {
     /// # Errors
     /// A photo or mask that is sampled cannot be decoded.
     pub fn new(frame: &'a Frame<'a>) -> Result<Self, PhotoError> {
+        // 1. Who paints them.
         let at = positions(frame.desired.width, frame.desired.height);
-        let fields: Vec<Vec<_>> = at
-            .par_iter()
-            .map(|(y, row)| {
-                let field = |&x: &u32| {
-                    let point = frame.proxy_point(Pixel::center_of(x, *y));
-                    (point, point.map_or_else(Vec::new, |p| frame.blend_at(&p)))
-                };
-                row.iter().map(field).collect()
-            })
+        let of_row = |(y, columns): &(u32, Vec<u32>)| {
+            let painted = |&x: &u32| {
+                let point = frame.proxy_point(Pixel::center_of(x, *y));
+                let contributors = point.map_or_else(Vec::new, |p| frame.blend_at(&p));
+                (x, point, contributors)
+            };
+            (*y, columns.iter().map(painted).collect())
+        };
+        let fields: Vec<(u32, Vec<Painted>)> = at.par_iter().map(of_row).collect();
+        // 2. With what.
+        let painted = fields.iter().flat_map(|(_, row)| row);
+        let mut wanted: Vec<usize> = painted
+            .flat_map(|(.., contributors)| contributors.iter().map(|c| c.source_idx))
             .collect();
-        let contributors = fields.iter().flatten().flat_map(|(_, field)| field);
-        let mut wanted: Vec<usize> = contributors.map(|c| c.source_idx).collect();
         wanted.sort_unstable();
         wanted.dedup();
         let photos = Held::new(frame, &wanted).uncounted();
-        let row = |((y, columns), fields): (&(u32, Vec<u32>), &Vec<(Option<ProxyPoint>, _)>)| {
-            let sample = |(&x, (point, field)): (&u32, &(Option<ProxyPoint>, Vec<_>))| {
-                let exact = match point {
-                    Some(point) => color_at(frame, &photos, point, field)?,
-                    None => [0.0; 4],
-                };
-                Ok(Sample {
-                    x,
-                    point: *point,
-                    exact,
-                })
+        let sample = |(x, point, contributors): Painted| {
+            let exact = match &point {
+                Some(point) => color_at(frame, &photos, point, &contributors)?,
+                None => [0.0; 4],
             };
-            Ok(Row {
-                y: *y,
-                samples: columns
-                    .iter()
-                    .zip(fields)
-                    .map(sample)
-                    .collect::<Result<_, _>>()?,
-            })
+            Ok(Sample { x, point, exact })
         };
-        let rows: Vec<Result<Row, PhotoError>> = at.par_iter().zip(&fields).map(row).collect();
+        let row = |(y, painted): (u32, Vec<Painted>)| {
+            let samples = painted.into_iter().map(sample).collect::<Result<_, _>>()?;
+            Ok(Row { y, samples })
+        };
+        let rows: Vec<Result<Row, PhotoError>> = fields.into_par_iter().map(row).collect();
         let rows = rows.into_iter().collect::<Result<_, _>>()?;
         frame.lumigraph.photos.check_masks()?;
         Ok(Self {
