@@ -43,8 +43,8 @@ struct Args {
 
 /// Frames of a path from one random view to the next.
 const PATH: usize = 25;
-/// Of the frames: until then caches fill.
-const WARM_UP: f64 = 0.2;
+/// Of the frames, or the seconds: until then caches fill, and budgets change what they hold.
+const WARM_UP: f64 = 0.5;
 /// How much memory may grow after that, at most.
 const GROWTH: f64 = 0.1;
 /// What photos may take, in bytes. All of a scene take 2.8 MB, one 230 kB.
