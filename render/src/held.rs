@@ -18,6 +18,8 @@ pub struct Held<'a> {
     store: &'a PhotoStore,
     finest: usize,
     photos: Vec<OnceLock<Result<Arc<Pyramid>, PhotoError>>>,
+    /// Whether the store is told how many were sampled.
+    counted: bool,
 }
 
 impl<'a> Held<'a> {
@@ -34,7 +36,14 @@ impl<'a> Held<'a> {
             store,
             finest,
             photos: (0..store.len()).map(|_| OnceLock::new()).collect(),
+            counted: true,
         }
+    }
+
+    /// For what is no drawing: [`PhotoStore::last_sampled`] does not speak of it.
+    pub(crate) fn uncounted(mut self) -> Self {
+        self.counted = false;
+        self
     }
 
     /// Whether the store has room for all of `wanted` in full.
@@ -61,6 +70,9 @@ impl<'a> Held<'a> {
 
 impl Drop for Held<'_> {
     fn drop(&mut self) {
+        if !self.counted {
+            return;
+        }
         let sampled = self.photos.iter().filter(|photo| photo.get().is_some());
         self.store.note_sampled(sampled.count());
     }

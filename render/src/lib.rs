@@ -5,6 +5,7 @@
 //! f64, is the specification; [`cpu`] and [`gpu`] are fast and compared with it.
 
 pub mod blend;
+mod bounded;
 pub mod coverage;
 pub mod cpu;
 mod engine;
@@ -38,6 +39,7 @@ pub mod triangulation;
 mod view_tree;
 mod visibility;
 
+pub use bounded::{Bounded, ErrorEstimate, GRIDS, Samples, prepare_within};
 pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};

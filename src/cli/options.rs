@@ -319,6 +319,14 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above zero".to_owned())
 }
 
+/// Steps of 255, zero or more; `inf` for no bound.
+pub(super) fn max_error(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value >= 0.0 => Ok(value),
+        _ => Err("expected steps of 255, zero or more, or inf, as in 0.5".to_owned()),
+    }
+}
+
 fn zero_or_more(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
@@ -356,6 +364,15 @@ mod tests {
         assert!(bytes("99999999999TiB").is_err());
         assert!(positive("0").is_err() && positive("x").is_err());
         assert_eq!(positive("1e-3"), Ok(1e-3));
+        assert_eq!(
+            (max_error("0"), max_error("inf")),
+            (Ok(0.0), Ok(f64::INFINITY))
+        );
+        assert!(
+            ["-1", "NaN", "50dB", ""]
+                .iter()
+                .all(|bad| max_error(bad).is_err())
+        );
         assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());
     }
 }

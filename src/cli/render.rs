@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::frames::{NamedView, ViewArgs, frames};
-use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
+use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
@@ -37,6 +37,12 @@ pub(super) struct Args {
     exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
+    /// Keep each frame's difference from --renderer exact within so many steps of 255 (the root
+    /// of the mean square over pixels and channels; 1 is 48 dB, half of it 6 dB more): by
+    /// measuring, the coarsest grid that does is taken, else exact [default: inf, not measured]
+    #[arg(long, value_name = "STEPS", value_parser = max_error, allow_negative_numbers = true,
+        conflicts_with_all = ["renderer", "grid"])]
+    max_error: Option<f64>,
     #[command(flatten)]
     draw: DrawArgs,
     #[command(flatten)]
@@ -63,6 +69,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.time,
         &args.at,
     )?;
+    session.max_error = args.max_error;
     let points = || session.points();
     let frames = frames(&args.views, args.frames, session.lumigraph(), points)?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));

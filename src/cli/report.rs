@@ -5,9 +5,10 @@ use super::time::InWindow;
 use calibrate::Distortion;
 use cpu_time::ProcessTime;
 use render::gpu::Gpu;
-use render::{Engine, Frame, Method, Ready, Residency, SourceView, photo_bytes};
+use render::{Bounded, Engine, Frame, Ready, Residency, SourceView, photo_bytes};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// When a command began.
@@ -50,6 +51,9 @@ pub(super) struct Report {
     device_time: DeviceTime,
     #[serde(flatten)]
     photos_used: PhotosUsed,
+    /// With `--max-error`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_error: Option<MaxError>,
     skipped: Skipped,
     seconds: f64,
     cpu_seconds: f64,
@@ -77,6 +81,7 @@ impl Report {
             decode_seconds: photos.decode_time().as_secs_f64(),
             device_time: DeviceTime::of(session),
             photos_used: PhotosUsed::of(costs),
+            max_error: MaxError::of(session),
             skipped: Skipped::of(session),
             device: session.device(),
             photos_decoded: photos.decoded(),
@@ -119,6 +124,9 @@ impl Report {
                 self.device_time.text()
             );
             text += &self.photos_used.text();
+            if let Some(max_error) = &self.max_error {
+                text += &max_error.text();
+            }
             text += &format!("\nskipped: {}", self.skipped.text());
         }
         if self.frames_by_cpu > 0 {
@@ -137,6 +145,10 @@ pub(super) struct Costs {
 }
 
 struct FrameCost {
+    /// Cells across; `None` for the exact field.
+    grid: Option<u32>,
+    /// Where it was measured.
+    error: Option<f64>,
     photos_used: Option<usize>,
     parts: usize,
     device: Option<Duration>,
@@ -153,14 +165,14 @@ impl Costs {
     pub(super) fn note(
         &mut self,
         frame: &Frame<'_>,
-        method: Method,
+        chosen: &Bounded,
         engine: &Engine,
         ready: &Ready,
     ) {
         let scored = frame.scored();
         let taking_part = frame.taking_part().count();
         let by_cpu = engine.last_by_cpu();
-        let of_all = method == Method::Exact && !by_cpu;
+        let of_all = chosen.cells_across.is_none() && !by_cpu;
         let ever: Vec<bool> = (0..frame.sources.len())
             .map(|i| scored.ever[i] || (of_all && frame.sources[i].time_penalty < f64::INFINITY))
             .collect();
@@ -176,6 +188,8 @@ impl Costs {
             None => Some(frame.lumigraph.photos.last_sampled()),
         };
         self.frames.push(FrameCost {
+            grid: chosen.cells_across,
+            error: chosen.error,
             photos_used,
             parts: if by_cpu { 1 } else { ready.parts() },
             device: gpu.and_then(Gpu::device_time),
@@ -200,6 +214,8 @@ impl Costs {
             "photos_used": cost.photos_used,
             "parts": cost.parts,
             "drawn_by_cpu": cost.by_cpu,
+            "grid": cost.grid,
+            "error_at_most": cost.error,
             "device_seconds": cost.device.map(|time| time.as_secs_f64()),
             "cameras_scored": cost.cameras_scored,
             "cameras_never_scored": cost.cameras - cost.cameras_scored,
@@ -264,6 +280,51 @@ impl PhotosUsed {
             Some([least, most]) if least == most => format!("; {most} photos a frame"),
             Some([least, most]) => format!("; {least} to {most} photos a frame"),
         }
+    }
+}
+
+/// What `--max-error` made of the frames.
+#[derive(Serialize)]
+struct MaxError {
+    /// Steps of 255; `None` for no bound.
+    bound: Option<f64>,
+    /// How many frames took a grid of so many cells across.
+    frames_by_grid: BTreeMap<u32, usize>,
+    frames_exact: usize,
+    /// The most that any frame was found to be off; `None` where none was measured.
+    error_at_most: Option<f64>,
+}
+
+impl MaxError {
+    fn of(session: &Session) -> Option<Self> {
+        let bound = session.max_error?;
+        let frames = &session.costs.frames;
+        let mut frames_by_grid = BTreeMap::new();
+        for grid in frames.iter().filter_map(|frame| frame.grid) {
+            *frames_by_grid.entry(grid).or_default() += 1;
+        }
+        Some(Self {
+            bound: bound.is_finite().then_some(bound),
+            frames_by_grid,
+            frames_exact: frames.iter().filter(|frame| frame.grid.is_none()).count(),
+            error_at_most: frames.iter().filter_map(|f| f.error).reduce(f64::max),
+        })
+    }
+
+    /// A line of its own.
+    fn text(&self) -> String {
+        let grids = self.frames_by_grid.iter();
+        let mut frames: Vec<String> = grids
+            .map(|(grid, count)| format!("{count} frames at grid {grid}"))
+            .collect();
+        if self.frames_exact > 0 {
+            frames.push(format!("{} exact", self.frames_exact));
+        }
+        let error = self.error_at_most.map_or_else(
+            || "not measured".to_owned(),
+            |error| format!("at most {error:.2} steps of 255"),
+        );
+        format!("\nerror {error}: {}", frames.join(", "))
     }
 }
 

@@ -15,8 +15,8 @@ use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
-    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError, Prepared,
-    RenderError, Residency, decode_ahead,
+    Bounded, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError,
+    RenderError, Residency, decode_ahead, prepare_within,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -32,6 +32,8 @@ pub(super) struct Session {
     pub(super) exposure: ExposureUsed,
     pub(super) options: FieldOptions,
     pub(super) method: Method,
+    /// Steps of 255: in [`Self::draw_all`] it chooses each frame's method.
+    pub(super) max_error: Option<f64>,
     /// Where time plays a part.
     pub(super) clock: Option<Clock>,
     pub(super) in_window: InWindow,
@@ -91,6 +93,7 @@ impl Session {
             exposure,
             options: field.options(),
             method: field.method(),
+            max_error: None,
             without,
             lumigraph,
             engine: None,
@@ -250,22 +253,28 @@ impl Session {
             bail!("the engine was opened above");
         };
         let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
-        let no_skip = self.no_skip;
+        let (no_skip, max_error) = (self.no_skip, self.max_error);
         let ledger = &self.ledger;
         let ready = |i: usize| {
             let (view, moment) = &views[i];
             let frame = ledger.time(i, Stage::Surface, || {
                 frame(lumigraph, view, options, moment.as_ref(), no_skip)
             });
-            let prepared = match method {
-                Method::Exact => Ok(Prepared::Exact),
-                method => ledger.time(i, Stage::Field, || Prepared::new(&frame, method)),
+            let prepared = match (max_error, method) {
+                (None, Method::Exact) => Ok(Bounded::EXACT),
+                (None, method) => {
+                    ledger.time(i, Stage::Field, || Bounded::unmeasured(&frame, method))
+                }
+                (Some(max_error), _) => {
+                    ledger.time(i, Stage::Field, || prepare_within(&frame, max_error))
+                }
             };
             (frame, prepared)
         };
         let mut next = (*done < views.len()).then(|| ready(*done));
         while let Some((frame, prepared)) = next {
-            let prepared = prepared?;
+            let chosen = prepared?;
+            let prepared = &chosen.prepared;
             if views[*done].1.is_some() {
                 self.in_window.note(frame.taking_part().count());
             }
@@ -273,13 +282,15 @@ impl Session {
             without.extend(prepared.listed());
             let drawn = AtomicBool::new(false);
             // A mask that cannot be decoded must be found by the frame that asks for it.
-            let ahead = !lumigraph.photos.any_masked();
+            // Photos that are measured would take the current frame's room.
+            let samples = max_error.is_some_and(f64::is_finite) && self.cpu_memory.is_some();
+            let ahead = !lumigraph.photos.any_masked() && !samples;
             let coming = Some(*done + 1).filter(|i| ahead && *i < views.len());
             let (picture, coming) = std::thread::scope(|scope| {
                 let prepare = |i| {
                     let (frame, prepared) = ready(i);
-                    if let Ok(prepared) = &prepared {
-                        let listed = prepared.listed();
+                    if let Ok(chosen) = &prepared {
+                        let listed = chosen.prepared.listed();
                         ledger.time(i, Stage::Ahead, || {
                             decode_ahead(&frame, &listed, &without, &drawn);
                         });
@@ -287,9 +298,9 @@ impl Session {
                     (frame, prepared)
                 };
                 let coming = coming.map(|i| scope.spawn(move || prepare(i)));
-                let ready = ledger.time(*done, Stage::Load, || engine.ready(&frame, &prepared));
+                let ready = ledger.time(*done, Stage::Load, || engine.ready(&frame, prepared));
                 let picture = ready.and_then(|ready| {
-                    let draw = || engine.draw_ready(&frame, &prepared, &ready);
+                    let draw = || engine.draw_ready(&frame, prepared, &ready);
                     let picture = ledger.time(*done, Stage::Draw, draw)?;
                     Ok((picture, ready))
                 });
@@ -298,7 +309,7 @@ impl Session {
             });
             say_notes(engine, &mut self.notes_said);
             let (picture, was_ready) = picture?;
-            self.costs.note(&frame, method, engine, &was_ready);
+            self.costs.note(&frame, &chosen, engine, &was_ready);
             ledger.time(*done, Stage::Write, || take(*done, picture))?;
             *done += 1;
             next = match coming.transpose() {

@@ -1,6 +1,6 @@
 //! What a run says of its cost.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use serde_json::Value;
 
 /// A report's counts: all but times and memory.
@@ -123,5 +123,63 @@ fn a_graphics_device_says_what_it_never_got() {
         assert!(device.is_null() || device.as_f64() > Some(0.0), "{device}");
         assert_eq!(frame["cost"]["drawn_by_cpu"], false);
         assert!(frame["cost"]["photos_used"].as_u64() <= Some(loads));
+    }
+}
+
+#[test]
+fn a_bound_on_the_error_chooses_frame_by_frame() {
+    let folder = with_wall();
+    let render = |options: &str, out: &str| {
+        let line = format!(
+            "render wall --proxy plane --path sweep --frames 3 --size 240x180 --json -o {out}{options}"
+        );
+        let ran = lumigraph(folder.path(), &line).ok().json();
+        (ran, files(&folder.path().join(out)))
+    };
+    let (default, by_default) = render("", "default");
+    assert!(default["report"].get("max_error").is_none());
+    assert_eq!(default["frames"][0]["cost"]["grid"], 32);
+    let (_, exact) = render(" --renderer exact", "exact");
+    assert!(exact != by_default);
+
+    let (none, pictures) = render(" --max-error inf", "none");
+    assert!(pictures == by_default);
+    let of_run = &none["report"]["max_error"];
+    assert!(of_run["bound"].is_null() && of_run["error_at_most"].is_null());
+    assert_eq!(of_run["frames_by_grid"]["32"], 3);
+
+    let (zero, pictures) = render(" --max-error 0", "zero");
+    assert!(pictures == exact);
+    assert_eq!(zero["report"]["max_error"]["frames_exact"], 3);
+
+    let (half, pictures) = render(" --max-error 0.5", "half");
+    let of_run = &half["report"]["max_error"];
+    let most = of_run["error_at_most"].as_f64().unwrap();
+    assert!(most > 0.0 && most <= 0.5, "{of_run}");
+    let each = half["frames"].as_array().unwrap().iter();
+    let errors = each.map(|frame| frame["cost"]["error_at_most"].as_f64().unwrap());
+    assert_eq!(errors.fold(0.0, f64::max), most);
+    // Neither what draws nor the threads have a say.
+    for (options, out) in [
+        (" --device reference", "reference"),
+        (" --threads 1", "one"),
+    ] {
+        let (again, of_again) = render(&format!(" --max-error 0.5{options}"), out);
+        assert_eq!(&again["report"]["max_error"], of_run, "{options}");
+        assert!(of_again == pictures || out == "reference");
+    }
+
+    for wrong in ["-1", "NaN", "50dB"] {
+        let line = format!("render wall --path orbit -o out --max-error {wrong}");
+        let error = lumigraph(folder.path(), &line).error(2);
+        assert!(error.contains("steps of 255"), "{error}");
+    }
+    for other in ["--grid 16", "--renderer exact"] {
+        let line = format!("render wall --path orbit -o out --max-error 1 {other}");
+        assert!(
+            lumigraph(folder.path(), &line)
+                .error(2)
+                .contains("cannot be used with")
+        );
     }
 }

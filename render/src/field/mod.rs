@@ -187,7 +187,7 @@ impl TriangulatedField {
     }
 
     /// The field at a proxy point seen through a triangle, with the corners' shares of it.
-    fn interpolate(
+    pub(crate) fn interpolate(
         &self,
         frame: &Frame<'_>,
         triangle_idx: usize,
