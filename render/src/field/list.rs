@@ -247,8 +247,21 @@ impl Triangle<'_> {
             let within = self.corners.map(|corner| corner.near.within);
             let mut guess = within.into_iter().fold(frame.first_guess(), f64::max);
             let sight = 0.5 * (0..3).map(reach).fold(0.0, f64::max);
-            for point in self.patch().between() {
-                views.extend(frame.near(&point, sight, &mut guess).views);
+            let mut ask = |point: ProxyPoint| {
+                let near = frame.near(&point, sight, &mut guess);
+                views.extend(near.views);
+                near.within
+            };
+            if frame.lumigraph.visibility.is_some() {
+                // Where a surface can hide a part of itself it may jump between them.
+                let most = self.patch().points().map(ask).fold(0.0, f64::max);
+                let mut found = Vec::new();
+                frame.views_within(self.patch().ball().as_ref(), most, &mut found);
+                views.extend(found);
+            } else {
+                self.patch().between().for_each(|point| {
+                    ask(point);
+                });
             }
         } else {
             let mut found = Vec::new();

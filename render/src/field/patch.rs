@@ -2,9 +2,10 @@
 
 use super::vertex::Vertex;
 use crate::frame::{Frame, ProxyPoint};
+use crate::view_tree::Ball;
 use crate::visibility::{DistanceMap, TOLERANCE, visible};
 use calibrate::Pixel;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// Steps between points that are spread over a triangle, along each side.
 const STEPS: usize = 4;
@@ -15,6 +16,8 @@ pub(super) struct Patch {
     points: Vec<Option<ProxyPoint>>,
     /// Whether pixels at some of them look at what was moved into some photo.
     pub(super) is_moved: bool,
+    /// Whether they are all about as far as the corners say: nothing juts out between those.
+    is_smooth: bool,
 }
 
 impl Patch {
@@ -24,8 +27,11 @@ impl Patch {
         let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
         let places = steps.map(|(i, j)| a + step(i) * (b - a) + step(j) * (c - a));
         let pixels: Vec<Pixel> = places.map(|at: DVec2| Pixel::new(at.x, at.y)).collect();
+        let points: Vec<Option<ProxyPoint>> =
+            pixels.iter().map(|p| frame.proxy_point(*p)).collect();
         Self {
-            points: pixels.iter().map(|p| frame.proxy_point(*p)).collect(),
+            is_smooth: is_smooth(&points, corners.map(|corner| corner.point)),
+            points,
             is_moved: pixels.iter().any(|p| frame.surface.is_moved_at(*p)),
         }
     }
@@ -41,6 +47,23 @@ impl Patch {
         amid.into_iter().filter_map(|(i, j)| self.points[at(i, j)])
     }
 
+    /// What holds them all; `None` where one is at infinity.
+    pub(super) fn ball(&self) -> Option<Ball> {
+        let places = || self.points().map(|p| p.ray / p.inverse_distance);
+        let (least, most) = places().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(least, most), place| (least.min(place), most.max(place)),
+        );
+        let center = 0.5 * (least + most);
+        let far = places().map(|place| place.distance(center));
+        let radius = far.fold(0.0, f64::max);
+        (center.is_finite() && radius.is_finite()).then_some(Ball {
+            center,
+            radius,
+            sight: radius,
+        })
+    }
+
     /// Whether nothing hides any part of the triangle from a source view for sure, by its distance
     /// map. (What is so close before it that the map's tolerance may take it for the surface, or
     /// nearly, does not count.)
@@ -50,6 +73,9 @@ impl Patch {
         source_idx: usize,
         map: &DistanceMap,
     ) -> bool {
+        if !self.is_smooth {
+            return false;
+        }
         let source = &frame.sources[source_idx];
         // Where each is in the photo, and its inverse distance from there.
         let mut seen = [(DVec2::ZERO, 0.0); POINTS];
@@ -80,6 +106,23 @@ impl Patch {
             && below(STEPS - 1)
                 .all(|(i, j)| is_open([at(i + 1, j + 1), at(i + 1, j), at(i, j + 1)]))
     }
+}
+
+/// Whether the points of a patch have, within the tolerance of distance maps, the inverse depths
+/// that a plane through the corners' would.
+fn is_smooth(points: &[Option<ProxyPoint>], corners: [Option<ProxyPoint>; 3]) -> bool {
+    // By z, as that of a plane is linear in the image.
+    let depth = |point: &ProxyPoint| point.inverse_distance / point.ray.z;
+    let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.map(|p| depth(&p))) else {
+        return false;
+    };
+    let share = |i: usize| i as f64 / STEPS as f64;
+    let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
+    points.iter().zip(steps).all(|(point, (i, j))| {
+        let expected = a + share(i) * (b - a) + share(j) * (c - a);
+        let off = point.map(|p| (depth(&p) - expected).abs());
+        off.is_some_and(|off| off <= TOLERANCE * expected.abs())
+    })
 }
 
 /// How many there are.
