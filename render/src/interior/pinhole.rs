@@ -94,3 +94,19 @@ impl Pinhole {
         ]
     }
 }
+
+impl Pinhole {
+    /// Without pixels.
+    pub(super) fn nowhere() -> Self {
+        Self {
+            center: DVec3::ZERO,
+            rotation: DMat3::IDENTITY,
+            focal: DVec2::ONE,
+            principal: DVec2::ZERO,
+            width: 0,
+            height: 0,
+            columns: Vec::new(),
+            rows: Vec::new(),
+        }
+    }
+}

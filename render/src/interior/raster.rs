@@ -12,7 +12,7 @@
 
 use super::{Pinhole, Target, Window};
 use glam::DVec3;
-use proxy::mesh::Model;
+use proxy::mesh::{Material, Model};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -190,7 +190,7 @@ impl Raster {
         let colors = target.color.par_chunks_mut(width);
         let rows = colors.zip(target.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
-            let mut last: Option<(u32, [DVec3; 3])> = None;
+            let mut last: Option<(u32, [DVec3; 3], Option<&Material>)> = None;
             let mut count = 0;
             for (x, (color, depth)) in colors.iter_mut().zip(depths).enumerate() {
                 let pixel = y * width + x;
@@ -200,14 +200,19 @@ impl Raster {
                 if !is_wanted(pixel, inverse_depth) {
                     continue;
                 }
-                let edges = match last {
-                    Some((same, edges)) if same == idx => edges,
-                    _ => edges(model.mesh.corners(idx as usize).map(|p| camera.point(p))),
+                let (edges, material) = match last {
+                    Some((same, edges, material)) if same == idx => (edges, material),
+                    _ => {
+                        let corners = model.mesh.corners(idx as usize);
+                        let edges = edges(corners.map(|p| camera.point(p)));
+                        (edges, model.material_of(idx))
+                    }
                 };
-                last = Some((idx, edges));
+                last = Some((idx, edges, material));
                 let ray = camera.ray(x as u32, y as u32);
-                let [r, g, b] = model.color(idx, shares(edges, ray));
-                *color = [r.round() as u8, g.round() as u8, b.round() as u8, 255];
+                let [r, g, b] = model.color_with(material, idx, shares(edges, ray));
+                // Rounded without a call: they are not negative.
+                *color = [(r + 0.5) as u8, (g + 0.5) as u8, (b + 0.5) as u8, 255];
                 *depth = inverse_depth;
                 count += 1;
             }
@@ -308,9 +313,12 @@ fn spans(corners: &[DVec3], camera: &Pinhole, room: f64) -> Option<([u32; 2], [u
             let at = p[axis] / p.z * camera.focal[axis] + camera.principal[axis];
             (low, high) = (low.min(at), high.max(at));
         }
-        // Pixels whose centres are between them; casts keep within range.
-        let from = (low - room - 0.5).ceil().max(0.0) as u32;
-        let to = ((high + room - 0.5).floor() + 1.0).max(0.0) as u32;
+        // Pixels whose centres are between them. A cast takes the whole part of what is positive,
+        // and keeps within range.
+        let first = (low - room - 0.5).max(0.0);
+        let whole = first as u32;
+        let from = whole.saturating_add(u32::from(f64::from(whole) < first));
+        let to = (high + room + 0.5).max(0.0) as u32;
         let span = [from, to.min(count)];
         (span[0] < span[1]).then_some(span)
     };
