@@ -70,8 +70,10 @@ struct Ready {
     rows: [u32; 2],
 }
 
-/// Triangles a task takes at once.
-const GRAIN: usize = 256;
+/// Lists that a task takes at once.
+const GRAIN: usize = 2;
+/// More columns than this are first narrowed down by each edge.
+const WIDE: u32 = 8;
 /// How far beyond a triangle's corners its pixels are asked for, in pixels: rounding.
 const ROOM: f64 = 1e-3;
 /// Corners nearer to the plane of the eye than this, in shares of their distance, are not
@@ -109,8 +111,7 @@ impl Raster {
             usize::from(ready.is_some_and(|t| self.fill(&t, *i, camera, window, beyond)))
         };
         let list = |list: &&[u32]| -> usize { list.iter().map(draw).sum() };
-        let few = (GRAIN / 96).max(1);
-        lists.par_iter().with_min_len(few).map(list).sum()
+        lists.par_iter().with_min_len(GRAIN).map(list).sum()
     }
 
     fn fill(
@@ -131,10 +132,13 @@ impl Raster {
             let depth = triangle.inverse_depth;
             let depth_rest = depth.y * dy + depth.z;
             let open = window.row(y);
-            let (from, to) = (
-                open.start.max(triangle.columns[0]),
-                open.end.min(triangle.columns[1]),
-            );
+            let mut from = open.start.max(triangle.columns[0]);
+            let mut to = open.end.min(triangle.columns[1]);
+            if to.saturating_sub(from) > WIDE {
+                for (edge, rest) in [a, b, c].iter().zip(rest) {
+                    (from, to) = narrowed(edge.x, rest, camera, from, to);
+                }
+            }
             let mut inside = false;
             for x in from..to {
                 let dx = camera.columns[x as usize];
@@ -219,6 +223,23 @@ impl Raster {
             count
         };
         rows.enumerate().map(row).sum()
+    }
+}
+
+/// The columns of from … to where slope·x + rest may be positive, but for rounding, which a
+/// column more allows for.
+fn narrowed(slope: f64, rest: f64, camera: &Pinhole, from: u32, to: u32) -> (u32, u32) {
+    let column = -rest / slope * camera.focal.x + camera.principal.x - 0.5;
+    // A cast takes the whole part of what is positive; an edge along the row has no column.
+    let at = column.max(0.0) as u32;
+    if !column.is_finite() {
+        (from, to)
+    } else if slope > 0.0 {
+        (from.max(at.saturating_sub(1)), to)
+    } else if column < -1.0 {
+        (from, from)
+    } else {
+        (from, to.min(at.saturating_add(3)))
     }
 }
 
