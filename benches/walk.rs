@@ -135,8 +135,13 @@ fn tours(args: &Args) {
         "wall, med"
     );
     let mut culling: Vec<f64> = Vec::new();
-    for fill in PortalFill::ALL {
-        let options = WalkOptions::default();
+    let whole = ("culling", PortalFill::Geometry, true);
+    let others = PortalFill::ALL.map(|fill| (fill.name(), fill, false));
+    for (name, fill, whole_cells) in [whole].into_iter().chain(others) {
+        let options = WalkOptions {
+            whole_cells,
+            ..WalkOptions::default()
+        };
         let mut walk = Walk::new(&house.interior, &contents, &house.model, options);
         let made = Instant::now();
         let mut waits = 0.0;
@@ -154,7 +159,7 @@ fn tours(args: &Args) {
             .collect();
         let images_s = made.elapsed().as_secs_f64() - 1e-3 * waits;
         let cpu: Vec<f64> = frames.iter().map(|(t, _)| t[0]).collect();
-        if fill == PortalFill::Geometry {
+        if whole_cells {
             culling.clone_from(&cpu);
         }
         let worst = (0..cpu.len())
@@ -167,7 +172,7 @@ fn tours(args: &Args) {
         let [median, most, greatest] = spread(&cpu);
         println!(
             "{:<10} {median:>8.1} {most:>8.1} {greatest:>8.1} {:>8.1} {:>8.2} {:>10.0} {:>9.0} {:>8.2} {:>7} {:>9.1} {:>9.1}",
-            fill.name(),
+            name,
             cpu[worst],
             culling[worst] / cpu[worst],
             mean(&|c| c.triangles_tried),

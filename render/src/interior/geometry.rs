@@ -56,14 +56,6 @@ impl CellGeometry {
         found
     }
 
-    /// Those of one cell, and of no cell.
-    pub fn seen_in<'a>(&'a self, eye: DVec3, cell: CellId, regions: &[Region]) -> Runs<'a> {
-        let mut found = Runs::default();
-        found.add(&self.elsewhere, eye, regions);
-        found.add(self.cell(cell), eye, regions);
-        found
-    }
-
     fn cell(&self, id: CellId) -> &[Run] {
         self.cells.get(id.0 as usize).map_or(&[], Vec::as_slice)
     }
@@ -89,12 +81,6 @@ impl<'a> Runs<'a> {
                 self.lists.push(&run.triangles);
             }
         }
-    }
-
-    /// Takes in the lists of another.
-    pub fn extend(&mut self, other: Self) {
-        self.lists.extend(other.lists);
-        self.asked += other.asked;
     }
 
     /// How many triangles are to be drawn; one in several lists counts for each.

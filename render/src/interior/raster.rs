@@ -74,6 +74,8 @@ struct Ready {
 const GRAIN: usize = 2;
 /// More columns than this are first narrowed down by each edge.
 const WIDE: u32 = 8;
+/// Edges that change less along the row than this, in shares of their terms, lie along it.
+const ALONG_ROW: f64 = 1e-9;
 /// How far beyond a triangle's corners its pixels are asked for, in pixels: rounding.
 const ROOM: f64 = 1e-3;
 /// Corners nearer to the plane of the eye than this, in shares of their distance, are not
@@ -136,7 +138,11 @@ impl Raster {
             let mut to = open.end.min(triangle.columns[1]);
             if to.saturating_sub(from) > WIDE {
                 for (edge, rest) in [a, b, c].iter().zip(rest) {
-                    (from, to) = narrowed(edge.x, rest, camera, from, to);
+                    // Along the row nothing but rounding would tell where it crosses.
+                    let size = (edge.y * dy).abs() + edge.z.abs();
+                    if edge.x.abs() > ALONG_ROW * size {
+                        (from, to) = narrowed(edge.x, rest, camera, from, to);
+                    }
                 }
             }
             let mut inside = false;
@@ -230,11 +236,9 @@ impl Raster {
 /// column more allows for.
 fn narrowed(slope: f64, rest: f64, camera: &Pinhole, from: u32, to: u32) -> (u32, u32) {
     let column = -rest / slope * camera.focal.x + camera.principal.x - 0.5;
-    // A cast takes the whole part of what is positive; an edge along the row has no column.
+    // A cast takes the whole part of what is positive.
     let at = column.max(0.0) as u32;
-    if !column.is_finite() {
-        (from, to)
-    } else if slope > 0.0 {
+    if slope > 0.0 {
         (from.max(at.saturating_sub(1)), to)
     } else if column < -1.0 {
         (from, from)

@@ -13,7 +13,9 @@ use super::{
 };
 use calibrate::View;
 use glam::DVec3;
-use proxy::interior::{CellId, Contents, Interior, Pass, Portal, visible, visible_through};
+use proxy::interior::{
+    CellId, Contents, Interior, Pass, Portal, Region, Visibility, visible, visible_through,
+};
 use proxy::mesh::Model;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -30,6 +32,9 @@ pub struct WalkOptions {
     pub near: f64,
     /// Farther than this, in radii, it is images; between the two it is a mix.
     pub far: f64,
+    /// Whether all of a visible cell is drawn, as the papers do, not only what of it is in sight.
+    /// The pictures are the same.
+    pub whole_cells: bool,
     /// Whether what no image shows keeps the last picture's colour. Then a picture depends on
     /// the one before it.
     pub persist: bool,
@@ -42,6 +47,7 @@ impl Default for WalkOptions {
             splat: Splat::default(),
             near: 2.0 / 3.0,
             far: 1.0,
+            whole_cells: false,
             persist: false,
         }
     }
@@ -160,6 +166,10 @@ impl<'a> Walk<'a> {
         let eye = camera.center;
         let cell = self.contents.locate(self.interior, eye);
         let visibility = visible(self.interior, cell, view);
+        let in_sight = |visibility: Visibility| match self.options.whole_cells {
+            true => everywhere(visibility),
+            false => visibility,
+        };
         cost.cell = cell;
         cost.visible_cells = visibility.cells.len();
         let own = visibility.passes.iter().filter(|pass| pass.depth == 0);
@@ -170,8 +180,12 @@ impl<'a> Walk<'a> {
         let mut fills: Vec<Filled<'_>> = Vec::new();
         let whole = Window::whole(camera.width, camera.height);
         match cell {
-            Some(cell) if fill != PortalFill::Geometry => {
-                windows.push((geometry.seen_in(eye, cell, visibility.regions(cell)), whole));
+            Some(_) if fill != PortalFill::Geometry => {
+                let alone = in_sight(Visibility {
+                    cells: visibility.cells.first().into_iter().cloned().collect(),
+                    passes: Vec::new(),
+                });
+                windows.push((geometry.seen(eye, &alone), whole));
                 for &(pass, into) in &open {
                     let portal = self.interior.portal(pass.portal);
                     let share = self.share_of_image(portal, eye);
@@ -179,7 +193,8 @@ impl<'a> Walk<'a> {
                     if share < 1.0 {
                         let (id, region) = (pass.portal, &pass.region);
                         let beyond = visible_through(self.interior, id, into, eye, region);
-                        windows.push((geometry.seen(eye, &beyond), window.clone()));
+                        let runs = geometry.seen(eye, &in_sight(beyond));
+                        windows.push((runs, window.clone()));
                     }
                     if share > 0.0 && fills.len() < usize::from(u16::MAX) {
                         fills.push(Filled {
@@ -192,7 +207,7 @@ impl<'a> Walk<'a> {
                     }
                 }
             }
-            _ => windows.push((geometry.seen(eye, &visibility), whole)),
+            _ => windows.push((geometry.seen(eye, &in_sight(visibility.clone())), whole)),
         }
         cost.filled = fills.len();
         cost.visibility = start.elapsed();
@@ -330,6 +345,14 @@ impl<'a> Walk<'a> {
         };
         rows.enumerate().map(row).sum()
     }
+}
+
+/// The same cells, seen everywhere.
+fn everywhere(mut visibility: Visibility) -> Visibility {
+    for cell in &mut visibility.cells {
+        cell.regions = vec![Region::ALL];
+    }
+    visibility
 }
 
 /// How far an eye is from the nearest point of a portal.
