@@ -120,13 +120,15 @@ fn tours(args: &Args) {
     let camera = Camera::of(&lens(), SIZE[0], SIZE[1]);
     let path = tour(&house.interior, &contents, &camera, args.frames, 15.0).expect("a tour");
     println!(
-        "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
+        "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
         "portals",
         "median",
         "95 %",
         "worst",
         "at worst",
         "speed-up",
+        "up to",
+        "overall",
         "triangles",
         "samples",
         "holes %",
@@ -168,10 +170,13 @@ fn tours(args: &Args) {
         let mean = |of: &dyn Fn(&FrameCost) -> usize| {
             frames.iter().map(|(_, c)| of(c)).sum::<usize>() as f64 / frames.len() as f64
         };
+        let ratios = culling.iter().zip(&cpu).map(|(a, b)| a / b);
+        let most_gained = ratios.fold(0.0, f64::max);
+        let overall = culling.iter().sum::<f64>() / cpu.iter().sum::<f64>();
         let wall: Vec<f64> = frames.iter().map(|(t, _)| t[1]).collect();
         let [median, most, greatest] = spread(&cpu);
         println!(
-            "{:<10} {median:>8.1} {most:>8.1} {greatest:>8.1} {:>8.1} {:>8.2} {:>10.0} {:>9.0} {:>8.2} {:>7} {:>9.1} {:>9.1}",
+            "{:<10} {median:>8.1} {most:>8.1} {greatest:>8.1} {:>8.1} {:>8.2} {most_gained:>8.2} {overall:>8.2} {:>10.0} {:>9.0} {:>8.2} {:>7} {:>9.1} {:>9.1}",
             name,
             cpu[worst],
             culling[worst] / cpu[worst],
