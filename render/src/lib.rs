@@ -14,6 +14,7 @@ mod frame;
 pub mod gpu;
 mod held;
 mod image_out;
+pub mod interior;
 mod lumigraph;
 mod mask;
 mod near;

@@ -17,6 +17,7 @@ mod npz;
 mod options;
 mod output;
 mod plan;
+mod plot;
 mod proxy;
 mod render;
 mod report;
@@ -24,6 +25,7 @@ mod session;
 mod surface;
 mod time;
 mod uncalibrated;
+mod walk;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -55,6 +57,7 @@ enum Command {
     Export(export::Args),
     Interior(interior::Args),
     Plan(plan::Args),
+    Walk(walk::Args),
     Generate(generate::Args),
 }
 
@@ -100,6 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Export(args) => export::run(&args),
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Walk(args) => walk::run(&args),
         Command::Generate(args) => generate::run(&args),
     }
 }

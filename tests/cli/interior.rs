@@ -132,6 +132,79 @@ fn an_interior_is_made_of_a_model() {
 }
 
 #[test]
+fn a_house_is_walked_through() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate house --rooms 2 --triangles 1 -o house").ok();
+    let line =
+        "walk house --portals all --frames 6 --size 64x48 --reference-size 32x32 --json -o out";
+    let ran = lumigraph(here, line).ok();
+    let report = ran.json();
+    let walks = report["walks"].as_array().unwrap();
+    let kinds: Vec<&str> = walks
+        .iter()
+        .map(|w| w["portals"].as_str().unwrap())
+        .collect();
+    assert_eq!(kinds, ["geometry", "texture", "warp1", "warp2"]);
+    let mut skipped = 0;
+    for walk in walks {
+        let frames = walk["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), 6);
+        for frame in frames {
+            let picture = image::open(here.join(frame["file"].as_str().unwrap())).unwrap();
+            assert_eq!((picture.width(), picture.height()), (64, 48));
+            assert!(frame["cell"].is_string() && frame["ms"].as_f64().unwrap() > 0.0);
+            skipped += frame["triangles_skipped"].as_u64().unwrap();
+        }
+        let made = walk["references_made"].as_u64().unwrap();
+        assert_eq!(made > 0, walk["portals"] != "geometry");
+    }
+    assert!(skipped > 0);
+    let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
+    assert_eq!(svg.matches("<polyline").count(), 4);
+    // Its path once more, byte for byte, on one thread; one kind needs no folder of its own.
+    let again = "--threads 1 walk house/interior.json --path out/path.json --portals warp2 \
+                 --reference-size 32x32 -o again";
+    let ran = lumigraph(here, again).ok();
+    assert!(ran.stdout.contains("again: 6 frames"), "{}", ran.stdout);
+    let read = |file: &str| std::fs::read(here.join(file)).unwrap();
+    for i in 0..6 {
+        let there = read(&format!("out/warp2/frame_{i:04}.png"));
+        assert!(read(&format!("again/frame_{i:04}.png")) == there);
+    }
+    // A model without triangles, and cells without portals.
+    let nothing = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#;
+    let padded = format!("{nothing:<64}");
+    let mut glb = b"glTF".to_vec();
+    for word in [2_u32, 12 + 8 + 64, 64] {
+        glb.extend(word.to_le_bytes());
+    }
+    glb.extend(b"JSON");
+    glb.extend(padded.as_bytes());
+    std::fs::create_dir(here.join("empty")).unwrap();
+    std::fs::write(here.join("empty/house.glb"), glb).unwrap();
+    let interior = r#"{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [{"name": "a", "box": {"min": [0, 0, 0], "max": [4, 3, 4]}}], "portals": []}"#;
+    std::fs::write(here.join("empty/interior.json"), interior).unwrap();
+    let ran = lumigraph(
+        here,
+        "walk empty --frames 2 --size 16x16 --portals warp1 -o none",
+    );
+    assert!(
+        ran.code == 0 || ran.stderr.contains("error: "),
+        "{}",
+        ran.stderr
+    );
+    assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+    // What is wrong is said.
+    let scenes = r#"{"version": 1, "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [{"name": "a", "scene": "../a"}], "portals": []}"#;
+    std::fs::write(here.join("interior.json"), scenes).unwrap();
+    let ran = lumigraph(here, "walk interior.json -o out");
+    assert!(ran.error(1).contains("it has no model"), "{}", ran.stderr);
+}
+
+#[test]
 fn usage_errors_exit_with_2() {
     let folder = tempfile::tempdir().unwrap();
     for (line, said) in [
@@ -141,6 +214,16 @@ fn usage_errors_exit_with_2() {
         ),
         ("plan house --views 4", "an odd number"),
         ("plan house --span 180", "less than 180"),
+        (
+            "walk house --portals ldi -o x",
+            "geometry, texture, warp1, warp2, or all",
+        ),
+        ("walk house --reference-views 4 -o x", "an odd number"),
+        ("walk house --near NaN -o x", "--near"),
+        (
+            "walk house --tour --path a.json -o x",
+            "cannot be used with",
+        ),
         ("generate house --rooms 1 -o x", "2 to 64"),
         ("generate house --size 8x8 -o x", "no photos"),
         ("generate shelf --rooms 3 -o x", "belong to `house`"),

@@ -22,8 +22,8 @@ pub use file::{parse_interior, read_interior, write_interior};
 pub use overlap::triangle_touches_box;
 pub use polygon::{Polygon, PolygonError};
 pub use rooms::{interior_from_nodes, interior_from_rooms, parse_rooms, read_rooms};
-pub use semicircle::{SemicircleOptions, SemicircleView, semicircles};
-pub use visibility::{Pass, Region, Visibility, VisibleCell, visible};
+pub use semicircle::{SemicircleOptions, SemicircleView, angle_before, semicircles};
+pub use visibility::{Pass, Region, Visibility, VisibleCell, visible, visible_through};
 
 use glam::DVec3;
 

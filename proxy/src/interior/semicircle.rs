@@ -65,6 +65,62 @@ pub fn semicircles(interior: &Interior, options: &SemicircleOptions) -> Vec<Semi
         .collect()
 }
 
+/// How a semicircle lies before a portal.
+struct Axes {
+    /// The portal's centre.
+    target: DVec3,
+    /// The same at eye height.
+    center: DVec3,
+    /// Towards the viewer.
+    ahead: DVec3,
+    /// To the right of who looks at the portal.
+    right: DVec3,
+}
+
+impl Axes {
+    fn before(interior: &Interior, portal: &Portal, from: Option<CellId>, into: CellId) -> Self {
+        let up = interior.up;
+        let target = portal.polygon.center();
+        let normal = match portal.cells[1] == Some(into) {
+            true => portal.polygon.normal(),
+            false => -portal.polygon.normal(),
+        };
+        // Whoever looks against `ahead` has `right` on the right.
+        let level = normal - up * normal.dot(up);
+        let (center, ahead) = if level.length() > 1e-3 {
+            let height = interior.floor_height(from, portal) + interior.eye_height;
+            (target + up * (height - target.dot(up)), level.normalize())
+        } else {
+            (target, normal)
+        };
+        let right = match up.cross(ahead).try_normalize() {
+            Some(right) if level.length() > 1e-3 => right,
+            _ => ahead.any_orthonormal_vector(),
+        };
+        Self {
+            target,
+            center,
+            ahead,
+            right,
+        }
+    }
+}
+
+/// The angle at which an eye stands before a portal, as [`SemicircleView::angle`] has it: 0 in the
+/// middle, positive to the right of who looks at the portal, beyond ±π/2 behind it.
+pub fn angle_before(
+    interior: &Interior,
+    portal: &Portal,
+    from: Option<CellId>,
+    into: CellId,
+    eye: DVec3,
+) -> f64 {
+    let axes = Axes::before(interior, portal, from, into);
+    let offset = eye - axes.center;
+    let angle = offset.dot(axes.right).atan2(offset.dot(axes.ahead));
+    if angle.is_nan() { 0.0 } else { angle }
+}
+
 fn before(
     interior: &Interior,
     id: PortalId,
@@ -74,25 +130,14 @@ fn before(
     options: &SemicircleOptions,
 ) -> Vec<SemicircleView> {
     let up = interior.up;
-    let target = portal.polygon.center();
-    let normal = match portal.cells[1] == Some(into) {
-        true => portal.polygon.normal(),
-        false => -portal.polygon.normal(),
-    };
+    let Axes {
+        target,
+        center,
+        ahead,
+        right,
+    } = Axes::before(interior, portal, from, into);
     let radius = portal.semicircle_radius(up);
-    // 1. The semicircle's axes. Whoever looks against `ahead` has `right` on the right.
-    let level = normal - up * normal.dot(up);
-    let (center, ahead) = if level.length() > 1e-3 {
-        let height = floor_height(interior, portal, from) + interior.eye_height;
-        (target + up * (height - target.dot(up)), level.normalize())
-    } else {
-        (target, normal)
-    };
-    let right = match up.cross(ahead).try_normalize() {
-        Some(right) if level.length() > 1e-3 => right,
-        _ => ahead.any_orthonormal_vector(),
-    };
-    // 2. The cameras.
+    // The cameras.
     let each_side = (options.views / 2) as i64;
     // A NaN is as good as nothing given.
     let span = match options.span.is_nan() {
@@ -132,24 +177,27 @@ fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
             .is_none_or(|floor| floor.covers(place, 0.0))
 }
 
-/// How high the floor is on the viewer's side, along `up`.
-fn floor_height(interior: &Interior, portal: &Portal, from: Option<CellId>) -> f64 {
-    let up = interior.up;
-    let cell = from.and_then(|id| interior.cells.get(id.0 as usize));
-    let lowest = |corners: &[DVec3]| {
-        let heights = corners.iter().map(|p| p.dot(up));
-        heights.fold(f64::INFINITY, f64::min)
-    };
-    match cell.map(|cell| (&cell.floor, &cell.content)) {
-        Some((Some(floor), _)) => lowest(floor.corners()),
-        Some((None, super::Content::Box(room))) => {
-            // The corner farthest down.
-            let corner = |k: usize| match up[k] > 0.0 {
-                true => room.min[k],
-                false => room.max[k],
-            };
-            DVec3::new(corner(0), corner(1), corner(2)).dot(up)
+impl Interior {
+    /// How high the floor is before a portal on the side of a cell, along `up`: the lowest point of
+    /// the cell, or where it has neither a box nor a floor, of the portal.
+    pub fn floor_height(&self, from: Option<CellId>, portal: &Portal) -> f64 {
+        let up = self.up;
+        let cell = from.and_then(|id| self.cells.get(id.0 as usize));
+        let lowest = |corners: &[DVec3]| {
+            let heights = corners.iter().map(|p| p.dot(up));
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        match cell.map(|cell| (&cell.floor, &cell.content)) {
+            Some((Some(floor), _)) => lowest(floor.corners()),
+            Some((None, super::Content::Box(room))) => {
+                // The corner farthest down.
+                let corner = |k: usize| match up[k] > 0.0 {
+                    true => room.min[k],
+                    false => room.max[k],
+                };
+                DVec3::new(corner(0), corner(1), corner(2)).dot(up)
+            }
+            _ => lowest(portal.polygon.corners()),
         }
-        _ => lowest(portal.polygon.corners()),
     }
 }

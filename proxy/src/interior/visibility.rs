@@ -230,20 +230,36 @@ pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibi
     else {
         return everything(interior, cell, &region);
     };
-    let mut search = Search {
-        interior,
-        eye,
-        pieces: interior
-            .portals
-            .iter()
-            .map(|portal| portal.polygon.convex_pieces())
-            .collect(),
-        is_passed: vec![false; interior.portals.len()],
-        found: Visibility::default(),
-    };
+    let mut search = Search::new(interior, eye);
     match search.visit(cell, &region, None, 0) {
         Ok(()) => search.found,
         Err(TooMany) => everything(interior, Some(cell), &region),
+    }
+}
+
+/// What an eye sees through a portal: the cells beyond it, the nearest first, and where. `region` is
+/// where it sees through it, as a [`Pass`] says; what the portal's outline leaves of it is up to
+/// the caller. The eye is on the other side of the portal; where it is, and behind what, is no matter.
+pub fn visible_through(
+    interior: &Interior,
+    portal: PortalId,
+    into: CellId,
+    eye: DVec3,
+    region: &Region,
+) -> Visibility {
+    let is_known = (into.0 as usize) < interior.cells.len()
+        && (portal.0 as usize) < interior.portals.len()
+        && eye.is_finite();
+    if !is_known {
+        return everything(interior, None, region);
+    }
+    let mut search = Search::new(interior, eye);
+    search.is_passed[portal.0 as usize] = true;
+    let entrance = interior.portal(portal);
+    let inwards = entrance.normal_into(Some(into));
+    match search.visit(into, region, Some((entrance, inwards)), 1) {
+        Ok(()) => search.found,
+        Err(TooMany) => everything(interior, Some(into), region),
     }
 }
 
@@ -271,7 +287,20 @@ struct Search<'a> {
     found: Visibility,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(interior: &'a Interior, eye: DVec3) -> Self {
+        let portals = interior.portals.iter();
+        Self {
+            interior,
+            eye,
+            pieces: portals
+                .map(|portal| portal.polygon.convex_pieces())
+                .collect(),
+            is_passed: vec![false; interior.portals.len()],
+            found: Visibility::default(),
+        }
+    }
+
     /// Visibility(cell, frustum), and so on behind its portals. `entrance` is the portal that one
     /// looks through, with its normal into this cell.
     fn visit(

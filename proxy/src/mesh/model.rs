@@ -81,6 +81,28 @@ pub enum Wrap {
 }
 
 impl Wrap {
+    /// The columns (or rows) `i` and `i` + 1, whole numbers, of a texture of that many.
+    fn texels(self, i: f64, count: u32) -> [u32; 2] {
+        // Whole numbers divide faster.
+        if !(i.abs() < 1e9 && (1..1 << 29).contains(&count)) {
+            return [self.texel(i, count), self.texel(i + 1.0, count)];
+        }
+        let (i, n) = (i as i32, count as i32);
+        let following = |at: i32, period: i32| if at + 1 == period { 0 } else { at + 1 };
+        let pair = match self {
+            Self::Clamp => [i.clamp(0, n - 1), (i + 1).clamp(0, n - 1)],
+            Self::Repeat => {
+                let at = i.rem_euclid(n);
+                [at, following(at, n)]
+            }
+            Self::Mirror => {
+                let at = i.rem_euclid(2 * n);
+                [at, following(at, 2 * n)].map(|at| at.min(2 * n - 1 - at))
+            }
+        };
+        pair.map(|at| at as u32)
+    }
+
     /// The column (or row) of a texture of that many.
     fn texel(self, i: f64, count: u32) -> u32 {
         let n = f64::from(count);
@@ -111,6 +133,22 @@ impl Model {
     /// bilinear at its finest level, the product of all that colours it. `shares` are the
     /// corners' barycentric weights, and sum to 1.
     pub fn color(&self, triangle_idx: u32, shares: [f64; 3]) -> [f64; 3] {
+        self.color_with(self.material_of(triangle_idx), triangle_idx, shares)
+    }
+
+    /// The material of a triangle, if it has one.
+    pub fn material_of(&self, triangle_idx: u32) -> Option<&Material> {
+        let part = self.part_of(triangle_idx)?;
+        self.materials.get(part.material_idx as usize)
+    }
+
+    /// [`Self::color`], for who has the triangle's material at hand.
+    pub fn color_with(
+        &self,
+        material: Option<&Material>,
+        triangle_idx: u32,
+        shares: [f64; 3],
+    ) -> [f64; 3] {
         let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
         let mut color = [0.0; 3];
         let mut uv = [0.0; 2];
@@ -122,8 +160,7 @@ impl Model {
                 *sum += share * f64::from(x);
             }
         }
-        let part = self.part_of(triangle_idx);
-        let Some(material) = part.and_then(|p| self.materials.get(p.material_idx as usize)) else {
+        let Some(material) = material else {
             return color;
         };
         let texture = material
@@ -140,6 +177,16 @@ impl Model {
     }
 }
 
+/// The greatest whole number that is not greater: without a call where processors have no
+/// instruction for it.
+fn floor(x: f64) -> f64 {
+    if !(x.abs() < 1e9) {
+        return x.floor();
+    }
+    let whole = f64::from(x as i32);
+    if whole > x { whole - 1.0 } else { whole }
+}
+
 /// A texture's colour, bilinear between the pixels' centres.
 fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
     let (width, height) = texture.dimensions();
@@ -148,18 +195,18 @@ fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
     }
     let x = uv[0] * f64::from(width) - 0.5;
     let y = uv[1] * f64::from(height) - 0.5;
-    let (left, top) = (x.floor(), y.floor());
+    let (left, top) = (floor(x), floor(y));
     let (right_share, bottom_share) = (x - left, y - top);
+    let columns = wrap[0].texels(left, width);
+    let rows = wrap[1].texels(top, height);
     let mut color = [0.0; 3];
     for (dx, dy, share) in [
-        (0.0, 0.0, (1.0 - right_share) * (1.0 - bottom_share)),
-        (1.0, 0.0, right_share * (1.0 - bottom_share)),
-        (0.0, 1.0, (1.0 - right_share) * bottom_share),
-        (1.0, 1.0, right_share * bottom_share),
+        (0, 0, (1.0 - right_share) * (1.0 - bottom_share)),
+        (1, 0, right_share * (1.0 - bottom_share)),
+        (0, 1, (1.0 - right_share) * bottom_share),
+        (1, 1, right_share * bottom_share),
     ] {
-        let column = wrap[0].texel(left + dx, width);
-        let row = wrap[1].texel(top + dy, height);
-        let texel = texture.get_pixel(column, row).0;
+        let texel = texture.get_pixel(columns[dx], rows[dy]).0;
         for k in 0..3 {
             color[k] += share * f64::from(texel[k]);
         }
@@ -197,10 +244,38 @@ mod tests {
         assert_eq!(texels(Wrap::Clamp), [0, 0, 0, 2, 2, 2]);
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             assert!(wrap.texel(1e300, 3) < 3 && wrap.texel(-1e300, 3) < 3);
+            for i in -12..12 {
+                let i = f64::from(i);
+                for n in 1..5 {
+                    assert_eq!(
+                        wrap.texels(i, n),
+                        [wrap.texel(i, n), wrap.texel(i + 1.0, n)]
+                    );
+                }
+            }
         }
         let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
         let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
         assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
+    }
+
+    #[test]
+    fn whole_numbers_below_are_found() {
+        for x in [
+            0.0,
+            0.3,
+            -0.3,
+            2.0,
+            -2.0,
+            -1e-300,
+            7.9e8,
+            -7.9e8 - 0.5,
+            3e9,
+            -1e300,
+        ] {
+            assert_eq!(floor(x), x.floor());
+        }
+        assert!(floor(f64::NAN).is_nan() && floor(f64::INFINITY) == f64::INFINITY);
     }
 
     #[test]

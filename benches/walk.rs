@@ -1,0 +1,292 @@
+//! Walks through interiors: `cargo bench --bench walk [-- --house FILE.glb --rooms ROOMS.json]`;
+//! see README.md.
+//!
+//! 1. A house of Brooks House's size (Rafferty et al. 1998): CPU time of each frame of a tour, by
+//!    what portals are filled with.
+//! 2. How far what portals show is from the truth, off their axis.
+
+use calibrate::{Camera, Lens, Rigid3, View};
+use clap::Parser;
+use cpu_time::ProcessTime;
+use datasets::house::{self, HouseOptions};
+use glam::{DVec2, DVec3};
+use image::RgbaImage;
+use proxy::interior::{
+    Contents, Interior, SemicircleOptions, SemicircleView, read_rooms, semicircles,
+};
+use proxy::mesh::{Model, read_model};
+use render::interior::{
+    FrameCost, Pinhole, PortalFill, Raster, Target, Walk, WalkOptions, Window, tour,
+};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Measures walks through interiors.
+#[derive(Parser)]
+struct Args {
+    /// Rooms of the house walked through
+    #[arg(long, default_value_t = 19)]
+    rooms: usize,
+    /// Its triangles
+    #[arg(long, default_value_t = 1_744_000)]
+    triangles: usize,
+    /// Frames of the tour; 0 leaves it out
+    #[arg(long, default_value_t = 520)]
+    frames: usize,
+    /// A model whose portals are looked through, too
+    #[arg(long, requires = "outlines")]
+    house: Option<PathBuf>,
+    /// Its rooms and openings
+    #[arg(long)]
+    outlines: Option<PathBuf>,
+    /// What cargo passes
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+const SIZE: [u32; 2] = [640, 512];
+/// How far from its cell's sides an eye stands, in metres.
+const IN_WALL: f64 = 0.3;
+const ANGLES: [f64; 5] = [0.0, 15.0, 30.0, 45.0, 60.0];
+
+fn lens() -> Lens {
+    let size = DVec2::new(f64::from(SIZE[0]), f64::from(SIZE[1]));
+    Lens::pinhole(DVec2::splat(0.7 * size.x), 0.5 * size)
+}
+
+fn main() {
+    let args = Args::parse();
+    if args.frames > 0 {
+        tours(&args);
+    }
+    let options = HouseOptions {
+        rooms: 6,
+        ..HouseOptions::default()
+    };
+    let small = house::house(&options).expect("a house");
+    let truth = |view: &View| house::render(&small, view).0;
+    through_doors(
+        "procedural house, 6 rooms",
+        &small.interior,
+        &small.model,
+        truth,
+    );
+    if let (Some(file), Some(outlines)) = (&args.house, &args.outlines) {
+        let (model, _) = read_model(file).expect("a model");
+        let (interior, _) = read_rooms(outlines, "house.glb").expect("its rooms");
+        let all: Vec<u32> = (0..model.mesh.triangles.len() as u32).collect();
+        let truth = |view: &View| {
+            let camera = Pinhole::new(view).expect("a pinhole");
+            let mut raster = Raster::default();
+            raster.clear(&camera);
+            let window = Window::whole(SIZE[0], SIZE[1]);
+            raster.draw(&model, &[&all], &camera, &window, None);
+            let mut target = Target::new(SIZE[0], SIZE[1]);
+            raster.shade(&model, &camera, &mut target, |_, _| true);
+            target.picture()
+        };
+        through_doors("house.glb", &interior, &model, truth);
+    }
+}
+
+/// A frame's CPU and wall time in ms, reference images made before.
+fn timed(walk: &mut Walk<'_>, view: &View, fill: PortalFill) -> ([f64; 2], FrameCost) {
+    loop {
+        let (cpu, wall) = (ProcessTime::now(), Instant::now());
+        let cost = walk.draw(view, fill).expect("a pinhole");
+        let times = [cpu.elapsed(), wall.elapsed()].map(|t| 1e3 * t.as_secs_f64());
+        if cost.references_made == 0 {
+            return (times, cost);
+        }
+    }
+}
+
+fn tours(args: &Args) {
+    let start = Instant::now();
+    let options = HouseOptions {
+        rooms: args.rooms,
+        triangles: Some(args.triangles),
+        seed: 1,
+    };
+    let house = house::house(&options).expect("a house");
+    let (contents, _) = Contents::new(&house.interior, &house.model).expect("contents");
+    println!(
+        "{} rooms, {} portals, {} triangles; made in {:.1} s",
+        house.interior.cells.len(),
+        house.interior.portals.len(),
+        house.model.mesh.triangles.len(),
+        start.elapsed().as_secs_f64()
+    );
+    let camera = Camera::of(&lens(), SIZE[0], SIZE[1]);
+    let path = tour(&house.interior, &contents, &camera, args.frames, 15.0).expect("a tour");
+    println!(
+        "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
+        "portals",
+        "median",
+        "95 %",
+        "worst",
+        "at worst",
+        "speed-up",
+        "up to",
+        "overall",
+        "triangles",
+        "samples",
+        "holes %",
+        "images",
+        "images s",
+        "wall, med"
+    );
+    let mut culling: Vec<f64> = Vec::new();
+    let whole = ("culling", PortalFill::Geometry, true);
+    let others = PortalFill::ALL.map(|fill| (fill.name(), fill, false));
+    for (name, fill, whole_cells) in [whole].into_iter().chain(others) {
+        let options = WalkOptions {
+            whole_cells,
+            ..WalkOptions::default()
+        };
+        let mut walk = Walk::new(&house.interior, &contents, &house.model, options);
+        let made = Instant::now();
+        let mut waits = 0.0;
+        let frames: Vec<([f64; 2], FrameCost)> = path
+            .frames
+            .iter()
+            .map(|frame| {
+                let before = walk.library().counts().1;
+                let drawn = timed(&mut walk, &frame.view, fill);
+                if walk.library().counts().1 == before {
+                    waits += drawn.0[1];
+                }
+                drawn
+            })
+            .collect();
+        let images_s = made.elapsed().as_secs_f64() - 1e-3 * waits;
+        let cpu: Vec<f64> = frames.iter().map(|(t, _)| t[0]).collect();
+        if whole_cells {
+            culling.clone_from(&cpu);
+        }
+        let worst = (0..cpu.len())
+            .max_by(|a, b| culling[*a].total_cmp(&culling[*b]))
+            .unwrap_or(0);
+        let mean = |of: &dyn Fn(&FrameCost) -> usize| {
+            frames.iter().map(|(_, c)| of(c)).sum::<usize>() as f64 / frames.len() as f64
+        };
+        let ratios = culling.iter().zip(&cpu).map(|(a, b)| a / b);
+        let most_gained = ratios.fold(0.0, f64::max);
+        let overall = culling.iter().sum::<f64>() / cpu.iter().sum::<f64>();
+        let wall: Vec<f64> = frames.iter().map(|(t, _)| t[1]).collect();
+        let [median, most, greatest] = spread(&cpu);
+        println!(
+            "{:<10} {median:>8.1} {most:>8.1} {greatest:>8.1} {:>8.1} {:>8.2} {most_gained:>8.2} {overall:>8.2} {:>10.0} {:>9.0} {:>8.2} {:>7} {:>9.1} {:>9.1}",
+            name,
+            cpu[worst],
+            culling[worst] / cpu[worst],
+            mean(&|c| c.triangles_tried),
+            mean(&|c| c.samples),
+            100.0 * mean(&|c| c.holes) / f64::from(SIZE[0] * SIZE[1]),
+            walk.library().counts().1,
+            images_s,
+            spread(&wall)[0],
+        );
+    }
+}
+
+fn spread(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    [0.5, 0.95, 1.0].map(|share| {
+        let i = (share * sorted.len() as f64).ceil() as usize;
+        sorted[i.saturating_sub(1)]
+    })
+}
+
+/// Looks through every portal from 1.25 radii off, at some angles.
+fn through_doors(
+    name: &str,
+    interior: &Interior,
+    model: &Model,
+    truth: impl Fn(&View) -> RgbaImage,
+) {
+    let (contents, _) = Contents::new(interior, model).expect("contents");
+    let mut walk = Walk::new(interior, &contents, model, WalkOptions::default());
+    println!("\n{name}: dB in the portal's pixels, % of them holes");
+    println!(
+        "{:<6} {:>6} {}",
+        "angle",
+        "views",
+        PortalFill::ALL
+            .map(|f| format!("{:>20}", f.name()))
+            .concat()
+    );
+    // The same semicircles, wider.
+    let mut wide = interior.clone();
+    for portal in &mut wide.portals {
+        portal.radius = Some(1.25 * portal.semicircle_radius(interior.up));
+    }
+    for angle in ANGLES {
+        let options = SemicircleOptions {
+            views: if angle > 0.0 { 3 } else { 1 },
+            span: (2.0 * angle).to_radians(),
+        };
+        let places = semicircles(&wide, &options);
+        let is_meant = |place: &&SemicircleView| {
+            let off = (place.angle.abs().to_degrees() - angle).abs();
+            let eye = place.camera_from_world.center();
+            let bounds = place.from.and_then(|id| contents.bounds[id.0 as usize]);
+            // A cell reaches into its walls, where nobody stands.
+            let is_free = bounds.is_some_and(|room| {
+                let low = room.min + IN_WALL * (DVec3::ONE - interior.up.abs());
+                let high = room.max - IN_WALL * (DVec3::ONE - interior.up.abs());
+                eye.clamp(low, high) == eye
+            });
+            off < 1e-6 && is_free && contents.locate(interior, eye) == place.from
+        };
+        // Squared error, pixels and holes.
+        let mut sums = [[0.0; 3]; 4];
+        let mut views = 0;
+        for place in places.iter().filter(is_meant) {
+            let view = View {
+                lens: lens(),
+                width: SIZE[0],
+                height: SIZE[1],
+                camera_from_world: place.camera_from_world,
+            };
+            let expected = truth(&view);
+            let pixels = inside(interior, place, &view);
+            views += 1;
+            for (k, fill) in PortalFill::ALL.into_iter().enumerate() {
+                walk.draw(&view, fill).expect("a pinhole");
+                let picture = walk.picture();
+                for &i in &pixels {
+                    let (ours, theirs) = (picture.color[i], expected.as_raw());
+                    let error = |c: usize| {
+                        let d = f64::from(ours[c]) - f64::from(theirs[4 * i + c]);
+                        d * d
+                    };
+                    sums[k][0] += (error(0) + error(1) + error(2)) / 3.0;
+                    sums[k][1] += 1.0;
+                    sums[k][2] += f64::from(u8::from(ours[3] == 0 && theirs[4 * i + 3] > 0));
+                }
+            }
+        }
+        let text = |[error, count, holes]: [f64; 3]| {
+            let psnr = 10.0 * (255.0 * 255.0 / (error / count)).log10();
+            format!("{psnr:>10.2} {:>8.2}%", 100.0 * holes / count)
+        };
+        println!("{angle:<6} {views:>6} {}", sums.map(text).concat());
+    }
+}
+
+/// The pixels through which one sees a portal's opening.
+fn inside(interior: &Interior, place: &SemicircleView, view: &View) -> Vec<usize> {
+    let polygon = &interior.portal(place.portal).polygon;
+    let camera = Pinhole::new(view).expect("a pinhole");
+    let eye = view.center();
+    let world: Rigid3 = view.camera_from_world.inverse();
+    let is_in = |i: &usize| {
+        let (x, y) = (*i as u32 % SIZE[0], *i as u32 / SIZE[0]);
+        let ray = world.rotation * camera.ray(x, y);
+        let along = -polygon.height(eye) / polygon.normal().dot(ray);
+        along > 0.0 && polygon.covers(eye + along * ray, 0.0)
+    };
+    (0..(SIZE[0] * SIZE[1]) as usize).filter(is_in).collect()
+}

@@ -1,0 +1,32 @@
+//! Walking through an interior.
+//!
+//! The cell that a viewer is in is drawn as geometry; what lies behind its portals as geometry,
+//! too, or out of images that were made before the portals (Rafferty et al. 1998, "3D image
+//! warping in architectural walkthroughs" and "Images for accelerating architectural
+//! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
+
+mod fill;
+mod geometry;
+mod library;
+mod pinhole;
+mod raster;
+mod reference;
+mod target;
+mod texture;
+mod tour;
+mod walk;
+mod warp;
+mod window;
+
+pub use fill::PortalFill;
+pub use geometry::{CellGeometry, Runs};
+pub use library::{Library, LibraryOptions};
+pub use pinhole::{Pinhole, PinholeError};
+pub use raster::{Beyond, Raster};
+pub use reference::{REFERENCE_SIZE, Reference};
+pub use target::Target;
+pub use texture::texture;
+pub use tour::{TourError, tour};
+pub use walk::{FrameCost, Walk, WalkOptions};
+pub use warp::{Splat, Warp, Warped, inverse_depth_of_buffer, warp};
+pub use window::Window;

@@ -1,0 +1,110 @@
+//! Images of what lies beyond a portal, made before it.
+
+use super::{Beyond, CellGeometry, Pinhole, Raster, Target, Window};
+use calibrate::{Lens, View};
+use glam::{DVec2, DVec3};
+use proxy::interior::{CellId, Interior, Portal, Region, SemicircleView, visible_through};
+use proxy::mesh::Model;
+
+/// An image with depth of what one sees through a portal, and nothing else.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Where it was made from.
+    pub place: SemicircleView,
+    /// Its camera: the portal fills the image, whatever that does to the shape of pixels.
+    pub camera: Pinhole,
+    /// What it sees: beyond the portal's plane, along rays through its outline.
+    pub seen: Target,
+}
+
+/// A reference image's width and height by default: those of Rafferty et al. 1998, §4.1.
+pub const REFERENCE_SIZE: [u32; 2] = [256, 256];
+/// Pixels that are left around the portal.
+const ROOM: f64 = 1.0;
+/// The most that an image spans to each side of its axis, as x / z.
+const WIDEST: f64 = 5.0;
+
+/// The plane of a portal as a camera sees it, and what is beyond on the side of `into`.
+pub(super) fn plane_of(camera: &Pinhole, portal: &Portal, into: Option<CellId>) -> Beyond {
+    let normal = match portal.cells[0] == into {
+        true => portal.polygon.normal(),
+        false => -portal.polygon.normal(),
+    };
+    Beyond::new(camera, portal.polygon.center(), normal)
+}
+
+impl Reference {
+    /// Draws the image of a place before a portal.
+    ///
+    /// What is in the way on the viewer's side is left out, so the place need not be free, or
+    /// even in the viewer's cell.
+    pub fn new(
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        place: &SemicircleView,
+        [width, height]: [u32; 2],
+    ) -> Self {
+        let portal = interior.portal(place.portal);
+        let eye = place.camera_from_world.center();
+        let view = View {
+            lens: lens(portal, place, [width, height]),
+            width,
+            height,
+            camera_from_world: place.camera_from_world,
+        };
+        let mut seen = Target::new(width, height);
+        // A place that is no place sees nothing.
+        let camera = match Pinhole::new(&view) {
+            Ok(camera) => camera,
+            Err(_) => {
+                return Self {
+                    place: place.clone(),
+                    camera: Pinhole::nowhere(),
+                    seen: Target::default(),
+                };
+            }
+        };
+        let region = Region::of(&view);
+        let visibility = visible_through(interior, place.portal, place.into, eye, &region);
+        let runs = geometry.seen(eye, &visibility);
+        let beyond = plane_of(&camera, portal, Some(place.into));
+        let mut raster = Raster::default();
+        raster.clear(&camera);
+        for piece in portal.polygon.convex_pieces() {
+            let mut edges: Vec<DVec3> = piece.iter().map(|p| *p - eye).collect();
+            // Counter-clockwise as the eye sees it.
+            if portal.polygon.height(eye) < 0.0 {
+                edges.reverse();
+            }
+            let window = Window::of_cone(&edges, &camera);
+            raster.draw(model, &runs.lists, &camera, &window, Some(&beyond));
+        }
+        raster.shade(model, &camera, &mut seen, |_, _| true);
+        Self {
+            place: place.clone(),
+            camera,
+            seen,
+        }
+    }
+}
+
+/// A lens whose image the portal's outline just fills.
+fn lens(portal: &Portal, place: &SemicircleView, [width, height]: [u32; 2]) -> Lens {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for corner in portal.polygon.corners() {
+        let p = place.camera_from_world * *corner;
+        let at = match p.z > 0.0 {
+            true => p.truncate() / p.z,
+            // Beside the eye.
+            false => WIDEST * p.truncate().normalize_or_zero(),
+        };
+        let at = at.clamp(DVec2::splat(-WIDEST), DVec2::splat(WIDEST));
+        (low, high) = (low.min(at), high.max(at));
+    }
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    let span = (high - low).max(DVec2::splat(1e-6));
+    let focal = (size - 2.0 * ROOM).max(DVec2::ONE) / span;
+    let middle = 0.5 * (low + high);
+    Lens::pinhole(focal, 0.5 * size - middle * focal)
+}

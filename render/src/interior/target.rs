@@ -1,0 +1,41 @@
+//! What is drawn into.
+
+use image::RgbaImage;
+
+/// A picture with depth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Target {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// Row by row, sRGB; alpha is 255, or 0 where nothing was drawn.
+    pub color: Vec<[u8; 4]>,
+    /// 1 / z of what was drawn, in the camera's frame; 0 where nothing was.
+    pub inverse_depth: Vec<f32>,
+}
+
+impl Target {
+    /// Nothing drawn yet.
+    pub fn new(width: u32, height: u32) -> Self {
+        let mut target = Self::default();
+        target.clear(width, height);
+        target
+    }
+
+    /// Empties it, as large as that.
+    pub fn clear(&mut self, width: u32, height: u32) {
+        let count = width as usize * height as usize;
+        (self.width, self.height) = (width, height);
+        self.color.clear();
+        self.color.resize(count, [0; 4]);
+        self.inverse_depth.clear();
+        self.inverse_depth.resize(count, 0.0);
+    }
+
+    /// The picture.
+    pub fn picture(&self) -> RgbaImage {
+        let bytes = self.color.as_flattened().to_vec();
+        RgbaImage::from_raw(self.width, self.height, bytes).expect("four bytes a pixel")
+    }
+}

@@ -1,0 +1,108 @@
+//! Lines over an axis, as SVG.
+
+use std::fmt::Write;
+
+/// A line: its name, and a value for each step.
+pub(super) struct Line<'a> {
+    pub(super) name: &'a str,
+    pub(super) values: &'a [f64],
+}
+
+const SIZE: (f64, f64) = (960.0, 420.0);
+/// Left, top, right and bottom of the axes.
+const ROOM: (f64, f64, f64, f64) = (64.0, 24.0, 24.0, 44.0);
+const COLORS: [&str; 5] = ["#c0392b", "#2c6fbb", "#2e8b57", "#b8860b", "#7d3c98"];
+
+/// A plot of lines that share both axes, from zero.
+pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
+    let greatest = lines
+        .iter()
+        .flat_map(|l| l.values)
+        .copied()
+        .fold(0.0, f64::max);
+    let step = step(greatest);
+    let top = (greatest / step).ceil().max(1.0) * step;
+    let count = lines.iter().map(|l| l.values.len()).max().unwrap_or(0);
+    let (width, height) = SIZE;
+    let (left, above, right, below) = ROOM;
+    let x = |i: f64| left + (width - left - right) * i / count.saturating_sub(1).max(1) as f64;
+    let y = |v: f64| height - below - (height - above - below) * v / top;
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+    );
+    // Writing to a string cannot fail.
+    let rows = (top / step).round() as usize;
+    for row in 0..=rows {
+        let value = row as f64 * step;
+        let at = y(value);
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{left} {at:.1}H{:.1}\" stroke=\"#ddd\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            width - right,
+            left - 6.0,
+            at + 4.0,
+            // No more digits than the step has.
+            (value * 1e6).round() / 1e6
+        );
+    }
+    let _ = writeln!(
+        svg,
+        "<text x=\"{left}\" y=\"14\">{up}</text>\
+         <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{across} (0 to {})</text>",
+        width - right,
+        height - below + 30.0,
+        count.saturating_sub(1)
+    );
+    for (k, line) in lines.iter().enumerate() {
+        let color = COLORS[k % COLORS.len()];
+        let points: String = line
+            .values
+            .iter()
+            .enumerate()
+            .map(|(i, v)| format!("{:.1},{:.1} ", x(i as f64), y(*v)))
+            .collect();
+        let _ = writeln!(
+            svg,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
+            points.trim_end(),
+            left + 90.0 * k as f64,
+            height - below + 30.0,
+            line.name
+        );
+    }
+    svg + "</svg>\n"
+}
+
+/// 1, 2 or 5 times a power of ten, so that there are up to ten rows.
+fn step(greatest: f64) -> f64 {
+    if !(greatest > 0.0 && greatest.is_finite()) {
+        return 1.0;
+    }
+    let power = 10_f64.powf((greatest / 10.0).log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
+    steps
+        .into_iter()
+        .find(|s| greatest / s <= 10.0)
+        .unwrap_or(10.0 * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_have_round_steps_and_lines_stay_within() {
+        assert_eq!([step(0.0), step(9.0), step(95.0)], [1.0, 1.0, 10.0]);
+        assert_eq!([step(130.0), step(0.3)], [20.0, 0.05]);
+        let (a, b) = ([1.0, 4.0, 2.0], [0.5, 0.5, 3.9]);
+        let lines = [("one", &a[..]), ("two", &b[..])].map(|(name, values)| Line { name, values });
+        let svg = plot(&lines, "frame", "ms");
+        assert_eq!(svg.matches("<polyline").count(), 2);
+        assert!(svg.contains("64.0,") && svg.contains(">one<") && svg.ends_with("</svg>\n"));
+        assert!(plot(&[], "frame", "ms").contains("</svg>"));
+    }
+}

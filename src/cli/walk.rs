@@ -1,0 +1,372 @@
+//! `lumigraph walk`
+
+use super::Usage;
+use super::interior::INTERIOR;
+use super::options::size;
+use super::output::{make_parent, print, print_json, say, write_file};
+use super::plot::{Line, plot};
+use super::session::progress;
+use anyhow::{Context, bail};
+use calibrate::{Camera, Lens, View};
+use glam::DVec2;
+use image::ImageFormat;
+use lumigraph::scene::picture_files;
+use proxy::interior::{Contents, Interior, read_interior};
+use proxy::mesh::{Model, read_model};
+use render::interior::{FrameCost, PortalFill, Splat, Walk, WalkOptions, tour};
+use render::path;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+/// Walk through an interior
+///
+/// The room one is in is drawn as geometry; what lies beyond its portals as geometry too, or out of
+/// images made before the portals: as textures, or warped. Frames are PNGs; times.svg plots the time
+/// of each frame, path.json is the tour.
+///
+///     lumigraph walk house --portals all -o walk
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    /// The interior: a folder with interior.json, or that file
+    interior: PathBuf,
+    /// A path file
+    #[arg(long, value_name = "FILE", conflicts_with = "tour")]
+    path: Option<PathBuf>,
+    /// Walk through all rooms [default, where there is no --path]
+    #[arg(long)]
+    tour: bool,
+    /// Frames of a tour
+    #[arg(long, value_name = "N", default_value_t = 520, conflicts_with = "path",
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// What portals show: geometry, texture, warp1, warp2, several of them, or all; of several,
+    /// each has a folder of its own
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        default_value = "geometry"
+    )]
+    portals: Vec<String>,
+    /// Size of the frames in pixels [default: the path's own; of a tour 640x512]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<(u32, u32)>,
+    /// Size of the reference images before portals
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "256x256")]
+    reference_size: (u32, u32),
+    /// Reference images before each side of a portal: an odd number
+    #[arg(long, value_name = "N", default_value_t = 13)]
+    reference_views: usize,
+    /// Draw samples as squares of so many pixels, not as large as their footprints
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    splat: Option<u32>,
+    /// Nearer to a portal than this, in radii of its semicircle (of 1.5 widths), what is beyond is
+    /// geometry; images are mixed in from 2/3 of it on
+    #[arg(long, value_name = "RADII", default_value_t = 1.0)]
+    near: f64,
+    /// Keep the last frame's colours where no image shows anything
+    #[arg(long)]
+    persist: bool,
+    /// Print times, and what was drawn and skipped, as JSON
+    #[arg(long)]
+    json: bool,
+    /// The folder for the frames
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+/// The tour's own size, that of Rafferty et al. 1998.
+const SIZE: (u32, u32) = (640, 512);
+const FPS: f64 = 15.0;
+/// Of a tour's camera, over the picture's width.
+const FOCAL: f64 = 0.7;
+
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    // 1. What to do.
+    let fills = fills(&args.portals)?;
+    if args.reference_views.is_multiple_of(2) || args.reference_views > 999 {
+        let found = args.reference_views;
+        let text = format!("--reference-views is {found}; expected an odd number up to 999");
+        return Err(Usage(text).into());
+    }
+    if !(args.near >= 0.0 && args.near.is_finite()) {
+        let text = format!("--near is {}; expected 0 or more", args.near);
+        return Err(Usage(text).into());
+    }
+    if args.reference_size.0.max(args.reference_size.1) > 4096 {
+        let text = "--reference-size: expected sides of up to 4096".to_owned();
+        return Err(Usage(text).into());
+    }
+    let mut options = WalkOptions {
+        splat: args.splat.map_or(Splat::Footprint, Splat::Fixed),
+        near: args.near * 2.0 / 3.0,
+        far: args.near,
+        persist: args.persist,
+        ..WalkOptions::default()
+    };
+    options.library.size = args.reference_size.into();
+    options.library.semicircles.views = args.reference_views;
+    // 2. What there is.
+    let (interior, model) = open(&args.interior)?;
+    let named = || args.interior.display().to_string();
+    let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
+    for warning in warnings {
+        say!("warning: {warning}");
+    }
+    let frames = frames(args, &interior, &contents)?;
+    // 3. The walks.
+    let mut walks = Vec::new();
+    for fill in &fills {
+        let folder = match fills.len() {
+            1 => args.output.clone(),
+            _ => args.output.join(fill.name()),
+        };
+        let walk = Walk::new(&interior, &contents, &model, options);
+        walks.push(draw(walk, *fill, &frames, &folder)?);
+    }
+    // 4. What it took.
+    let times: Vec<Vec<f64>> = walks.iter().map(Walked::times_ms).collect();
+    let lines = walks.iter().zip(&times);
+    let lines: Vec<Line<'_>> = lines
+        .map(|(walk, values)| Line {
+            name: walk.fill.name(),
+            values,
+        })
+        .collect();
+    let svg = plot(&lines, "frame", "ms a frame");
+    write_file(&args.output.join("times.svg"), svg.as_bytes())?;
+    if args.json {
+        let walks: Vec<Value> = walks.iter().map(|w| w.json(&interior)).collect();
+        return print_json(&json!({
+            "triangles": model.mesh.triangles.len(),
+            "cells": interior.cells.len(),
+            "portals": interior.portals.len(),
+            "walks": walks,
+        }));
+    }
+    let mut text = format!(
+        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7}\n",
+        "portals", "median ms", "95 % ms", "worst ms", "triangles", "samples", "holes", "images"
+    );
+    for walk in &walks {
+        text += &walk.line();
+    }
+    print(&format!(
+        "{text}{}: {} frames\n",
+        args.output.display(),
+        frames.len()
+    ))
+}
+
+fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
+    let mut fills = Vec::new();
+    for name in names {
+        match (name.as_str(), PortalFill::from_name(name)) {
+            ("all", _) => fills.extend(PortalFill::ALL),
+            (_, Some(fill)) => fills.push(fill),
+            _ => {
+                let known = PortalFill::ALL.map(PortalFill::name).join(", ");
+                let text = format!("--portals: unknown {name:?}; expected {known}, or all");
+                return Err(Usage(text).into());
+            }
+        }
+    }
+    let mut once = Vec::new();
+    for fill in fills {
+        if !once.contains(&fill) {
+            once.push(fill);
+        }
+    }
+    Ok(once)
+}
+
+fn open(given: &Path) -> anyhow::Result<(Interior, Model)> {
+    let path = match given.is_dir() {
+        true => given.join(INTERIOR),
+        false => given.to_owned(),
+    };
+    let (interior, warnings) = read_interior(&path)?;
+    for warning in warnings {
+        say!("warning: {warning}");
+    }
+    let Some(name) = &interior.model else {
+        bail!(
+            "{}: it has no model; cells that are scenes are not drawn yet",
+            path.display()
+        );
+    };
+    let file = path.parent().unwrap_or(Path::new("")).join(name);
+    let (model, warnings) = read_model(&file)?;
+    for warning in warnings {
+        say!("warning: {}: {warning}", file.display());
+    }
+    Ok((interior, model))
+}
+
+struct Named {
+    name: String,
+    view: View,
+}
+
+fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Result<Vec<Named>> {
+    let path = match &args.path {
+        Some(file) => path::read(file)?,
+        None => {
+            let (width, height) = args.size.unwrap_or(SIZE);
+            let size = DVec2::new(f64::from(width), f64::from(height));
+            let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
+            let camera = Camera::of(&lens, width, height);
+            let planned = tour(interior, contents, &camera, args.frames as usize, FPS)
+                .with_context(|| args.interior.display().to_string())?;
+            let file = args.output.join("path.json");
+            make_parent(&file)?;
+            path::write(&file, &planned)?;
+            planned
+        }
+    };
+    let named = |frame: path::PathFrame| Named {
+        name: frame.name,
+        view: match args.size {
+            Some((width, height)) => frame.view.resized(width, height),
+            None => frame.view,
+        },
+    };
+    Ok(path.frames.into_iter().map(named).collect())
+}
+
+/// A walk with one kind of portals.
+struct Walked {
+    fill: PortalFill,
+    frames: Vec<(String, PathBuf, FrameCost)>,
+    /// How many reference images there may be, and how many were made.
+    references: (usize, usize),
+}
+
+fn draw(
+    mut walk: Walk<'_>,
+    fill: PortalFill,
+    frames: &[Named],
+    folder: &Path,
+) -> anyhow::Result<Walked> {
+    let names = frames.iter().map(|f| (f.name.as_str(), true));
+    let files = picture_files("frame", names, folder)?;
+    let bar = progress(frames.len(), fill.name());
+    let mut drawn = Vec::new();
+    for (frame, file) in frames.iter().zip(files) {
+        let cost = walk
+            .draw(&frame.view, fill)
+            .with_context(|| format!("frame {}", frame.name))?;
+        let mut png = Cursor::new(Vec::new());
+        let picture = walk.picture().picture();
+        picture.write_to(&mut png, ImageFormat::Png)?;
+        write_file(&file, png.get_ref())?;
+        drawn.push((frame.name.clone(), file, cost));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(Walked {
+        fill,
+        frames: drawn,
+        references: walk.library().counts(),
+    })
+}
+
+#[derive(Serialize)]
+struct FrameReport<'a> {
+    name: &'a str,
+    file: &'a Path,
+    cell: Option<&'a str>,
+    ms: f64,
+    visibility_ms: f64,
+    geometry_ms: f64,
+    fill_ms: f64,
+    shade_ms: f64,
+    references_ms: f64,
+    references_made: usize,
+    visible_cells: usize,
+    portals: usize,
+    filled: usize,
+    /// Of the cells drawn as geometry.
+    triangles_in_cells: usize,
+    /// Passed over in whole runs.
+    triangles_skipped: usize,
+    /// That touch a pixel's centre.
+    triangles_met: usize,
+    samples: usize,
+    holes: usize,
+}
+
+fn ms(time: std::time::Duration) -> f64 {
+    1e3 * time.as_secs_f64()
+}
+
+impl Walked {
+    fn times_ms(&self) -> Vec<f64> {
+        self.frames.iter().map(|(.., c)| ms(c.time())).collect()
+    }
+
+    /// The median, what 95 % stay below, and the worst.
+    fn spread(&self) -> [f64; 3] {
+        let mut times = self.times_ms();
+        times.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let i = (share * times.len() as f64).ceil() as usize;
+            times.get(i.saturating_sub(1)).copied().unwrap_or(0.0)
+        };
+        [at(0.5), at(0.95), at(1.0)]
+    }
+
+    fn mean(&self, of: impl Fn(&FrameCost) -> usize) -> f64 {
+        let sum: usize = self.frames.iter().map(|(.., c)| of(c)).sum();
+        sum as f64 / self.frames.len().max(1) as f64
+    }
+
+    fn line(&self) -> String {
+        let [median, most, worst] = self.spread();
+        format!(
+            "{:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7}\n",
+            self.fill.name(),
+            self.mean(|c| c.triangles_tried),
+            self.mean(|c| c.samples),
+            self.mean(|c| c.holes),
+            self.references.1
+        )
+    }
+
+    fn json(&self, interior: &Interior) -> Value {
+        let [median, most, worst] = self.spread();
+        let frames = self.frames.iter().map(|(name, file, c)| FrameReport {
+            name,
+            file,
+            cell: c.cell.map(|id| interior.cell(id).name.as_str()),
+            ms: ms(c.time()),
+            visibility_ms: ms(c.visibility),
+            geometry_ms: ms(c.geometry),
+            fill_ms: ms(c.fill),
+            shade_ms: ms(c.shade),
+            references_ms: ms(c.references),
+            references_made: c.references_made,
+            visible_cells: c.visible_cells,
+            portals: c.portals,
+            filled: c.filled,
+            triangles_in_cells: c.triangles_in_cells,
+            triangles_skipped: c.triangles_in_cells - c.triangles_tried,
+            triangles_met: c.triangles_met,
+            samples: c.samples,
+            holes: c.holes,
+        });
+        let frames: Vec<FrameReport<'_>> = frames.collect();
+        json!({
+            "portals": self.fill.name(),
+            "median_ms": median,
+            "percentile_95_ms": most,
+            "worst_ms": worst,
+            "references_possible": self.references.0,
+            "references_made": self.references.1,
+            "frames": frames,
+        })
+    }
+}
