@@ -43,8 +43,8 @@ impl Frame<'_> {
     }
 
     /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
-    /// see something in sight of it; all that do are among them. All that take part where the ball is `None`: at
-    /// infinity.
+    /// see something in sight of it; all that do are among them. All that take part where the ball
+    /// is `None`: at infinity.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
             Some(ball) => {
@@ -63,9 +63,9 @@ impl Frame<'_> {
     }
 
     /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights
-    /// are those of all views. Views that see something within a distance of it, `sight`, are found,
-    /// too. The guess is of the difference that matters: time depends on it, and
-    /// which views are found besides those that count, but no weight.
+    /// are those of all views. Views that see something within a distance of it, `sight`, are
+    /// found, too. The guess is of the difference that matters: time depends on it, and which views
+    /// are found besides those that count, but no weight.
     ///
     /// Views are asked for within a difference. Where those found make a threshold within it,
     /// others cannot count, as they could only lower it; else they are asked for again.

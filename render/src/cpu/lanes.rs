@@ -41,7 +41,9 @@ pub(crate) fn angle(y: f32, x: f32) -> f32 {
     let larger = ax.max(y).max(f32::MIN_POSITIVE);
     let q = ax.min(y) / larger;
     let far = q > TAN_PI_8;
-    let r = if far { (q - 1.0) / (q + 1.0) } else { q };
+    // One division for both, as one that only some lanes need keeps the rest from being vectors.
+    let (above, below) = if far { (q - 1.0, q + 1.0) } else { (q, 1.0) };
+    let r = above / below;
     let z = r * r;
     let polynomial =
         (((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1) * z * r

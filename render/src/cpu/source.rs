@@ -136,22 +136,25 @@ impl Source {
         // 3. Mip level; see [`Frame::level_of_detail`].
         let [cx, cy, cz] = self.center;
         let [qx, qy, qz] = &tile.q;
-        sight.level = each(|k| {
-            let there = if self.by_distance {
-                (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt()
-            } else {
-                z[k]
-            };
-            let here = if self.desired_by_distance {
-                (tile.x[k] * tile.x[k] + tile.y[k] * tile.y[k] + tile.z[k] * tile.z[k]).sqrt()
-            } else {
-                tile.z[k]
-            };
-            let ratio = here / there;
-            let height = (1.0 - cx * qx[k] - cy * qy[k] - cz * qz[k]).abs();
-            let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
-            (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
-        });
+        sight.level = each(
+            #[inline(always)]
+            |k| {
+                let there = if self.by_distance {
+                    (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt()
+                } else {
+                    z[k]
+                };
+                let here = if self.desired_by_distance {
+                    (tile.x[k] * tile.x[k] + tile.y[k] * tile.y[k] + tile.z[k] * tile.z[k]).sqrt()
+                } else {
+                    tile.z[k]
+                };
+                let ratio = here / there;
+                let height = (1.0 - cx * qx[k] - cy * qy[k] - cz * qz[k]).abs();
+                let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
+                (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
+            },
+        );
         if self.occluded {
             sight.inverse_distance =
                 each(|k| tile.s[k] / (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt());
@@ -173,24 +176,46 @@ impl Source {
         let [cx, cy, cz] = self.center;
         let center_squared = cx * cx + cy * cy + cz * cz;
         let g = self.footprint_ratio;
-        each(|k| {
-            let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
-            let (ax, ay, az) = (cy * z - cz * y, cz * x - cx * z, cx * y - cy * x);
-            let across = s * (ax * ax + ay * ay + az * az).sqrt();
-            let ray_squared = x * x + y * y + z * z;
-            let towards = x * cx + y * cy + z * cz;
-            let ang = angle(across, ray_squared - s * towards);
-            let resolution = if self.by_length {
-                let squares = s * center_squared - 2.0 * towards;
-                let (dx, dy, dz) = (x - s * cx, y - s * cy, z - s * cz);
-                squares / ((dx * dx + dy * dy + dz * dz).sqrt() + ray_squared.sqrt())
-            } else {
-                let excess = (s * s * center_squared - 2.0 * s * towards) / ray_squared;
-                (self.footprint_ratio_squared_less_one + g * g * excess)
-                    / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)
-            };
-            ang + self.time_penalty + self.beta * resolution.max(0.0)
-        })
+        // Each loop without a branch, and its closure part of it: else it is no vector code.
+        let angles = each(
+            #[inline(always)]
+            |k| {
+                let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
+                let (ax, ay, az) = (cy * z - cz * y, cz * x - cx * z, cx * y - cy * x);
+                let across = s * (ax * ax + ay * ay + az * az).sqrt();
+                let ray_squared = x * x + y * y + z * z;
+                let towards = x * cx + y * cy + z * cz;
+                angle(across, ray_squared - s * towards)
+            },
+        );
+        let resolutions = if self.by_length {
+            each(
+                #[inline(always)]
+                |k| {
+                    let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
+                    let ray_squared = x * x + y * y + z * z;
+                    let squares = s * center_squared - 2.0 * (x * cx + y * cy + z * cz);
+                    let (dx, dy, dz) = (x - s * cx, y - s * cy, z - s * cz);
+                    squares / ((dx * dx + dy * dy + dz * dz).sqrt() + ray_squared.sqrt())
+                },
+            )
+        } else {
+            each(
+                #[inline(always)]
+                |k| {
+                    let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
+                    let ray_squared = x * x + y * y + z * z;
+                    let towards = x * cx + y * cy + z * cz;
+                    let excess = (s * s * center_squared - 2.0 * s * towards) / ray_squared;
+                    (self.footprint_ratio_squared_less_one + g * g * excess)
+                        / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)
+                },
+            )
+        };
+        each(
+            #[inline(always)]
+            |k| angles[k] + self.time_penalty + self.beta * resolutions[k].max(0.0),
+        )
     }
 }
 

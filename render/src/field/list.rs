@@ -48,6 +48,7 @@ impl List {
             // other corners say counts.
             return Self::of_weights(corners);
         };
+
         // 1. The views that may matter: where the corners' differences bound the threshold, all
         // within it.
         let triangle = Triangle {
@@ -56,10 +57,10 @@ impl List {
             points: [a, b, c],
             patch: OnceCell::new(),
         };
-        let mut listed = triangle.list(&[]);
+        let mut listed = triangle.known();
         let mut bounds = triangle.bounds(&listed);
         if (0..3).any(|c| bounds[c] > corners[c].near.within) {
-            listed = triangle.list(&triangle.others_within(bounds));
+            triangle.add(triangle.others_within(bounds), &mut listed);
             bounds = triangle.bounds(&listed);
         }
 
@@ -69,16 +70,12 @@ impl List {
             match listed.binary_search_by_key(&source_idx, |l| l.source_idx) {
                 Ok(at) => listed[at].sees = Sees::Part,
                 Err(at) => {
-                    let diffs = triangle.points.map(|p| frame.difference(source_idx, &p));
-                    let sees = Sees::Part;
-                    listed.insert(
-                        at,
-                        Listed {
-                            source_idx,
-                            sees,
-                            diffs,
-                        },
-                    );
+                    let view = Listed {
+                        source_idx,
+                        sees: Sees::Part,
+                        diffs: triangle.points.map(|p| frame.difference(source_idx, &p)),
+                    };
+                    listed.insert(at, view);
                 }
             }
         }
@@ -183,36 +180,49 @@ impl Triangle<'_> {
             .get_or_init(|| Patch::new(self.frame, self.corners))
     }
 
-    /// The source views that the corners know of and `others`, in order, and how they see the
-    /// triangle.
-    fn list(&self, others: &[u32]) -> Vec<Listed> {
+    /// The source views that the corners know of, in order, and how they see the triangle.
+    fn known(&self) -> Vec<Listed> {
         let nears = self.corners.map(|corner| &corner.near);
-        let mut next = [0; 4];
-        let lists: [&[u32]; 4] = [&nears[0].views, &nears[1].views, &nears[2].views, others];
-        let mut listed = Vec::with_capacity(lists.iter().map(|l| l.len()).sum());
+        let mut next = [0; 3];
+        let mut listed = Vec::with_capacity(nears.iter().map(|n| n.views.len()).sum());
         // The least of all that come next.
-        while let Some(source_idx) = (0..4).filter_map(|l| lists[l].get(next[l])).min() {
-            let source_idx = *source_idx;
-            let at = [0, 1, 2, 3].map(|l| {
-                let is_known = lists[l].get(next[l]) == Some(&source_idx);
-                next[l] += usize::from(is_known);
-                (is_known && l < 3).then(|| nears[l].of_views[next[l] - 1])
+        while let Some(&i) = (0..3).filter_map(|c| nears[c].views.get(next[c])).min() {
+            let known = [0, 1, 2].map(|c| {
+                let is_known = nears[c].views.get(next[c]) == Some(&i);
+                next[c] += usize::from(is_known);
+                is_known.then(|| nears[c].of_views[next[c] - 1])
             });
-            let source_idx = source_idx as usize;
-            let at = [0, 1, 2].map(|c| {
-                let point = &self.points[c];
-                at[c].unwrap_or_else(|| {
-                    let diff = self.frame.difference(source_idx, point);
-                    (diff, self.frame.project(source_idx, point))
-                })
-            });
-            listed.push(Listed {
-                source_idx,
-                sees: self.how_it_is_seen(source_idx, at.map(|a| a.1)),
-                diffs: at.map(|a| a.0),
-            });
+            listed.push(self.listed(i as usize, known));
         }
         listed
+    }
+
+    /// Adds source views that are not listed yet, in order.
+    fn add(&self, others: Vec<u32>, listed: &mut Vec<Listed>) {
+        let known = listed.len();
+        for i in others.into_iter().map(|i| i as usize) {
+            let before = listed[..known].binary_search_by_key(&i, |view| view.source_idx);
+            if before.is_err() {
+                listed.push(self.listed(i, [None; 3]));
+            }
+        }
+        listed.sort_unstable_by_key(|view| view.source_idx);
+    }
+
+    /// How a source view sees the triangle; with what is known of it at the corners.
+    fn listed(&self, source_idx: usize, known: [Option<(f64, Option<Pixel>)>; 3]) -> Listed {
+        let at = [0, 1, 2].map(|c| {
+            let point = &self.points[c];
+            known[c].unwrap_or_else(|| {
+                let diff = self.frame.difference(source_idx, point);
+                (diff, self.frame.project(source_idx, point))
+            })
+        });
+        Listed {
+            source_idx,
+            sees: self.how_it_is_seen(source_idx, at.map(|a| a.1)),
+            diffs: at.map(|a| a.0),
+        }
     }
 
     /// Those that see all of a triangle bound the threshold at each corner from above.

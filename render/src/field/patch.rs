@@ -23,9 +23,7 @@ pub(super) struct Patch {
 impl Patch {
     pub(super) fn new(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.at);
-        let step = |i: usize| i as f64 / STEPS as f64;
-        let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
-        let places = steps.map(|(i, j)| a + step(i) * (b - a) + step(j) * (c - a));
+        let places = steps().map(|(i, j)| a + share(i) * (b - a) + share(j) * (c - a));
         let pixels: Vec<Pixel> = places.map(|at: DVec2| Pixel::new(at.x, at.y)).collect();
         let points: Vec<Option<ProxyPoint>> =
             pixels.iter().map(|p| frame.proxy_point(*p)).collect();
@@ -116,9 +114,7 @@ fn is_smooth(points: &[Option<ProxyPoint>], corners: [Option<ProxyPoint>; 3]) ->
     let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.map(|p| depth(&p))) else {
         return false;
     };
-    let share = |i: usize| i as f64 / STEPS as f64;
-    let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
-    points.iter().zip(steps).all(|(point, (i, j))| {
+    points.iter().zip(steps()).all(|(point, (i, j))| {
         let expected = a + share(i) * (b - a) + share(j) * (c - a);
         let off = point.map(|p| (depth(&p) - expected).abs());
         off.is_some_and(|off| off <= TOLERANCE * expected.abs())
@@ -127,6 +123,16 @@ fn is_smooth(points: &[Option<ProxyPoint>], corners: [Option<ProxyPoint>; 3]) ->
 
 /// How many there are.
 const POINTS: usize = (STEPS + 1) * (STEPS + 2) / 2;
+
+/// Rows, and places in them, of all.
+fn steps() -> impl Iterator<Item = (usize, usize)> {
+    (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)))
+}
+
+/// Of a side of the triangle.
+fn share(steps: usize) -> f64 {
+    steps as f64 / STEPS as f64
+}
 
 /// The index of a row's j-th.
 fn at(row: usize, j: usize) -> usize {
@@ -139,8 +145,7 @@ mod tests {
 
     #[test]
     fn rows_of_points_follow_each_other() {
-        let steps = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j)));
-        let indices: Vec<usize> = steps.map(|(i, j)| at(i, j)).collect();
+        let indices: Vec<usize> = steps().map(|(i, j)| at(i, j)).collect();
         assert_eq!(indices, (0..POINTS).collect::<Vec<_>>());
     }
 }

@@ -14,7 +14,7 @@ const SHORT_OF_HORIZON: f64 = 1e-6;
 pub(super) struct Vertex {
     /// In pixels of the desired image.
     pub(super) at: DVec2,
-    /// `None` where the lens has no ray.
+    /// `None` where the lens has no ray or nothing is near, and where no triangle needs it.
     pub(super) point: Option<ProxyPoint>,
     /// The source views that matter there, and in about the triangles around it.
     pub(super) near: Near,
@@ -66,8 +66,9 @@ fn extent(frame: &Frame<'_>, at: DVec2, cell: DVec2, point: &ProxyPoint) -> f64 
 }
 
 /// The proxy point at a position in the desired image; `None` where the lens has no ray. Where
-/// nothing is there, what is nearest to it in the image, within a `cell` of it, goes on.
-pub(super) fn point_at(frame: &Frame<'_>, at: DVec2, cell: DVec2) -> Option<ProxyPoint> {
+/// nothing is there, what is nearest to it in the image, within a `cell` of it, goes on, if
+/// anything is.
+fn point_at(frame: &Frame<'_>, at: DVec2, cell: DVec2) -> Option<ProxyPoint> {
     let pixel = Pixel::new(at.x, at.y);
     let ray = frame.desired.lens.unproject(pixel)?;
     if let Surface::Facets(map) = &frame.surface
