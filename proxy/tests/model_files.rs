@@ -159,6 +159,35 @@ fn what_is_missing_is_a_plain_colour_and_told() {
     assert_eq!(warnings, ["there is no material 7: it is white"]);
 }
 
+#[test]
+fn what_has_no_triangles_takes_nobodys_looks() {
+    let model = small();
+    let bytes = mesh::model_to_glb(&model).unwrap();
+    // Corners without a triangle, before all others.
+    let with_none = changed(&bytes, |text| {
+        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let mut none = json["meshes"][0]["primitives"][0].clone();
+        let indices = none["indices"].as_u64().unwrap() as usize;
+        let mut one = json["accessors"][indices].clone();
+        one["count"] = 1.into();
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors.push(one);
+        none["indices"] = (accessors.len() - 1).into();
+        let primitives = json["meshes"][0]["primitives"].as_array_mut().unwrap();
+        primitives.insert(0, none);
+        json.to_string()
+    });
+    let (plain, _) = read(&bytes).unwrap();
+    let (read, _) = read(&with_none).unwrap();
+    assert!(read.mesh.positions.len() > plain.mesh.positions.len());
+    assert_eq!(read.uvs.len(), read.mesh.positions.len());
+    assert_eq!(read.colors.len(), read.mesh.positions.len());
+    let shares = [0.2, 0.3, 0.5];
+    for i in 0..plain.mesh.triangles.len() as u32 {
+        assert_eq!(read.color(i, shares), plain.color(i, shares));
+    }
+}
+
 /// How the file names its picture's bytes.
 fn small_view(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);

@@ -116,6 +116,8 @@ pub(in crate::mesh) fn parse_model(
         pictures,
         ..
     } = looks;
+    model.uvs.resize(mesh.positions.len(), [0.0; 2]);
+    model.colors.resize(mesh.positions.len(), [255; 4]);
     model.mesh = mesh;
     // On all threads, in order.
     let decoded: Vec<_> = pictures.par_iter().map(|p| decode(path, p)).collect();
@@ -179,7 +181,9 @@ impl Visitor for Looks {
             record: here.clone(),
             problem,
         };
-        // 1. Corners.
+        // 1. Corners; those before of what has no triangles look like nothing.
+        self.model.uvs.resize(place.corners.start, [0.0; 2]);
+        self.model.colors.resize(place.corners.start, [255; 4]);
         let count = place.corners.len();
         for (what, accessor) in [("texture coordinates", uvs), ("colours", colors)] {
             let Some(accessor) = accessor else {
