@@ -1,4 +1,4 @@
-//! Walks through interiors: `cargo bench --bench walk [-- --house FILE.glb --rooms ROOMS.json]`;
+//! Walks through interiors: `cargo bench --bench walk [-- --house FILE.glb --outlines ROOMS.json]`;
 //! see README.md.
 //!
 //! 1. A house of Brooks House's size (Rafferty et al. 1998): CPU time of each frame of a tour, by

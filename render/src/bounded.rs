@@ -66,6 +66,14 @@ pub fn prepare_within(frame: &Frame<'_>, max_error: f64) -> Result<Bounded, Rend
     if !(max_error > 0.0) {
         return Ok(exact);
     }
+    // No estimate is less than what samples may miss.
+    let (width, height) = (frame.desired.width, frame.desired.height);
+    let count = positions(width, height)
+        .into_iter()
+        .map(|(_, row)| row.len());
+    if missed(frame, count.sum()).sqrt() > max_error {
+        return Ok(exact);
+    }
     let samples = Samples::new(frame)?;
     for cells_across in GRIDS {
         let Ok(field) = TriangulatedField::new(frame, cells_across) else {
@@ -83,7 +91,7 @@ pub fn prepare_within(frame: &Frame<'_>, max_error: f64) -> Result<Bounded, Rend
         // A finer grid's values differ by as much less as its cells are smaller, squared, at best.
         let finest = f64::from(cells_across) / f64::from(GRIDS[GRIDS.len() - 1]);
         let at_best = estimate.mean_square.sqrt() * finest * finest;
-        if at_best.max(estimate.missed.sqrt()) > max_error {
+        if at_best > max_error {
             break;
         }
     }
@@ -240,16 +248,21 @@ impl<'a> Samples<'a> {
             .map(|s| (s - mean_square).powi(2))
             .sum::<f64>()
             / count;
-        let missed = match self.frame.lumigraph.visibility {
-            Some(_) => MISSED_BEHIND,
-            None => MISSED,
-        };
         Ok(ErrorEstimate {
             mean_square,
             uncertainty: (variance / count).sqrt(),
-            missed: missed * missed / count,
+            missed: missed(self.frame, squares.len()),
         })
     }
+}
+
+/// What a pixel that so many samples miss adds to the mean square.
+fn missed(frame: &Frame<'_>, samples: usize) -> f64 {
+    let steps = match frame.lumigraph.visibility {
+        Some(_) => MISSED_BEHIND,
+        None => MISSED,
+    };
+    steps * steps / samples.max(1) as f64
 }
 
 /// What the square of a difference of two values is after both were rounded to whole steps,

@@ -232,9 +232,7 @@ impl Engine {
                 | RenderError::DeviceFull(_)
                 | RenderError::DeviceLost(_)),
             ) => {
-                if self.frames_by_cpu == 0 {
-                    self.note(format!("{error}; the CPU draws such frames"));
-                }
+                self.note(format!("{error}; the CPU draws such frames"));
                 self.frames_by_cpu += 1;
                 self.draw_by_cpu(frame, prepared)
             }

@@ -224,6 +224,7 @@ impl<'a> Frame<'a> {
         }
         // It has only those that take part.
         self.view_tree = OnceLock::new();
+        self.tally = Tally::new(self.sources.len());
         self.match_exposures();
         self
     }

@@ -52,11 +52,6 @@ impl<'a> Held<'a> {
         finest_level(budget, sizes_of(frame, wanted)) == 0
     }
 
-    /// The mip level from which on they are held.
-    pub fn finest(&self) -> usize {
-        self.finest
-    }
-
     /// The photo of a source view.
     ///
     /// # Errors
@@ -89,7 +84,9 @@ pub fn decode_ahead(next: &Frame<'_>, wanted: &[usize], without: &[usize], stop:
     let store = &next.lumigraph.photos;
     let mut stay = vec![false; store.len()];
     wanted.iter().for_each(|&i| stay[i] = true);
-    let missing = wanted.par_iter().filter(|i| !without.contains(i));
+    let mut is_there = vec![false; store.len()];
+    without.iter().for_each(|&i| is_there[i] = true);
+    let missing = wanted.par_iter().filter(|&&i| !is_there[i]);
     missing.for_each(|&i| {
         if !stop.load(Ordering::Relaxed) {
             let View { width, height, .. } = next.lumigraph.sources[i].view;

@@ -18,7 +18,7 @@ use render::interior::{
 use render::score::score;
 use std::path::Path;
 
-/// A house of two rooms, and what its semicircles see, some of them.
+/// A house, and what its semicircles see, some of them.
 struct Set {
     house: datasets::house::House,
     references: Vec<Reference>,

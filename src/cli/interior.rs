@@ -4,7 +4,7 @@ use super::Usage;
 use super::output::{print, say};
 use anyhow::{Context, bail};
 use proxy::interior::{Contents, Interior, interior_from_nodes, read_rooms, write_interior};
-use proxy::mesh::read_model;
+use proxy::mesh::{MeshFileError, parse_model};
 use std::path::{Path, PathBuf};
 
 /// Make an interior of a model: cells joined by portals
@@ -38,7 +38,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let found = args.model.display();
         return Err(Usage(format!("{found}: interiors are made of .glb models")).into());
     }
-    let (model, warnings) = read_model(&args.model)?;
+    // The copy is of what was read.
+    let unreadable = |e| MeshFileError::Io(args.model.clone(), e);
+    let bytes = std::fs::read(&args.model).map_err(unreadable)?;
+    let (model, warnings) = parse_model(&args.model, &bytes)?;
     for warning in warnings {
         say!("warning: {}: {warning}", args.model.display());
     }
@@ -52,7 +55,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for warning in warnings.into_iter().chain(more) {
         say!("warning: {warning}");
     }
-    write(args, &interior)?;
+    write(args, &bytes, &interior)?;
     let mut table = String::new();
     for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
         table += &format!("{:>9} triangles  {}\n", triangles.len(), cell.name);
@@ -68,7 +71,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 /// Fills a folder that takes its name only when it is complete. An interior that is there
 /// already is replaced, if it is nothing else.
-fn write(args: &Args, interior: &Interior) -> anyhow::Result<()> {
+fn write(args: &Args, model: &[u8], interior: &Interior) -> anyhow::Result<()> {
     let folder = &args.output;
     let cannot = || format!("{}: cannot write", folder.display());
     if folder.exists() && !may_be_replaced(folder)? {
@@ -82,9 +85,7 @@ fn write(args: &Args, interior: &Interior) -> anyhow::Result<()> {
     let filled = || -> anyhow::Result<()> {
         std::fs::create_dir_all(&partial).with_context(cannot)?;
         let beside = partial.join(args.model.file_name().unwrap_or_default());
-        // Its bytes alone: not that it is read-only, say.
-        let bytes = std::fs::read(&args.model).with_context(cannot)?;
-        std::fs::write(beside, bytes).with_context(cannot)?;
+        std::fs::write(beside, model).with_context(cannot)?;
         write_interior(&partial.join(INTERIOR), interior)?;
         if folder.exists() {
             std::fs::remove_dir_all(folder).with_context(cannot)?;

@@ -9,7 +9,6 @@ use super::session::progress;
 use anyhow::{Context, bail};
 use calibrate::{Camera, Lens, View};
 use glam::DVec2;
-use image::ImageFormat;
 use lumigraph::scene::picture_files;
 use proxy::interior::{Contents, Interior, read_interior};
 use proxy::mesh::{Model, read_model};
@@ -17,7 +16,6 @@ use render::interior::{FrameCost, PortalFill, Splat, Walk, WalkOptions, tour};
 use render::path;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// Walk through an interior
@@ -259,10 +257,7 @@ fn draw(
         let cost = walk
             .draw(&frame.view, fill)
             .with_context(|| format!("frame {}", frame.name))?;
-        let mut png = Cursor::new(Vec::new());
-        let picture = walk.picture().picture();
-        picture.write_to(&mut png, ImageFormat::Png)?;
-        write_file(&file, png.get_ref())?;
+        capture::write_png(&file, &walk.picture().picture())?;
         drawn.push((frame.name.clone(), file, cost));
         bar.inc(1);
     }

@@ -23,7 +23,7 @@ pub use overlap::triangle_touches_box;
 pub use polygon::{Polygon, PolygonError};
 pub use rooms::{interior_from_nodes, interior_from_rooms, parse_rooms, read_rooms};
 pub use semicircle::{SemicircleOptions, SemicircleView, angle_before, semicircles};
-pub use visibility::{Pass, Region, Visibility, VisibleCell, visible, visible_through};
+pub use visibility::{Pass, Region, Visibility, VisibleCell, clip, visible, visible_through};
 
 use glam::DVec3;
 
@@ -164,7 +164,7 @@ impl Portal {
     }
 
     /// The normal on the side of `cell`, into it.
-    pub(crate) fn normal_into(&self, cell: Option<CellId>) -> DVec3 {
+    pub fn normal_into(&self, cell: Option<CellId>) -> DVec3 {
         match self.cells[0] == cell {
             true => self.polygon.normal(),
             false => -self.polygon.normal(),
@@ -181,12 +181,6 @@ impl Interior {
     /// A portal.
     pub fn portal(&self, id: PortalId) -> &Portal {
         &self.portals[id.0 as usize]
-    }
-
-    /// The cell of that name.
-    pub fn cell_named(&self, name: &str) -> Option<CellId> {
-        let found = self.cells.iter().position(|cell| cell.name == name);
-        found.map(|i| CellId(i as u32))
     }
 
     /// The portals of a cell (none: of the outside), in order.

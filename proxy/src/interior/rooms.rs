@@ -208,6 +208,8 @@ pub fn interior_from_nodes(
         Some(bounds.min.midpoint(bounds.max))
     };
     // 3. Portals.
+    let ids = interior.cells.iter().map(|c| c.name.as_str());
+    let ids: BTreeMap<&str, CellId> = ids.zip((0..).map(CellId)).collect();
     for name in names {
         let Some(between) = name.strip_prefix(PORTAL_NODE) else {
             continue;
@@ -218,8 +220,6 @@ pub fn interior_from_nodes(
             part.map(str::to_owned)
         };
         let between_cells = [side(), side()];
-        let ids = interior.cells.iter().map(|c| c.name.as_str());
-        let ids: BTreeMap<&str, CellId> = ids.zip((0..).map(CellId)).collect();
         let failed = |problem: String| InteriorError::PortalNode(name.to_owned(), problem);
         let corners = outline(model, &below(model, |n| n == name)).map_err(failed)?;
         let polygon =

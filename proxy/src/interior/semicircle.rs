@@ -13,8 +13,8 @@ pub struct SemicircleOptions {
     /// How many cameras for each portal and direction: odd, 2n + 1, so that one is in the
     /// middle. An even number is taken as the next odd one.
     pub views: usize,
-    /// The angle at the portal that they span, in radians, more than 0 and less than π: at π
-    /// the outermost would stand in the portal's plane.
+    /// The angle at the portal that they span, in radians, of 0 to π: at π the outermost stand in
+    /// the portal's plane.
     pub span: f64,
 }
 
@@ -78,13 +78,10 @@ struct Axes {
 }
 
 impl Axes {
-    fn before(interior: &Interior, portal: &Portal, from: Option<CellId>, into: CellId) -> Self {
+    fn before(interior: &Interior, portal: &Portal, from: Option<CellId>) -> Self {
         let up = interior.up;
         let target = portal.polygon.center();
-        let normal = match portal.cells[1] == Some(into) {
-            true => portal.polygon.normal(),
-            false => -portal.polygon.normal(),
-        };
+        let normal = portal.normal_into(from);
         // Whoever looks against `ahead` has `right` on the right.
         let level = normal - up * normal.dot(up);
         let (center, ahead) = if level.length() > 1e-3 {
@@ -108,14 +105,8 @@ impl Axes {
 
 /// The angle at which an eye stands before a portal, as [`SemicircleView::angle`] has it: 0 in the
 /// middle, positive to the right of who looks at the portal, beyond ±π/2 behind it.
-pub fn angle_before(
-    interior: &Interior,
-    portal: &Portal,
-    from: Option<CellId>,
-    into: CellId,
-    eye: DVec3,
-) -> f64 {
-    let axes = Axes::before(interior, portal, from, into);
+pub fn angle_before(interior: &Interior, portal: &Portal, from: Option<CellId>, eye: DVec3) -> f64 {
+    let axes = Axes::before(interior, portal, from);
     let offset = eye - axes.center;
     let angle = offset.dot(axes.right).atan2(offset.dot(axes.ahead));
     if angle.is_nan() { 0.0 } else { angle }
@@ -135,7 +126,7 @@ fn before(
         center,
         ahead,
         right,
-    } = Axes::before(interior, portal, from, into);
+    } = Axes::before(interior, portal, from);
     let radius = portal.semicircle_radius(up);
     // The cameras.
     let each_side = (options.views / 2) as i64;

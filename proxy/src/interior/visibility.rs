@@ -84,6 +84,11 @@ impl Region {
         &self.corners
     }
 
+    /// Unit normals of its sides, inwards; none of all directions.
+    pub fn sides(&self) -> &[DVec3] {
+        &self.sides
+    }
+
     /// Whether it has a direction; any length will do.
     pub fn contains(&self, direction: DVec3) -> bool {
         let slack = -MARGIN * direction.length();
@@ -141,7 +146,7 @@ impl Region {
 
 /// The part of a convex polygon where a function that is about linear is not negative
 /// (Sutherland and Hodgman 1974).
-fn clip(polygon: &[DVec3], height: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
+pub fn clip(polygon: &[DVec3], height: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
     let mut left = Vec::with_capacity(polygon.len() + 1);
     for (i, &p) in polygon.iter().enumerate() {
         let q = polygon[(i + 1) % polygon.len()];

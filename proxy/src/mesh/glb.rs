@@ -1,12 +1,11 @@
 //! glTF 2.0 binary, written by way of the `gltf` crate's types.
 
+use super::model_glb::container;
 use super::{ExportError, Mesh};
 use calibrate::View;
 use glam::{DQuat, DVec3, Vec3};
-use gltf::binary::{Glb, Header};
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::{self, validation::Checked::Valid, validation::USize64};
-use std::borrow::Cow;
 
 /// A mesh as GLB, with its cameras, for looking at elsewhere.
 ///
@@ -151,20 +150,7 @@ pub fn to_glb(
     root.scene = Some(scene);
     // 4. The file.
     let text = json::serialize::to_string(&root).map_err(ExportError::Extras)?;
-    let mut text = text.into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    data.resize(data.len().next_multiple_of(4), 0);
-    let length = 12 + 8 + text.len() + 8 + data.len();
-    let glb = Glb {
-        header: Header {
-            magic: *b"glTF",
-            version: 2,
-            length: u32::try_from(length).map_err(|_| ExportError::TooLarge(length))?,
-        },
-        bin: Some(Cow::Owned(data)),
-        json: Cow::Owned(text),
-    };
-    glb.to_vec().map_err(|_| ExportError::TooLarge(length))
+    container(text.into_bytes(), data)
 }
 
 /// A camera's node, relative to `origin`.

@@ -113,12 +113,12 @@ pub fn model_to_glb(model: &Model) -> Result<Vec<u8>, ExportError> {
             root[key] = values.into();
         }
     }
-    container(&root, file.data)
+    let text = serde_json::to_vec(&root).map_err(ExportError::Extras)?;
+    container(text, file.data)
 }
 
 /// JSON and bytes as GLB.
-fn container(root: &Value, mut data: Vec<u8>) -> Result<Vec<u8>, ExportError> {
-    let mut text = serde_json::to_vec(root).map_err(ExportError::Extras)?;
+pub(super) fn container(mut text: Vec<u8>, mut data: Vec<u8>) -> Result<Vec<u8>, ExportError> {
     text.resize(text.len().next_multiple_of(4), b' ');
     data.resize(data.len().next_multiple_of(4), 0);
     let length = 12 + 8 + text.len() + 8 + data.len();

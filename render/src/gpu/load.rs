@@ -236,7 +236,7 @@ impl Gpu {
         let store = &frame.lumigraph.photos;
         let mut weighed: Vec<usize> = match (order, &self.photos) {
             (Order::ByLayer, Some(photos)) => photos.recent(),
-            _ => (0..frame.sources.len()).collect(),
+            _ => frame.taking_part().collect(),
         };
         weighed.sort_unstable();
         let mut masked = weighed.clone();

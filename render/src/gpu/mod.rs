@@ -43,6 +43,8 @@ pub struct Gpu {
     info: wgpu::AdapterInfo,
     description: String,
     asked: DeviceLimits,
+    /// Whether software drivers were passed over.
+    is_real: bool,
     /// The device's, within what was asked; fewer layers once memory ran out.
     limits: wgpu::Limits,
     pipelines: Pipelines,
@@ -130,6 +132,7 @@ impl Gpu {
             queue,
             info,
             asked,
+            is_real: real,
             limits,
             pipelines,
             sampler,
@@ -148,7 +151,7 @@ impl Gpu {
         })
     }
 
-    /// Opens a device again in place of one that was lost. What was on it is brought again when
+    /// Opens a device of the same kind again in place of one that was lost. What was on it is brought again when
     /// it is needed; budget and counts go on.
     ///
     /// # Errors
@@ -157,7 +160,7 @@ impl Gpu {
         if self.gone {
             return Err(RenderError::Gpu("no graphics driver answers".to_owned()));
         }
-        let fresh = Self::open_within(self.asked)?;
+        let fresh = Self::open_any(self.asked, self.is_real)?;
         let old = std::mem::replace(self, fresh);
         self.residency = Residency {
             held: 0,
@@ -174,11 +177,6 @@ impl Gpu {
         self.device.destroy();
         // Tells the callback.
         let _ = self.device.poll(wgpu::PollType::Poll);
-    }
-
-    /// Whether the driver imitates a graphics processor in software.
-    pub fn is_software(&self) -> bool {
-        self.info.device_type == wgpu::DeviceType::Cpu
     }
 
     /// The most bytes that photos may take on the device; `None` for as many as there are.

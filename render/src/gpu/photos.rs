@@ -298,6 +298,9 @@ impl Layers {
             .copied()
             .filter(|&i| self.layers[i].is_none())
             .collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
         let mut old = self.by_age(wanted).into_iter();
         // As many at a time as there are threads to decode them.
         for some in missing.chunks(rayon::current_num_threads().max(1)) {

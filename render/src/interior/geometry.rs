@@ -64,20 +64,15 @@ impl CellGeometry {
 impl<'a> Runs<'a> {
     /// `regions`: none is everywhere.
     fn add(&mut self, runs: &'a [Run], eye: DVec3, regions: &[Region]) {
-        // Counter-clockwise corners: sides inwards.
-        let sides = |region: &Region| -> Vec<DVec3> {
-            let corners = region.corners();
-            let next = |i: usize| corners[(i + 1) % corners.len()];
-            let side = |i: usize| next(i).cross(corners[i]).try_normalize();
-            (0..corners.len()).filter_map(side).collect()
-        };
-        let cones: Vec<Vec<DVec3>> = regions.iter().map(sides).collect();
         for run in runs {
             self.asked += run.triangles.len();
             let offset = run.center - eye;
             let reach = run.radius + SLACK * (offset.length() + run.radius);
-            let touches = |cone: &Vec<DVec3>| cone.iter().all(|side| side.dot(offset) >= -reach);
-            if cones.is_empty() || cones.iter().any(touches) {
+            let touches = |cone: &Region| {
+                let mut sides = cone.sides().iter();
+                sides.all(|side| side.dot(offset) >= -reach)
+            };
+            if regions.is_empty() || regions.iter().any(touches) {
                 self.lists.push(&run.triangles);
             }
         }

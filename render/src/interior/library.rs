@@ -80,7 +80,7 @@ impl Library {
             (place.portal, place.from, place.into) == (portal, Some(from), into)
         };
         let range = self.sides.iter().find(is_meant).cloned().unwrap_or(0..0);
-        let eye_angle = angle_before(interior, interior.portal(portal), Some(from), into, eye);
+        let eye_angle = angle_before(interior, interior.portal(portal), Some(from), eye);
         let mut places: Vec<usize> = range.collect();
         let off = |i: &usize| (self.places[*i].angle - eye_angle).abs();
         places.sort_by(|a, b| off(a).total_cmp(&off(b)));

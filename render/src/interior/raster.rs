@@ -12,6 +12,7 @@
 
 use super::{Pinhole, Target, Window};
 use glam::DVec3;
+use proxy::interior::clip;
 use proxy::mesh::{Material, Model};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -304,18 +305,7 @@ fn pixels_around(corners: &[DVec3; 3], camera: &Pinhole) -> Option<([u32; 2], [u
     ];
     let mut part = corners.to_vec();
     for side in sides {
-        let mut left = Vec::with_capacity(part.len() + 1);
-        for (i, &p) in part.iter().enumerate() {
-            let q = part[(i + 1) % part.len()];
-            let (at_p, at_q) = (side.dot(p), side.dot(q));
-            if at_p >= 0.0 {
-                left.push(p);
-            }
-            if (at_p >= 0.0) != (at_q >= 0.0) {
-                left.push(p.lerp(q, at_p / (at_p - at_q)));
-            }
-        }
-        part = left;
+        part = clip(&part, |p| side.dot(p));
     }
     if part.is_empty() {
         return None;

@@ -26,11 +26,7 @@ const WIDEST: f64 = 5.0;
 
 /// The plane of a portal as a camera sees it, and what is beyond on the side of `into`.
 pub(super) fn plane_of(camera: &Pinhole, portal: &Portal, into: Option<CellId>) -> Beyond {
-    let normal = match portal.cells[0] == into {
-        true => portal.polygon.normal(),
-        false => -portal.polygon.normal(),
-    };
-    Beyond::new(camera, portal.polygon.center(), normal)
+    Beyond::new(camera, portal.polygon.center(), portal.normal_into(into))
 }
 
 impl Reference {

@@ -100,10 +100,7 @@ fn stops(interior: &Interior, contents: &Contents) -> Option<Vec<DVec3>> {
             let height = interior.floor_height(Some(at), portal) + unit;
             let center = center + up * (height - center.dot(up));
             // Straight through.
-            let normal = match portal.cells[0] == Some(at) {
-                true => portal.polygon.normal(),
-                false => -portal.polygon.normal(),
-            };
+            let normal = portal.normal_into(Some(at));
             let level = (normal - up * normal.dot(up)).normalize_or_zero();
             let off = BEFORE_DOOR * unit * level;
             stops.extend([center + off, center, center - off]);

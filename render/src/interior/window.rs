@@ -62,9 +62,4 @@ impl Window {
         let (first, end) = self.rows.get(y as usize).copied().unwrap_or_default();
         first..end
     }
-
-    /// How many pixels it has.
-    pub fn count(&self) -> usize {
-        self.rows.iter().map(|(a, b)| (b - a) as usize).sum()
-    }
 }
