@@ -1,19 +1,19 @@
 //! Whether frames drawn with `--max-error` keep within it: `cargo bench --bench error_bound
 //! [-- CAPTURE…]`; see README.md.
 
-use calibrate::{Lens, Rigid3, View};
+mod common;
+
 use clap::Parser;
+use common::{generate, on_the_way};
 use cpu_time::ProcessTime;
-use datasets::Options;
-use glam::DVec2;
 use lumigraph::scene::{Kind, Scene};
 use render::cpu::Cpu;
 use render::score::score;
-use render::{FieldOptions, Frame, GRIDS, Lumigraph, Method, Samples, TriangulatedField};
+use render::{FieldOptions, Frame, GRIDS, Method, Samples, TriangulatedField};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Compares the error that a frame's samples tell with the whole picture's.
 #[derive(Parser)]
@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
     let synthetic = tempfile::tempdir()?;
     let folders = if args.captures.is_empty() {
-        let write = |name: &&str| generate(name, synthetic.path());
+        let write = |name: &&str| generate(name, SIZE, Some(VIEWS), synthetic.path());
         SYNTHETIC.iter().map(write).collect::<Result<_, _>>()?
     } else {
         args.captures.clone()
@@ -108,17 +108,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         std::fs::write(file, serde_json::to_string_pretty(&all)?)?;
     }
     Ok(())
-}
-
-fn generate(name: &str, into: &Path) -> Result<PathBuf, Box<dyn Error>> {
-    let options = Options {
-        size: Some(SIZE),
-        views: Some(VIEWS),
-        samples_per_side: Some(1),
-    };
-    let folder = into.join(name);
-    datasets::write(&datasets::by_name(name, &options)?, &folder)?;
-    Ok(folder)
 }
 
 /// The frame's grid for a bound, as `render::prepare_within` chooses; `None` for exact.
@@ -174,7 +163,7 @@ fn measure(
         let at = (i as f64 + 0.5) * steps as f64 / args.frames as f64;
         // Parts of the way spread evenly, too.
         let share = (0.5 + 0.618_034 * i as f64).fract();
-        let desired = desired(&lumigraph, at as usize, share, args.long_side);
+        let desired = on_the_way(&lumigraph, at as usize, share, args.long_side);
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
         // Decodes what it needs.
         let exact = cpu.render(&frame, Method::Exact)?;
@@ -212,25 +201,4 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = ProcessTime::now();
     let done = work();
     (done, start.elapsed().as_secs_f64() * 1e3)
-}
-
-/// A pinhole on the way from a photo to the next, with the first one's focal length and
-/// proportions.
-fn desired(lumigraph: &Lumigraph, first: usize, share: f64, long_side: u32) -> View {
-    let (a, b) = (
-        &lumigraph.sources[first].view,
-        &lumigraph.sources[first + 1].view,
-    );
-    let scale = f64::from(long_side) / f64::from(a.width.max(a.height));
-    let [width, height] = [a.width, a.height].map(|s| (f64::from(s) * scale).round() as u32);
-    let (from, to) = (a.camera_from_world, b.camera_from_world);
-    let rotation = from.rotation.slerp(to.rotation, share).normalize();
-    let center = a.center().lerp(b.center(), share);
-    let half = 0.5 * DVec2::new(f64::from(width), f64::from(height));
-    View {
-        lens: Lens::pinhole(DVec2::splat(a.lens.mean_focal() * scale), half),
-        width,
-        height,
-        camera_from_world: Rigid3::new(rotation, -(rotation * center)),
-    }
 }

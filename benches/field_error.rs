@@ -1,21 +1,22 @@
 //! How far the triangulated field is from the exact one: `cargo bench --bench field_error
 //! [-- CAPTURE…]`; see README.md.
 
-use calibrate::{Lens, Pixel, Rigid3, View};
+mod common;
+
+use calibrate::Pixel;
 use clap::Parser;
-use datasets::Options;
-use glam::DVec2;
+use common::{generate, on_the_way};
 use image::{Rgba, RgbaImage};
 use lumigraph::scene::{Kind, Scene};
 use render::blend::Contributor;
 use render::cpu::Cpu;
 use render::reference::blend_at;
 use render::score::score;
-use render::{FieldOptions, Frame, Lumigraph, Method, Surface, TriangulatedField};
+use render::{FieldOptions, Frame, Method, Surface, TriangulatedField};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compares the triangulated picture with the exact one, and their weights.
@@ -111,7 +112,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let folders = if args.captures.is_empty() {
         SYNTHETIC
             .iter()
-            .map(|name| generate(name, synthetic.path()))
+            .map(|name| generate(name, SIZE, None, synthetic.path()))
             .collect::<Result<_, _>>()?
     } else {
         args.captures.clone()
@@ -142,18 +143,6 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         std::fs::write(file, serde_json::to_string_pretty(&errors)?)?;
     }
     Ok(complete)
-}
-
-/// Writes a synthetic scene as a capture.
-fn generate(name: &str, into: &Path) -> Result<PathBuf, Box<dyn Error>> {
-    let options = Options {
-        size: Some(SIZE),
-        views: None,
-        samples_per_side: Some(1),
-    };
-    let folder = into.join(name);
-    datasets::write(&datasets::by_name(name, &options)?, &folder)?;
-    Ok(folder)
 }
 
 /// A scene and kind in a line: the worst dB of its frames, the mean of everything else.
@@ -196,7 +185,7 @@ fn measure(
     let mut errors = Vec::new();
     for &pair in &pairs {
         for (at, share) in SHARES {
-            let desired = desired(&lumigraph, pair, share, args.long_side);
+            let desired = on_the_way(&lumigraph, pair, share, args.long_side);
             let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
             let exact = cpu.render(&frame, Method::Exact)?;
             let triangulated = cpu.render(&frame, Method::TRIANGULATED)?;
@@ -234,27 +223,6 @@ fn field_of(frame: &Frame<'_>) -> Result<TriangulatedField, Box<dyn Error>> {
         return Err("not triangulated".into());
     };
     Ok(TriangulatedField::new(frame, cells_across)?)
-}
-
-/// A pinhole on the way from a photo to the next, with the first one's focal length and
-/// proportions.
-fn desired(lumigraph: &Lumigraph, pair: usize, share: f64, long_side: u32) -> View {
-    let (a, b) = (
-        &lumigraph.sources[pair].view,
-        &lumigraph.sources[pair + 1].view,
-    );
-    let scale = f64::from(long_side) / f64::from(a.width.max(a.height));
-    let [width, height] = [a.width, a.height].map(|s| (f64::from(s) * scale).round() as u32);
-    let (from, to) = (a.camera_from_world, b.camera_from_world);
-    let rotation = from.rotation.slerp(to.rotation, share).normalize();
-    let center = a.center().lerp(b.center(), share);
-    let half = 0.5 * DVec2::new(f64::from(width), f64::from(height));
-    View {
-        lens: Lens::pinhole(DVec2::splat(a.lens.mean_focal() * scale), half),
-        width,
-        height,
-        camera_from_world: Rigid3::new(rotation, -(rotation * center)),
-    }
 }
 
 /// The mean over pixels that any photo paints in either field of how much of the weight went

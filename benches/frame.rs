@@ -1,6 +1,6 @@
 //! Time and error of one frame: `cargo bench --bench frame [-- CAPTURE…]`; see README.md.
 
-use calibrate::{Lens, Rigid3, View};
+use calibrate::{Lens, View};
 use cpu_time::ProcessTime;
 use datasets::Options;
 use glam::DVec2;
@@ -105,18 +105,13 @@ fn desired_views(lumigraph: &Lumigraph) -> [(&'static str, View); 2] {
     let a = &lumigraph.sources[middle - 1].view;
     let b = &lumigraph.sources[middle].view;
     let between = |t: f64| {
-        let rotation = a
-            .camera_from_world
-            .rotation
-            .slerp(b.camera_from_world.rotation, t);
-        let center = a.center().lerp(b.center(), t);
         let size = DVec2::new(f64::from(SIZE.0), f64::from(SIZE.1));
         let scale = (size / DVec2::new(f64::from(a.width), f64::from(a.height))).min_element();
         View {
             lens: Lens::pinhole(DVec2::splat(a.lens.mean_focal() * scale), 0.5 * size),
             width: SIZE.0,
             height: SIZE.1,
-            camera_from_world: Rigid3::new(rotation, -(rotation * center)),
+            ..a.between(b, t)
         }
     };
     [("midway", between(0.5)), ("1 %", between(0.01))]

@@ -5,7 +5,7 @@
 //! changes more. Motion is then divided by 4096, and what is left is what pops: a point that
 //! comes or goes, a triangle that flips, a photo that enters.
 
-use calibrate::{Rigid3, View};
+use calibrate::View;
 use clap::Parser;
 use image::RgbaImage;
 use lumigraph::scene::{Kind, Scene, SceneError};
@@ -69,21 +69,10 @@ fn change(a: &RgbaImage, b: &RgbaImage) -> Change {
     }
 }
 
-/// Part of the way from one view to another with the same lens.
-fn between(a: &View, b: &View, share: f64) -> View {
-    let (from, to) = (a.camera_from_world, b.camera_from_world);
-    let rotation = from.rotation.slerp(to.rotation, share);
-    let center = from.center().lerp(to.center(), share);
-    View {
-        camera_from_world: Rigid3::new(rotation, -(rotation * center)),
-        ..a.clone()
-    }
-}
-
 /// What is left of the change from one view to another when it is halved again and again.
 fn pop(lumigraph: &Lumigraph, a: &View, b: &View) -> Result<Change, SceneError> {
     let draw = |share: f64| {
-        let frame = Frame::new(lumigraph, between(a, b, share), FieldOptions::default());
+        let frame = Frame::new(lumigraph, a.between(b, share), FieldOptions::default());
         cpu::render(&frame, Method::Exact).map_err(|e| SceneError::Unfit(e.to_string()))
     };
     let (mut from, mut to) = (0.0, 1.0);
@@ -115,7 +104,7 @@ fn measure(capture: &Path, kind: Kind, steps: usize) -> Result<Vec<Change>, Scen
     });
     (0..steps)
         .map(|i| {
-            let at = |i: usize| between(&a, &b, i as f64 / steps as f64);
+            let at = |i: usize| a.between(&b, i as f64 / steps as f64);
             pop(&lumigraph, &at(i), &at(i + 1))
         })
         .collect()

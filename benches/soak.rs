@@ -4,7 +4,6 @@
 //! on the device. Now and then a frame must be the same, byte for byte, as a new engine draws it
 //! from photos that nobody decoded before, under the same budgets; and memory must not grow.
 
-use calibrate::{Rigid3, View};
 use clap::Parser;
 use datasets::Options;
 use lumigraph::scene::{Kind, Scene};
@@ -118,7 +117,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let share = (i % PATH) as f64 / PATH as f64;
         let (width, height) = SIZES[random.below(SIZES.len())];
         let [a, b] = [from, to].map(|i| &lumigraph.sources[i].view);
-        let desired = between(a, b, share).resized(width, height);
+        let desired = a.between(b, share).resized(width, height);
         let options = FieldOptions {
             k: 1 + random.below(16),
             beta: [0.0, 0.1, 1.0][random.below(3)],
@@ -261,17 +260,6 @@ fn scenes(folder: &Path) -> Result<Vec<Subject>, Box<dyn Error>> {
         }
     }
     Ok(scenes)
-}
-
-/// Part of the way from one view to another, with the first one's lens.
-fn between(a: &View, b: &View, share: f64) -> View {
-    let (from, to) = (a.camera_from_world, b.camera_from_world);
-    let rotation = from.rotation.slerp(to.rotation, share).normalize();
-    let center = from.center().lerp(to.center(), share);
-    View {
-        camera_from_world: Rigid3::new(rotation, -(rotation * center)),
-        ..a.clone()
-    }
 }
 
 /// Memory held, where the system says so in Linux's way.

@@ -43,6 +43,19 @@ impl View {
             && (0.0..=f64::from(self.height)).contains(&pixel.y)
     }
 
+    /// This camera on the way to where another one is, and turned as it is: at a share of 0 its own
+    /// pose, at 1 the other's.
+    #[must_use]
+    pub fn between(&self, other: &Self, share: f64) -> Self {
+        let (from, to) = (self.camera_from_world, other.camera_from_world);
+        let rotation = from.rotation.slerp(to.rotation, share).normalize();
+        let center = from.center().lerp(to.center(), share);
+        Self {
+            camera_from_world: Rigid3::new(rotation, -(rotation * center)),
+            ..self.clone()
+        }
+    }
+
     /// The same camera with another image size: focal lengths and principal point follow.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Shot, between};
+use common::Shot;
 use image::RgbaImage;
 use render::score::score;
 use render::{
@@ -18,7 +18,7 @@ fn on_frames(mut look: impl FnMut(&str, &Frame<'_>)) {
         let shot = Shot::of(name, views, None);
         let lumigraph = shot.lumigraph();
         let first = views / 2;
-        let desired = between(&shot.views[first], &shot.views[first + 1], 0.5);
+        let desired = shot.views[first].between(&shot.views[first + 1], 0.5);
         let desired = desired.resized(240, 180);
         look(
             name,

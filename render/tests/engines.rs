@@ -3,9 +3,7 @@
 mod common;
 
 use calibrate::{Distortion, Lens, Rigid3, View, colmap};
-use common::{
-    METHODS, Shot, assert_close, between, by_all, by_reference, gpu, pinhole, psnr, psnr_covered,
-};
+use common::{METHODS, Shot, assert_close, by_all, by_reference, gpu, pinhole, psnr, psnr_covered};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
@@ -98,7 +96,7 @@ fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
 /// Desired views that try everything: between photos, nearer, farther than the photos
 /// cover, coarser, through other lenses, with the horizon in the picture.
 fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
-    let middle = between(&shot.views[0], &shot.views[5], 0.5);
+    let middle = shot.views[0].between(&shot.views[5], 0.5);
     let distance = shot.plane.signed_distance(middle.center()).abs();
     let wide = View {
         lens: Lens::pinhole(DVec2::splat(60.0), DVec2::new(80.0, 60.0)),
@@ -157,7 +155,7 @@ fn exact_pictures_are_the_same_whatever_the_photos_lenses() {
     let shot = mixed();
     let lumigraph = shot.lumigraph;
     for (name, desired) in [
-        ("between", between(&shot.views[0], &shot.views[3], 0.4)),
+        ("between", shot.views[0].between(&shot.views[3], 0.4)),
         ("at a fisheye", shot.views[1].clone()),
         ("turned", turned(&shot.views[2], 0.1, -0.2)),
     ] {
@@ -244,8 +242,8 @@ fn triangulated_pictures_are_close_to_exact_ones() {
     let lumigraph = shot.lumigraph();
     let views = &shot.views;
     let mut desired = desired_views(&shot);
-    desired.push(("midway", between(&views[1], &views[2], 0.5)));
-    desired.push(("1 % off", between(&views[4], &views[5], 0.01)));
+    desired.push(("midway", views[1].between(&views[2], 0.5)));
+    desired.push(("1 % off", views[4].between(&views[5], 0.01)));
     for (name, view) in desired {
         for blend in [Blend::Consistent, Blend::Paper] {
             let what = format!("{name}, {blend:?}");
@@ -259,8 +257,8 @@ fn triangulated_pictures_are_close_to_exact_ones() {
 fn triangulated_pictures_are_close_with_other_lenses_gains_and_alpha() {
     let shot = mixed();
     for (name, desired) in [
-        ("midway", between(&shot.views[3], &shot.views[6], 0.5)),
-        ("1 % off", between(&shot.views[4], &shot.views[0], 0.01)),
+        ("midway", shot.views[3].between(&shot.views[6], 0.5)),
+        ("1 % off", shot.views[4].between(&shot.views[0], 0.01)),
     ] {
         let options = FieldOptions::default();
         check_triangulated(&shot.lumigraph, desired, options, name);
@@ -321,7 +319,7 @@ fn triangulated_pictures_are_close_on_real_captures() {
         let others = lumigraph.sources.iter().filter(|s| distance(s) > 0.0);
         let nearest = others.min_by(|a, b| distance(a).total_cmp(&distance(b)));
         for share in [0.5, 0.01] {
-            let desired = between(first, &nearest.unwrap().view, share);
+            let desired = first.between(&nearest.unwrap().view, share);
             let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
             let exact = cpu::render(&frame, Method::Exact).unwrap();
             let triangulated = cpu::render(&frame, Method::TRIANGULATED).unwrap();
@@ -338,7 +336,7 @@ fn triangulated_pictures_are_close_on_real_captures() {
 fn the_true_plane_gives_the_true_picture_and_a_wrong_one_does_not() {
     let shot = Shot::of("wall", 9, None);
     let mut lumigraph = shot.lumigraph();
-    let desired = between(&shot.views[0], &shot.views[4], 0.5);
+    let desired = shot.views[0].between(&shot.views[4], 0.5);
     let truth = datasets::render_view(&shot.dataset.scene, &desired, 2);
     let wrong = Plane::new(
         shot.plane.point() + 0.3 * shot.plane.normal(),
@@ -448,7 +446,7 @@ fn a_device_that_holds_other_photos_draws_the_same_bytes() {
         return;
     }
     let shot = Shot::of("shelf", 12, None);
-    let desired = between(&shot.views[0], &shot.views[1], 0.3);
+    let desired = shot.views[0].between(&shot.views[1], 0.3);
     for method in METHODS {
         let fresh = shot.lumigraph();
         let frame = Frame::new(&fresh, desired.clone(), FieldOptions::default());
@@ -468,7 +466,7 @@ fn a_device_that_holds_other_photos_draws_the_same_bytes() {
 #[test]
 fn the_number_of_threads_changes_nothing() {
     let mixed = mixed();
-    let desired = between(&mixed.views[0], &mixed.views[5], 0.3);
+    let desired = mixed.views[0].between(&mixed.views[5], 0.3);
     for method in METHODS {
         let with_threads = |count: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
@@ -517,7 +515,7 @@ fn a_photo_that_cannot_be_decoded_is_named_and_does_no_further_harm() {
 fn what_no_photo_sees_is_transparent() {
     let shot = Shot::of("shelf", 9, None);
     let mut lumigraph = shot.lumigraph();
-    let middle = between(&shot.views[0], &shot.views[4], 0.5);
+    let middle = shot.views[0].between(&shot.views[4], 0.5);
     let in_the_plane = {
         let plane = shot.plane;
         let center = middle.center() - plane.signed_distance(middle.center()) * plane.normal();
@@ -584,7 +582,7 @@ fn transparent_photos_make_transparent_pictures() {
     let mut lumigraph = shot.lumigraph();
     let clear = vec![RgbaImage::from_pixel(160, 120, Rgba([90, 80, 70, 0])); 4];
     lumigraph.photos = PhotoStore::from_images(clear);
-    let desired = between(&shot.views[0], &shot.views[1], 0.5);
+    let desired = shot.views[0].between(&shot.views[1], 0.5);
     let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
     for method in METHODS {
         for (engine, picture) in by_all(&frame, method) {
@@ -619,7 +617,7 @@ fn crowd() -> (Lumigraph, View) {
         gain: [1.0; 3],
         time_s: None,
     };
-    let desired = between(&views[0], &views[4], 0.3).resized(101, 75);
+    let desired = views[0].between(&views[4], 0.3).resized(101, 75);
     let lumigraph = Lumigraph {
         points: Vec::new(),
         sources: views.iter().enumerate().map(source).collect(),
@@ -663,7 +661,7 @@ fn many_photos_and_every_k_look_the_same_from_every_engine() {
 fn pictures_of_any_size_can_be_drawn() {
     let shot = Shot::of("shelf", 4, None);
     let lumigraph = shot.lumigraph();
-    let middle = between(&shot.views[0], &shot.views[1], 0.5);
+    let middle = shot.views[0].between(&shot.views[1], 0.5);
     for (width, height) in [(1, 1), (1, 50), (33, 1), (31, 7), (65, 64)] {
         let desired = middle.resized(width, height);
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Shot, assert_close, between, by_all};
+use common::{Shot, assert_close, by_all};
 use image::{Rgba, RgbaImage};
 use render::{FieldOptions, Frame, Lumigraph, Method, PhotoStore, seams};
 
@@ -61,7 +61,7 @@ fn a_frame_is_as_if_all_photos_had_its_exposure() {
     let (plain, known) = (shot.lumigraph(), altered(&shot, true));
     let options = FieldOptions::default();
     for share in [0.1, 0.5] {
-        let desired = between(&shot.views[3], &shot.views[4], share);
+        let desired = shot.views[3].between(&shot.views[4], share);
         let unaltered = pictures(&Frame::new(&plain, desired.clone(), options));
         let frame = Frame::new(&known, desired, options);
         // One exposure for the frame, between those of the photos in it.
@@ -109,7 +109,7 @@ fn plain_wall(color: Rgba<u8>) -> Shot {
 #[test]
 fn seams_go_where_gains_are_known() {
     let seams_of = |shot: &Shot, lumigraph: &Lumigraph| {
-        let desired = between(&shot.views[3], &shot.views[4], 0.5);
+        let desired = shot.views[3].between(&shot.views[4], 0.5);
         let frame = Frame::new(lumigraph, desired, FieldOptions::default());
         seams(&frame).unwrap().unwrap()
     };
@@ -133,7 +133,7 @@ fn white_stays_white() {
     let mut lumigraph = shot.lumigraph();
     let sources = lumigraph.sources.iter_mut().enumerate();
     sources.for_each(|(i, source)| source.gain = gain(i));
-    let desired = between(&shot.views[3], &shot.views[4], 0.5);
+    let desired = shot.views[3].between(&shot.views[4], 0.5);
     let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
     assert!(frame.exposures_differ());
     for (what, picture) in pictures(&frame) {

@@ -4,7 +4,7 @@
 mod common;
 
 use calibrate::{Distortion, Lens, Pixel, View};
-use common::{METHODS, Random, Shot, between, by_all, pinhole, psnr_covered};
+use common::{METHODS, Random, Shot, by_all, pinhole, psnr_covered};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::{Mesh, MeshKind, Plane, Proxy, Solid};
@@ -87,7 +87,7 @@ fn hills() -> Arc<Solid> {
 #[test]
 fn use_of_geometric_proxies() {
     let shot = Shot::of("wall", 6, None);
-    let desired = between(&shot.views[1], &shot.views[4], 0.5);
+    let desired = shot.views[1].between(&shot.views[4], 0.5);
     let truth = datasets::render_view(&shot.dataset.scene, &desired, 2);
     let with = |proxy: Proxy| {
         let lumigraph = Lumigraph {

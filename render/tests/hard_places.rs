@@ -3,7 +3,7 @@
 mod common;
 
 use calibrate::Pixel;
-use common::{Shot, between, psnr};
+use common::{Shot, psnr};
 use glam::{DVec2, DVec3};
 use proxy::{Plane, Proxy};
 use render::{FieldOptions, Frame, Method, TriangulatedField, cpu};
@@ -33,7 +33,7 @@ fn views_of_a_planes_horizon_are_as_exact() {
         let mut lumigraph = shot.lumigraph();
         lumigraph.proxy = Proxy::Plane(Plane::new(on_it, normal).unwrap());
         for (first, share) in [(1, 0.5), (4, 0.3), (7, 0.5), (9, 0.05)] {
-            let desired = between(&shot.views[first], &shot.views[first + 1], share);
+            let desired = shot.views[first].between(&shot.views[first + 1], share);
             let frame = Frame::new(
                 &lumigraph,
                 desired.resized(SIZE.0, SIZE.1),
@@ -63,7 +63,7 @@ fn views_along_the_way_ahead_are_as_exact() {
         let mut lumigraph = shot.lumigraph();
         lumigraph.proxy = Proxy::Plane(plane);
         for (first, share) in [(1, 0.01), (1, 0.5), (5, 0.01), (5, 0.4), (8, 0.02)] {
-            let desired = between(&shot.views[first], &shot.views[first + 1], share);
+            let desired = shot.views[first].between(&shot.views[first + 1], share);
             let frame = Frame::new(
                 &lumigraph,
                 desired.resized(SIZE.0, SIZE.1),

@@ -5,7 +5,7 @@
 mod common;
 
 use calibrate::{Rigid3, View};
-use common::{Random, Shot, between, differing, gpu};
+use common::{Random, Shot, differing, gpu};
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use proxy::{Plane, Proxy};
@@ -130,7 +130,7 @@ fn check(before: &RgbaImage, after: &RgbaImage, seen: &Seen, what: &str) {
 
 /// Between the photos, farther away than they cover, and with the horizon in the picture.
 fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
-    let middle = between(&shot.views[0], &shot.views[5], 0.45);
+    let middle = shot.views[0].between(&shot.views[5], 0.45);
     let distance = shot.plane.signed_distance(middle.center()).abs();
     let back = Rigid3::new(DQuat::IDENTITY, 1.2 * distance * DVec3::Z);
     let tilt = Rigid3::new(DQuat::from_rotation_x(1.1), DVec3::ZERO);

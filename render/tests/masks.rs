@@ -5,8 +5,7 @@ mod common;
 
 use calibrate::{Pixel, View};
 use common::{
-    METHODS, Random, Shot, assert_close, between, by_all, by_reference, differing, psnr,
-    psnr_covered,
+    METHODS, Random, Shot, assert_close, by_all, by_reference, differing, psnr, psnr_covered,
 };
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use proxy::Proxy;
@@ -70,7 +69,7 @@ fn frame<'a>(lumigraph: &'a Lumigraph, desired: &View) -> Frame<'a> {
 
 /// Between the photos, nearer, coarser than the photos, and at one of them.
 fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
-    let middle = between(&shot.views[0], &shot.views[5], 0.45);
+    let middle = shot.views[0].between(&shot.views[5], 0.45);
     let (right, ahead) = (middle.forward().cross(middle.up()), middle.forward());
     let distance = shot.plane.signed_distance(middle.center()).abs();
     let moved = |offset: glam::DVec3| View {
@@ -265,7 +264,7 @@ fn what_every_photo_ignores_is_a_hole() {
         photos: store(shot.photos.clone(), masks.collect()),
         ..shot.lumigraph()
     };
-    let desired = between(&shot.views[0], &shot.views[4], 0.5);
+    let desired = shot.views[0].between(&shot.views[4], 0.5);
     let Pixel { x: cx, y: cy } = lens(&desired);
     for method in METHODS {
         for (engine, picture) in by_all(&frame(&lumigraph, &desired), method) {
@@ -375,7 +374,7 @@ fn the_weight_fades_steadily_across_a_masks_edge() {
     // Along a line on the wall, in small steps.
     let shot = Shot::of("wall", 9, None);
     let lumigraph = scene_with(&shot, |i| i == 4);
-    let desired = between(&shot.views[4], &shot.views[0], 0.3);
+    let desired = shot.views[4].between(&shot.views[0], 0.3);
     let frame = frame(&lumigraph, &desired);
     let mut last: Option<f64> = None;
     let mut seen = (f64::INFINITY, 0.0_f64);
@@ -420,7 +419,7 @@ fn mattes_become_coverage() {
         photos: PhotoStore::from_images(photos),
         ..shot.lumigraph()
     };
-    let desired = between(&shot.views[0], &shot.views[4], 0.5);
+    let desired = shot.views[0].between(&shot.views[4], 0.5);
     for method in METHODS {
         for (engine, picture) in by_all(&frame(&lumigraph, &desired), method) {
             let mut error = 0.0;
@@ -466,7 +465,7 @@ fn masks_are_decoded_for_photos_in_sight_alone() {
     let turn = calibrate::Rigid3::new(away, glam::DVec3::ZERO);
     let view = &mut lumigraph.sources[8].view;
     view.camera_from_world = turn * view.camera_from_world;
-    let desired = between(&shot.views[0], &shot.views[4], 0.5);
+    let desired = shot.views[0].between(&shot.views[4], 0.5);
     for method in METHODS {
         cpu::render(&frame(&lumigraph, &desired), method).unwrap();
     }

@@ -233,7 +233,7 @@ fn a_flat_mesh_is_a_plane() {
         proxy: Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh))),
         ..shot.lumigraph()
     };
-    let desired = common::between(&shot.views[0], &shot.views[3], 0.4);
+    let desired = shot.views[0].between(&shot.views[3], 0.4);
     let of = |lumigraph: &Lumigraph, method| {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
         cpu::render(&frame, method).unwrap()

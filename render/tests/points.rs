@@ -3,7 +3,7 @@
 mod common;
 
 use calibrate::{ImageId, View};
-use common::{Shot, assert_close, between, gpu, psnr, psnr_covered, unmoved};
+use common::{Shot, assert_close, gpu, psnr, psnr_covered, unmoved};
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use proxy::{Proxy, SparsePoint};
@@ -50,7 +50,7 @@ fn pictures(frame: &Frame<'_>, method: Method) -> Vec<(&'static str, RgbaImage)>
 }
 
 fn desired_views(shot: &Shot) -> Vec<(&'static str, View)> {
-    let middle = between(&shot.views[0], &shot.views[5], 0.45);
+    let middle = shot.views[0].between(&shot.views[5], 0.45);
     let lens = calibrate::Lens::new(
         glam::DVec2::new(95.0, 96.0),
         glam::DVec2::new(81.0, 59.5),
@@ -114,7 +114,7 @@ fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
 #[test]
 fn it_shows_what_no_plane_can() {
     let shot = Shot::of("shelf", 9, None);
-    let desired = between(&shot.views[0], &shot.views[5], 0.45);
+    let desired = shot.views[0].between(&shot.views[5], 0.45);
     let truth = datasets::render_view(&shot.dataset.scene, &desired, 2);
     let score = |lumigraph: &Lumigraph| {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
@@ -130,7 +130,7 @@ fn it_shows_what_no_plane_can() {
 fn neither_the_worlds_place_nor_any_order_matters() {
     let shot = Shot::of("shelf", 9, None);
     let before = lumigraph(&shot);
-    let desired = between(&shot.views[0], &shot.views[5], 0.45);
+    let desired = shot.views[0].between(&shot.views[5], 0.45);
     let render = |lumigraph: &Lumigraph, desired: &View| {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
         cpu::render(&frame, Method::Exact).unwrap()

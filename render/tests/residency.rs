@@ -3,7 +3,7 @@
 mod common;
 
 use calibrate::View;
-use common::{METHODS, between, gpu, pinhole};
+use common::{METHODS, gpu, pinhole};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use proptest::prelude::*;
@@ -72,7 +72,7 @@ const LAYER: u64 = 4 * (128 * 128 + 64 * 64 + 32 * 32 + 16 * 16 + 8 * 8 + 4 * 4 
 
 /// Between the photos' cameras.
 fn path(shot: &Shot) -> Vec<View> {
-    let pair = |i: usize| between(&shot.views[i], &shot.views[i + 1], 0.4);
+    let pair = |i: usize| shot.views[i].between(&shot.views[i + 1], 0.4);
     (0..COUNT - 1).step_by(3).map(pair).collect()
 }
 

@@ -3,7 +3,7 @@
 mod common;
 
 use calibrate::{Pixel, View, find_period};
-use common::{Random, Shot, assert_close, between, gpu, psnr, psnr_covered};
+use common::{Random, Shot, assert_close, gpu, psnr, psnr_covered};
 use image::RgbaImage;
 use render::{
     FieldOptions, Frame, Lumigraph, Method, Moment, PhotoStore, TriangulatedField, cpu, field,
@@ -175,7 +175,7 @@ fn largest_jump(lumigraph: &Lumigraph, desired: &View, steps: usize) -> f64 {
 fn weights_change_continuously_as_time_goes_on() {
     let shot = helicopter();
     let lumigraph = shot.lumigraph();
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     let coarse = largest_jump(&lumigraph, &desired, 1000);
     let fine = largest_jump(&lumigraph, &desired, 4000);
     println!("largest change of a weight: {coarse:.4} in P/1000, {fine:.4} in P/4000");
@@ -187,7 +187,7 @@ fn weights_change_continuously_as_time_goes_on() {
 fn pictures_change_smoothly_as_time_goes_on() {
     let shot = helicopter();
     let lumigraph = shot.lumigraph();
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     // The worst from moment to moment, over an eighth of a period with its end in it.
     let worst = |steps: u32| {
         let moments = (steps * 15 / 16..=steps * 17 / 16)
@@ -236,7 +236,7 @@ fn times_alone_change_nothing() {
         .sources
         .iter_mut()
         .for_each(|s| s.time_s = Some(7.0));
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     let plain = |lumigraph| Frame::new(lumigraph, desired.clone(), FieldOptions::default());
     for method in METHODS {
         let expected = by_engines(&plain(&untimed), method);
@@ -288,7 +288,7 @@ fn a_source_view_that_takes_no_part_might_as_well_not_be_there() {
 fn the_order_of_photos_does_not_matter() {
     let shot = helicopter();
     let mut order: Vec<usize> = (0..shot.views.len()).collect();
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     let in_order = lumigraph_of(shot, &order);
     Random(8).shuffle(&mut order);
     let shuffled = lumigraph_of(shot, &order);
@@ -306,7 +306,7 @@ fn the_order_of_photos_does_not_matter() {
 #[test]
 fn engines_agree_and_decode_only_photos_in_the_window() {
     let shot = helicopter();
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     for method in METHODS {
         for time_s in [0.1, 1.36] {
             let lumigraph = shot.lumigraph();
@@ -336,7 +336,7 @@ fn engines_agree_and_decode_only_photos_in_the_window() {
 fn triangulated_pictures_are_close_to_exact_ones() {
     let shot = helicopter();
     let lumigraph = shot.lumigraph();
-    let desired = between(&shot.views[3], &shot.views[11], 0.4);
+    let desired = shot.views[3].between(&shot.views[11], 0.4);
     for time_s in [0.0, 0.5, 1.0] {
         let frame = frame(&lumigraph, &desired, &moment(time_s));
         let [exact, triangulated] = METHODS.map(|method| cpu::render(&frame, method).unwrap());

@@ -187,20 +187,6 @@ pub(crate) fn by_all(
     pictures
 }
 
-/// A view between two others: `share` 0 is the first, 1 the second; the first's lens.
-pub(crate) fn between(first: &View, second: &View, share: f64) -> View {
-    let center = first.center().lerp(second.center(), share);
-    let (from, to) = (
-        first.camera_from_world.rotation,
-        second.camera_from_world.rotation,
-    );
-    let rotation = from.slerp(to, share).normalize();
-    View {
-        camera_from_world: Rigid3::new(rotation, -(rotation * center)),
-        ..first.clone()
-    }
-}
-
 /// PSNR in dB over the pixels that both cover at all, colour as seen on black; infinite
 /// where they are the same.
 pub(crate) fn psnr_covered(a: &RgbaImage, b: &RgbaImage) -> f64 {
