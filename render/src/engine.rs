@@ -43,21 +43,26 @@ enum By {
     Reference,
 }
 
-/// A frame whose photos are where they are needed, as far as is known which.
+/// A frame whose photos are where they are needed, as far as is known which; or what a graphics
+/// device had to say against it.
 #[derive(Clone, Debug)]
-pub struct Ready(Option<gpu::Loaded>);
+pub struct Ready(Result<Option<gpu::Loaded>, RenderError>);
 
 impl Ready {
     /// How many photos a graphics device was told to sample; `None` for other engines, and where
     /// all photos that take part are on the device already.
     pub fn photos_used(&self) -> Option<usize> {
-        self.0.as_ref()?.photos_used()
+        self.loaded()?.photos_used()
     }
 
     /// In how many parts a graphics device draws the frame: more than one where its photos do
     /// not fit on the device at once.
     pub fn parts(&self) -> usize {
-        self.0.as_ref().map_or(1, gpu::Loaded::parts)
+        self.loaded().map_or(1, gpu::Loaded::parts)
+    }
+
+    fn loaded(&self) -> Option<&gpu::Loaded> {
+        self.0.as_ref().ok()?.as_ref()
     }
 }
 
@@ -159,20 +164,18 @@ impl Engine {
     /// Other engines decode what they sample when they sample it.
     ///
     /// # Errors
-    /// A photo that is needed cannot be decoded. (What a device has to say is left to
-    /// [`Self::draw_ready`].)
+    /// A photo that is needed cannot be decoded. (What a device has to say against the frame is
+    /// kept for [`Self::draw_ready`].)
     pub fn ready(&mut self, frame: &Frame<'_>, prepared: &Prepared) -> Result<Ready, RenderError> {
         let By::Gpu(gpu) = &mut self.by else {
-            return Ok(Ready(None));
+            return Ok(Ready(Ok(None)));
         };
         if prepared.field().is_some() {
             frame.lumigraph.photos.check_masks()?;
         }
         match gpu.load(frame, prepared.field()) {
-            Ok(loaded) => Ok(Ready(Some(loaded))),
             Err(error @ (RenderError::Photo(_) | RenderError::Triangulation(_))) => Err(error),
-            // To be heard again.
-            Err(_) => Ok(Ready(None)),
+            loaded => Ok(Ready(loaded.map(Some))),
         }
     }
 
@@ -203,8 +206,10 @@ impl Engine {
         };
         let field = prepared.field();
         let drawn = match &ready.0 {
-            Some(loaded) => gpu.draw(frame, field, loaded),
-            None => draw_anew(gpu, frame, field),
+            Ok(Some(loaded)) => gpu.draw(frame, field, loaded),
+            // Made ready by an engine of another kind.
+            Ok(None) => draw_anew(gpu, frame, field),
+            Err(error) => Err(error.clone()),
         };
         let drawn = match drawn {
             Err(lost @ RenderError::DeviceLost(_)) => {

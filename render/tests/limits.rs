@@ -175,7 +175,7 @@ fn what_a_device_cannot_draw_the_cpu_draws_and_it_is_said() {
                 ..DeviceLimits::default()
             },
             false,
-            "are needed at once",
+            "more photos are needed at once than this device holds",
         ),
         (
             DeviceLimits {
@@ -191,7 +191,7 @@ fn what_a_device_cannot_draw_the_cpu_draws_and_it_is_said() {
                 ..DeviceLimits::default()
             },
             true,
-            "30 masks are needed at once",
+            "more masks are needed at once than this device holds",
         ),
     ] {
         if masked {

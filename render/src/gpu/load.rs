@@ -55,6 +55,9 @@ impl Gpu {
     ) -> Result<Loaded, RenderError> {
         self.device_time = None;
         frame.lumigraph.photos.begin_frame();
+        if self.ever_loaded.0 != frame.lumigraph.photos.id() {
+            self.photo_layers = self.limits.max_texture_array_layers;
+        }
         let loaded = loop {
             let count = match self.try_load(frame, field) {
                 Err(Shortage::Memory { count, .. }) if count > 1 => count,
@@ -64,8 +67,7 @@ impl Gpu {
             if self.trouble.lost().is_some() {
                 break Err(RenderError::Gpu("memory ran out".to_owned()));
             }
-            let most = &mut self.limits.max_texture_array_layers;
-            *most = (count - count.div_ceil(4)).min(*most);
+            self.photo_layers = (count - count.div_ceil(4)).min(self.photo_layers);
         };
         self.told(loaded)
     }
@@ -140,13 +142,12 @@ impl Gpu {
     }
 
     fn photo_room(&self, frame: &Frame<'_>, count: usize) -> Result<Room, RenderError> {
-        Room::of(
-            Content::Photos,
-            array_size(frame),
-            count as u32,
-            self.residency.budget,
-            &self.limits,
-        )
+        let limits = wgpu::Limits {
+            max_texture_array_layers: self.photo_layers,
+            ..self.limits.clone()
+        };
+        let (size, budget) = (array_size(frame), self.residency.budget);
+        Room::of(Content::Photos, size, count as u32, budget, &limits)
     }
 
     /// What a group of triangles may have at most.

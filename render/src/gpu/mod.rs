@@ -45,8 +45,10 @@ pub struct Gpu {
     asked: DeviceLimits,
     /// Whether software drivers were passed over.
     is_real: bool,
-    /// The device's, within what was asked; fewer layers once memory ran out.
+    /// The device's, within what was asked.
     limits: wgpu::Limits,
+    /// Layers that the photos' array may have: fewer once memory ran out, until other photos come.
+    photo_layers: u32,
     pipelines: Pipelines,
     sampler: wgpu::Sampler,
     photos: Option<Layers>,
@@ -133,6 +135,7 @@ impl Gpu {
             info,
             asked,
             is_real: real,
+            photo_layers: limits.max_texture_array_layers,
             limits,
             pipelines,
             sampler,

@@ -125,9 +125,9 @@ impl Layers {
             most -= 1;
         }
         if wanted.len() > most as usize {
+            // The same words for every such frame, so that they are said once.
             return Err(Shortage::Render(RenderError::Gpu(format!(
-                "{} {} are needed at once, and this device holds {most}; use --device cpu",
-                wanted.len(),
+                "more {} are needed at once than this device holds; use --device cpu",
                 content.name()
             ))));
         }
