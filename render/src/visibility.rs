@@ -9,14 +9,18 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Of a source view that something hides a point from, this much is left: nothing beside a
-/// view that sees it, and something where no view does.
-pub(crate) const HIDDEN: f64 = 1e-3;
+/// The fourth root of what is left of a source view that something hides a point from: of a
+/// thousandth, which is nothing beside a view that sees it, and something where no view does.
+/// There it counts how views stand to one another, so each power of ten from one to a thousandth
+/// has about a third of the way: only so does a view that begins to see take over smoothly.
+pub(crate) const HIDDEN_ROOT: f64 = 0.177_827_941_003_892_28;
 
 /// How much farther than what a source view sees a point may lie, relatively, before it
-/// starts to count as hidden; at twice that it is. Meshes are not exact, and slanted
-/// surfaces change within a texel.
+/// starts to count as hidden. Meshes are not exact, and slanted surfaces change within a texel.
 pub(crate) const TOLERANCE: f64 = 0.02;
+
+/// How much farther still until it is hidden, in tolerances.
+pub(crate) const FADE: f64 = 1.75;
 
 /// Photo pixels a texel of a map, across and down.
 pub(crate) const REDUCTION: u32 = 2;
@@ -195,8 +199,9 @@ pub(crate) fn visible(inverse_distance: f64, nearest: f64) -> f64 {
     if beyond <= slack {
         return 1.0;
     }
-    let s = ((2.0 * slack - beyond) / slack).clamp(0.0, 1.0);
-    HIDDEN + (1.0 - HIDDEN) * s * s * (3.0 - 2.0 * s)
+    let r = ((beyond - slack) / (FADE * slack)).clamp(0.0, 1.0);
+    let root = 1.0 - (1.0 - HIDDEN_ROOT) * r * r * (3.0 - 2.0 * r);
+    (root * root) * (root * root)
 }
 
 /// The reduction, for the twins that sample the maps by pixels of the photo.

@@ -464,9 +464,7 @@ fn continuity() {
 
     let fields_of_view = Changes::along_sweeps(&wall, Blend::Consistent, 12);
     let visibility = Changes::along_sweeps(&around, Blend::Consistent, 12);
-    // Where one camera begins to see what none did, it takes over from all those that only
-    // guess within a fraction of a pixel: steep, and a matter of more halvings.
-    let first_to_see = Changes::along_sweeps(&beside, Blend::Consistent, 20);
+    let first_to_see = Changes::along_sweeps(&beside, Blend::Consistent, 12);
     let paper = Changes::along_sweeps(&wall, Blend::Paper, 12);
     println!(
         "plane: {fields_of_view:?}\nhills: {visibility:?}\nhills, seen only from beside: \

@@ -5,7 +5,7 @@ use super::source::Sight;
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
-use crate::visibility::{DistanceMap, HIDDEN, TEXEL_PER_PIXEL, TOLERANCE};
+use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TEXEL_PER_PIXEL, TOLERANCE};
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
 use std::ops::{Add, Mul, Sub};
@@ -135,6 +135,7 @@ pub(super) fn visible(map: &DistanceMap, [u, v]: [f32; 2], inverse_distance: f32
     if beyond <= slack {
         return 1.0;
     }
-    let s = ((2.0 * slack - beyond) / slack).clamp(0.0, 1.0);
-    HIDDEN as f32 + (1.0 - HIDDEN as f32) * s * s * (3.0 - 2.0 * s)
+    let r = ((beyond - slack) / (FADE as f32 * slack)).clamp(0.0, 1.0);
+    let root = 1.0 - (1.0 - HIDDEN_ROOT as f32) * r * r * (3.0 - 2.0 * r);
+    (root * root) * (root * root)
 }

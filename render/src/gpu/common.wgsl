@@ -409,9 +409,10 @@ fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f
 // See IGNORED of mask.rs.
 const IGNORED: f32 = 0.5;
 
-// TOLERANCE and HIDDEN of visibility.rs.
+// As in visibility.rs.
 const TOLERANCE: f32 = 0.02;
-const HIDDEN: f32 = 1e-3;
+const FADE: f32 = 1.75;
+const HIDDEN_ROOT: f32 = 0.17782794;
 
 // How much a photo counts at a point: little where something is before it.
 fn visible(source_idx: u32, sight: Sight) -> f32 {
@@ -426,8 +427,9 @@ fn visible(source_idx: u32, sight: Sight) -> f32 {
     if beyond <= slack {
         return 1.0;
     }
-    let s = clamp((2.0 * slack - beyond) / slack, 0.0, 1.0);
-    return HIDDEN + (1.0 - HIDDEN) * s * s * (3.0 - 2.0 * s);
+    let r = clamp((beyond - slack) / (FADE * slack), 0.0, 1.0);
+    let root = 1.0 - (1.0 - HIDDEN_ROOT) * r * r * (3.0 - 2.0 * r);
+    return (root * root) * (root * root);
 }
 
 // fovBlend, what the ignore mask leaves of it, and what is before the point.
