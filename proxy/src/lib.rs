@@ -40,7 +40,7 @@ pub use planes::{
 };
 pub use points::SparsePoint;
 pub use shell::shell;
-pub use solid::{Hit, MeshKind, Solid};
+pub use solid::{Hit, MeshKind, Scan, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 
 /// The approximate surface.

@@ -5,7 +5,7 @@ use crate::lumigraph::Lumigraph;
 use crate::sight::within_sight;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
-use proxy::{Facets, Plane, Proxy, Solid, fit_plane_for_view, points};
+use proxy::{Facets, Plane, Proxy, Scan, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
 
 /// What each pixel of the desired view looks at: a plane, by its vector q (a ray v meets
@@ -21,7 +21,7 @@ pub enum Surface {
 }
 
 /// No facet.
-pub const NO_FACET: u32 = u32::MAX;
+pub const NO_FACET: u32 = Scan::NOTHING;
 
 /// Flat facets and which of them each pixel sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -174,6 +174,14 @@ impl FacetMap {
         };
         let triangles = (0..mesh.triangles.len()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
+        if let Some(scan) = solid.scan(desired, 1) {
+            return Self {
+                moved_from: planes.len() as u32,
+                planes,
+                facet_of: scan.triangle_of,
+                size: [desired.width, desired.height],
+            };
+        }
         let world_from_camera = rotation.conjugate();
         Self::new(desired, planes, |ray, _| {
             let hit = solid.first_hit(center, world_from_camera * ray);

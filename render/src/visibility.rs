@@ -83,19 +83,26 @@ impl fmt::Debug for Visibility {
 }
 
 impl DistanceMap {
-    /// Casts a ray for each texel.
+    /// Finds what each texel sees: by scanning for a pinhole, else by a ray.
     pub fn new(solid: &Solid, view: &View) -> Self {
         let size = [view.width, view.height].map(|side| side.div_ceil(REDUCTION));
         let [width, height] = size.map(|side| side as usize);
+        let scan = solid.scan(view, REDUCTION);
         let center = view.center();
         let world_from_camera = view.camera_from_world.rotation.conjugate();
-        let ray = |x: usize, y: usize| {
+        let inverse_distance = |x: usize, y: usize| {
             let at = |i: usize| (i as f64 + 0.5) * f64::from(REDUCTION);
             let ray = view.lens.unproject(Pixel::new(at(x), at(y)))?;
+            if let Some(scan) = &scan {
+                return Some(scan.inverse_depth[y * width + x] * ray.z / ray.length());
+            }
             let hit = solid.first_hit(center, world_from_camera * ray)?;
             Some(1.0 / (hit.along * ray.length()))
         };
-        let row = |y: usize| -> Vec<f64> { (0..width).map(|x| ray(x, y).unwrap_or(0.0)).collect() };
+        let row = |y: usize| -> Vec<f64> {
+            let texel = |x| inverse_distance(x, y).unwrap_or(0.0);
+            (0..width).map(texel).collect()
+        };
         let rows: Vec<Vec<f64>> = (0..height).into_par_iter().map(row).collect();
 
         // The unit keeps the values within what 16 bits hold.
