@@ -2,13 +2,15 @@
 
 use crate::frame::FrameSource;
 use crate::surface::{FacetMap, NO_FACET};
-use calibrate::{Pixel, View};
+use calibrate::{Distortion, Pixel, View};
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// The factor between inverse distances that are tried, and how many on either side.
 const STEP: f64 = 1.15;
 const STEPS: i32 = 24;
+/// More than rounding makes of a position in a photo.
+const MARGIN_PX: f64 = 1e-3;
 /// Halvings of a step in the end.
 const HALVINGS: u32 = 6;
 
@@ -30,33 +32,56 @@ fn sees(source: &FrameSource, ray: DVec3, s: f64) -> bool {
 /// Where no photo shows the proxy, its depth is a guess anyway: beside the points that it is
 /// made of, or on a dome. A guess that photos can answer paints what they show there, and
 /// not nothing. (Of house-walk's held-out pixels that are 2 to 4 %, black before.)
+///
+/// What pixels of a row see of one facet lies on a line, in a photo, too, as long as neither lens
+/// bends. So where a photo has both ends of it well inside it has all of it.
 pub(crate) fn within_sight(mut map: FacetMap, desired: &View, sources: &[FrameSource]) -> FacetMap {
     let [width, height] = map.size.map(|side| side as usize);
+    let is_straight = desired.lens.distortion() == Distortion::None;
     let moved_in_row = |y: usize| {
+        let facets = &map.facet_of[y * width..(y + 1) * width];
+        // The pixel's ray and the inverse distance of what it sees.
+        let looks = |x: usize| {
+            let center = Pixel::center_of(x as u32, y as u32);
+            let ray = desired.lens.unproject(center)?;
+            Some((ray, map.planes[facets[x] as usize].dot(ray)))
+        };
         // The view that saw the last pixel mostly sees the next.
         let mut last = 0;
         let mut moved = Vec::new();
-        for x in 0..width {
-            let facet = map.facet_of[y * width + x];
-            let center = Pixel::center_of(x as u32, y as u32);
-            let Some(ray) = desired.lens.unproject(center).filter(|_| facet != NO_FACET) else {
-                continue;
-            };
-            let s = map.planes[facet as usize].dot(ray);
-            let mut seen = |s: f64| {
-                let hint = sources.get(last).filter(|source| sees(source, ray, s));
-                let found = match hint {
-                    Some(_) => Some(last),
-                    None => sources.iter().position(|source| sees(source, ray, s)),
-                };
-                last = found.unwrap_or(last);
-                found.is_some()
-            };
-            if !(s >= 0.0) || seen(s) {
+        let mut next = 0;
+        for run in facets.chunk_by(|a, b| a == b) {
+            let pixels = next..next + run.len();
+            next = pixels.end;
+            if run[0] == NO_FACET {
                 continue;
             }
-            if let Some(s) = nearest_seen(s, &mut seen) {
-                moved.push((x, ray * (s / ray.length_squared())));
+            if is_straight && let Some(source) = sources.get(last) {
+                let ends = [pixels.start, pixels.end - 1].map(looks);
+                let is_inside = |end: Option<(DVec3, f64)>| {
+                    end.is_some_and(|(ray, s)| s >= 0.0 && has_well_inside(source, ray, s))
+                };
+                if ends.into_iter().all(is_inside) {
+                    continue;
+                }
+            }
+            for x in pixels {
+                let Some((ray, s)) = looks(x) else { continue };
+                let mut seen = |s: f64| {
+                    let hint = sources.get(last).filter(|source| sees(source, ray, s));
+                    let found = match hint {
+                        Some(_) => Some(last),
+                        None => sources.iter().position(|source| sees(source, ray, s)),
+                    };
+                    last = found.unwrap_or(last);
+                    found.is_some()
+                };
+                if !(s >= 0.0) || seen(s) {
+                    continue;
+                }
+                if let Some(s) = nearest_seen(s, &mut seen) {
+                    moved.push((x, ray * (s / ray.length_squared())));
+                }
             }
         }
         moved
@@ -69,6 +94,20 @@ pub(crate) fn within_sight(mut map: FacetMap, desired: &View, sources: &[FrameSo
         }
     }
     map
+}
+
+/// Whether the point at ray / s lies inside a source view's image, beyond doubt of rounding, and
+/// its lens does not bend.
+fn has_well_inside(source: &FrameSource, ray: DVec3, s: f64) -> bool {
+    if !source.takes_part() || source.lens.distortion() != Distortion::None {
+        return false;
+    }
+    let point = source.rotation * ray + source.translation * s;
+    let [width, height] = source.size;
+    source.lens.project(point).is_some_and(|p| {
+        let inside = p.x.min(width - p.x).min(p.y).min(height - p.y);
+        inside >= MARGIN_PX
+    })
 }
 
 /// The inverse distance nearest to `s`, by its ratio, that is seen; `None` if none tried is.

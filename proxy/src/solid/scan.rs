@@ -1,9 +1,10 @@
 //! What a pinhole camera sees of a mesh, all pixels at once: much faster than a ray for each.
 //!
 //! Corners are taken to where a pixel's ray is (x, y, 1). There the side from corner A to B is the
-//! plane A × B through the eye, and a triangle's inverse depth is linear, too, n = (A × B + B × C
-//! + C × A) / A·(B × C); so nothing is divided by a depth, and no triangle need be cut at the eye
-//! (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates").
+//! plane A × B through the eye, and a triangle's inverse depth is linear, too:
+//! (A × B + B × C + C × A) / A·(B × C). So nothing is divided by a depth, and no triangle need be
+//! cut at the eye (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous
+//! coordinates").
 
 use super::Solid;
 use calibrate::{Distortion, View};

@@ -4,7 +4,7 @@ use super::patch::Patch;
 use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
-use crate::reference::candidate;
+use crate::near::Near;
 use crate::surface::Surface;
 use crate::view_tree::Ball;
 use calibrate::Pixel;
@@ -56,6 +56,7 @@ impl List {
             corners,
             points: [a, b, c],
             patch: OnceCell::new(),
+            asked: OnceCell::new(),
         };
         let mut listed = triangle.known();
         let mut bounds = triangle.bounds(&listed);
@@ -172,6 +173,7 @@ struct Triangle<'a> {
     /// Those of the corners.
     points: [ProxyPoint; 3],
     patch: OnceCell<Patch>,
+    asked: OnceCell<Vec<Near>>,
 }
 
 impl Triangle<'_> {
@@ -225,6 +227,32 @@ impl Triangle<'_> {
         }
     }
 
+    /// What counts at points spread over the triangle.
+    fn asked(&self) -> &[Near] {
+        self.asked.get_or_init(|| self.ask(self.patch().points()))
+    }
+
+    /// What counts at points of the triangle, with the views in sight of them.
+    fn ask(&self, points: impl Iterator<Item = ProxyPoint>) -> Vec<Near> {
+        let within = self.corners.map(|corner| corner.near.within);
+        let mut guess = within.into_iter().fold(self.frame.first_guess(), f64::max);
+        let sight = 0.5 * (0..3).map(|c| self.reach(c)).fold(0.0, f64::max);
+        let near = |point| self.frame.near(&point, sight, &mut guess);
+        points.map(near).collect()
+    }
+
+    /// How far the triangle reaches from a corner, in the world.
+    fn reach(&self, c: usize) -> f64 {
+        let places = self.points.map(|p| p.ray / p.inverse_distance);
+        let others = [(c + 1) % 3, (c + 2) % 3];
+        let far = others.map(|other| places[c].distance(places[other]));
+        if far.iter().all(|far| far.is_finite()) {
+            far[0].max(far[1])
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// Those that see all of a triangle bound the threshold at each corner from above.
     fn bounds(&self, listed: &[Listed]) -> [f64; 3] {
         let mut diffs = Vec::with_capacity(listed.len());
@@ -240,43 +268,23 @@ impl Triangle<'_> {
     /// hardly any sees all of the triangle, those that points within it say.
     fn others_within(&self, bounds: [f64; 3]) -> Vec<u32> {
         let frame = self.frame;
-        let places = self.points.map(|p| p.ray / p.inverse_distance);
-        // How far the triangle reaches from a corner.
-        let reach = |c: usize| {
-            let others = [(c + 1) % 3, (c + 2) % 3];
-            let far = others.map(|other| places[c].distance(places[other]));
-            if far.iter().all(|far| far.is_finite()) {
-                far[0].max(far[1])
-            } else {
-                f64::INFINITY
-            }
-        };
         let mut views = Vec::new();
         if bounds.contains(&f64::INFINITY) && frame.view_tree().is_large() {
             // Borders anywhere: what the corners and points between them need, all of it may.
-            let within = self.corners.map(|corner| corner.near.within);
-            let mut guess = within.into_iter().fold(frame.first_guess(), f64::max);
-            let sight = 0.5 * (0..3).map(reach).fold(0.0, f64::max);
-            let mut ask = |point: ProxyPoint| {
-                let near = frame.near(&point, sight, &mut guess);
-                views.extend(near.views);
-                near.within
-            };
             if frame.lumigraph.visibility.is_some() {
                 // Where a surface can hide a part of itself it may jump between them.
-                let most = self.patch().points().map(ask).fold(0.0, f64::max);
-                let mut found = Vec::new();
-                frame.views_within(self.patch().ball().as_ref(), most, &mut found);
-                views.extend(found);
+                let most = self.asked().iter().map(|near| near.within);
+                let most = most.fold(0.0, f64::max);
+                frame.views_within(self.patch().ball().as_ref(), most, &mut views);
+                views.extend(self.asked().iter().flat_map(|near| &near.views));
             } else {
-                self.patch().between().for_each(|point| {
-                    ask(point);
-                });
+                let nears = self.ask(self.patch().between());
+                views.extend(nears.iter().flat_map(|near| &near.views));
             }
         } else {
             let mut found = Vec::new();
             for c in (0..3).filter(|&c| bounds[c] > self.corners[c].near.within) {
-                let ball = Ball::around(&self.points[c], reach(c));
+                let ball = Ball::around(&self.points[c], self.reach(c));
                 frame.views_within(ball.as_ref(), bounds[c], &mut found);
                 views.extend_from_slice(&found);
             }
@@ -293,29 +301,25 @@ impl Triangle<'_> {
         if !matches!(frame.surface, Surface::Facets(_)) || !self.patch().is_moved {
             return Vec::new();
         }
-        let mut seen = BTreeSet::new();
-        let mut guess = frame.first_guess();
-        for point in self.patch().points() {
-            let near = frame.near(&point, 0.0, &mut guess);
-            seen.extend(near.candidates.iter().map(|c| c.source_idx));
-        }
+        let candidates = self.asked().iter().flat_map(|near| &near.candidates);
+        let seen: BTreeSet<usize> = candidates.map(|c| c.source_idx).collect();
         seen.into_iter().collect()
     }
 
-    /// The best rank, by difference, that listed views have among those of them that see a point,
-    /// for points spread over the triangle.
+    /// The best rank, by difference, that listed views have among those of them that count at a
+    /// point, for points spread over the triangle.
     fn ranks(&self, listed: &[Listed]) -> BTreeMap<usize, usize> {
-        let frame = self.frame;
+        let is_listed = |i: usize| {
+            listed
+                .binary_search_by_key(&i, |view| view.source_idx)
+                .is_ok()
+        };
         let mut ranks = BTreeMap::new();
-        for point in self.patch().points() {
-            let seeing = listed.iter().filter_map(|view| {
-                let i = view.source_idx;
-                let pixel = frame.project(i, &point)?;
-                let seen = candidate(frame, i, &point, pixel, || frame.difference(i, &point))?;
-                Some((seen.diff, i))
-            });
-            let mut seeing: Vec<(f64, usize)> = seeing.collect();
-            seeing.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for near in self.asked() {
+            let candidates = near.candidates.iter().filter(|c| is_listed(c.source_idx));
+            let mut seeing: Vec<(f64, usize)> =
+                candidates.map(|c| (c.diff, c.source_idx)).collect();
+            seeing.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
             for (rank, (_, i)) in seeing.into_iter().enumerate() {
                 let best = ranks.entry(i).or_insert(rank);
                 *best = rank.min(*best);
