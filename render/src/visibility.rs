@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 /// thousandth, which is nothing beside a view that sees it, and something where no view does.
 /// There it counts how views stand to one another, so each power of ten from one to a thousandth
 /// has about a third of the way: only so does a view that begins to see take over smoothly.
-pub(crate) const HIDDEN_ROOT: f64 = 0.177_827_941_003_892_28;
+pub(crate) const HIDDEN_ROOT: f64 = 0.177_827_941_003_892_3;
 
 /// How much farther than what a source view sees a point may lie, relatively, before it
 /// starts to count as hidden. Meshes are not exact, and slanted surfaces change within a texel.
