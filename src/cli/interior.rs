@@ -3,7 +3,9 @@
 use super::Usage;
 use super::output::{print, say};
 use anyhow::{Context, bail};
-use proxy::interior::{Contents, Interior, interior_from_nodes, read_rooms, write_interior};
+use proxy::interior::{
+    Contents, Interior, interior_from_nodes, read_interior, read_rooms, write_interior,
+};
 use proxy::mesh::{MeshFileError, parse_model};
 use std::path::{Path, PathBuf};
 
@@ -101,7 +103,20 @@ fn write(args: &Args, model: &[u8], interior: &Interior) -> anyhow::Result<()> {
 }
 
 /// The interior's own file in its folder.
-pub(super) const INTERIOR: &str = "interior.json";
+const INTERIOR: &str = "interior.json";
+
+/// Opens an interior, its folder or its file, says what is odd, and where the file is.
+pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
+    let path = match given.is_dir() {
+        true => given.join(INTERIOR),
+        false => given.to_owned(),
+    };
+    let (interior, warnings) = read_interior(&path)?;
+    for warning in warnings {
+        say!("warning: {warning}");
+    }
+    Ok((path, interior))
+}
 
 /// Whether a folder is empty, or holds an interior and one model.
 fn may_be_replaced(folder: &Path) -> anyhow::Result<bool> {
