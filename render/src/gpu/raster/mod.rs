@@ -195,6 +195,7 @@ impl GpuRaster {
         {
             let mut pass = pass(&mut encoder, "shade", &frame.drawn.view, None);
             pass.set_bind_group(0, &of_model, &[]);
+            pass.set_bind_group(1, &of_list, &[]);
             pass.set_bind_group(2, &of_looks, &[]);
             pass.set_pipeline(&pipelines.shade);
             pass.draw(0..3, 0..1);

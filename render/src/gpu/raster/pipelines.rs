@@ -3,8 +3,8 @@
 use crate::gpu::pipelines::group;
 use wgpu::{BindGroupLayout, Device, ShaderStages, TextureFormat};
 
-/// Which triangle a pixel sees.
-pub(super) const SEEN: TextureFormat = TextureFormat::R32Uint;
+/// Which triangle a pixel sees, and in which window.
+pub(super) const SEEN: TextureFormat = TextureFormat::Rg32Uint;
 /// A pixel's colour and the bits of its inverse depth.
 pub(super) const DRAWN: TextureFormat = TextureFormat::Rg32Uint;
 /// The nearer the greater, and 0 where nothing is.
@@ -97,7 +97,7 @@ impl Pipelines {
             let groups = [Some(&layouts[0]), Some(&layouts[1]), None];
             pipeline("corner", fragment, groups, SEEN, Some(depth))
         };
-        let looks = [Some(&layouts[0]), None, Some(&layouts[2])];
+        let looks = [0, 1, 2].map(|i| Some(&layouts[i]));
         Self {
             in_front: met("in_front"),
             in_front_in_window: met("in_front_in_window"),

@@ -26,7 +26,7 @@ struct Camera {
 // By window from 1 on, and by row: the pixels from … to before.
 @group(1) @binding(1) var windows: texture_2d<u32>;
 
-// By pixel: one more than the triangle; 0 for none.
+// By pixel: one more than the triangle, 0 for none, and its window.
 @group(2) @binding(0) var seen: texture_2d<u32>;
 // By corner.
 @group(2) @binding(1) var uvs: texture_2d<u32>;
@@ -80,20 +80,20 @@ fn is_outside(window: u32, pixel: vec2u) -> bool {
 
 // A triangle whose depths the device interpolates well.
 @fragment
-fn in_front(it: Corner) -> @location(0) u32 {
-    return it.triangle + 1u;
+fn in_front(it: Corner) -> @location(0) vec2u {
+    return vec2u(it.triangle + 1u, 0u);
 }
 
 @fragment
-fn in_front_in_window(it: Corner) -> @location(0) u32 {
+fn in_front_in_window(it: Corner) -> @location(0) vec2u {
     if is_outside(it.window, vec2u(it.position.xy)) {
         discard;
     }
-    return it.triangle + 1u;
+    return vec2u(it.triangle + 1u, it.window);
 }
 
 struct Across {
-    @location(0) triangle: u32,
+    @location(0) seen: vec2u,
     @builtin(frag_depth) depth: f32,
 }
 
@@ -105,17 +105,22 @@ fn across(it: Corner) -> Across {
     if is_outside(it.window, pixel) {
         discard;
     }
-    let depth = camera.picture.z * inverse_depth(met(it.triangle, pixel));
-    return Across(it.triangle + 1u, clamp(depth, 0.0, 1.0));
+    let depth = camera.picture.z * met(it.triangle, pixel).inverse_depth;
+    return Across(vec2u(it.triangle + 1u, it.window), clamp(depth, 0.0, 1.0));
 }
 
 struct Met {
     corners: vec4u,
     // Barycentric weights, none negative.
     shares: vec3f,
-    // Depths of the corners.
-    depths: vec3f,
+    // 1 / z there; 0 where it does not meet the plane in front.
+    inverse_depth: f32,
+    // Whether it meets the triangle.
+    is_inside: bool,
 }
+
+// How far outside of a triangle still counts as inside, in shares of its size.
+const NEARLY: f32 = 3e-5;
 
 // Where the ray through a pixel's centre meets a triangle's plane.
 fn met(triangle: u32, pixel: vec2u) -> Met {
@@ -127,14 +132,17 @@ fn met(triangle: u32, pixel: vec2u) -> Met {
     // Olano and Greer 1997: the edges' values are the weights but for their sum.
     let weights = vec3f(dot(cross(b, c), ray), dot(cross(c, a), ray), dot(cross(a, b), ray));
     let sum = weights.x + weights.y + weights.z;
-    let inside = max(select(weights, -weights, sum < 0.0), vec3f(0.0));
+    let turned = select(weights, -weights, sum < 0.0);
+    let inside = max(turned, vec3f(0.0));
     let all = inside.x + inside.y + inside.z;
     let shares = select(vec3f(1.0, 0.0, 0.0), inside / all, all > 0.0);
-    return Met(corners, shares, vec3f(a.z, b.z, c.z));
+    let depth = dot(shares, vec3f(a.z, b.z, c.z));
+    let is_inside = all > 0.0 && all_at_least(turned, -NEARLY * all);
+    return Met(corners, shares, select(0.0, 1.0 / depth, depth > 0.0), is_inside);
 }
 
-fn inverse_depth(it: Met) -> f32 {
-    return 1.0 / max(dot(it.shares, it.depths), 1e-30);
+fn all_at_least(v: vec3f, least: f32) -> bool {
+    return v.x >= least && v.y >= least && v.z >= least;
 }
 
 // One triangle that covers the picture.
@@ -196,10 +204,31 @@ fn corner_uv(i: u32) -> vec2f {
 fn shade(@builtin(position) position: vec4f) -> @location(0) vec2u {
     let pixel = vec2u(position.xy);
     let found = textureLoad(seen, pixel, 0).x;
-    if found == 0u {
+    var it = Met(vec4u(0u), vec3f(0.0), 0.0, false);
+    if found > 0u {
+        it = met(found - 1u, pixel);
+    }
+    // Devices move corners to a grid. Where one lies on another triangle's side that opens cracks;
+    // what should be there is next to them.
+    let size = vec2i(camera.picture.xy);
+    for (var k = 0u; k < 4u; k++) {
+        let step = select(-1, 1, (k & 1u) == 1u);
+        let beside = vec2i(pixel) + select(vec2i(0, step), vec2i(step, 0), k < 2u);
+        if any(beside < vec2i(0)) || any(beside >= size) {
+            continue;
+        }
+        let other = textureLoad(seen, beside, 0).xy;
+        if other.x == 0u || other.x == found || is_outside(other.y, pixel) {
+            continue;
+        }
+        let there = met(other.x - 1u, pixel);
+        if there.is_inside && there.inverse_depth > it.inverse_depth {
+            it = there;
+        }
+    }
+    if it.inverse_depth == 0.0 {
         return vec2u(0u);
     }
-    let it = met(found - 1u, pixel);
     var color = it.shares.x * corner_color(it.corners.x)
         + it.shares.y * corner_color(it.corners.y)
         + it.shares.z * corner_color(it.corners.z);
@@ -218,5 +247,5 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec2u {
     }
     let codes = vec3u(clamp(floor(color + 0.5), vec3f(0.0), vec3f(255.0)));
     let packed = codes.x | (codes.y << 8u) | (codes.z << 16u) | (255u << 24u);
-    return vec2u(packed, bitcast<u32>(inverse_depth(it) / camera.picture.w));
+    return vec2u(packed, bitcast<u32>(it.inverse_depth / camera.picture.w));
 }
