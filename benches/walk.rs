@@ -15,8 +15,9 @@ use proxy::interior::{
     Contents, Interior, SemicircleOptions, SemicircleView, read_rooms, semicircles,
 };
 use proxy::mesh::{Model, read_model};
+use render::DeviceChoice;
 use render::interior::{
-    FrameCost, Pinhole, PortalFill, Raster, Target, Walk, WalkOptions, Window, tour,
+    FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Walk, WalkOptions, Window, tour,
 };
 use std::path::PathBuf;
 use std::time::Instant;
@@ -39,6 +40,9 @@ struct Args {
     /// Its rooms and openings
     #[arg(long)]
     outlines: Option<PathBuf>,
+    /// Draw the tour's geometry with whatever graphics driver there is
+    #[arg(long)]
+    gpu: bool,
     /// What cargo passes
     #[arg(long, hide = true)]
     bench: bool,
@@ -136,6 +140,10 @@ fn tours(args: &Args) {
         "images s",
         "wall, med"
     );
+    let device = match args.gpu {
+        true => DeviceChoice::Gpu,
+        false => DeviceChoice::Cpu,
+    };
     let mut culling: Vec<f64> = Vec::new();
     let whole = ("culling", PortalFill::Geometry, true);
     let others = PortalFill::ALL.map(|fill| (fill.name(), fill, false));
@@ -144,16 +152,18 @@ fn tours(args: &Args) {
             whole_cells,
             ..WalkOptions::default()
         };
-        let mut walk = Walk::new(&house.interior, &contents, &house.model, options);
+        let painter = Painter::open(device, &house.model);
+        let (interior, model) = (&house.interior, &house.model);
+        let mut walk = Walk::with(painter, interior, &contents, model, options);
         let made = Instant::now();
         let mut waits = 0.0;
         let frames: Vec<([f64; 2], FrameCost)> = path
             .frames
             .iter()
             .map(|frame| {
-                let before = walk.library().counts().1;
+                let before = walk.library().residency().loads;
                 let drawn = timed(&mut walk, &frame.view, fill);
-                if walk.library().counts().1 == before {
+                if walk.library().residency().loads == before {
                     waits += drawn.0[1];
                 }
                 drawn
@@ -183,7 +193,7 @@ fn tours(args: &Args) {
             mean(&|c| c.triangles_tried),
             mean(&|c| c.samples),
             100.0 * mean(&|c| c.holes) / f64::from(SIZE[0] * SIZE[1]),
-            walk.library().counts().1,
+            walk.library().residency().loads,
             images_s,
             spread(&wall)[0],
         );

@@ -59,4 +59,4 @@ pub use shape::{Shape, Surface};
 pub use shelf::shelf;
 pub use texture::{Motif, Texture};
 pub use wall::wall;
-pub use write::{DEPTH_STEPS_PER_UNIT, Written, write};
+pub use write::{DEPTH_STEPS_PER_UNIT, Written, in_new_folder, write};

@@ -34,7 +34,7 @@ pub struct Written {
 /// `folder` exists and is not empty, or something cannot be written; then nothing stays
 /// behind.
 pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> {
-    in_new_folder(folder, |partial| fill(dataset, partial))?;
+    in_new_folder(folder, |_| false, |partial| fill(dataset, partial))?;
     let points = &dataset.reconstruction.points;
     Ok(Written {
         folder: folder.to_owned(),
@@ -46,31 +46,34 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
 }
 
 /// Fills a folder that takes its name only when it is complete.
-pub(crate) fn in_new_folder(
+///
+/// # Errors
+/// The folder is there and not empty, and `may_be_replaced` does not say that it may go;
+/// whatever `fill` fails with; the file system's. Then nothing stays behind.
+pub fn in_new_folder<E: From<DatasetError>>(
     folder: &Path,
-    fill: impl FnOnce(&Path) -> Result<(), DatasetError>,
-) -> Result<(), DatasetError> {
+    may_be_replaced: impl FnOnce(&Path) -> bool,
+    fill: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
     // 1. A place to work, next to the destination: renaming must not cross disks.
-    if folder.exists() && !is_empty(folder)? {
-        return Err(DatasetError::NotEmpty {
-            folder: folder.to_owned(),
-        });
+    if folder.exists() && !is_empty(folder)? && !may_be_replaced(folder) {
+        let folder = folder.to_owned();
+        return Err(DatasetError::NotEmpty { folder }.into());
     }
     let partial = partial_name(folder);
     make_folder(&partial)?;
     // 2. Fill it, and let it take the destination's place.
     let done = fill(&partial).and_then(|()| {
         if folder.exists() {
-            std::fs::remove_dir(folder).map_err(|source| io(folder, source))?;
+            std::fs::remove_dir_all(folder).map_err(|source| io(folder, source))?;
         }
-        std::fs::rename(&partial, folder).map_err(|source| io(folder, source))
+        Ok(std::fs::rename(&partial, folder).map_err(|source| io(folder, source))?)
     });
-    if let Err(error) = done {
+    if done.is_err() {
         // The first error is the one to tell.
         let _ = std::fs::remove_dir_all(&partial);
-        return Err(error);
     }
-    Ok(())
+    done
 }
 
 fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {

@@ -106,6 +106,7 @@ impl Corpus {
         };
         let glb = proxy::mesh::to_glb(&square, &[], None).map_err(io::Error::other)?;
         self.add("mesh_glb", "own", &glb)?;
+        self.add("model_glb", "own", &model::textured_glb())?;
         self.add("mesh_ply", "own", &proxy::mesh::to_ply(&square, "by hand"))
     }
 
@@ -177,6 +178,7 @@ impl Corpus {
             "jpg" | "png" if bytes.len() < 12_000 => self.add("photo", &name, &bytes),
             "glb" => {
                 self.add("mesh_glb", &name, &bytes)?;
+                self.add("model_glb", &name, &bytes)?;
                 self.add("proxy_glb", &name, &bytes)
             }
             "obj" | "ply" => self.add(&format!("mesh_{extension}"), &name, &bytes),

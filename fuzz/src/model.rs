@@ -1,4 +1,4 @@
-//! A small COLMAP model in both formats.
+//! A small COLMAP model in both formats, and a small textured one.
 
 use calibrate::colmap;
 use std::path::Path;
@@ -37,4 +37,41 @@ pub fn written(
     });
     std::fs::remove_dir_all(folder).expect("just written");
     files
+}
+
+/// Two rooms, an opening and a texture, as .glb.
+pub fn textured_glb() -> Vec<u8> {
+    use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, model_to_glb};
+    let node = |name: &str| ModelNode {
+        name: name.to_owned(),
+        parent_idx: None,
+    };
+    let part = |i: u32| Part {
+        triangles: i..i + 1,
+        node_idx: i,
+        material_idx: 0,
+    };
+    let model = Model {
+        mesh: Mesh {
+            positions: vec![
+                glam::DVec3::ZERO,
+                glam::DVec3::X,
+                glam::DVec3::Y,
+                glam::DVec3::Z,
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [1, 2, 3]],
+        },
+        uvs: vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]],
+        colors: vec![[255; 4], [0, 1, 2, 255], [9, 9, 9, 255], [254, 255, 0, 255]],
+        parts: vec![part(0), part(1), part(2)],
+        nodes: vec![node("cell:a"), node("cell:b"), node("portal:a|b")],
+        materials: vec![Material {
+            texture_idx: Some(0),
+            ..Material::default()
+        }],
+        textures: vec![image::RgbaImage::from_fn(4, 2, |x, y| {
+            image::Rgba([60 * x as u8, 100 * y as u8, 7, 255])
+        })],
+    };
+    model_to_glb(&model).expect("a model that is whole")
 }

@@ -93,8 +93,7 @@ fn a_model_comes_back_from_its_file() {
     for (a, b) in back.materials[1].base_color.iter().zip([0.5, 0.25, 1.0]) {
         assert!((a - b).abs() < 1e-6);
     }
-    let names: Vec<&str> = back.names_up(1).collect();
-    assert_eq!(names, ["chair", "cell:a"]);
+    assert_eq!(back.nodes, model.nodes);
     // The geometry is what the reader of meshes finds.
     let mesh = mesh::parse(Path::new("m.glb"), &bytes).unwrap();
     assert_eq!(mesh, back.mesh);

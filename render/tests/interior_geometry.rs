@@ -3,7 +3,7 @@
 mod house;
 
 use glam::DVec3;
-use house::{drawn, small_house, view, viewpoint};
+use house::{Pixels, drawn, small_house, view, viewpoint};
 use image::RgbaImage;
 use proxy::interior::{Contents, visible};
 use rayon::prelude::*;
@@ -21,29 +21,19 @@ fn draw(model: &proxy::mesh::Model, lists: &[&[u32]], view: &calibrate::View) ->
     target
 }
 
-/// How many pixels differ, and how many of them lie farther than 1.5 pixels from an edge of the
-/// true picture: of depth or of colour.
+/// How many pixels differ, and how many of them at no edge of the true picture.
 fn compare(ours: &Target, truth: &RgbaImage, depths: &[f64]) -> (usize, usize) {
-    let (width, height) = truth.dimensions();
-    let at = |x: u32, y: u32| (y * width + x) as usize;
-    let differs = |x: u32, y: u32| {
-        let ours = ours.color[at(x, y)];
-        let pairs = ours.iter().zip(truth.get_pixel(x, y).0);
-        pairs.into_iter().any(|(a, b)| a.abs_diff(b) > 2)
+    let pixels = Pixels::of_rays(truth, depths);
+    let differs = |(ours, theirs): (&[u8; 4], &image::Rgba<u8>)| {
+        (0..4).any(|k| ours[k].abs_diff(theirs.0[k]) > 2)
     };
-    let is_edge = |x: u32, y: u32| {
-        let around = |low: u32, end: u32| low.saturating_sub(1)..=(low + 1).min(end - 1);
-        let pixels = around(y, height).flat_map(|v| around(x, width).map(move |u| (u, v)));
-        let (z, color) = (depths[at(x, y)], truth.get_pixel(x, y).0);
-        pixels.into_iter().any(|(u, v)| {
-            let other = truth.get_pixel(u, v).0;
-            let far = (depths[at(u, v)] - z).abs() > 0.01 * z;
-            far || (0..3).any(|k| color[k].abs_diff(other[k]) > 8)
-        })
-    };
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    let wrong: Vec<(u32, u32)> = pixels.filter(|&(x, y)| differs(x, y)).collect();
-    let off = wrong.iter().filter(|&&(x, y)| !is_edge(x, y)).count();
+    let wrong = ours.color.iter().zip(truth.pixels()).map(differs);
+    let wrong: Vec<usize> = (0..)
+        .zip(wrong)
+        .filter(|(_, is)| *is)
+        .map(|(i, _)| i)
+        .collect();
+    let off = wrong.iter().filter(|i| !pixels.is_edge(**i)).count();
     (wrong.len(), off)
 }
 

@@ -5,7 +5,6 @@ mod house;
 use calibrate::{Lens, Rigid3, View};
 use glam::{DVec2, DVec3};
 use house::{random, room, small_house, view, viewpoint};
-use proptest::prelude::*;
 use proxy::interior::{
     CellId, Contents, Interior, PortalId, SemicircleOptions, SemicircleView, parse_rooms,
     semicircles,
@@ -13,7 +12,7 @@ use proxy::interior::{
 use proxy::mesh::Model;
 use render::interior::{
     CellGeometry, Pinhole, PortalFill, Reference, Splat, Target, Walk, WalkOptions, Warp, Window,
-    inverse_depth_of_buffer, texture, warp,
+    texture, warp,
 };
 use render::score::score;
 use std::path::Path;
@@ -344,14 +343,14 @@ fn nothing_pops_as_one_comes_nearer() {
             walk.picture().picture()
         };
         let [a, b] = [at - 1e-6, at + 1e-6].map(|off| picture(&mut walk, off));
-        // But for the last pixels of edges, which move on, and what no image shows: this eye is
-        // lower than where images were made.
+        // But for the last pixels of edges, which move on.
         let is_changed = |(p, q): &(&image::Rgba<u8>, &image::Rgba<u8>)| {
-            (0..3).any(|k| p.0[k].abs_diff(q.0[k]) > 1)
+            let seen = |p: &image::Rgba<u8>, k: usize| u32::from(p.0[k]) * u32::from(p.0[3]) / 255;
+            (0..3).any(|k| seen(p, k).abs_diff(seen(q, k)) > 1)
         };
         let changed = a.pixels().zip(b.pixels()).filter(is_changed).count();
         eprintln!("{changed} pixels change at {at} widths");
-        assert!(changed <= 240, "portal {id:?} at {at} widths: {changed}");
+        assert!(changed <= 4, "portal {id:?} at {at} widths: {changed}");
     }
 }
 
@@ -483,18 +482,5 @@ fn a_texture_is_right_where_it_was_made() {
     assert!(drawn > 2500, "{drawn}");
     for (ours, theirs) in target.color.iter().zip(&reference.seen.color) {
         assert!(theirs[3] == 0 || ours == theirs);
-    }
-}
-
-proptest! {
-    #[test]
-    fn buffers_of_depth_are_inverse_depths(near in 1e-3..1.0, ratio in 2.0..1e4, share in 0.0..1.0) {
-        let far = near * ratio;
-        let depth: f64 = near + share * (far - near);
-        // OpenGL's, after division and the viewport.
-        let buffer = far * (depth - near) / (depth * (far - near));
-        let found = inverse_depth_of_buffer(buffer, near, far);
-        prop_assert!((found * depth - 1.0).abs() < 1e-9 * ratio);
-        prop_assert!(((1.0 - buffer * (far - near) / far) - near / depth).abs() < 1e-12);
     }
 }

@@ -2,8 +2,11 @@
 
 use super::Usage;
 use super::output::{print, say};
-use anyhow::{Context, bail};
-use proxy::interior::{Contents, Interior, interior_from_nodes, read_rooms, write_interior};
+use anyhow::Context;
+use datasets::in_new_folder;
+use proxy::interior::{
+    Contents, Interior, interior_from_nodes, read_interior, read_rooms, write_interior,
+};
 use proxy::mesh::{MeshFileError, parse_model};
 use std::path::{Path, PathBuf};
 
@@ -69,50 +72,42 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Fills a folder that takes its name only when it is complete. An interior that is there
-/// already is replaced, if it is nothing else.
+/// Writes the model and what was made of it. An interior that is there already is replaced, if it
+/// is nothing else.
 fn write(args: &Args, model: &[u8], interior: &Interior) -> anyhow::Result<()> {
-    let folder = &args.output;
-    let cannot = || format!("{}: cannot write", folder.display());
-    if folder.exists() && !may_be_replaced(folder)? {
-        bail!(
-            "{}: the folder is not empty; choose another or remove it first",
-            folder.display()
-        );
-    }
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    let partial = folder.with_file_name(format!(".{name}.partial-{}", std::process::id()));
-    let filled = || -> anyhow::Result<()> {
-        std::fs::create_dir_all(&partial).with_context(cannot)?;
-        let beside = partial.join(args.model.file_name().unwrap_or_default());
-        std::fs::write(beside, model).with_context(cannot)?;
-        write_interior(&partial.join(INTERIOR), interior)?;
-        if folder.exists() {
-            std::fs::remove_dir_all(folder).with_context(cannot)?;
-        }
-        std::fs::rename(&partial, folder).with_context(cannot)
-    };
-    let done = filled();
-    if done.is_err() {
-        // The first error is the one to tell.
-        let _ = std::fs::remove_dir_all(&partial);
-    }
-    done
+    in_new_folder(&args.output, is_ours, |folder| {
+        let beside = folder.join(args.model.file_name().unwrap_or_default());
+        std::fs::write(&beside, model)
+            .with_context(|| format!("{}: cannot write", beside.display()))?;
+        Ok(write_interior(&folder.join(INTERIOR), interior)?)
+    })
 }
 
 /// The interior's own file in its folder.
-pub(super) const INTERIOR: &str = "interior.json";
+const INTERIOR: &str = "interior.json";
 
-/// Whether a folder is empty, or holds an interior and one model.
-fn may_be_replaced(folder: &Path) -> anyhow::Result<bool> {
-    let failed = || format!("{}: cannot read", folder.display());
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(failed)? {
-        names.push(entry.with_context(failed)?.file_name());
-    }
-    let is_interior = names.iter().any(|name| name == INTERIOR);
-    let is_ours = |name: &std::ffi::OsString| {
-        name == INTERIOR || Path::new(name).extension().is_some_and(|e| e == "glb")
+/// Opens an interior, its folder or its file, says what is odd, and where the file is.
+pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
+    let path = match given.is_dir() {
+        true => given.join(INTERIOR),
+        false => given.to_owned(),
     };
-    Ok(names.is_empty() || is_interior && names.len() <= 2 && names.iter().all(is_ours))
+    let (interior, warnings) = read_interior(&path)?;
+    for warning in warnings {
+        say!("warning: {warning}");
+    }
+    Ok((path, interior))
+}
+
+/// Whether a folder holds an interior and one model, and nothing else.
+fn is_ours(folder: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return false;
+    };
+    let names: Vec<_> = entries.map(|e| e.map(|e| e.file_name())).collect();
+    let is_interior = |name: &std::ffi::OsString| name == INTERIOR;
+    let is_model = |name: &std::ffi::OsString| Path::new(name).extension() == Some("glb".as_ref());
+    let has_interior = names.iter().flatten().any(is_interior);
+    let is_known = |name: &std::ffi::OsString| is_interior(name) || is_model(name);
+    has_interior && names.len() <= 2 && names.iter().all(|n| n.as_ref().is_ok_and(is_known))
 }

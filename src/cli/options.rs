@@ -274,7 +274,7 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// `512MiB`: at least one byte.
-fn bytes(text: &str) -> Result<u64, String> {
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
     const UNITS: [(&str, u64); 10] = [
         ("", 1),
         ("b", 1),

@@ -1,10 +1,10 @@
 //! `lumigraph plan`
 
 use super::Usage;
-use super::interior::INTERIOR;
+use super::interior::open;
 use super::output::{print, print_json, say};
 use glam::DMat4;
-use proxy::interior::{CellId, Interior, SemicircleOptions, read_interior, semicircles};
+use proxy::interior::{CellId, Interior, SemicircleOptions, semicircles};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -58,14 +58,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         ))
         .into());
     }
-    let path = match args.interior.is_dir() {
-        true => args.interior.join(INTERIOR),
-        false => args.interior.clone(),
-    };
-    let (interior, warnings) = read_interior(&path)?;
-    for warning in warnings {
-        say!("warning: {warning}");
-    }
+    let (path, interior) = open(&args.interior)?;
     let options = SemicircleOptions {
         views: args.views,
         span: args.span.to_radians(),

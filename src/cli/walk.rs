@@ -1,19 +1,20 @@
 //! `lumigraph walk`
 
 use super::Usage;
-use super::interior::INTERIOR;
-use super::options::size;
+use super::interior::open;
+use super::options::{bytes, resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
 use super::plot::{Line, plot};
 use super::session::progress;
 use anyhow::{Context, bail};
 use calibrate::{Camera, Lens, View};
+use clap::ValueEnum;
 use glam::DVec2;
 use lumigraph::scene::picture_files;
-use proxy::interior::{Contents, Interior, read_interior};
+use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
-use render::interior::{FrameCost, PortalFill, Splat, Walk, WalkOptions, tour};
-use render::path;
+use render::interior::{FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, tour};
+use render::{DeviceChoice, path};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -68,12 +69,26 @@ pub(super) struct Args {
     /// Keep the last frame's colours where no image shows anything
     #[arg(long)]
     persist: bool,
+    /// What draws geometry; auto is the graphics processor if there is one, else the CPU
+    #[arg(long, value_enum, default_value = "auto")]
+    device: Device,
+    /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames; those not used
+    /// for longest are made again when they are needed [default: no limit]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
+    cpu_memory: Option<u64>,
     /// Print times, and what was drawn and skipped, as JSON
     #[arg(long)]
     json: bool,
     /// The folder for the frames
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Device {
+    Auto,
+    Gpu,
+    Cpu,
 }
 
 /// The tour's own size, that of Rafferty et al. 1998.
@@ -100,31 +115,44 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut options = WalkOptions {
         splat: args.splat.map_or(Splat::Footprint, Splat::Fixed),
-        near: args.near * 2.0 / 3.0,
-        far: args.near,
+        near: args.near,
         persist: args.persist,
         ..WalkOptions::default()
     };
     options.library.size = args.reference_size.into();
     options.library.semicircles.views = args.reference_views;
+    options.library.budget = args.cpu_memory;
+    let device = match args.device {
+        Device::Auto => DeviceChoice::Auto,
+        Device::Gpu => DeviceChoice::Gpu,
+        Device::Cpu => DeviceChoice::Cpu,
+    };
     // 2. What there is.
-    let (interior, model) = open(&args.interior)?;
+    let (path, interior) = open(&args.interior)?;
+    let model = model_of(&path, &interior)?;
     let named = || args.interior.display().to_string();
     let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
     for warning in warnings {
         say!("warning: {warning}");
     }
     let frames = frames(args, &interior, &contents)?;
-    // 3. The walks.
+    // 3. The walks: one walker, so that images are made once for all kinds.
+    let painter = Painter::open(device, &model);
+    let mut walk = Walk::with(painter, &interior, &contents, &model, options);
     let mut walks = Vec::new();
     for fill in &fills {
         let folder = match fills.len() {
             1 => args.output.clone(),
             _ => args.output.join(fill.name()),
         };
-        let walk = Walk::new(&interior, &contents, &model, options);
-        walks.push(draw(walk, *fill, &frames, &folder)?);
+        walk.begin();
+        walks.push(draw(&mut walk, *fill, &frames, &folder)?);
     }
+    for note in walk.painter().notes() {
+        say!("note: {note}");
+    }
+    let device = walk.painter().description();
+    let references = walk.library().residency();
     // 4. What it took.
     let times: Vec<Vec<f64>> = walks.iter().map(Walked::times_ms).collect();
     let lines = walks.iter().zip(&times);
@@ -142,6 +170,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "triangles": model.mesh.triangles.len(),
             "cells": interior.cells.len(),
             "portals": interior.portals.len(),
+            "device": device,
+            "references_possible": walk.library().len(),
+            "references_made": references.loads,
+            "references_let_go": references.evictions,
+            "references_peak_bytes": references.peak,
             "walks": walks,
         }));
     }
@@ -153,7 +186,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         text += &walk.line();
     }
     print(&format!(
-        "{text}{}: {} frames\n",
+        "{text}{}: {} frames, drawn by {device}\n",
         args.output.display(),
         frames.len()
     ))
@@ -181,15 +214,7 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
     Ok(once)
 }
 
-fn open(given: &Path) -> anyhow::Result<(Interior, Model)> {
-    let path = match given.is_dir() {
-        true => given.join(INTERIOR),
-        false => given.to_owned(),
-    };
-    let (interior, warnings) = read_interior(&path)?;
-    for warning in warnings {
-        say!("warning: {warning}");
-    }
+fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model> {
     let Some(name) = &interior.model else {
         bail!(
             "{}: it has no model; cells that are scenes are not drawn yet",
@@ -201,7 +226,7 @@ fn open(given: &Path) -> anyhow::Result<(Interior, Model)> {
     for warning in warnings {
         say!("warning: {}: {warning}", file.display());
     }
-    Ok((interior, model))
+    Ok(model)
 }
 
 struct Named {
@@ -227,10 +252,7 @@ fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Resu
     };
     let named = |frame: path::PathFrame| Named {
         name: frame.name,
-        view: match args.size {
-            Some((width, height)) => frame.view.resized(width, height),
-            None => frame.view,
-        },
+        view: resized(frame.view, args.size),
     };
     Ok(path.frames.into_iter().map(named).collect())
 }
@@ -239,12 +261,12 @@ fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Resu
 struct Walked {
     fill: PortalFill,
     frames: Vec<(String, PathBuf, FrameCost)>,
-    /// How many reference images there may be, and how many were made.
-    references: (usize, usize),
+    /// How many reference images it used.
+    references: usize,
 }
 
 fn draw(
-    mut walk: Walk<'_>,
+    walk: &mut Walk<'_>,
     fill: PortalFill,
     frames: &[Named],
     folder: &Path,
@@ -265,7 +287,7 @@ fn draw(
     Ok(Walked {
         fill,
         frames: drawn,
-        references: walk.library().counts(),
+        references: walk.references_used(),
     })
 }
 
@@ -288,8 +310,8 @@ struct FrameReport<'a> {
     triangles_in_cells: usize,
     /// Passed over in whole runs.
     triangles_skipped: usize,
-    /// That touch a pixel's centre.
-    triangles_met: usize,
+    /// That touch a pixel's centre; none where a graphics device drew them.
+    triangles_met: Option<usize>,
     samples: usize,
     holes: usize,
 }
@@ -327,7 +349,7 @@ impl Walked {
             self.mean(|c| c.triangles_tried),
             self.mean(|c| c.samples),
             self.mean(|c| c.holes),
-            self.references.1
+            self.references
         )
     }
 
@@ -359,8 +381,8 @@ impl Walked {
             "median_ms": median,
             "percentile_95_ms": most,
             "worst_ms": worst,
-            "references_possible": self.references.0,
-            "references_made": self.references.1,
+            "references_used": self.references,
+            "references_made": self.frames.iter().map(|(.., c)| c.references_made).sum::<usize>(),
             "frames": frames,
         })
     }

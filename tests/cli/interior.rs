@@ -2,30 +2,40 @@
 
 use crate::run::lumigraph;
 use serde_json::Value;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// A folder with a small house.
+fn with_house() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "generate house --rooms 2 --triangles 1 -o house";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(ran.stdout.starts_with("house: 2 cells, "), "{}", ran.stdout);
+    folder
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
 
 #[test]
 fn a_house_is_generated_and_planned() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_house();
     let here = folder.path();
-    let ran = lumigraph(here, "generate house --rooms 2 --triangles 1 -o house");
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stdout.starts_with("house: 2 cells, "), "{}", ran.stdout);
     // Again, byte for byte, on one thread.
     let again = "--threads 1 generate house --rooms 2 --triangles 1 -o again";
-    assert_eq!(lumigraph(here, again).code, 0);
+    lumigraph(here, again).ok();
     for file in ["house.glb", "interior.json"] {
         let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
         assert!(read("house") == read("again"), "{file}");
     }
     // Another is another.
-    assert_eq!(
-        lumigraph(
-            here,
-            "generate house --rooms 2 --triangles 1 --seed 2 -o other"
-        )
-        .code,
-        0
-    );
+    let other = "generate house --rooms 2 --triangles 1 --seed 2 -o other";
+    lumigraph(here, other).ok();
     let read = |folder: &str| std::fs::read(here.join(folder).join("interior.json")).unwrap();
     assert!(read("house") != read("other"));
     // Where to photograph it from.
@@ -48,8 +58,7 @@ fn a_house_is_generated_and_planned() {
         }
         assert!((center[1] - 1.6).abs() < 1e-9);
     }
-    let ran = lumigraph(here, "plan house/interior.json --views 3 --span 90");
-    assert_eq!(ran.code, 0);
+    let ran = lumigraph(here, "plan house/interior.json --views 3 --span 90").ok();
     assert_eq!(ran.stdout.lines().count(), 1 + portals * 2 * 3);
     assert!(ran.stdout.contains("-45.0°"), "{}", ran.stdout);
 }
@@ -59,41 +68,28 @@ const ROOMS: &str = r#"{"version": 1,
 
 #[test]
 fn an_interior_is_made_of_a_model() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_house();
     let here = folder.path();
-    let ran = lumigraph(here, "generate house --rooms 2 --triangles 1 -o house");
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
     std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
     let line = "interior house/house.glb --rooms rooms.json -o one";
     // The second time it takes the first one's place.
     for _ in 0..2 {
-        let ran = lumigraph(here, line);
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-        assert!(
-            ran.stdout.contains("one: 1 cells, 0 portals, "),
-            "{}",
-            ran.stdout
-        );
+        let ran = lumigraph(here, line).ok();
+        assert_eq!(ran.stderr, "");
+        let said = "one: 1 cells, 0 portals, ";
+        assert!(ran.stdout.contains(said), "{}", ran.stdout);
     }
-    let names = |folder: &str| {
-        let entries = std::fs::read_dir(here.join(folder)).unwrap();
-        let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
-        let mut names: Vec<String> = names.collect();
-        names.sort();
-        names
-    };
-    assert_eq!(names("one"), ["house.glb", "interior.json"]);
+    assert_eq!(names(&here.join("one")), ["house.glb", "interior.json"]);
     assert_eq!(lumigraph(here, "plan one --json").stdout, "[]\n");
     // What is there and no interior stays.
     std::fs::create_dir(here.join("mine")).unwrap();
     std::fs::write(here.join("mine/thesis.txt"), "…").unwrap();
-    let ran = lumigraph(here, "interior house/house.glb --rooms rooms.json -o mine");
-    assert_eq!(ran.code, 1);
-    assert!(
-        ran.stderr.contains("mine: the folder is not empty"),
-        "{}",
-        ran.stderr
-    );
+    let failed = |line: &str, said: &str| {
+        let error = lumigraph(here, line).error(1);
+        assert!(error.contains(said), "{error}");
+    };
+    let mine = "interior house/house.glb --rooms rooms.json -o mine";
+    failed(mine, "mine: the folder is not empty");
     // What is wrong is said, and nothing is left behind.
     for (rooms, said) in [
         ("{", "rooms.json: not a list of rooms"),
@@ -103,39 +99,21 @@ fn an_interior_is_made_of_a_model() {
         ),
     ] {
         std::fs::write(here.join("rooms.json"), rooms).unwrap();
-        let ran = lumigraph(here, "interior house/house.glb --rooms rooms.json -o two");
-        assert_eq!(ran.code, 1);
-        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+        failed("interior house/house.glb --rooms rooms.json -o two", said);
     }
-    let ran = lumigraph(here, "interior house/house.glb -o two");
-    assert_eq!(ran.code, 1);
-    assert!(
-        ran.stderr.contains("no node is called `cell:NAME`"),
-        "{}",
-        ran.stderr
-    );
+    let unnamed = "interior house/house.glb -o two";
+    failed(unnamed, "no node is called `cell:NAME`");
     std::fs::write(here.join("empty.glb"), "").unwrap();
-    let ran = lumigraph(here, "interior empty.glb -o two");
-    assert_eq!(ran.code, 1);
-    assert!(
-        ran.stderr.contains("empty.glb: not a glTF file"),
-        "{}",
-        ran.stderr
-    );
-    assert_eq!(
-        names(""),
-        ["empty.glb", "house", "mine", "one", "rooms.json"]
-    );
-    let ran = lumigraph(here, "plan nowhere");
-    assert_eq!(ran.code, 1);
-    assert!(ran.stderr.contains("nowhere: "), "{}", ran.stderr);
+    failed("interior empty.glb -o two", "empty.glb: not a glTF file");
+    let left = ["empty.glb", "house", "mine", "one", "rooms.json"];
+    assert_eq!(names(here), left);
+    failed("plan nowhere", "nowhere: ");
 }
 
 #[test]
 fn a_house_is_walked_through() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_house();
     let here = folder.path();
-    lumigraph(here, "generate house --rooms 2 --triangles 1 -o house").ok();
     let line =
         "walk house --portals all --frames 6 --size 64x48 --reference-size 32x32 --json -o out";
     let ran = lumigraph(here, line).ok();
@@ -156,15 +134,25 @@ fn a_house_is_walked_through() {
             assert!(frame["cell"].is_string() && frame["ms"].as_f64().unwrap() > 0.0);
             skipped += frame["triangles_skipped"].as_u64().unwrap();
         }
-        let made = walk["references_made"].as_u64().unwrap();
-        assert_eq!(made > 0, walk["portals"] != "geometry");
+        let used = walk["references_used"].as_u64().unwrap();
+        assert_eq!(used > 0, walk["portals"] != "geometry");
     }
     assert!(skipped > 0);
+    // Images are made once for all kinds.
+    let made = |walk: &Value| walk["references_made"].as_u64().unwrap();
+    let [texture, warp1, warp2] = [1, 2, 3].map(|i| &walks[i]);
+    assert!(made(texture) > 0 && made(warp1) == 0);
+    assert_eq!(made(texture), texture["references_used"].as_u64().unwrap());
+    let all: u64 = walks.iter().map(made).sum();
+    assert_eq!(all, warp2["references_used"].as_u64().unwrap());
+    assert_eq!(all, made(&report));
+    assert_eq!(report["device"], "CPU");
     let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
     assert_eq!(svg.matches("<polyline").count(), 4);
     // Its path once more, byte for byte, on one thread; one kind needs no folder of its own.
+    // Nor does a budget for images show.
     let again = "--threads 1 walk house/interior.json --path out/path.json --portals warp2 \
-                 --reference-size 32x32 -o again";
+                 --reference-size 32x32 --cpu-memory 1 -o again";
     let ran = lumigraph(here, again).ok();
     assert!(ran.stdout.contains("again: 6 frames"), "{}", ran.stdout);
     let read = |file: &str| std::fs::read(here.join(file)).unwrap();
@@ -196,6 +184,12 @@ fn a_house_is_walked_through() {
         ran.stderr
     );
     assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+    // Wherever there is no graphics device there are pictures, and a note.
+    let by_device = "walk house --path out/path.json --device gpu -o device";
+    let ran = lumigraph(here, by_device).ok();
+    let noted = ran.stderr.contains("note: graphics device: ");
+    assert_eq!(noted, ran.stdout.contains("drawn by CPU"), "{}", ran.stdout);
+    assert_eq!(names(&here.join("device")).len(), 7);
     // What is wrong is said.
     let scenes = r#"{"version": 1, "up": [0, 1, 0], "eye_height": 1.6,
         "cells": [{"name": "a", "scene": "../a"}], "portals": []}"#;

@@ -52,7 +52,12 @@ pub(crate) fn lumigraph(folder: &Path, line: &str) -> Ran {
 pub(crate) fn run(folder: &Path, words: &[&str], variables: &[(&str, &str)]) -> Ran {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lumigraph"));
     command.current_dir(folder).args(words);
-    if matches!(words[0], "render" | "evaluate") && !words.contains(&"--device") {
+    let name = if words[0] == "--threads" {
+        words[2]
+    } else {
+        words[0]
+    };
+    if matches!(name, "render" | "evaluate" | "walk") && !words.contains(&"--device") {
         command.args(["--device", "cpu"]);
     }
     let Output {

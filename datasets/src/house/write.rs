@@ -13,7 +13,7 @@ use std::path::Path;
 /// # Errors
 /// The folder exists and is not empty, or something cannot be written.
 pub fn write(house: &House, folder: &Path) -> Result<(), DatasetError> {
-    in_new_folder(folder, |folder| {
+    let fill = |folder: &Path| {
         let path = folder.join(MODEL_FILE);
         let glb = model_to_glb(&house.model).map_err(|source| DatasetError::Model {
             path: path.clone(),
@@ -23,7 +23,8 @@ pub fn write(house: &House, folder: &Path) -> Result<(), DatasetError> {
         write_interior(&folder.join(INTERIOR_FILE), &house.interior)?;
         let path = folder.join("README.md");
         std::fs::write(&path, readme(house)).map_err(|source| io(&path, source))
-    })
+    };
+    in_new_folder(folder, |_| false, fill)
 }
 
 fn readme(house: &House) -> String {

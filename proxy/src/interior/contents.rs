@@ -1,9 +1,6 @@
 //! What of the model each cell has.
 
-use super::{
-    CellId, Content, Interior, InteriorError, InteriorWarning, RoomBox, Visibility,
-    triangle_touches_box,
-};
+use super::{Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box};
 use crate::mesh::Model;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -72,17 +69,6 @@ impl Contents {
             odd.push(InteriorWarning::Elsewhere(contents.elsewhere.len()));
         }
         Ok((contents, odd))
-    }
-
-    /// The triangles to draw where these cells are visible, in order, none twice.
-    pub fn visible_triangles(&self, visibility: &Visibility) -> Vec<u32> {
-        let cells = visibility.cells.iter();
-        let of = |id: CellId| self.triangles.get(id.0 as usize);
-        let mut all: Vec<u32> = self.elsewhere.clone();
-        all.extend(cells.filter_map(|c| of(c.cell)).flatten());
-        all.sort_unstable();
-        all.dedup();
-        all
     }
 }
 

@@ -35,52 +35,52 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 #[derive(Serialize, Deserialize)]
-struct Stored {
-    version: u32,
+pub(super) struct Stored {
+    pub version: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    model: Option<String>,
-    up: [f64; 3],
-    eye_height: f64,
-    cells: Vec<StoredCell>,
-    portals: Vec<StoredPortal>,
+    pub model: Option<String>,
+    pub up: [f64; 3],
+    pub eye_height: f64,
+    pub cells: Vec<StoredCell>,
+    pub portals: Vec<StoredPortal>,
     #[serde(flatten)]
-    other: Extra,
+    pub other: Extra,
 }
 
 #[derive(Serialize, Deserialize)]
-struct StoredCell {
-    name: String,
+pub(super) struct StoredCell {
+    pub name: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    scene: Option<String>,
+    pub scene: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    nodes: Option<Vec<String>>,
+    pub nodes: Option<Vec<String>>,
     #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
-    room: Option<StoredBox>,
+    pub room: Option<StoredBox>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    floor: Option<Vec<[f64; 3]>>,
+    pub floor: Option<Vec<[f64; 3]>>,
     #[serde(flatten)]
-    other: Extra,
+    pub other: Extra,
 }
 
 #[derive(Serialize, Deserialize)]
-struct StoredBox {
-    min: [f64; 3],
-    max: [f64; 3],
+pub(super) struct StoredBox {
+    pub min: [f64; 3],
+    pub max: [f64; 3],
 }
 
 #[derive(Serialize, Deserialize)]
-struct StoredPortal {
-    name: String,
-    polygon: Vec<[f64; 3]>,
-    cells: [Option<String>; 2],
+pub(super) struct StoredPortal {
+    pub name: String,
+    pub polygon: Vec<[f64; 3]>,
+    pub cells: [Option<String>; 2],
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    radius: Option<f64>,
+    pub radius: Option<f64>,
     #[serde(flatten)]
-    other: Extra,
+    pub other: Extra,
 }
 
 /// A polygon of a file's numbers.
-pub(super) fn polygon(corners: &[[f64; 3]]) -> Result<Polygon, PolygonError> {
+fn polygon(corners: &[[f64; 3]]) -> Result<Polygon, PolygonError> {
     Polygon::new(corners.iter().map(|p| DVec3::from_array(*p)).collect())
 }
 
@@ -169,7 +169,7 @@ impl Stored {
         }
     }
 
-    fn interior(self) -> Result<Interior, InteriorError> {
+    pub(super) fn interior(self) -> Result<Interior, InteriorError> {
         let mut cells = Vec::with_capacity(self.cells.len());
         for cell in self.cells {
             let given = usize::from(cell.scene.is_some())
@@ -217,7 +217,7 @@ impl Stored {
 }
 
 /// Unit length; what has it already keeps every digit.
-pub(super) fn direction(up: [f64; 3]) -> Result<DVec3, InteriorError> {
+fn direction(up: [f64; 3]) -> Result<DVec3, InteriorError> {
     let given = DVec3::from_array(up);
     if (given.length() - 1.0).abs() < 1e-12 {
         return Ok(given);

@@ -9,11 +9,11 @@ mod check;
 mod contents;
 mod error;
 mod file;
+mod locate;
 mod overlap;
 mod polygon;
 mod rooms;
 mod semicircle;
-mod track;
 mod visibility;
 
 pub use contents::Contents;

@@ -146,6 +146,19 @@ impl Polygon {
         is_inside(&corners, at) || distance_to_outline(&corners, at) <= margin
     }
 
+    /// How far a point is from the nearest point of it.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let height = self.height(point);
+        let (x, y) = self.axes();
+        let offset = point - self.center;
+        let at = DVec2::new(offset.dot(x), offset.dot(y));
+        let corners = self.flattened();
+        match is_inside(&corners, at) {
+            true => height.abs(),
+            false => distance_to_outline(&corners, at).hypot(height),
+        }
+    }
+
     /// Convex pieces, each counter-clockwise around the normal: itself, or triangles.
     pub fn convex_pieces(&self) -> Vec<Vec<DVec3>> {
         let flat = self.flattened();
@@ -320,5 +333,14 @@ mod tests {
         let covers = |x, y| l.covers(far + DVec3::new(x, y, 7.0), 0.0);
         assert!(covers(0.5, 2.0) && covers(1.5, 0.5) && !covers(1.5, 1.5));
         assert!(l.covers(far + DVec3::new(1.1, 2.0, 0.0), 0.2));
+        for (x, y, z, expected) in [
+            (0.5, 2.0, -7.0, 7.0),
+            (1.5, 2.0, 0.0, 0.5),
+            (1.5, 1.4, 0.3, 0.5),
+            (-3.0, 7.0, 0.0, 5.0),
+        ] {
+            let found = l.distance(far + DVec3::new(x, y, z));
+            assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+        }
     }
 }

@@ -27,10 +27,10 @@
 
 use super::check::is_turned;
 use super::contents::{PORTAL_NODE, below};
-use super::file::{direction, parse_version_1, polygon, sides};
+use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
 use super::{
     Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
-    InteriorWarning, Polygon, Portal, RoomBox,
+    InteriorWarning, Polygon, Portal,
 };
 use crate::mesh::Model;
 use glam::DVec3;
@@ -99,48 +99,41 @@ pub fn parse_rooms(
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
     let rooms: Rooms = parse_version_1(path, "a list of rooms", bytes)?;
     let failed = |e| InteriorFileError::Interior(path.to_owned(), e);
-    interior_of(rooms, model).map_err(failed)
+    let interior = rooms.stored(model).interior().map_err(failed)?;
+    interior_from_rooms(interior).map_err(failed)
 }
 
-fn interior_of(
-    rooms: Rooms,
-    model: &str,
-) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
-    let mut cells = Vec::with_capacity(rooms.rooms.len());
-    for room in rooms.rooms {
-        let floor = room.floor.map(|corners| polygon(&corners)).transpose();
-        cells.push(Cell {
-            floor: floor.map_err(|e| InteriorError::Floor(room.name.clone(), e))?,
+impl Rooms {
+    /// The same as an interior's file has it.
+    fn stored(self, model: &str) -> Stored {
+        let cell = |room: Room| StoredCell {
             name: room.name,
-            content: Content::Box(RoomBox {
-                min: DVec3::from_array(room.min),
-                max: DVec3::from_array(room.max),
+            scene: None,
+            nodes: None,
+            room: Some(StoredBox {
+                min: room.min,
+                max: room.max,
             }),
+            floor: room.floor,
             other: Extra::new(),
-        });
-    }
-    let names = cells.iter().map(|c| c.name.as_str());
-    let ids: BTreeMap<&str, CellId> = names.zip((0..).map(CellId)).collect();
-    let mut portals = Vec::with_capacity(rooms.openings.len());
-    for opening in rooms.openings {
-        let outline = polygon(&opening.polygon);
-        portals.push(Portal {
-            cells: sides(&opening.name, &opening.between, &ids)?,
-            polygon: outline.map_err(|e| InteriorError::Portal(opening.name.clone(), e))?,
+        };
+        let portal = |opening: Opening| StoredPortal {
             name: opening.name,
+            polygon: opening.polygon,
+            cells: opening.between,
             radius: opening.radius,
             other: Extra::new(),
-        });
+        };
+        Stored {
+            version: 1,
+            model: Some(model.to_owned()),
+            up: self.up,
+            eye_height: self.eye_height,
+            cells: self.rooms.into_iter().map(cell).collect(),
+            portals: self.openings.into_iter().map(portal).collect(),
+            other: Extra::new(),
+        }
     }
-    let interior = Interior {
-        model: Some(model.to_owned()),
-        up: direction(rooms.up)?,
-        eye_height: rooms.eye_height,
-        cells,
-        portals,
-        other: Extra::new(),
-    };
-    interior_from_rooms(interior)
 }
 
 /// Turns the outlines round that go the other way, by where the cells are, and checks the whole.

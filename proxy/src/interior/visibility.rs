@@ -5,7 +5,7 @@
 //! bounds on the screen; here the part of a portal that is visible is the exact intersection of
 //! cones with their apex at the eye, so that nothing depends on a near plane or on the image.
 
-use super::track::tolerance;
+use super::locate::tolerance;
 use super::{CellId, Interior, Portal, PortalId};
 use calibrate::{Pixel, View};
 use glam::DVec3;
@@ -93,15 +93,6 @@ impl Region {
     pub fn contains(&self, direction: DVec3) -> bool {
         let slack = -MARGIN * direction.length();
         self.sides.iter().all(|side| side.dot(direction) >= slack)
-    }
-
-    /// Its outline in a view's image: straight lines between these pixels, for a pinhole's. None
-    /// where it has all directions, or some lie where the lens does not see.
-    pub fn outline(&self, view: &View) -> Option<Vec<Pixel>> {
-        let center = view.center();
-        let corners = self.corners.iter();
-        let pixels: Option<Vec<Pixel>> = corners.map(|d| view.project(center + *d)).collect();
-        pixels.filter(|pixels| !pixels.is_empty())
     }
 
     /// A cone of edges that are counter-clockwise as seen from its apex, the origin; none if
@@ -196,12 +187,6 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Where one sees a cell; nowhere, if it is not visible.
-    pub fn regions(&self, cell: CellId) -> &[Region] {
-        let found = self.cells.iter().find(|c| c.cell == cell);
-        found.map_or(&[], |c| &c.regions)
-    }
-
     fn add(&mut self, cell: CellId, region: &Region) {
         let at = self.cells.iter().position(|c| c.cell == cell);
         let at = at.unwrap_or_else(|| {
@@ -226,8 +211,8 @@ const MAX_DEPTH: u32 = 256;
 /// A line of sight passes each portal at most once, so ways that come back to a cell end. A
 /// viewer on a portal's plane and inside its outline sees all that both sides show. A viewer in no
 /// cell may see all of them, and so it is where portals are too many to follow. The cell must be
-/// the one that the view's centre is in ([`Contents::locate`](super::Contents::locate),
-/// [`Interior::track`]); through a portal to the outside one sees nothing.
+/// the one that the view's centre is in ([`Contents::locate`](super::Contents::locate)); through a
+/// portal to the outside one sees nothing.
 pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibility {
     let region = Region::of(view);
     let eye = view.center();

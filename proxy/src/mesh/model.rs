@@ -169,12 +169,6 @@ impl Model {
         let texel = texture.map_or([255.0; 3], |t| sample(t, uv, material.wrap));
         [0, 1, 2].map(|k| color[k] * f64::from(material.base_color[k]) * texel[k] / 255.0)
     }
-
-    /// The name of a node and of all above it, the node's own first.
-    pub fn names_up(&self, node_idx: u32) -> impl Iterator<Item = &str> {
-        let above = |node: &&ModelNode| self.nodes.get(node.parent_idx? as usize);
-        std::iter::successors(self.nodes.get(node_idx as usize), above).map(|n| n.name.as_str())
-    }
 }
 
 /// The greatest whole number that is not greater: without a call where processors have no

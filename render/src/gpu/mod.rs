@@ -6,6 +6,7 @@ mod layout;
 mod load;
 mod photos;
 mod pipelines;
+mod raster;
 mod room;
 #[cfg(test)]
 mod shader_tests;
@@ -15,6 +16,7 @@ mod timing;
 
 pub use device::DeviceLimits;
 pub use load::Loaded;
+pub use raster::GpuRaster;
 
 use crate::RenderError;
 use crate::field::{FieldEntry, TriangulatedField};

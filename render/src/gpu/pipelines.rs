@@ -256,7 +256,7 @@ impl Pipelines {
     }
 }
 
-fn group<const N: usize>(
+pub(super) fn group<const N: usize>(
     device: &Device,
     layout: &BindGroupLayout,
     resources: [BindingResource<'_>; N],

@@ -11,6 +11,7 @@ pub(crate) struct Target {
     pub view: wgpu::TextureView,
     texture: wgpu::Texture,
     readback: wgpu::Buffer,
+    bytes_per_pixel: u32,
     bytes_per_row: u32,
     rows: u32,
 }
@@ -18,6 +19,17 @@ pub(crate) struct Target {
 impl Target {
     /// `most_bytes` are those of a buffer.
     pub(crate) fn new(device: &wgpu::Device, width: u32, height: u32, most_bytes: u64) -> Self {
+        let format = super::pipelines::PICTURE_FORMAT;
+        Self::of(device, format, [width, height], most_bytes)
+    }
+
+    /// A picture of any format whose texels are read one by one.
+    pub(crate) fn of(
+        device: &wgpu::Device,
+        format: wgpu::TextureFormat,
+        [width, height]: [u32; 2],
+        most_bytes: u64,
+    ) -> Self {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size: wgpu::Extent3d {
@@ -28,12 +40,14 @@ impl Target {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: super::pipelines::PICTURE_FORMAT,
+            format,
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
         let view = texture.create_view(&Default::default());
-        let bytes_per_row = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes_per_pixel = format.block_copy_size(None).unwrap_or(4);
+        let bytes_per_row =
+            (width * bytes_per_pixel).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let rows = (most_bytes / u64::from(bytes_per_row)).clamp(1, u64::from(height.max(1)));
         let readback = readback_buffer(device, u64::from(bytes_per_row) * rows);
         Self {
@@ -41,6 +55,7 @@ impl Target {
             view,
             texture,
             readback,
+            bytes_per_pixel,
             bytes_per_row,
             rows: rows as u32,
         }
@@ -53,7 +68,18 @@ impl Target {
         queue: &wgpu::Queue,
     ) -> Result<RgbaImage, RenderError> {
         let [width, height] = self.size;
-        let row_bytes = width as usize * 4;
+        let pixels = self.read_bytes(device, queue)?;
+        Ok(RgbaImage::from_raw(width, height, pixels).expect("one row each"))
+    }
+
+    /// Waits for the device and reads the pixels, row by row.
+    pub(crate) fn read_bytes(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+    ) -> Result<Vec<u8>, RenderError> {
+        let [width, height] = self.size;
+        let row_bytes = width as usize * self.bytes_per_pixel as usize;
         let mut pixels = Vec::with_capacity(row_bytes * height as usize);
         for y in (0..height).step_by(self.rows as usize) {
             let rows = self.rows.min(height - y);
@@ -84,7 +110,7 @@ impl Target {
                 pixels.extend_from_slice(&row[..row_bytes]);
             }
         }
-        Ok(RgbaImage::from_raw(width, height, pixels).expect("one row each"))
+        Ok(pixels)
     }
 }
 

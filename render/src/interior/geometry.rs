@@ -25,6 +25,8 @@ pub struct CellGeometry {
 pub struct Runs<'a> {
     /// A triangle may be in several.
     pub lists: Vec<&'a [u32]>,
+    /// Around each list's triangles: centre and radius.
+    balls: Vec<(DVec3, f64)>,
     /// How many triangles the cells have that were asked for, those passed over included.
     pub asked: usize,
 }
@@ -74,8 +76,15 @@ impl<'a> Runs<'a> {
             };
             if regions.is_empty() || regions.iter().any(touches) {
                 self.lists.push(&run.triangles);
+                self.balls.push((run.center, run.radius));
             }
         }
+    }
+
+    /// Each list with the ball around it.
+    pub(crate) fn balls(&self) -> impl Iterator<Item = (&'a [u32], DVec3, f64)> + '_ {
+        let lists = self.lists.iter().zip(&self.balls);
+        lists.map(|(list, (center, radius))| (*list, *center, *radius))
     }
 
     /// How many triangles are to be drawn; one in several lists counts for each.

@@ -1,13 +1,14 @@
 //! The reference images of an interior, made when they are first asked for.
 
 use super::{CellGeometry, REFERENCE_SIZE, Reference};
+use crate::residency::Residency;
 use glam::DVec3;
 use proxy::interior::{
     CellId, Interior, PortalId, SemicircleOptions, SemicircleView, angle_before, semicircles,
 };
 use proxy::mesh::Model;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::Arc;
 
 /// How reference images are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,9 @@ pub struct LibraryOptions {
     pub size: [u32; 2],
     /// Where they are made.
     pub semicircles: SemicircleOptions,
+    /// The most bytes that they may take between frames; `None` for no limit. A frame has all
+    /// that it needs, even if they are more. No picture depends on it.
+    pub budget: Option<u64>,
 }
 
 impl Default for LibraryOptions {
@@ -23,18 +27,23 @@ impl Default for LibraryOptions {
         Self {
             size: REFERENCE_SIZE,
             semicircles: SemicircleOptions::default(),
+            budget: None,
         }
     }
 }
 
-/// The places of all reference images, and those images that were made.
+/// The places of all reference images, and those images that are in memory.
 #[derive(Debug)]
 pub struct Library {
     size: [u32; 2],
     places: Vec<SemicircleView>,
     /// Of each portal and direction, one after the other: which places, from left to right.
     sides: Vec<Range<usize>>,
-    made: Vec<OnceLock<Reference>>,
+    /// By place, with the turn that it was last used in.
+    images: Vec<Option<(Arc<Reference>, u64)>>,
+    /// Counts frames.
+    turn: u64,
+    residency: Residency,
 }
 
 impl Library {
@@ -52,16 +61,30 @@ impl Library {
         }
         Self {
             size: options.size.map(|n| n.clamp(1, 4096)),
-            made: places.iter().map(|_| OnceLock::new()).collect(),
+            images: vec![None; places.len()],
             places,
             sides,
+            turn: 0,
+            residency: Residency {
+                budget: options.budget,
+                ..Residency::default()
+            },
         }
     }
 
-    /// How many images there may be, and how many were made.
-    pub fn counts(&self) -> (usize, usize) {
-        let made = self.made.iter().filter(|image| image.get().is_some());
-        (self.made.len(), made.count())
+    /// How many images there may be.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Whether there are no places at all.
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    /// What the images take and took; `loads` counts those that were made.
+    pub fn residency(&self) -> Residency {
+        self.residency
     }
 
     /// The places nearest to an eye by their angle before a portal, the nearest first; of two at
@@ -88,21 +111,48 @@ impl Library {
         places
     }
 
-    /// The image of a place, made now if it was not yet.
-    pub fn image(
-        &self,
-        place: usize,
+    /// The images of a frame's places, in their order, and how many were made for it. Others go,
+    /// those not used for longest first, as far as the budget asks.
+    pub fn images(
+        &mut self,
+        places: &[usize],
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
-    ) -> &Reference {
-        let place_of = &self.places[place];
-        let make = || Reference::new(interior, model, geometry, place_of, self.size);
-        self.made[place].get_or_init(make)
+    ) -> (Vec<Arc<Reference>>, usize) {
+        self.turn += 1;
+        // 1. What stays is no candidate for leaving.
+        let mut missing: Vec<usize> = Vec::new();
+        for &place in places {
+            match &mut self.images[place] {
+                Some((_, used)) => *used = self.turn,
+                None if !missing.contains(&place) => missing.push(place),
+                None => {}
+            }
+        }
+        let needed = missing.len() as u64 * Reference::bytes(self.size);
+        self.make_room(needed);
+        // 2. What is missing.
+        for &place in &missing {
+            let made = Reference::new(interior, model, geometry, &self.places[place], self.size);
+            self.images[place] = Some((Arc::new(made), self.turn));
+            self.residency.change(Reference::bytes(self.size), 0);
+            self.residency.loads += 1;
+        }
+        let image = |place: &usize| self.images[*place].as_ref().map(|(image, _)| image.clone());
+        (places.iter().filter_map(image).collect(), missing.len())
     }
 
-    /// Whether the image of a place was made.
-    pub fn is_made(&self, place: usize) -> bool {
-        self.made[place].get().is_some()
+    fn make_room(&mut self, bytes: u64) {
+        while !self.residency.allows(self.residency.held + bytes) {
+            let others = self.images.iter().enumerate();
+            let others = others.filter_map(|(i, image)| Some((image.as_ref()?.1, i)));
+            let Some((_, oldest)) = others.filter(|(used, _)| *used < self.turn).min() else {
+                return;
+            };
+            self.images[oldest] = None;
+            self.residency.change(0, Reference::bytes(self.size));
+            self.residency.evictions += 1;
+        }
     }
 }

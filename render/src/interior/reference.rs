@@ -30,6 +30,14 @@ pub(super) fn plane_of(camera: &Pinhole, portal: &Portal, into: Option<CellId>) 
 }
 
 impl Reference {
+    /// Bytes of an image of that size.
+    pub fn bytes([width, height]: [u32; 2]) -> u64 {
+        const COLOR_AND_DEPTH: u64 = 4 + 4;
+        let (width, height) = (u64::from(width), u64::from(height));
+        // And the rays of its columns and rows.
+        COLOR_AND_DEPTH * (width * height + width + height)
+    }
+
     /// Draws the image of a place before a portal.
     ///
     /// What is in the way on the viewer's side is left out, so the place need not be free, or

@@ -9,7 +9,8 @@ pub struct Target {
     pub width: u32,
     /// In pixels.
     pub height: u32,
-    /// Row by row, sRGB; alpha is 255, or 0 where nothing was drawn.
+    /// Row by row, sRGB; alpha is 255, or 0 where nothing was drawn. In a picture of a walk it is
+    /// between them where a hole is mixed in.
     pub color: Vec<[u8; 4]>,
     /// 1 / z of what was drawn, in the camera's frame; 0 where nothing was.
     pub inverse_depth: Vec<f32>,

@@ -3,7 +3,7 @@
 use crate::path::{CameraPath, PathError, PathFrame};
 use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
-use proxy::interior::{CellId, Contents, Interior, Portal, PortalId};
+use proxy::interior::{CellId, Contents, Interior, Portal, PortalId, RoomBox};
 use std::collections::VecDeque;
 
 /// Why there is no tour.
@@ -92,12 +92,12 @@ fn stops(interior: &Interior, contents: &Contents) -> Option<Vec<DVec3>> {
     let mut is_seen = vec![false; places.len()];
     is_seen[first] = true;
     let unit = interior.eye_height;
-    while let Some(route) = route(interior, &places, &is_seen, at) {
+    while let Some(route) = route(interior, contents, &places, &is_seen, at) {
         for (id, into) in route {
             let portal = interior.portal(id);
             let up = interior.up;
             let center = portal.polygon.center();
-            let height = interior.floor_height(Some(at), portal) + unit;
+            let height = floor(interior, contents, at, portal) + unit;
             let center = center + up * (height - center.dot(up));
             // Straight through.
             let normal = portal.normal_into(Some(at));
@@ -115,27 +115,43 @@ fn stops(interior: &Interior, contents: &Contents) -> Option<Vec<DVec3>> {
 /// The middle of a room, at eye height.
 fn place(interior: &Interior, contents: &Contents, id: CellId) -> Option<DVec3> {
     let up = interior.up;
-    let bounds = contents.bounds.get(id.0 as usize).copied().flatten();
-    let floor = interior.cell(id).floor.as_ref();
-    let (middle, lowest) = match (floor, bounds) {
-        (Some(floor), _) => {
-            let heights = floor.corners().iter().map(|p| p.dot(up));
-            (floor.center(), heights.fold(f64::INFINITY, f64::min))
-        }
-        (None, Some(room)) => {
-            let middle = room.min.midpoint(room.max);
-            let half = 0.5 * (room.max - room.min);
-            (middle, middle.dot(up) - half.dot(up.abs()))
-        }
+    let middle = match (&interior.cell(id).floor, bounds(contents, id)) {
+        (Some(floor), _) => floor.center(),
+        (None, Some(room)) => room.min.midpoint(room.max),
         (None, None) => return None,
     };
+    let lowest = lowest(interior, contents, id)?;
     let at = middle + up * (lowest + interior.eye_height - middle.dot(up));
     at.is_finite().then_some(at)
+}
+
+fn bounds(contents: &Contents, id: CellId) -> Option<RoomBox> {
+    contents.bounds.get(id.0 as usize).copied().flatten()
+}
+
+/// How high a room's lowest point is, of its floor if that is known.
+fn lowest(interior: &Interior, contents: &Contents, id: CellId) -> Option<f64> {
+    let up = interior.up;
+    if let Some(floor) = &interior.cell(id).floor {
+        let heights = floor.corners().iter().map(|p| p.dot(up));
+        return Some(heights.fold(f64::INFINITY, f64::min));
+    }
+    let room = bounds(contents, id)?;
+    let half = 0.5 * (room.max - room.min);
+    Some(room.min.midpoint(room.max).dot(up) - half.dot(up.abs()))
+}
+
+/// How high the floor is before a portal: the room's, or where nothing is known of that, what
+/// the interior takes it for.
+fn floor(interior: &Interior, contents: &Contents, id: CellId, portal: &Portal) -> f64 {
+    let of_room = lowest(interior, contents, id);
+    of_room.unwrap_or_else(|| interior.floor_height(Some(id), portal))
 }
 
 /// The portals to pass to the nearest room not seen yet.
 fn route(
     interior: &Interior,
+    contents: &Contents,
     places: &[Option<DVec3>],
     is_seen: &[bool],
     from: CellId,
@@ -144,7 +160,7 @@ fn route(
         let up = interior.up;
         let heights = portal.polygon.corners().iter().map(|p| p.dot(up));
         let sill = heights.fold(f64::INFINITY, f64::min);
-        sill - interior.floor_height(Some(cell), portal) <= STEP * interior.eye_height
+        sill - floor(interior, contents, cell, portal) <= STEP * interior.eye_height
     };
     let search = |doors_only: bool| {
         let mut came: Vec<Option<(CellId, PortalId)>> = vec![None; places.len()];

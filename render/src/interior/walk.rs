@@ -4,12 +4,13 @@
 //! 2. Every other portal that is visible is filled out of reference images, in the pixels where
 //!    one sees through it.
 //! 3. A pixel shows the cell's own surface where that is before the portal, else the fill, else
-//!    whatever surface there is. Only what is shown is coloured.
+//!    whatever surface there is. Only what is shown is coloured. Where geometry is mixed in, a
+//!    pixel that the images leave open fades away with its geometry, so that nothing pops.
 
 use super::reference::plane_of;
 use super::{
-    Beyond, CellGeometry, Library, LibraryOptions, Pinhole, PinholeError, PortalFill, Raster, Runs,
-    Splat, Target, Window, texture, warp,
+    Beyond, CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
+    Runs, Splat, Target, Window, texture, warp,
 };
 use calibrate::View;
 use glam::DVec3;
@@ -27,11 +28,10 @@ pub struct WalkOptions {
     pub library: LibraryOptions,
     /// How large samples are drawn.
     pub splat: Splat,
-    /// Nearer to a portal than this, in radii of its semicircle, what is beyond is geometry:
-    /// from there one sees farther aside than the images do.
+    /// Nearer to a portal than this, in radii of its semicircle, geometry is mixed into what is
+    /// beyond, and from two thirds of it on it is alone: from there one sees farther aside than
+    /// the images do.
     pub near: f64,
-    /// Farther than this, in radii, it is images; between the two it is a mix.
-    pub far: f64,
     /// Whether all of a visible cell is drawn, as the papers do, not only what of it is in sight.
     /// The pictures are the same.
     pub whole_cells: bool,
@@ -45,13 +45,15 @@ impl Default for WalkOptions {
         Self {
             library: LibraryOptions::default(),
             splat: Splat::default(),
-            near: 2.0 / 3.0,
-            far: 1.0,
+            near: 1.0,
             whole_cells: false,
             persist: false,
         }
     }
 }
+
+/// Where geometry is alone, in shares of where it begins to be mixed in.
+const ALONE: f64 = 2.0 / 3.0;
 
 /// What a frame took and what was left out.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,8 +70,8 @@ pub struct FrameCost {
     pub triangles_in_cells: usize,
     /// Those of them in runs that are in sight.
     pub triangles_tried: usize,
-    /// Those of them that touch a pixel's centre.
-    pub triangles_met: usize,
+    /// Those of them that touch a pixel's centre; a graphics device does not tell.
+    pub triangles_met: Option<usize>,
     /// Samples of reference images that were drawn, or pixels of textures.
     pub samples: usize,
     /// Pixels of portals that nothing was drawn in.
@@ -104,11 +106,13 @@ pub struct Walk<'a> {
     geometry: CellGeometry,
     library: Library,
     options: WalkOptions,
-    raster: Raster,
+    painter: Painter,
     filled: Target,
     /// By pixel: one more than the place in the frame's list of fills; 0 for none.
     owners: Vec<u16>,
     picture: Target,
+    /// By place of the library: whether the walk needed it.
+    is_used: Vec<bool>,
 }
 
 /// A portal that is filled with images in this frame.
@@ -122,21 +126,35 @@ struct Filled<'p> {
 }
 
 impl<'a> Walk<'a> {
-    /// A walk; reference images are made when they are needed.
+    /// A walk drawn by the CPU; reference images are made when they are needed.
     pub fn new(
         interior: &'a Interior,
         contents: &'a Contents,
         model: &'a Model,
         options: WalkOptions,
     ) -> Self {
+        Self::with(Painter::cpu(), interior, contents, model, options)
+    }
+
+    /// A walk whose geometry a painter draws that was opened for the model. Reference images are
+    /// the CPU's all the same.
+    pub fn with(
+        painter: Painter,
+        interior: &'a Interior,
+        contents: &'a Contents,
+        model: &'a Model,
+        options: WalkOptions,
+    ) -> Self {
+        let library = Library::new(interior, &options.library);
         Self {
             interior,
             contents,
             model,
             geometry: CellGeometry::new(model, contents),
-            library: Library::new(interior, &options.library),
+            is_used: vec![false; library.len()],
+            library,
             options,
-            raster: Raster::default(),
+            painter,
             filled: Target::default(),
             owners: Vec::new(),
             picture: Target::default(),
@@ -146,6 +164,28 @@ impl<'a> Walk<'a> {
     /// The reference images.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// What draws the geometry.
+    pub fn painter(&self) -> &Painter {
+        &self.painter
+    }
+
+    /// See [`Self::painter`].
+    pub fn painter_mut(&mut self) -> &mut Painter {
+        &mut self.painter
+    }
+
+    /// Begins anew, with the reference images that there are: the last picture is forgotten, and
+    /// which images were used.
+    pub fn begin(&mut self) {
+        self.picture = Target::default();
+        self.is_used.fill(false);
+    }
+
+    /// How many reference images were used since the beginning.
+    pub fn references_used(&self) -> usize {
+        self.is_used.iter().filter(|is| **is).count()
     }
 
     /// The last frame drawn.
@@ -213,37 +253,34 @@ impl<'a> Walk<'a> {
         cost.visibility = start.elapsed();
         // 2. Triangles.
         let start = Instant::now();
-        self.raster.clear(&camera);
-        for (runs, window) in &windows {
+        for (runs, _) in &windows {
             cost.triangles_in_cells += runs.asked;
             cost.triangles_tried += runs.count();
-            cost.triangles_met += self
-                .raster
-                .draw(self.model, &runs.lists, &camera, window, None);
         }
+        cost.triangles_met = self.painter.meet(self.model, &windows, &camera);
         cost.geometry = start.elapsed();
         // 3. Fills.
         let start = Instant::now();
-        let needed: Vec<Vec<usize>> = fills
-            .iter()
-            .map(|f| {
-                let (id, from) = (f.pass.portal, f.pass.from);
-                let count = fill.references();
-                self.library
-                    .nearest(self.interior, id, from, f.into, eye, count)
-            })
-            .collect();
-        let image = |i: usize| self.library.image(i, self.interior, self.model, geometry);
-        for &i in needed.iter().flatten() {
-            cost.references_made += usize::from(!self.library.is_made(i));
-            image(i);
-        }
+        let nearest = |f: &Filled<'_>| {
+            let (id, from) = (f.pass.portal, f.pass.from);
+            let count = fill.references();
+            self.library
+                .nearest(self.interior, id, from, f.into, eye, count)
+        };
+        let needed: Vec<Vec<usize>> = fills.iter().map(nearest).collect();
+        let all: Vec<usize> = needed.iter().flatten().copied().collect();
+        all.iter().for_each(|i| self.is_used[*i] = true);
+        let (images, made) = self
+            .library
+            .images(&all, self.interior, self.model, geometry);
+        cost.references_made = made;
         cost.references = start.elapsed();
+        let mut images = images.iter();
         let start = Instant::now();
         self.filled.clear(camera.width, camera.height);
         self.owners.clear();
         self.owners.resize(self.filled.color.len(), 0);
-        for (k, (f, images)) in fills.iter().zip(&needed).enumerate() {
+        for (k, (f, needed)) in fills.iter().zip(&needed).enumerate() {
             for y in 0..camera.height {
                 let open = f.window.row(y);
                 let first = y as usize * camera.width as usize;
@@ -251,8 +288,9 @@ impl<'a> Walk<'a> {
                 self.owners[row].fill(k as u16 + 1);
             }
             // The nearest last.
-            for &i in images.iter().rev() {
-                let (reference, into) = (image(i), &mut self.filled);
+            let of_portal: Vec<_> = images.by_ref().take(needed.len()).collect();
+            for reference in of_portal.into_iter().rev() {
+                let into = &mut self.filled;
                 cost.samples += match fill {
                     PortalFill::Texture => texture(reference, &f.plane, &camera, &f.window, into),
                     _ => warp(reference, &camera, &f.window, self.options.splat, into),
@@ -269,9 +307,9 @@ impl<'a> Walk<'a> {
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
     fn share_of_image(&self, portal: &Portal, eye: DVec3) -> f64 {
-        let radius = portal.semicircle_radius(self.interior.up);
-        let (near, far) = (self.options.near * radius, self.options.far * radius);
-        let distance = distance(portal, eye);
+        let far = self.options.near * portal.semicircle_radius(self.interior.up);
+        let near = ALONE * far;
+        let distance = portal.polygon.distance(eye);
         if !(distance > near) {
             return 0.0;
         }
@@ -302,12 +340,12 @@ impl<'a> Walk<'a> {
                 f.share < 1.0 || filled.color[pixel][3] == 0 || is_before(pixel, f, inverse_depth)
             }
         };
-        self.raster
+        self.painter
             .shade(self.model, camera, &mut self.picture, is_wanted);
         if fills.is_empty() {
             return 0;
         }
-        let raster = &self.raster;
+        let painter = &self.painter;
         let colors = self.picture.color.par_chunks_mut(width);
         let rows = colors.zip(self.picture.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
@@ -317,28 +355,24 @@ impl<'a> Walk<'a> {
                 let Some(f) = fill_of(pixel) else {
                     continue;
                 };
-                let image = filled.color[pixel];
-                let own = raster.at(pixel);
-                if own.is_some_and(|(_, s)| is_before(pixel, f, s)) {
+                let own = painter.inverse_depth(pixel);
+                if own.is_some_and(|s| is_before(pixel, f, s)) {
                     continue;
                 }
+                let mut image = filled.color[pixel];
                 if image[3] == 0 {
-                    if own.is_none() {
-                        holes += 1;
-                        if last.color.len() == owners.len() {
-                            *color = last.color[pixel];
-                        }
+                    holes += usize::from(own.is_none());
+                    if last.color.len() == owners.len() {
+                        image = last.color[pixel];
                     }
-                    continue;
                 }
-                if f.share >= 1.0 || own.is_none() {
+                if f.share < 1.0 {
+                    *color = mixed(*color, image, f.share);
+                } else if own.is_none() || filled.color[pixel][3] > 0 {
                     *color = image;
-                    *depth = filled.inverse_depth[pixel];
-                    continue;
                 }
-                for k in 0..3 {
-                    let (a, b) = (f64::from(color[k]), f64::from(image[k]));
-                    color[k] = (a + f.share * (b - a)).round() as u8;
+                if own.is_none() || (f.share >= 1.0 && filled.color[pixel][3] > 0) {
+                    *depth = filled.inverse_depth[pixel];
                 }
             }
             holes
@@ -347,28 +381,22 @@ impl<'a> Walk<'a> {
     }
 }
 
+/// Colours with coverage mixed, `share` of the second.
+fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
+    let weights = [(1.0 - share) * f64::from(a[3]), share * f64::from(b[3])];
+    let alpha = weights[0] + weights[1];
+    if alpha < 0.5 {
+        return [0; 4];
+    }
+    let part = weights[1] / alpha;
+    let mix = |k: usize| f64::from(a[k]) + part * (f64::from(b[k]) - f64::from(a[k]));
+    [mix(0), mix(1), mix(2), alpha].map(|v| v.round() as u8)
+}
+
 /// The same cells, seen everywhere.
 fn everywhere(mut visibility: Visibility) -> Visibility {
     for cell in &mut visibility.cells {
         cell.regions = vec![Region::ALL];
     }
     visibility
-}
-
-/// How far an eye is from the nearest point of a portal.
-fn distance(portal: &Portal, eye: DVec3) -> f64 {
-    let polygon = &portal.polygon;
-    let height = polygon.height(eye);
-    if polygon.covers(eye, 0.0) {
-        return height.abs();
-    }
-    let corners = polygon.corners();
-    let side = |i: usize| {
-        let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
-        let along = b - a;
-        let t = ((eye - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-        let t = if t.is_nan() { 0.0 } else { t };
-        eye.distance(a + t * along)
-    };
-    (0..corners.len()).map(side).fold(f64::INFINITY, f64::min)
 }

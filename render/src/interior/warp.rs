@@ -42,12 +42,6 @@ pub enum Splat {
     Fixed(u32),
 }
 
-/// The inverse depth 1 / Z of a depth buffer's value z between 0 and 1 (OpenGL's, not
-/// reversed): 1 − z(f − n)/f = n/Z (Rafferty et al. 1998, §3.1).
-pub fn inverse_depth_of_buffer(z: f64, near: f64, far: f64) -> f64 {
-    (1.0 - z * (far - near) / far) / near
-}
-
 /// How far beyond its footprint a splat reaches, in pixels, so that neighbours leave no gap.
 const OVERLAP: f64 = 0.08;
 /// The least and the most half sides of a splat, in pixels.

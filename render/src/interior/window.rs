@@ -57,6 +57,11 @@ impl Window {
         }
     }
 
+    /// Whether it has all pixels of an image so wide.
+    pub(crate) fn is_whole(&self, width: u32) -> bool {
+        self.rows.iter().all(|row| *row == (0, width))
+    }
+
     /// The pixels of a row.
     pub fn row(&self, y: u32) -> Range<u32> {
         let (first, end) = self.rows.get(y as usize).copied().unwrap_or_default();

@@ -1,74 +1,14 @@
 //! What the tests of interiors share. Each of them uses a part.
 #![allow(dead_code)]
 
-use calibrate::{Lens, Rigid3, View};
-use datasets::house::{House, HouseOptions, house};
-use glam::{DVec2, DVec3};
-use proxy::interior::{Content, Contents, Interior, RoomBox, visible};
-use render::interior::{CellGeometry, Runs};
+#[path = "../../../proxy/tests/house/mod.rs"]
+mod shared;
 
-pub(crate) fn view(eye: DVec3, target: DVec3, [width, height]: [u32; 2]) -> View {
-    let size = DVec2::new(f64::from(width), f64::from(height));
-    View {
-        lens: Lens::pinhole(DVec2::splat(0.6 * size.x), 0.5 * size),
-        width,
-        height,
-        camera_from_world: Rigid3::looking_at(eye, target, DVec3::Y),
-    }
-}
-
-/// Numbers from 0 to 1, the same every time: SplitMix64.
-pub(crate) fn random(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
-pub(crate) fn room(interior: &Interior, cell: usize) -> RoomBox {
-    match interior.cells[cell].content {
-        Content::Box(room) => room,
-        _ => panic!("a house's cells are boxes"),
-    }
-}
-
-/// A viewpoint anywhere in a house, one in eight in a doorway, some on portals' planes.
-pub(crate) fn viewpoint(interior: &Interior, seed: u64) -> (DVec3, DVec3) {
-    let mut r = random(seed);
-    let eye = if seed.is_multiple_of(8) {
-        let i = (r() * interior.portals.len() as f64) as usize;
-        let portal = &interior.portals[i];
-        let corners = portal.polygon.corners();
-        let (s, t) = (0.05 + 0.9 * r(), 0.05 + 0.9 * r());
-        let at = corners[0]
-            .lerp(corners[1], s)
-            .lerp(corners[3].lerp(corners[2], s), t);
-        let off = [0.0, 1e-12, -1e-12, 1e-7, -1e-5, 0.01, -0.05, 0.06];
-        at + portal.polygon.normal() * off[(r() * 8.0) as usize]
-    } else {
-        let room = room(interior, (r() * interior.cells.len() as f64) as usize);
-        let inset = DVec3::splat(0.1);
-        let share = DVec3::new(r(), r(), r());
-        room.min + inset + (room.max - room.min - 2.0 * inset) * share
-    };
-    let target = DVec3::new(r() - 0.5, 0.6 * (r() - 0.5), r() - 0.5);
-    (eye, eye + target)
-}
-
-pub(crate) fn small_house(rooms: usize, seed: u32) -> (House, Contents) {
-    let options = HouseOptions {
-        rooms,
-        triangles: Some(1),
-        seed,
-    };
-    let house = house(&options).unwrap();
-    let (contents, warnings) = Contents::new(&house.interior, &house.model).unwrap();
-    assert_eq!(warnings, []);
-    (house, contents)
-}
+use calibrate::View;
+use proxy::interior::{Contents, Interior, visible};
+use render::interior::{CellGeometry, Runs, Target};
+#[allow(unused_imports)]
+pub(crate) use shared::{random, room, small_house, view, viewpoint};
 
 /// What portal culling leaves to draw.
 pub(crate) fn drawn<'a>(
@@ -79,4 +19,56 @@ pub(crate) fn drawn<'a>(
 ) -> Runs<'a> {
     let cell = contents.locate(interior, view.center());
     geometry.seen(view.center(), &visible(interior, cell, view))
+}
+
+/// A picture with what its edges follow from.
+pub(crate) struct Pixels {
+    width: usize,
+    color: Vec<[u8; 4]>,
+    /// 0 where nothing is.
+    inverse_depth: Vec<f64>,
+}
+
+impl Pixels {
+    pub(crate) fn of(target: &Target) -> Self {
+        Self {
+            width: target.width as usize,
+            color: target.color.clone(),
+            inverse_depth: target.inverse_depth.iter().map(|s| f64::from(*s)).collect(),
+        }
+    }
+
+    pub(crate) fn of_rays(picture: &image::RgbaImage, depths: &[f64]) -> Self {
+        Self {
+            width: picture.width() as usize,
+            color: picture.pixels().map(|p| p.0).collect(),
+            inverse_depth: depths.iter().map(|z| 1.0 / z).collect(),
+        }
+    }
+
+    /// Whether a pixel lies within 1.5 pixels of an edge: of depth or of colour.
+    pub(crate) fn is_edge(&self, pixel: usize) -> bool {
+        let height = self.color.len() / self.width;
+        let (x, y) = (pixel % self.width, pixel / self.width);
+        let around = |at: usize, end: usize| at.saturating_sub(1)..=(at + 1).min(end - 1);
+        let (s, color) = (self.inverse_depth[pixel], self.color[pixel]);
+        let mut pixels =
+            around(y, height).flat_map(|v| around(x, self.width).map(move |u| v * self.width + u));
+        pixels.any(|i| {
+            let far = (self.inverse_depth[i] - s).abs() > 0.01 * s;
+            far || (0..3).any(|k| color[k].abs_diff(self.color[i][k]) > 8)
+        })
+    }
+
+    /// Whether a pixel of a picture `times` smaller lies within 1.5 of its pixels of an edge.
+    pub(crate) fn has_edge_around(&self, [x, y]: [u32; 2], times: u32) -> bool {
+        let height = self.color.len() / self.width;
+        let reach = |at: u32, end: usize| {
+            let from = (at * times).saturating_sub(times);
+            from as usize..(((at + 2) * times) as usize).min(end)
+        };
+        let mut pixels =
+            reach(y, height).flat_map(|v| reach(x, self.width).map(move |u| v * self.width + u));
+        pixels.any(|pixel| self.is_edge(pixel))
+    }
 }

@@ -99,17 +99,15 @@ pub(in crate::mesh) fn parse_model(
     bytes: &[u8],
 ) -> Result<(Model, Vec<String>), MeshFileError> {
     let (json, blob) = super::split(path, bytes)?;
-    let root = |e| MeshFileError::File(path.to_owned(), format!("its materials: {e}"));
     // The geometry's reader looks at the JSON first, and says what is wrong with it.
-    let mut looks = Looks::default();
-    match serde_json::from_slice(json) {
-        Ok(read) => looks.root = Some(read),
-        Err(error) => {
-            super::parse(path, bytes)?;
-            return Err(root(error));
-        }
-    }
-    let mesh = super::read(path, bytes.len(), json, blob, &mut looks)?;
+    let root = super::root(path, json)?;
+    let failed = |e| MeshFileError::File(path.to_owned(), format!("its materials: {e}"));
+    let mut looks = Looks {
+        root: Some(serde_json::from_slice(json).map_err(failed)?),
+        most_encoded: super::MAX_GROWTH * bytes.len() + 65536,
+        ..Looks::default()
+    };
+    let mesh = super::read(path, bytes.len(), &root, blob, &mut looks)?;
     let Looks {
         mut model,
         mut warnings,
@@ -119,6 +117,22 @@ pub(in crate::mesh) fn parse_model(
     model.uvs.resize(mesh.positions.len(), [0.0; 2]);
     model.colors.resize(mesh.positions.len(), [255; 4]);
     model.mesh = mesh;
+    let mut together = 0;
+    for picture in &pictures {
+        together += decoded_size(&picture.bytes);
+        if together > MAX_PICTURES {
+            return Err(MeshFileError::Record {
+                path: path.to_owned(),
+                record: format!("image {}", picture.number),
+                problem: format!(
+                    "with those before it, it takes {} MiB of memory, more than {} MiB; make the \
+                     model's pictures smaller",
+                    together >> 20,
+                    MAX_PICTURES >> 20
+                ),
+            });
+        }
+    }
     // On all threads, in order.
     let decoded: Vec<_> = pictures.par_iter().map(|p| decode(path, p)).collect();
     for picture in decoded {
@@ -143,6 +157,9 @@ struct Looks {
     picture_idxs: BTreeMap<usize, Option<u32>>,
     /// Textures that are yet to be decoded.
     pictures: Vec<Picture>,
+    /// Their bytes, and how many they may be: nothing keeps a file's pictures from sharing bytes.
+    encoded: usize,
+    most_encoded: usize,
 }
 
 struct Picture {
@@ -310,7 +327,19 @@ impl Looks {
             problem,
         };
         let bytes = match (source.buffer_view, &source.uri) {
-            (Some(view), _) => Ok(accessors.view_bytes(view)?.to_vec()),
+            (Some(view), _) => {
+                let bytes = accessors.view_bytes(view)?;
+                self.encoded += bytes.len();
+                let most = self.most_encoded;
+                if self.encoded > most + accessors.buffers.external_size() {
+                    return Err(failed(format!(
+                        "pictures share bytes until they take {} bytes, more than {most}; export \
+                         the model again",
+                        self.encoded
+                    )));
+                }
+                Ok(accessors.view_bytes(view)?.to_vec())
+            }
             (None, Some(uri)) => fetch(accessors.path, uri, failed).map(|(bytes, _)| bytes),
             (None, None) => Err(failed("it is nowhere".to_owned())),
         };
@@ -336,6 +365,17 @@ impl Looks {
 
 /// Bytes that a picture may take, decoded.
 const MAX_PICTURE: u64 = 1 << 30;
+/// Bytes that all of a model's may take.
+const MAX_PICTURES: u64 = 4 << 30;
+
+/// Bytes that a picture takes as RGBA, by what it says of itself; none where it does not.
+fn decoded_size(bytes: &[u8]) -> u64 {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let size = reader.ok().and_then(|r| r.into_dimensions().ok());
+    size.map_or(0, |(width, height)| {
+        4 * u64::from(width) * u64::from(height)
+    })
+}
 
 /// A picture; white, and a warning, where it is of a kind that is not read.
 fn decode(path: &Path, picture: &Picture) -> Result<(RgbaImage, Option<String>), MeshFileError> {

@@ -128,7 +128,7 @@ impl Visitor for () {}
 /// Reads a .glb or a .gltf file.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     let (json, blob) = split(path, bytes)?;
-    read(path, bytes.len(), json, blob, &mut ())
+    read(path, bytes.len(), &root(path, json)?, blob, &mut ())
 }
 
 /// The JSON and the binary chunk of a GLB; of a .gltf file, all of it is JSON.
@@ -139,14 +139,8 @@ fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>
     }
 }
 
-/// The triangles; the visitor hears of each primitive.
-fn read(
-    path: &Path,
-    file_size: usize,
-    json: &[u8],
-    blob: Option<&[u8]>,
-    visitor: &mut impl Visitor,
-) -> Result<Mesh, MeshFileError> {
+/// What the JSON says of geometry, if it can be read at all.
+fn root(path: &Path, json: &[u8]) -> Result<Root, MeshFileError> {
     let whole = |problem: String| MeshFileError::File(path.to_owned(), problem);
     let root: Root =
         serde_json::from_slice(json).map_err(|e| whole(format!("not a glTF file: {e}")))?;
@@ -164,6 +158,17 @@ fn read(
             super::obj::shown(extension)
         )));
     }
+    Ok(root)
+}
+
+/// The triangles; the visitor hears of each primitive.
+fn read(
+    path: &Path,
+    file_size: usize,
+    root: &Root,
+    blob: Option<&[u8]>,
+    visitor: &mut impl Visitor,
+) -> Result<Mesh, MeshFileError> {
     let mut reader = Reader {
         accessors: Accessors {
             path,
@@ -174,7 +179,7 @@ fn read(
         mesh: Mesh::default(),
         file_size,
     };
-    for (node, parent, world_from_node) in world_from_nodes(path, &root)? {
+    for (node, parent, world_from_node) in world_from_nodes(path, root)? {
         visitor.node(node, parent);
         if let Some(number) = root.nodes[node].mesh {
             let record = |problem: String| MeshFileError::Record {

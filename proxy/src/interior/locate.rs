@@ -1,6 +1,6 @@
-//! Which cell a viewer is in: followed through portals, or found anew.
+//! Which cell a viewer is in.
 
-use super::{CellId, Contents, Interior, Portal, PortalId};
+use super::{CellId, Contents, Interior, Portal};
 use glam::DVec3;
 
 /// How near to a portal's plane counts as on it, in shares of its size.
@@ -12,48 +12,6 @@ const ROUNDING: f64 = 1e-14;
 pub(super) fn tolerance(portal: &Portal) -> f64 {
     let center = portal.polygon.center().abs().max_element();
     ON_PLANE * portal.polygon.size() + ROUNDING * center
-}
-
-impl Interior {
-    /// The cell of a viewer who was in `cell` (none: outside) and moved in a straight line:
-    /// each portal crossed leads on; walls are no matter, so a step should be short. After a
-    /// jump, [`Contents::locate`] finds the cell.
-    ///
-    /// On a portal's plane one still is in the cell that one came from.
-    pub fn track(&self, cell: Option<CellId>, from: DVec3, to: DVec3) -> Option<CellId> {
-        if !from.is_finite() || !to.is_finite() {
-            return cell;
-        }
-        let mut cell = cell;
-        let mut along = 0.0;
-        let mut crossed: Vec<PortalId> = Vec::new();
-        // A straight line crosses a plane once.
-        loop {
-            let open = self.portals_of(cell);
-            let crossings = open
-                .filter(|(id, _)| !crossed.contains(id))
-                .filter_map(|(id, portal)| Some((crossing(portal, cell, from, to)?, id, portal)))
-                .filter(|(t, ..)| *t >= along);
-            let Some((t, id, portal)) = crossings.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-                return cell;
-            };
-            (along, cell) = (t, portal.beyond(cell).unwrap_or(cell));
-            crossed.push(id);
-        }
-    }
-}
-
-/// Where on the way, 0 to 1, it crosses a portal out of the cell.
-fn crossing(portal: &Portal, cell: Option<CellId>, from: DVec3, to: DVec3) -> Option<f64> {
-    let normal = portal.normal_into(cell);
-    let height = |p: DVec3| (p - portal.polygon.center()).dot(normal);
-    let (before, after) = (height(from), height(to));
-    let margin = tolerance(portal);
-    if !(before >= -margin && after < 0.0 && before > after) {
-        return None;
-    }
-    let t = (before / (before - after)).max(0.0);
-    portal.polygon.covers(from.lerp(to, t), margin).then_some(t)
 }
 
 impl Contents {
