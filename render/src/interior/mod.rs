@@ -30,3 +30,5 @@ pub use tour::{TourError, tour};
 pub use walk::{FrameCost, Walk, WalkOptions};
 pub use warp::{Splat, Warp, Warped, inverse_depth_of_buffer, warp};
 pub use window::Window;
+
+pub(crate) use warp::slope;
