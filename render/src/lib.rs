@@ -15,6 +15,7 @@ pub mod gpu;
 mod held;
 mod image_out;
 pub mod interior;
+pub mod ldi;
 mod lumigraph;
 mod mask;
 mod near;

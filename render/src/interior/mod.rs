@@ -32,3 +32,5 @@ pub use tour::{TourError, tour};
 pub use walk::{FrameCost, Walk, WalkOptions};
 pub use warp::{Splat, Warp, Warped, warp};
 pub use window::Window;
+
+pub(crate) use warp::slope;

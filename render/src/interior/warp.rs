@@ -15,11 +15,11 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug)]
 pub struct Warp {
     /// Homogeneous desired pixels from homogeneous reference pixels, at infinity.
-    pixel_from_pixel: DMat3,
+    pub pixel_from_pixel: DMat3,
     /// What an inverse depth of 1 adds.
-    shift: DVec3,
+    pub shift: DVec3,
     /// The desired centre, in the reference camera's frame.
-    center: DVec3,
+    pub center: DVec3,
 }
 
 /// Where a sample falls.
@@ -191,7 +191,12 @@ fn ceil(x: f64) -> i32 {
 /// How inverse depth changes from a pixel to the next: the smaller of the changes on its two
 /// sides, zero where they disagree. It is exact on a plane, and at the border of a surface that
 /// surface's own.
-fn slope(inverse_depth: &[f32], i: usize, step: usize, [before, after]: [bool; 2]) -> f64 {
+pub(crate) fn slope(
+    inverse_depth: &[f32],
+    i: usize,
+    step: usize,
+    [before, after]: [bool; 2],
+) -> f64 {
     let s = f64::from(inverse_depth[i]);
     let other = |has: bool, j: usize| {
         let other = if has {

@@ -1,0 +1,173 @@
+//! Which columns of an LDI one can see through its portal (Popescu et al. 1998, §3.2.4).
+//!
+//! A binary tree has the least and the greatest inverse depth of runs of columns. A run lies
+//! between eight points: its corners at both. What they span in the desired image holds all of
+//! its samples.
+
+use super::Layered;
+use super::free::bounds;
+use crate::interior::{Pinhole, Target, Warp, Window};
+use glam::DVec2;
+use std::ops::Range;
+
+/// The columns that are left.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Clipped {
+    /// From left to right, apart from one another.
+    pub kept: Vec<Range<u32>>,
+}
+
+impl Clipped {
+    /// All columns.
+    pub fn whole(ldi: &Layered) -> Self {
+        let kept = vec![0..ldi.size()[0]];
+        Self { kept }
+    }
+
+    /// How many samples they have.
+    pub fn samples(&self, ldi: &Layered) -> usize {
+        let rows = 0..ldi.size()[1];
+        let in_row = |row| {
+            let count = |columns: &Range<u32>| ldi.samples_of(columns.clone(), row).len();
+            self.kept.iter().map(count).sum::<usize>()
+        };
+        rows.map(in_row).sum()
+    }
+}
+
+/// The least and greatest inverse depths of runs of columns.
+#[derive(Clone, Debug)]
+pub struct ClipTree {
+    width: u32,
+    height: u32,
+    /// The first is all columns; below the i-th are the 2i-th and the next, counted from 1.
+    /// The least is above the greatest where there are no samples.
+    nodes: Vec<[f32; 2]>,
+}
+
+/// Added to how far splats reach, in pixels: rounding to f32.
+const SLACK: f64 = 0.5;
+
+impl ClipTree {
+    /// Of an LDI.
+    pub fn new(ldi: &Layered) -> Self {
+        let [width, height] = ldi.size();
+        let leaves = (width as usize).next_power_of_two();
+        let mut nodes = vec![[f32::INFINITY, f32::NEG_INFINITY]; 2 * leaves];
+        for y in 0..height {
+            for i in ldi.samples_of(0..width, y) {
+                let s = ldi.inverse_depth[i];
+                // At most half a pixel from its column's middle, so in it.
+                let column = (ldi.x[i] as u32).min(width - 1);
+                let leaf = &mut nodes[leaves + column as usize];
+                *leaf = [leaf[0].min(s), leaf[1].max(s)];
+            }
+        }
+        for i in (1..leaves).rev() {
+            let [a, b] = [nodes[2 * i], nodes[2 * i + 1]];
+            nodes[i] = [a[0].min(b[0]), a[1].max(b[1])];
+        }
+        Self {
+            width,
+            height,
+            nodes,
+        }
+    }
+
+    /// The columns of which something may be drawn in a window, where no splat reaches farther
+    /// than that many pixels from its sample's place. Of another LDI's size, nothing is
+    /// promised.
+    pub fn columns(
+        &self,
+        ldi: &Layered,
+        desired: &Pinhole,
+        window: &Window,
+        reach: f64,
+    ) -> Clipped {
+        let mut kept = Clipped::default();
+        // Only its size is asked.
+        let target = Target {
+            width: desired.width,
+            height: desired.height,
+            ..Target::default()
+        };
+        let Some([across, down]) = bounds(window, &target) else {
+            return kept;
+        };
+        let far = reach + SLACK;
+        let low = DVec2::new(f64::from(across.start), f64::from(down.start)) - far;
+        let high = DVec2::new(f64::from(across.end), f64::from(down.end)) + far;
+        let warp = Warp::new(&ldi.camera, desired);
+        let leaves = self.nodes.len() / 2;
+        self.ask(&warp, [low, high], 1, 0..leaves as u32, &mut kept);
+        kept
+    }
+
+    fn ask(
+        &self,
+        warp: &Warp,
+        open: [DVec2; 2],
+        node: usize,
+        columns: Range<u32>,
+        kept: &mut Clipped,
+    ) {
+        let [least, greatest] = self.nodes[node];
+        if !(least <= greatest) {
+            return;
+        }
+        let to = columns.end.min(self.width);
+        match self.place(warp, open, columns.start..to, [least, greatest]) {
+            Place::Outside => {}
+            Place::Across if node < self.nodes.len() / 2 => {
+                let middle = columns.start.midpoint(columns.end);
+                self.ask(warp, open, 2 * node, columns.start..middle, kept);
+                self.ask(warp, open, 2 * node + 1, middle..columns.end, kept);
+            }
+            _ => match kept.kept.last_mut() {
+                Some(last) if last.end == columns.start => last.end = to,
+                _ => kept.kept.push(columns.start..to),
+            },
+        }
+    }
+
+    fn place(
+        &self,
+        warp: &Warp,
+        [low, high]: [DVec2; 2],
+        columns: Range<u32>,
+        depths: [f32; 2],
+    ) -> Place {
+        let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let (mut before, mut behind) = (0, 0);
+        for x in [columns.start, columns.end].map(f64::from) {
+            for y in [0.0, f64::from(self.height)] {
+                let ray = warp.pixel_from_pixel * DVec2::new(x, y).extend(1.0);
+                for s in depths.map(f64::from) {
+                    let at = ray + s * warp.shift;
+                    if at.z > 0.0 {
+                        before += 1;
+                        let at = at.truncate() / at.z;
+                        (least, most) = (least.min(at), most.max(at));
+                    } else {
+                        behind += 1;
+                    }
+                }
+            }
+        }
+        let is_apart = least.cmpgt(high).any() || most.cmplt(low).any();
+        let is_within = least.cmpge(low).all() && most.cmple(high).all();
+        match (before, behind) {
+            (0, _) => Place::Outside,
+            (_, 0) if is_apart => Place::Outside,
+            (_, 0) if is_within => Place::Inside,
+            _ => Place::Across,
+        }
+    }
+}
+
+/// How what a run of columns may cover lies to what is open.
+enum Place {
+    Outside,
+    Across,
+    Inside,
+}

@@ -1,0 +1,89 @@
+//! What fills holes: the farther of what is around.
+//!
+//! A hole opens where something near moved away from what is behind it, so it is that which
+//! belongs there.
+
+use crate::interior::{Target, Window};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Neighbours within this share of the farthest's inverse depth are the same surface.
+const SAME: f32 = 1.2;
+
+/// Fills the pixels of a window that show nothing from those that do, along their row and
+/// column, up to a distance; how many are left.
+pub(super) fn fill(
+    window: &Window,
+    [across, down]: [&Range<u32>; 2],
+    reach: u32,
+    into: &mut Target,
+) -> usize {
+    let width = into.width as usize;
+    let (colors, depths) = (&into.color, &into.inverse_depth);
+    let open = |y: u32| {
+        let row = window.row(y);
+        row.start..row.end.min(across.end)
+    };
+    // The nearest pixel along a line that shows something and that is open.
+    let look = |x: u32, y: u32, [dx, dy]: [i32; 2]| {
+        for step in 1..=reach as i32 {
+            let (x, y) = (x as i32 + step * dx, y as i32 + step * dy);
+            if x < 0 || !down.contains(&(y.max(0) as u32)) || y < 0 {
+                return None;
+            }
+            if !open(y as u32).contains(&(x as u32)) {
+                // Beside a slanted outline there may be more.
+                if dy == 0 {
+                    return None;
+                }
+                continue;
+            }
+            let i = y as usize * width + x as usize;
+            if colors[i][3] > 0 {
+                return Some((i, step));
+            }
+        }
+        None
+    };
+    let fill_row = |y: u32| {
+        let mut filled: Vec<(usize, [u8; 4], f32)> = Vec::new();
+        let mut left = 0;
+        for x in open(y) {
+            let i = y as usize * width + x as usize;
+            if colors[i][3] > 0 {
+                continue;
+            }
+            let found = [[-1, 0], [1, 0], [0, -1], [0, 1]].map(|way| look(x, y, way));
+            let farthest = found.iter().flatten().map(|(i, _)| depths[*i]);
+            let farthest = farthest.fold(f32::INFINITY, f32::min);
+            let (mut sum, mut weight, mut depth) = ([0.0; 3], 0.0, 0.0);
+            for (j, step) in found.into_iter().flatten() {
+                if depths[j] <= SAME * farthest {
+                    let w = 1.0 / step as f32;
+                    weight += w;
+                    depth += w * depths[j];
+                    for k in 0..3 {
+                        sum[k] += w * f32::from(colors[j][k]);
+                    }
+                }
+            }
+            if weight > 0.0 {
+                let [r, g, b] = sum.map(|v| (v / weight + 0.5) as u8);
+                filled.push((i, [r, g, b, 255], depth / weight));
+            } else {
+                left += 1;
+            }
+        }
+        (filled, left)
+    };
+    let rows: Vec<_> = down.clone().into_par_iter().map(fill_row).collect();
+    let mut left = 0;
+    for (row, unfilled) in rows {
+        left += unfilled;
+        for (i, color, depth) in row {
+            into.color[i] = color;
+            into.inverse_depth[i] = depth;
+        }
+    }
+    left
+}
