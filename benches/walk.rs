@@ -251,7 +251,7 @@ fn through_doors(
             off < 1e-6 && is_free && contents.locate(interior, eye) == place.from
         };
         // Squared error, pixels and holes.
-        let mut sums = [[0.0; 3]; 4];
+        let mut sums = [[0.0; 3]; PortalFill::ALL.len()];
         let mut views = 0;
         for place in places.iter().filter(is_meant) {
             let view = View {

@@ -238,7 +238,7 @@ fn what_images_show_is_close_to_what_is_there() {
             span: 1.0,
         },
     );
-    let mut sums = [[0.0; 3]; 4];
+    let mut sums = [[0.0; 3]; PortalFill::ALL.len()];
     let mut count = 0.0;
     for place in places.iter().filter(|p| p.is_inside).take(6) {
         for angle in [0.0, 0.1, 0.6] {

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Walk through an interior
 ///
 /// The room one is in is drawn as geometry; what lies beyond its portals as geometry too, or out of
-/// images made before the portals: as textures, or warped. Frames are PNGs; times.svg plots the time
+/// images made before the portals: as textures, warped, or as layered depth images. Frames are PNGs; times.svg plots the time
 /// of each frame, path.json is the tour.
 ///
 ///     lumigraph walk house --portals all -o walk
@@ -41,7 +41,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 520, conflicts_with = "path",
         value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
-    /// What portals show: geometry, texture, warp1, warp2, several of them, or all; of several,
+    /// What portals show: geometry, texture, warp1, warp2, ldi, several of them, or all; of several,
     /// each has a folder of its own
     #[arg(
         long,
@@ -313,6 +313,8 @@ struct FrameReport<'a> {
     /// That touch a pixel's centre; none where a graphics device drew them.
     triangles_met: Option<usize>,
     samples: usize,
+    /// Of LDIs, in columns out of sight.
+    samples_clipped: usize,
     holes: usize,
 }
 
@@ -373,6 +375,7 @@ impl Walked {
             triangles_skipped: c.triangles_in_cells - c.triangles_tried,
             triangles_met: c.triangles_met,
             samples: c.samples,
+            samples_clipped: c.samples_clipped,
             holes: c.holes,
         });
         let frames: Vec<FrameReport<'_>> = frames.collect();

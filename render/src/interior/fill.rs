@@ -11,11 +11,19 @@ pub enum PortalFill {
     Warp1,
     /// The two nearest, warped: the second first, the nearest over it.
     Warp2,
+    /// A layered depth image made of all of the semicircle's, warped in any order.
+    Ldi,
 }
 
 impl PortalFill {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Geometry, Self::Texture, Self::Warp1, Self::Warp2];
+    pub const ALL: [Self; 5] = [
+        Self::Geometry,
+        Self::Texture,
+        Self::Warp1,
+        Self::Warp2,
+        Self::Ldi,
+    ];
 
     /// As the command line and reports spell it.
     pub fn name(self) -> &'static str {
@@ -24,6 +32,7 @@ impl PortalFill {
             Self::Texture => "texture",
             Self::Warp1 => "warp1",
             Self::Warp2 => "warp2",
+            Self::Ldi => "ldi",
         }
     }
 
@@ -32,10 +41,10 @@ impl PortalFill {
         Self::ALL.into_iter().find(|fill| fill.name() == name)
     }
 
-    /// How many reference images it takes.
+    /// How many reference images a frame takes. An LDI is made of all of them once.
     pub fn references(self) -> usize {
         match self {
-            Self::Geometry => 0,
+            Self::Geometry | Self::Ldi => 0,
             Self::Texture | Self::Warp1 => 1,
             Self::Warp2 => 2,
         }

@@ -1,6 +1,7 @@
-//! The reference images of an interior, made when they are first asked for.
+//! The reference images of an interior and the LDIs of them, made when they are first asked for.
 
 use super::{CellGeometry, REFERENCE_SIZE, Reference};
+use crate::ldi::{ClipTree, ConstructOptions, Layered, construct};
 use crate::residency::Residency;
 use glam::DVec3;
 use proxy::interior::{
@@ -17,6 +18,8 @@ pub struct LibraryOptions {
     pub size: [u32; 2],
     /// Where they are made.
     pub semicircles: SemicircleOptions,
+    /// How an LDI is made of them.
+    pub ldi: ConstructOptions,
     /// The most bytes that they may take between frames; `None` for no limit. A frame has all
     /// that it needs, even if they are more. No picture depends on it.
     pub budget: Option<u64>,
@@ -27,23 +30,44 @@ impl Default for LibraryOptions {
         Self {
             size: REFERENCE_SIZE,
             semicircles: SemicircleOptions::default(),
+            ldi: ConstructOptions::default(),
             budget: None,
         }
     }
 }
 
-/// The places of all reference images, and those images that are in memory.
+/// A portal's LDI, from one side.
+#[derive(Clone, Debug)]
+pub struct PortalLdi {
+    /// Its samples.
+    pub ldi: Layered,
+    /// What tells which of its columns are in sight.
+    pub tree: ClipTree,
+}
+
+/// The places of all reference images, and those images and LDIs that are in memory.
 #[derive(Debug)]
 pub struct Library {
-    size: [u32; 2],
+    options: LibraryOptions,
     places: Vec<SemicircleView>,
     /// Of each portal and direction, one after the other: which places, from left to right.
     sides: Vec<Range<usize>>,
-    /// By place, with the turn that it was last used in.
-    images: Vec<Option<(Arc<Reference>, u64)>>,
+    /// By place.
+    images: Vec<Option<Kept<Reference>>>,
+    /// By side.
+    ldis: Vec<Option<Kept<PortalLdi>>>,
     /// Counts frames.
     turn: u64,
     residency: Residency,
+}
+
+/// What is in memory.
+#[derive(Clone, Debug)]
+struct Kept<T> {
+    what: Arc<T>,
+    bytes: u64,
+    /// When it was last used.
+    used: u64,
 }
 
 impl Library {
@@ -60,8 +84,12 @@ impl Library {
             }
         }
         Self {
-            size: options.size.map(|n| n.clamp(1, 4096)),
+            options: LibraryOptions {
+                size: options.size.map(|n| n.clamp(1, 4096)),
+                ..*options
+            },
             images: vec![None; places.len()],
+            ldis: vec![None; sides.len()],
             places,
             sides,
             turn: 0,
@@ -98,17 +126,28 @@ impl Library {
         eye: DVec3,
         count: usize,
     ) -> Vec<usize> {
-        let is_meant = |range: &&Range<usize>| {
-            let place = &self.places[range.start];
-            (place.portal, place.from, place.into) == (portal, Some(from), into)
-        };
-        let range = self.sides.iter().find(is_meant).cloned().unwrap_or(0..0);
+        let side = self.side(portal, from, into);
+        let range = side.map_or(0..0, |side| self.sides[side].clone());
         let eye_angle = angle_before(interior, interior.portal(portal), Some(from), eye);
         let mut places: Vec<usize> = range.collect();
         let off = |i: &usize| (self.places[*i].angle - eye_angle).abs();
         places.sort_by(|a, b| off(a).total_cmp(&off(b)));
         places.truncate(count);
         places
+    }
+
+    /// The portal and direction of that cell's, which has an LDI of its own; `None` where there are no
+    /// places.
+    pub fn side(&self, portal: PortalId, from: CellId, into: CellId) -> Option<usize> {
+        self.sides.iter().position(|range| {
+            let place = &self.places[range.start];
+            (place.portal, place.from, place.into) == (portal, Some(from), into)
+        })
+    }
+
+    /// How many LDIs there may be.
+    pub fn side_count(&self) -> usize {
+        self.sides.len()
     }
 
     /// The images of a frame's places, in their order, and how many were made for it. Others go,
@@ -122,37 +161,109 @@ impl Library {
     ) -> (Vec<Arc<Reference>>, usize) {
         self.turn += 1;
         // 1. What stays is no candidate for leaving.
-        let mut missing: Vec<usize> = Vec::new();
-        for &place in places {
-            match &mut self.images[place] {
-                Some((_, used)) => *used = self.turn,
-                None if !missing.contains(&place) => missing.push(place),
-                None => {}
-            }
-        }
-        let needed = missing.len() as u64 * Reference::bytes(self.size);
-        self.make_room(needed);
+        let missing = touch(&mut self.images, places, self.turn);
+        let bytes = Reference::bytes(self.options.size);
+        self.make_room(missing.len() as u64 * bytes);
         // 2. What is missing.
         for &place in &missing {
-            let made = Reference::new(interior, model, geometry, &self.places[place], self.size);
-            self.images[place] = Some((Arc::new(made), self.turn));
-            self.residency.change(Reference::bytes(self.size), 0);
+            let made = self.make(place, interior, model, geometry);
+            self.images[place] = Some(Kept {
+                what: Arc::new(made),
+                bytes,
+                used: self.turn,
+            });
+            self.residency.change(bytes, 0);
             self.residency.loads += 1;
         }
-        let image = |place: &usize| self.images[*place].as_ref().map(|(image, _)| image.clone());
-        (places.iter().filter_map(image).collect(), missing.len())
+        (found(&self.images, places), missing.len())
+    }
+
+    /// The LDIs of a frame's sides, in their order, and how many reference images were made for
+    /// them; `None` for a side whose images have no camera. Others go as for [`Self::images`].
+    pub fn ldis(
+        &mut self,
+        sides: &[usize],
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+    ) -> (Vec<Option<Arc<PortalLdi>>>, usize) {
+        self.turn += 1;
+        let mut made = 0;
+        for side in touch(&mut self.ldis, sides, self.turn) {
+            // Its images are of no more use once it is made.
+            let range = self.sides[side].clone();
+            let images: Vec<Arc<Reference>> = range
+                .map(|place| match &self.images[place] {
+                    Some(kept) => kept.what.clone(),
+                    None => {
+                        made += 1;
+                        Arc::new(self.make(place, interior, model, geometry))
+                    }
+                })
+                .collect();
+            let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
+            let Ok(constructed) = construct(&images, &self.options.ldi) else {
+                continue;
+            };
+            let ldi = constructed.ldi;
+            let tree = ClipTree::new(&ldi);
+            let bytes = ldi.bytes() + tree.bytes();
+            self.make_room(bytes);
+            self.ldis[side] = Some(Kept {
+                what: Arc::new(PortalLdi { ldi, tree }),
+                bytes,
+                used: self.turn,
+            });
+            self.residency.change(bytes, 0);
+        }
+        self.residency.loads += made as u64;
+        let ldi = |side: &usize| self.ldis[*side].as_ref().map(|kept| kept.what.clone());
+        (sides.iter().map(ldi).collect(), made)
+    }
+
+    fn make(
+        &self,
+        place: usize,
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+    ) -> Reference {
+        let size = self.options.size;
+        Reference::new(interior, model, geometry, &self.places[place], size)
     }
 
     fn make_room(&mut self, bytes: u64) {
         while !self.residency.allows(self.residency.held + bytes) {
-            let others = self.images.iter().enumerate();
-            let others = others.filter_map(|(i, image)| Some((image.as_ref()?.1, i)));
-            let Some((_, oldest)) = others.filter(|(used, _)| *used < self.turn).min() else {
-                return;
+            let images = self.images.iter().enumerate();
+            let images = images.filter_map(|(i, kept)| Some((kept.as_ref()?.used, 0, i)));
+            let ldis = self.ldis.iter().enumerate();
+            let ldis = ldis.filter_map(|(i, kept)| Some((kept.as_ref()?.used, 1, i)));
+            let others = images.chain(ldis).filter(|(used, ..)| *used < self.turn);
+            let freed = match others.min() {
+                Some((_, 0, image)) => self.images[image].take().map(|kept| kept.bytes),
+                Some((.., ldi)) => self.ldis[ldi].take().map(|kept| kept.bytes),
+                None => return,
             };
-            self.images[oldest] = None;
-            self.residency.change(0, Reference::bytes(self.size));
+            self.residency.change(0, freed.unwrap_or(0));
             self.residency.evictions += 1;
         }
     }
+}
+
+/// Marks what is used in a turn; which of it is not there, each once.
+fn touch<T>(kept: &mut [Option<Kept<T>>], wanted: &[usize], turn: u64) -> Vec<usize> {
+    let mut missing = Vec::new();
+    for &i in wanted {
+        match &mut kept[i] {
+            Some(kept) => kept.used = turn,
+            None if !missing.contains(&i) => missing.push(i),
+            None => {}
+        }
+    }
+    missing
+}
+
+fn found<T>(kept: &[Option<Kept<T>>], wanted: &[usize]) -> Vec<Arc<T>> {
+    let what = |i: &usize| kept[*i].as_ref().map(|kept| kept.what.clone());
+    wanted.iter().filter_map(what).collect()
 }

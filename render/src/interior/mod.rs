@@ -21,7 +21,7 @@ mod window;
 
 pub use fill::PortalFill;
 pub use geometry::{CellGeometry, Runs};
-pub use library::{Library, LibraryOptions};
+pub use library::{Library, LibraryOptions, PortalLdi};
 pub use painter::Painter;
 pub use pinhole::{Pinhole, PinholeError};
 pub use raster::{Beyond, Raster};

@@ -10,8 +10,9 @@
 use super::reference::plane_of;
 use super::{
     Beyond, CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
-    Runs, Splat, Target, Window, texture, warp,
+    PortalLdi, Reference, Runs, Splat, Target, Window, texture, warp,
 };
+use crate::ldi::{Clipped, Free, FreeOptions, free};
 use calibrate::View;
 use glam::DVec3;
 use proxy::interior::{
@@ -19,6 +20,7 @@ use proxy::interior::{
 };
 use proxy::mesh::Model;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What can be chosen about a walk.
@@ -26,8 +28,12 @@ use std::time::{Duration, Instant};
 pub struct WalkOptions {
     /// Reference images.
     pub library: LibraryOptions,
-    /// How large samples are drawn.
+    /// How large samples of images are drawn.
     pub splat: Splat,
+    /// How LDIs are drawn.
+    pub ldi: FreeOptions,
+    /// Whether columns of an LDI that are out of sight are drawn, too. The pictures are the same.
+    pub whole_ldis: bool,
     /// Nearer to a portal than this, in radii of its semicircle, geometry is mixed into what is
     /// beyond, and from two thirds of it on it is alone: from there one sees farther aside than
     /// the images do.
@@ -45,6 +51,8 @@ impl Default for WalkOptions {
         Self {
             library: LibraryOptions::default(),
             splat: Splat::default(),
+            ldi: FreeOptions::default(),
+            whole_ldis: false,
             near: 1.0,
             whole_cells: false,
             persist: false,
@@ -72,8 +80,10 @@ pub struct FrameCost {
     pub triangles_tried: usize,
     /// Those of them that touch a pixel's centre; a graphics device does not tell.
     pub triangles_met: Option<usize>,
-    /// Samples of reference images that were drawn, or pixels of textures.
+    /// Samples of images that were drawn, or pixels of textures.
     pub samples: usize,
+    /// Samples of LDIs in columns that were clipped away.
+    pub samples_clipped: usize,
     /// Pixels of portals that nothing was drawn in.
     pub holes: usize,
     /// Reference images made for this frame.
@@ -108,11 +118,28 @@ pub struct Walk<'a> {
     options: WalkOptions,
     painter: Painter,
     filled: Target,
+    /// Memory of the last LDI's drawing.
+    scratch: Free,
     /// By pixel: one more than the place in the frame's list of fills; 0 for none.
     owners: Vec<u16>,
     picture: Target,
-    /// By place of the library: whether the walk needed it.
+    /// By place of the library, then by side: whether the walk needed its image or LDI.
     is_used: Vec<bool>,
+}
+
+/// What fills a portal.
+enum Images {
+    /// Reference images, the nearest first.
+    References(Vec<Arc<Reference>>),
+    /// `None` where there is none.
+    Ldi(Option<Arc<PortalLdi>>),
+}
+
+/// What a frame's portals are filled with.
+struct Needed {
+    of_fills: Vec<Images>,
+    /// Reference images made for it.
+    made: usize,
 }
 
 /// A portal that is filled with images in this frame.
@@ -151,11 +178,12 @@ impl<'a> Walk<'a> {
             contents,
             model,
             geometry: CellGeometry::new(model, contents),
-            is_used: vec![false; library.len()],
+            is_used: vec![false; library.len() + library.side_count()],
             library,
             options,
             painter,
             filled: Target::default(),
+            scratch: Free::default(),
             owners: Vec::new(),
             picture: Target::default(),
         }
@@ -183,7 +211,7 @@ impl<'a> Walk<'a> {
         self.is_used.fill(false);
     }
 
-    /// How many reference images were used since the beginning.
+    /// How many reference images and LDIs were used since the beginning.
     pub fn references_used(&self) -> usize {
         self.is_used.iter().filter(|is| **is).count()
     }
@@ -261,40 +289,46 @@ impl<'a> Walk<'a> {
         cost.geometry = start.elapsed();
         // 3. Fills.
         let start = Instant::now();
-        let nearest = |f: &Filled<'_>| {
-            let (id, from) = (f.pass.portal, f.pass.from);
-            let count = fill.references();
-            self.library
-                .nearest(self.interior, id, from, f.into, eye, count)
-        };
-        let needed: Vec<Vec<usize>> = fills.iter().map(nearest).collect();
-        let all: Vec<usize> = needed.iter().flatten().copied().collect();
-        all.iter().for_each(|i| self.is_used[*i] = true);
-        let (images, made) = self
-            .library
-            .images(&all, self.interior, self.model, geometry);
-        cost.references_made = made;
+        let images = self.images(fill, &fills, eye);
+        cost.references_made = images.made;
         cost.references = start.elapsed();
-        let mut images = images.iter();
         let start = Instant::now();
         self.filled.clear(camera.width, camera.height);
         self.owners.clear();
         self.owners.resize(self.filled.color.len(), 0);
-        for (k, (f, needed)) in fills.iter().zip(&needed).enumerate() {
+        for (k, (f, images)) in fills.iter().zip(&images.of_fills).enumerate() {
             for y in 0..camera.height {
                 let open = f.window.row(y);
                 let first = y as usize * camera.width as usize;
                 let row = first + open.start as usize..first + open.end as usize;
                 self.owners[row].fill(k as u16 + 1);
             }
-            // The nearest last.
-            let of_portal: Vec<_> = images.by_ref().take(needed.len()).collect();
-            for reference in of_portal.into_iter().rev() {
-                let into = &mut self.filled;
-                cost.samples += match fill {
-                    PortalFill::Texture => texture(reference, &f.plane, &camera, &f.window, into),
-                    _ => warp(reference, &camera, &f.window, self.options.splat, into),
-                };
+            let into = &mut self.filled;
+            match images {
+                Images::References(images) => {
+                    // The nearest last.
+                    for reference in images.iter().rev() {
+                        cost.samples += match fill {
+                            PortalFill::Texture => {
+                                texture(reference, &f.plane, &camera, &f.window, into)
+                            }
+                            _ => warp(reference, &camera, &f.window, self.options.splat, into),
+                        };
+                    }
+                }
+                Images::Ldi(Some(portal)) => {
+                    let (ldi, options) = (&portal.ldi, &self.options.ldi);
+                    let reach = f64::from(options.reach());
+                    let columns = match self.options.whole_ldis {
+                        true => Clipped::whole(ldi),
+                        false => portal.tree.columns(ldi, &camera, &f.window, reach),
+                    };
+                    let scratch = &mut self.scratch;
+                    let took = free(ldi, &columns, &camera, &f.window, options, scratch, into);
+                    cost.samples += took.drawn;
+                    cost.samples_clipped += ldi.len() - took.samples;
+                }
+                Images::Ldi(None) => {}
             }
         }
         cost.fill = start.elapsed();
@@ -303,6 +337,44 @@ impl<'a> Walk<'a> {
         cost.holes = self.compose(&camera, &fills);
         cost.shade = start.elapsed();
         Ok(cost)
+    }
+
+    /// What portals are filled with, made now if it is not in memory.
+    fn images(&mut self, fill: PortalFill, fills: &[Filled<'_>], eye: DVec3) -> Needed {
+        let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
+        if fill == PortalFill::Ldi {
+            let side = |f: &Filled<'_>| self.library.side(f.pass.portal, f.pass.from, f.into);
+            let sides: Vec<Option<usize>> = fills.iter().map(side).collect();
+            let all: Vec<usize> = sides.iter().flatten().copied().collect();
+            for &side in &all {
+                self.is_used[self.library.len() + side] = true;
+            }
+            let (ldis, made) = self.library.ldis(&all, interior, model, geometry);
+            let mut ldis = ldis.into_iter();
+            let of_side = |side: &Option<usize>| side.and_then(|_| ldis.next().flatten());
+            let of_fills = sides.iter().map(|side| Images::Ldi(of_side(side)));
+            return Needed {
+                of_fills: of_fills.collect(),
+                made,
+            };
+        }
+        let nearest = |f: &Filled<'_>| {
+            let (id, from) = (f.pass.portal, f.pass.from);
+            let count = fill.references();
+            self.library.nearest(interior, id, from, f.into, eye, count)
+        };
+        let needed: Vec<Vec<usize>> = fills.iter().map(nearest).collect();
+        let all: Vec<usize> = needed.iter().flatten().copied().collect();
+        all.iter().for_each(|i| self.is_used[*i] = true);
+        let (images, made) = self.library.images(&all, interior, model, geometry);
+        let mut images = images.into_iter();
+        let of_fills = needed
+            .iter()
+            .map(|needed| Images::References(images.by_ref().take(needed.len()).collect()));
+        Needed {
+            of_fills: of_fills.collect(),
+            made,
+        }
     }
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.

@@ -74,6 +74,11 @@ impl ClipTree {
         }
     }
 
+    /// What it takes in memory.
+    pub fn bytes(&self) -> u64 {
+        size_of_val(self.nodes.as_slice()) as u64
+    }
+
     /// The columns of which something may be drawn in a window, where no splat reaches farther
     /// than that many pixels from its sample's place. Of another LDI's size, nothing is
     /// promised.

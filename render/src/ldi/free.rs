@@ -35,6 +35,14 @@ pub struct FreeOptions {
     pub fill: u32,
 }
 
+impl FreeOptions {
+    /// How far from its place a sample is drawn at most, in pixels.
+    pub fn reach(&self) -> f32 {
+        // What is beyond a patch counts only where another covers.
+        BEYOND * Options::of(self).most
+    }
+}
+
 impl Default for FreeOptions {
     fn default() -> Self {
         Self {

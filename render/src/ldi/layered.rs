@@ -159,6 +159,12 @@ impl Layered {
         self.x.len() - Self::PAD
     }
 
+    /// What it takes in memory.
+    pub fn bytes(&self) -> u64 {
+        let sample = size_of::<[f32; 3]>() + size_of::<[u8; 4]>() + size_of::<Look>();
+        (self.x.len() * sample + self.first.len() * size_of::<u32>()) as u64
+    }
+
     /// Whether it has none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
