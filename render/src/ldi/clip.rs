@@ -21,7 +21,7 @@ pub struct Clipped {
 impl Clipped {
     /// All columns.
     pub fn whole(ldi: &Layered) -> Self {
-        let kept = vec![0..ldi.size()[0]];
+        let kept = std::iter::once(0..ldi.size()[0]).collect();
         Self { kept }
     }
 
