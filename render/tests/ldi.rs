@@ -328,7 +328,7 @@ fn what_one_sees_through_doorways_is_there() {
                 let plane = Beyond::new(&camera, portal.polygon.center(), normal);
                 let rows = (0..size[1]).flat_map(|y| open.row(y).map(move |x| (x, y)));
                 let is_beyond = |(x, y): &(u32, u32)| {
-                    let depth = f64::from(depths[(y * size[0] + x) as usize]);
+                    let depth = depths[(y * size[0] + x) as usize];
                     depth > 0.0 && plane.has(camera.ray(*x, *y), 1.0 / depth)
                 };
                 let pixels: Vec<usize> = rows
