@@ -270,11 +270,34 @@ fn what_images_show_is_close_to_what_is_there() {
         );
     }
     assert!(count >= 8.0);
-    let [geometry, texture, warp1, warp2] = mean;
+    let [geometry, texture, warp1, warp2, ldi] = mean;
     assert_eq!([geometry[0], geometry[1], geometry[2]], [60.0, 0.0, 0.0]);
     assert!(texture[0] > 15.0 && warp1[0] > 15.0 && warp2[0] > texture[0] + 2.0);
     assert!(warp1[1] < 0.06 && warp2[1] <= warp1[1]);
+    assert!(ldi[0] > warp1[0].max(warp2[0]) && ldi[1] <= warp2[1]);
     assert!(texture[2] >= 1.0);
+}
+
+#[test]
+fn columns_out_of_sight_are_missed_by_no_pixel() {
+    let (house, contents) = small_house(5, 4);
+    let mut walk = walk_of(&house, &contents);
+    let options = WalkOptions {
+        whole_ldis: true,
+        ..WalkOptions::default()
+    };
+    let mut whole = Walk::new(&house.interior, &contents, &house.model, options);
+    let mut clipped = 0;
+    for seed in 1..25 {
+        let (eye, target) = viewpoint(&house.interior, seed);
+        let desired = view(eye, target, [96, 72]);
+        let some = walk.draw(&desired, PortalFill::Ldi).unwrap();
+        let all = whole.draw(&desired, PortalFill::Ldi).unwrap();
+        assert!(walk.picture() == whole.picture(), "{seed}");
+        assert_eq!((all.samples_clipped, all.samples), (0, some.samples));
+        clipped += some.samples_clipped;
+    }
+    assert!(clipped > 0);
 }
 
 #[test]

@@ -50,10 +50,12 @@ fn nearest(ldi: &Layered, camera: &Pinhole) -> Vec<f32> {
     depths
 }
 
-/// Pixels drawn; those that show what is more than 5 % farther than the nearest sample; and of
+/// Inverse depths apart by more than this ratio are two surfaces.
+const FAR: f32 = 0.9;
+
+/// Pixels drawn; those that show what is a tenth farther than the nearest sample; and of
 /// those the ones without a depth edge beside them.
 fn compare(ours: &Target, nearest: &[f32]) -> [usize; 3] {
-    let far = 0.95;
     let (width, height) = (ours.width as i32, ours.height as i32);
     let mut counts = [0; 3];
     for y in 0..height {
@@ -61,13 +63,13 @@ fn compare(ours: &Target, nearest: &[f32]) -> [usize; 3] {
             let i = (y * width + x) as usize;
             let (a, b) = (ours.inverse_depth[i], nearest[i]);
             counts[0] += usize::from(a > 0.0);
-            if b > 0.0 && a > 0.0 && a < far * b {
+            if b > 0.0 && a > 0.0 && a < FAR * b {
                 counts[1] += 1;
                 let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
                 let is_edge = around
                     .filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y))
                     .map(|(x, y)| nearest[(y * width + x) as usize])
-                    .any(|s| s < far * b || s > b / far);
+                    .any(|s| s < FAR * b || s > b / FAR);
                 counts[2] += usize::from(!is_edge);
             }
         }

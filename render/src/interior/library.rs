@@ -54,8 +54,8 @@ pub struct Library {
     sides: Vec<Range<usize>>,
     /// By place.
     images: Vec<Option<Kept<Reference>>>,
-    /// By side.
-    ldis: Vec<Option<Kept<PortalLdi>>>,
+    /// By side; nothing for images that make none.
+    ldis: Vec<Option<Kept<Option<PortalLdi>>>>,
     /// Counts frames.
     turn: u64,
     residency: Residency,
@@ -179,14 +179,14 @@ impl Library {
     }
 
     /// The LDIs of a frame's sides, in their order, and how many reference images were made for
-    /// them; `None` for a side whose images have no camera. Others go as for [`Self::images`].
+    /// them; nothing for a side whose images make none. Others go as for [`Self::images`].
     pub fn ldis(
         &mut self,
         sides: &[usize],
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
-    ) -> (Vec<Option<Arc<PortalLdi>>>, usize) {
+    ) -> (Vec<Arc<Option<PortalLdi>>>, usize) {
         self.turn += 1;
         let mut made = 0;
         for side in touch(&mut self.ldis, sides, self.turn) {
@@ -202,23 +202,22 @@ impl Library {
                 })
                 .collect();
             let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
-            let Ok(constructed) = construct(&images, &self.options.ldi) else {
-                continue;
-            };
-            let ldi = constructed.ldi;
-            let tree = ClipTree::new(&ldi);
-            let bytes = ldi.bytes() + tree.bytes();
+            let constructed = construct(&images, &self.options.ldi).ok();
+            let ldi = constructed.map(|made| PortalLdi {
+                tree: ClipTree::new(&made.ldi),
+                ldi: made.ldi,
+            });
+            let bytes = ldi.as_ref().map_or(0, |l| l.ldi.bytes() + l.tree.bytes());
             self.make_room(bytes);
             self.ldis[side] = Some(Kept {
-                what: Arc::new(PortalLdi { ldi, tree }),
+                what: Arc::new(ldi),
                 bytes,
                 used: self.turn,
             });
             self.residency.change(bytes, 0);
         }
         self.residency.loads += made as u64;
-        let ldi = |side: &usize| self.ldis[*side].as_ref().map(|kept| kept.what.clone());
-        (sides.iter().map(ldi).collect(), made)
+        (found(&self.ldis, sides), made)
     }
 
     fn make(

@@ -131,8 +131,8 @@ pub struct Walk<'a> {
 enum Images {
     /// Reference images, the nearest first.
     References(Vec<Arc<Reference>>),
-    /// `None` where there is none.
-    Ldi(Option<Arc<PortalLdi>>),
+    /// Nothing where there are no images, or they make none.
+    Ldi(Arc<Option<PortalLdi>>),
 }
 
 /// What a frame's portals are filled with.
@@ -316,7 +316,10 @@ impl<'a> Walk<'a> {
                         };
                     }
                 }
-                Images::Ldi(Some(portal)) => {
+                Images::Ldi(portal) => {
+                    let Some(portal) = portal.as_ref() else {
+                        continue;
+                    };
                     let (ldi, options) = (&portal.ldi, &self.options.ldi);
                     let reach = f64::from(options.reach());
                     let columns = match self.options.whole_ldis {
@@ -326,9 +329,10 @@ impl<'a> Walk<'a> {
                     let scratch = &mut self.scratch;
                     let took = free(ldi, &columns, &camera, &f.window, options, scratch, into);
                     cost.samples += took.drawn;
-                    cost.samples_clipped += ldi.len() - took.samples;
+                    if took.pixels > 0 {
+                        cost.samples_clipped += ldi.len() - took.samples;
+                    }
                 }
-                Images::Ldi(None) => {}
             }
         }
         cost.fill = start.elapsed();
@@ -351,8 +355,10 @@ impl<'a> Walk<'a> {
             }
             let (ldis, made) = self.library.ldis(&all, interior, model, geometry);
             let mut ldis = ldis.into_iter();
-            let of_side = |side: &Option<usize>| side.and_then(|_| ldis.next().flatten());
-            let of_fills = sides.iter().map(|side| Images::Ldi(of_side(side)));
+            let ldi = |side: &Option<usize>| {
+                Images::Ldi(side.and_then(|_| ldis.next()).unwrap_or_default())
+            };
+            let of_fills = sides.iter().map(ldi);
             return Needed {
                 of_fills: of_fills.collect(),
                 made,

@@ -2,7 +2,8 @@
 //!
 //! A binary tree has the least and the greatest inverse depth of runs of columns. A run lies
 //! between eight points: its corners at both. What they span in the desired image holds all of
-//! its samples.
+//! its samples. Here a column is in sixteen parts, one above the other, each with its own depths:
+//! floors and ceilings are near where walls are not.
 
 use super::Layered;
 use super::free::bounds;
@@ -20,7 +21,7 @@ pub struct Clipped {
 impl Clipped {
     /// All columns.
     pub fn whole(ldi: &Layered) -> Self {
-        let kept = vec![0..ldi.size()[0]];
+        let kept = std::iter::once(0..ldi.size()[0]).collect();
         Self { kept }
     }
 
@@ -42,9 +43,12 @@ pub struct ClipTree {
     height: u32,
     /// The first is all columns; below the i-th are the 2i-th and the next, counted from 1.
     /// The least is above the greatest where there are no samples.
-    nodes: Vec<[f32; 2]>,
+    nodes: Vec<[[f32; 2]; PARTS]>,
 }
 
+/// Parts of a column.
+const PARTS: usize = 16;
+const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 /// Added to how far splats reach, in pixels: rounding to f32.
 const SLACK: f64 = 0.5;
 
@@ -53,19 +57,23 @@ impl ClipTree {
     pub fn new(ldi: &Layered) -> Self {
         let [width, height] = ldi.size();
         let leaves = (width as usize).next_power_of_two();
-        let mut nodes = vec![[f32::INFINITY, f32::NEG_INFINITY]; 2 * leaves];
+        let mut nodes = vec![[EMPTY; PARTS]; 2 * leaves];
         for y in 0..height {
+            let part = y as usize * PARTS / height as usize;
             for i in ldi.samples_of(0..width, y) {
                 let s = ldi.inverse_depth[i];
                 // At most half a pixel from its column's middle, so in it.
                 let column = (ldi.x[i] as u32).min(width - 1);
-                let leaf = &mut nodes[leaves + column as usize];
+                let leaf = &mut nodes[leaves + column as usize][part];
                 *leaf = [leaf[0].min(s), leaf[1].max(s)];
             }
         }
         for i in (1..leaves).rev() {
             let [a, b] = [nodes[2 * i], nodes[2 * i + 1]];
-            nodes[i] = [a[0].min(b[0]), a[1].max(b[1])];
+            for part in 0..PARTS {
+                let ([low, high], [l, h]) = (a[part], b[part]);
+                nodes[i][part] = [low.min(l), high.max(h)];
+            }
         }
         Self {
             width,
@@ -116,12 +124,12 @@ impl ClipTree {
         columns: Range<u32>,
         kept: &mut Clipped,
     ) {
-        let [least, greatest] = self.nodes[node];
-        if !(least <= greatest) {
-            return;
-        }
         let to = columns.end.min(self.width);
-        match self.place(warp, open, columns.start..to, [least, greatest]) {
+        let parts = self.nodes[node].iter().enumerate();
+        let places = parts
+            .filter(|(_, [least, greatest])| least <= greatest)
+            .map(|(part, depths)| self.place(warp, open, columns.start..to, part, *depths));
+        match places.fold(Place::Outside, Place::max) {
             Place::Outside => {}
             Place::Across if node < self.nodes.len() / 2 => {
                 let middle = columns.start.midpoint(columns.end);
@@ -140,12 +148,15 @@ impl ClipTree {
         warp: &Warp,
         [low, high]: [DVec2; 2],
         columns: Range<u32>,
+        part: usize,
         depths: [f32; 2],
     ) -> Place {
+        // The first rows of a part and of the next.
+        let row = |part: usize| (part * self.height as usize).div_ceil(PARTS) as f64;
         let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         let (mut before, mut behind) = (0, 0);
         for x in [columns.start, columns.end].map(f64::from) {
-            for y in [0.0, f64::from(self.height)] {
+            for y in [row(part), row(part + 1)] {
                 let ray = warp.pixel_from_pixel * DVec2::new(x, y).extend(1.0);
                 for s in depths.map(f64::from) {
                     let at = ray + s * warp.shift;
@@ -171,6 +182,7 @@ impl ClipTree {
 }
 
 /// How what a run of columns may cover lies to what is open.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Place {
     Outside,
     Across,

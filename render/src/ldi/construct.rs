@@ -29,8 +29,8 @@ pub struct ConstructOptions {
     /// What becomes of them.
     pub conflict: Conflict,
     /// Whether the central image's sample is in slot one of its pixel, drawn last, even where
-    /// another one is nearer: at the edge of something within the pixel. The papers' rule; in
-    /// depth order three times fewer points are wrong, and six times fewer of wider stamps.
+    /// another one is nearer: at the edge of something within the pixel. The papers' rule; without
+    /// it samples lie in depth order, and a tenth fewer points are drawn over nearer ones.
     pub center_in_front: bool,
     /// How far the LDI reaches to each side of the central image, in widths and heights of that.
     pub margin: f64,
@@ -41,7 +41,7 @@ impl Default for ConstructOptions {
         Self {
             range: 0.01,
             conflict: Conflict::default(),
-            center_in_front: false,
+            center_in_front: true,
             margin: 3.0,
         }
     }

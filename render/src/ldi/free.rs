@@ -74,7 +74,7 @@ pub struct FreeCost {
 }
 
 /// A sample as it will be drawn.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Drawn {
     x: f32,
     y: f32,
@@ -87,14 +87,14 @@ struct Drawn {
 }
 
 /// What is kept between frames: memory.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Free {
     chunks: Vec<Chunk>,
     bands: Vec<Band>,
 }
 
 /// Rows of the LDI worked on together, and what of them falls in each band of the picture.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Chunk {
     bands: Vec<Vec<Drawn>>,
     samples: usize,
@@ -102,7 +102,7 @@ struct Chunk {
 }
 
 /// Rows of the picture.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Band {
     /// The nearest inverse depth, then what is behind that the same surface.
     nearest: Vec<f32>,
@@ -374,6 +374,18 @@ impl Ready {
     };
 }
 
+/// Within less than 2, 4 and 6 pixels are no more than 4, 8 and 12 middles.
+#[inline(always)]
+fn tile_count(reach: f32) -> i32 {
+    1 + i32::from(reach >= 2.0) + i32::from(reach >= 4.0)
+}
+
+/// From a place to the middle of a pixel, counted from the margin's first.
+#[inline(always)]
+fn off(first: i32, at: f32) -> f32 {
+    (first - MARGIN as i32) as f32 + 0.5 - at
+}
+
 /// The first pixel whose middle is within reach of a place, counted from the margin's; places
 /// are within the margin, so it is not negative.
 #[inline(always)]
@@ -394,12 +406,9 @@ impl Drawn {
     /// Of a reach, within which a pixel is the first.
     #[inline(always)]
     fn tiles(&self, first: [i32; 2], reach: [f32; 2], top: i32) -> Tiles {
-        // Within less than 2, 4 and 6 pixels are no more than 4, 8 and 12.
-        let count = |reach: f32| 1 + i32::from(reach >= 2.0) + i32::from(reach >= 4.0);
-        let off = |first: i32, at: f32| (first - MARGIN as i32) as f32 + 0.5 - at;
         Tiles {
             first: [first[0], first[1] - MARGIN as i32 - top],
-            count: [count(reach[0]), count(reach[1])],
+            count: [tile_count(reach[0]), tile_count(reach[1])],
             offset: [off(first[0], self.x), off(first[1], self.y)],
         }
     }
@@ -484,7 +493,14 @@ impl Band {
         let is_near_hole =
             |drawn: &&Drawn| holes[(drawn.x + MARGIN as f32) as i32 as usize / COLUMN];
         self.beside.clear();
-        self.beside.extend(lists.flatten().filter(is_near_hole));
+        for list in lists {
+            for drawn in list.iter().filter(is_near_hole) {
+                let tiles = drawn.wide_tiles(drawn.wide(options), at.top);
+                if meets_hole(&tiles, at, &self.nearest) {
+                    self.beside.push(*drawn);
+                }
+            }
+        }
         for drawn in &self.beside {
             let wide = drawn.wide(options);
             let tiles = drawn.wide_tiles(wide, at.top);
@@ -557,6 +573,26 @@ fn more(row: &mut [f32; WIDE], weights: [f32; WIDE], value: f32) {
     *row = sums;
 }
 
+/// What a squared distance is multiplied by in the exponent, of a patch of that half side.
+#[inline(always)]
+fn narrowness(deviation: f32, half: f32) -> f32 {
+    let deviation = deviation * half;
+    0.5 / (deviation * deviation)
+}
+
+/// The weights of a tile's columns, or rows.
+#[inline(always)]
+fn weights(offset: f32, tile: i32, narrow: f32, reach: f32) -> [f32; WIDE] {
+    let first = offset + (tile * WIDE as i32) as f32;
+    let mut weights = [0.0; WIDE];
+    for k in 0..WIDE {
+        let d = first + k as f32;
+        let weight = gaussian(d * d * narrow);
+        weights[k] = if d.abs() <= reach { weight } else { 0.0 };
+    }
+    weights
+}
+
 /// Keeps the nearest depths of what a box around a sample covers.
 #[inline(always)]
 fn near(drawn: &Drawn, tiles: &Tiles, half: [f32; 2], at: Place, plane: &mut [f32]) {
@@ -586,6 +622,26 @@ fn near(drawn: &Drawn, tiles: &Tiles, half: [f32; 2], at: Place, plane: &mut [f3
     }
 }
 
+/// Whether nothing is in some pixel of tiles.
+#[inline(always)]
+fn meets_hole(tiles: &Tiles, at: Place, plane: &[f32]) -> bool {
+    let mut least = [f32::INFINITY; WIDE];
+    for right in 0..tiles.count[0] {
+        let column = (tiles.first[0] + right * WIDE as i32) as usize;
+        for row in 0..tiles.count[1] * WIDE as i32 {
+            let y = (tiles.first[1] + row) as usize;
+            if y < BAND {
+                let i = y * at.stride + column;
+                let depths: &[f32; WIDE] = plane[i..i + WIDE].try_into().expect("as many");
+                for k in 0..WIDE {
+                    least[k] = least[k].min(depths[k]);
+                }
+            }
+        }
+    }
+    least.iter().fold(false, |any, s| any | (*s == 0.0))
+}
+
 /// Adds a sample to the pixels within its reach where it is no farther than a depth.
 #[inline(always)]
 fn add(
@@ -598,28 +654,17 @@ fn add(
     sums: &mut [Vec<f32>; 4],
 ) {
     let s = drawn.inverse_depth;
-    let narrow = |half: f32| {
-        let deviation = at.deviation * half;
-        0.5 / (deviation * deviation)
-    };
-    let narrow = [narrow(half[0]), narrow(half[1])];
-    let weights = |tile: [i32; 2]| {
-        let mut weights = [[0.0; WIDE]; 2];
-        for axis in 0..2 {
-            for k in 0..WIDE {
-                let d = tiles.offset[axis] + (tile[axis] * WIDE as i32 + k as i32) as f32;
-                let weight = gaussian(d * d * narrow[axis]);
-                weights[axis][k] = if d.abs() <= reach[axis] { weight } else { 0.0 };
-            }
-        }
-        weights
-    };
+    let narrow = [
+        narrowness(at.deviation, half[0]),
+        narrowness(at.deviation, half[1]),
+    ];
     let [r, g, b, _] = drawn.color;
     let (r, g, b) = (f32::from(r), f32::from(g), f32::from(b));
     let [red, green, blue, sum] = sums;
     for below in 0..tiles.count[1] {
         for right in 0..tiles.count[0] {
-            let [across, down] = weights([right, below]);
+            let across = weights(tiles.offset[0], right, narrow[0], reach[0]);
+            let down = weights(tiles.offset[1], below, narrow[1], reach[1]);
             let column = (tiles.first[0] + right * WIDE as i32) as usize;
             for j in 0..WIDE {
                 let y = (tiles.first[1] + below * WIDE as i32 + j as i32) as usize;
