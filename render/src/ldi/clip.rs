@@ -2,8 +2,8 @@
 //!
 //! A binary tree has the least and the greatest inverse depth of runs of columns. A run lies
 //! between eight points: its corners at both. What they span in the desired image holds all of
-//! its samples. Here a column is in sixteen parts, one above the other, each with its own depths:
-//! floors and ceilings are near where walls are not.
+//! its samples. Here a column is in sixteen parts, one above the other, each with its own depths
+//! and kept or not by itself: floors and ceilings are near where walls are not, and out of sight.
 
 use super::Layered;
 use super::free::bounds;
@@ -11,18 +11,40 @@ use crate::interior::{Pinhole, Target, Warp, Window};
 use glam::DVec2;
 use std::ops::Range;
 
-/// The columns that are left.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// The columns that are left, in each part of the rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Clipped {
-    /// From left to right, apart from one another.
-    pub kept: Vec<Range<u32>>,
+    /// From left to right, apart from one another; parts from top to bottom.
+    parts: Vec<Vec<Range<u32>>>,
+    height: u32,
 }
 
 impl Clipped {
     /// All columns.
     pub fn whole(ldi: &Layered) -> Self {
-        let kept = std::iter::once(0..ldi.size()[0]).collect();
-        Self { kept }
+        let [width, height] = ldi.size();
+        Self {
+            parts: vec![std::iter::once(0..width).collect()],
+            height,
+        }
+    }
+
+    /// Given columns, in all rows.
+    pub fn of_columns(ldi: &Layered, columns: Vec<Range<u32>>) -> Self {
+        Self {
+            parts: vec![columns],
+            height: ldi.size()[1],
+        }
+    }
+
+    /// Those of a row.
+    pub fn of_row(&self, row: u32) -> &[Range<u32>] {
+        &self.parts[part_of(row, self.height, self.parts.len())]
+    }
+
+    /// Whether nothing is left.
+    pub fn is_empty(&self) -> bool {
+        self.parts.iter().all(Vec::is_empty)
     }
 
     /// How many samples they have.
@@ -30,10 +52,15 @@ impl Clipped {
         let rows = 0..ldi.size()[1];
         let in_row = |row| {
             let count = |columns: &Range<u32>| ldi.samples_of(columns.clone(), row).len();
-            self.kept.iter().map(count).sum::<usize>()
+            self.of_row(row).iter().map(count).sum::<usize>()
         };
         rows.map(in_row).sum()
     }
+}
+
+/// Which of so many parts a row is in.
+fn part_of(row: u32, height: u32, parts: usize) -> usize {
+    row as usize * parts / height as usize
 }
 
 /// The least and greatest inverse depths of runs of columns.
@@ -59,7 +86,7 @@ impl ClipTree {
         let leaves = (width as usize).next_power_of_two();
         let mut nodes = vec![[EMPTY; PARTS]; 2 * leaves];
         for y in 0..height {
-            let part = y as usize * PARTS / height as usize;
+            let part = part_of(y, height, PARTS);
             for i in ldi.samples_of(0..width, y) {
                 let s = ldi.inverse_depth[i];
                 // At most half a pixel from its column's middle, so in it.
@@ -97,7 +124,10 @@ impl ClipTree {
         window: &Window,
         reach: f64,
     ) -> Clipped {
-        let mut kept = Clipped::default();
+        let mut kept = Clipped {
+            parts: vec![Vec::new(); PARTS],
+            height: self.height,
+        };
         // Only its size is asked.
         let target = Target {
             width: desired.width,
@@ -112,7 +142,9 @@ impl ClipTree {
         let high = DVec2::new(f64::from(across.end), f64::from(down.end)) + far;
         let warp = Warp::new(&ldi.camera, desired);
         let leaves = self.nodes.len() / 2;
-        self.ask(&warp, [low, high], 1, 0..leaves as u32, &mut kept);
+        for (part, kept) in kept.parts.iter_mut().enumerate() {
+            self.ask(&warp, [low, high], part, 1, 0..leaves as u32, kept);
+        }
         kept
     }
 
@@ -120,25 +152,26 @@ impl ClipTree {
         &self,
         warp: &Warp,
         open: [DVec2; 2],
+        part: usize,
         node: usize,
         columns: Range<u32>,
-        kept: &mut Clipped,
+        kept: &mut Vec<Range<u32>>,
     ) {
         let to = columns.end.min(self.width);
-        let parts = self.nodes[node].iter().enumerate();
-        let places = parts
-            .filter(|(_, [least, greatest])| least <= greatest)
-            .map(|(part, depths)| self.place(warp, open, columns.start..to, part, *depths));
-        match places.fold(Place::Outside, Place::max) {
+        let depths = self.nodes[node][part];
+        if !(depths[0] <= depths[1]) {
+            return;
+        }
+        match self.place(warp, open, columns.start..to, part, depths) {
             Place::Outside => {}
             Place::Across if node < self.nodes.len() / 2 => {
                 let middle = columns.start.midpoint(columns.end);
-                self.ask(warp, open, 2 * node, columns.start..middle, kept);
-                self.ask(warp, open, 2 * node + 1, middle..columns.end, kept);
+                self.ask(warp, open, part, 2 * node, columns.start..middle, kept);
+                self.ask(warp, open, part, 2 * node + 1, middle..columns.end, kept);
             }
-            _ => match kept.kept.last_mut() {
+            _ => match kept.last_mut() {
                 Some(last) if last.end == columns.start => last.end = to,
-                _ => kept.kept.push(columns.start..to),
+                _ => kept.push(columns.start..to),
             },
         }
     }
@@ -182,7 +215,7 @@ impl ClipTree {
 }
 
 /// How what a run of columns may cover lies to what is open.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Outside,
     Across,

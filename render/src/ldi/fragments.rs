@@ -4,7 +4,7 @@
 //! line, so those of two fragments meet only beside a cut: where a sample's stamp may reach a cut
 //! it is left to the buffer zone.
 
-use super::Layered;
+use super::{Clipped, Layered};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -69,7 +69,7 @@ impl Pencil {
 impl Pieces {
     /// Cuts an LDI into that many fragments, around the epipole (homogeneous, in its pixels), by
     /// the samples in its columns.
-    pub fn new(ldi: &Layered, columns: &[Range<u32>], epipole: DVec3, count: usize) -> Self {
+    pub fn new(ldi: &Layered, columns: &Clipped, epipole: DVec3, count: usize) -> Self {
         let [width, height] = ldi.size();
         let size = DVec2::new(f64::from(width), f64::from(height));
         let epipole = match epipole.abs().max_element() {
@@ -144,9 +144,9 @@ impl Pieces {
     }
 
     /// How many samples each fragment has.
-    pub fn areas(&self, ldi: &Layered, columns: &[Range<u32>]) -> Vec<usize> {
+    pub fn areas(&self, ldi: &Layered, columns: &Clipped) -> Vec<usize> {
         let in_span = |(row, span): &(u32, Range<u32>)| {
-            let common = columns.iter().map(|c| overlap(c, span));
+            let common = columns.of_row(*row).iter().map(|c| overlap(c, span));
             common.map(|c| ldi.samples_of(c, *row).len()).sum::<usize>()
         };
         self.spans
@@ -162,7 +162,7 @@ pub(super) fn overlap(a: &Range<u32>, b: &Range<u32>) -> Range<u32> {
 }
 
 /// The angles that part an LDI's samples into equal shares, ascending.
-fn cuts(ldi: &Layered, columns: &[Range<u32>], pencil: &Pencil, count: usize) -> Vec<f64> {
+fn cuts(ldi: &Layered, columns: &Clipped, pencil: &Pencil, count: usize) -> Vec<f64> {
     let [width, height] = ldi.size();
     let count = count.clamp(1, 1024);
     if count == 1 {
@@ -174,7 +174,7 @@ fn cuts(ldi: &Layered, columns: &[Range<u32>], pencil: &Pencil, count: usize) ->
             let block = left..(left + BLOCK).min(width);
             let rows = top..(top + BLOCK).min(height);
             let in_row = |row| -> usize {
-                let common = columns.iter().map(|c| overlap(c, &block));
+                let common = columns.of_row(row).iter().map(|c| overlap(c, &block));
                 common.map(|c| ldi.samples_of(c, row).len()).sum()
             };
             let samples: usize = rows.map(in_row).sum();

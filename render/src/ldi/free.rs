@@ -31,7 +31,7 @@ pub struct FreeOptions {
     pub least_wide: f32,
     /// The greatest, up to 4.
     pub most: f32,
-    /// Holes this near to something, in pixels, are filled; 0 leaves all.
+    /// Holes up to this wide, or high, in pixels, are filled; 0 leaves all.
     pub fill: u32,
 }
 
@@ -53,7 +53,7 @@ impl Default for FreeOptions {
             wide: 1.6,
             least_wide: 1.5,
             most: 4.0,
-            fill: 64,
+            fill: 24,
         }
     }
 }
@@ -300,7 +300,7 @@ impl Work<'_> {
         let mut ready = Ready::EMPTY;
         for row in rows {
             let base = self.projection.row(row);
-            for columns in &self.columns.kept {
+            for columns in self.columns.of_row(row) {
                 let samples = self.ldi.samples_of(columns.clone(), row);
                 chunk.samples += samples.len();
                 for first in samples.clone().step_by(LANES) {

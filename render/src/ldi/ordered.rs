@@ -107,7 +107,7 @@ pub fn ordered_by(
     let sizes = (options.stamp == Stamp::Sized).then(|| Sizes::new(&ldi.camera, desired));
     let work = Work {
         ldi,
-        columns: &columns.kept,
+        columns,
         traversal,
         projection: Projection::new(ldi, desired, origin),
         sizes: sizes.as_ref(),
@@ -143,7 +143,7 @@ pub fn ordered_by(
             f.y * warp.center.y + c.y * warp.center.z,
             warp.center.z,
         );
-        let pieces = Pieces::new(ldi, &columns.kept, epipole, options.fragments);
+        let pieces = Pieces::new(ldi, columns, epipole, options.fragments);
         let wedges = pieces.wedges.iter();
         let fences: Vec<Fence> = wedges
             .map(|w| Fence::new(w, &warp, options.stamp))
@@ -300,7 +300,7 @@ const NOWHERE: u32 = u32::MAX;
 /// What all rows have in common.
 struct Work<'a> {
     ldi: &'a Layered,
-    columns: &'a [Range<u32>],
+    columns: &'a Clipped,
     traversal: &'a Traversal,
     projection: Projection,
     sizes: Option<&'a Sizes>,
@@ -336,13 +336,14 @@ impl Work<'_> {
             if spans.is_empty() {
                 continue;
             }
+            let kept = self.columns.of_row(row);
             for run in &self.traversal.columns {
                 // Ranges lie from left to right.
-                let count = spans.len() * self.columns.len();
+                let count = spans.len() * kept.len();
                 for i in 0..count {
                     let i = if run.is_reversed { count - 1 - i } else { i };
-                    let span = &spans[i / self.columns.len()].1;
-                    let columns = &self.columns[i % self.columns.len()];
+                    let span = &spans[i / kept.len()].1;
+                    let columns = &kept[i % kept.len()];
                     let columns = overlap(&overlap(span, columns), &run.range);
                     let samples = self.ldi.samples_of(columns, row);
                     if samples.is_empty() {
