@@ -53,7 +53,7 @@ impl Default for FreeOptions {
             wide: 1.6,
             least_wide: 1.5,
             most: 4.0,
-            fill: 24,
+            fill: 8,
         }
     }
 }
