@@ -19,8 +19,12 @@ const BELOW_CEILING: [f64; 2] = [0.6, 0.12];
 const LEAST_CEILING: f64 = 2.05;
 /// Things at eye height that are joined to no wall and smaller than this do not divide a room.
 const LOOSE: f64 = 1.5;
+/// What is taken all the way up here is wall or screen; metres over the floor.
+const TALL: [f64; 2] = [0.2, 2.0];
 /// The floor under furniture is not there in a scan; so much of it is filled in.
 const HIDDEN: f64 = 0.4;
+/// Gaps between lines of sight are filled up to twice this; metres.
+const UNSEEN: f64 = 0.15;
 /// Squares of the floor grid.
 const MOST_COLUMNS: f64 = 4e6;
 /// In a place whose floor has a ceiling over this share of it, where there is none is outside.
@@ -298,11 +302,18 @@ impl Columns {
         self.drop_loose(&mut is_wall, |t| top != 0 && has_top(t));
         // 2. Where one may be.
         let inside = match &self.seen {
-            Some(seen) => seen.iter().map(|s| (s & eye).count_ones() >= 2).collect(),
+            Some(seen) => self.closed(UNSEEN, |i| (seen[i] & eye).count_ones() >= 2),
             None => self.floored(),
         };
+        let [width, height] = self.size;
+        let is_border = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            x == 0 || y == 0 || x + 1 == width || y + 1 == height
+        };
         let state = |i: usize| {
-            if is_wall[i] {
+            if is_border(i) {
+                State::Unknown
+            } else if is_wall[i] {
                 State::Wall
             } else if has_top(self.taken[i]) {
                 State::Lintel
@@ -326,6 +337,7 @@ impl Columns {
     /// Takes small things at eye height for free that are not joined to anything above.
     fn drop_loose(&self, is_wall: &mut [bool], has_top: impl Fn(u128) -> bool) {
         let mut is_done = vec![false; self.count()];
+        let tall = band(TALL);
         for first in 0..self.count() {
             if is_done[first] || !is_wall[first] {
                 continue;
@@ -335,12 +347,15 @@ impl Columns {
             let mut next = 0;
             let [mut low, mut high] = [[usize::MAX; 2], [0; 2]];
             let mut is_fast = false;
+            let mut tall_count = 0;
             while let Some(i) = piece.get(next).copied() {
                 next += 1;
                 let place = [i % self.size[0], i / self.size[0]];
                 low = [low[0].min(place[0]), low[1].min(place[1])];
                 high = [high[0].max(place[0]), high[1].max(place[1])];
                 is_fast |= has_top(self.taken[i]);
+                let of = (self.taken[i] & tall).count_ones();
+                tall_count += usize::from(4 * of >= 3 * tall.count_ones());
                 for j in self.beside(i) {
                     if is_wall[j] && !is_done[j] {
                         is_done[j] = true;
@@ -349,6 +364,8 @@ impl Columns {
                 }
             }
             let extent = (high[0] - low[0]).max(high[1] - low[1]) + 1;
+            // Doors' leaves and screens go up from the floor.
+            is_fast |= 2 * tall_count > piece.len();
             if !is_fast && (extent as f64) < self.squares(LOOSE) {
                 piece.iter().for_each(|i| is_wall[*i] = false);
             }

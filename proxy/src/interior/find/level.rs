@@ -38,11 +38,10 @@ impl Level {
         self.world_from_level * along.extend(0.0)
     }
 
-    /// Whether each axis is one of the world's, within an angle in radians.
-    pub(super) fn is_along_world(&self, within: f64) -> bool {
+    /// Whether each axis is one of the world's.
+    pub(super) fn is_along_world(&self) -> bool {
         let axes = [0, 1, 2].map(|i| self.world_from_level.col(i));
-        axes.iter()
-            .all(|a| a.abs().max_element() >= within.cos() - 1e-12)
+        axes.iter().all(|a| a.abs().max_element() >= 1.0 - 1e-12)
     }
 }
 
@@ -59,6 +58,17 @@ const NEAR: f64 = 8.0;
 /// A direction that a file format or cameras say is right if this much lies across it,
 /// compared with the best.
 const TRUST: f64 = 0.4;
+
+/// Directions this near to an axis of the world are that axis; radians.
+const SAME_AXIS: f64 = 0.003;
+
+fn as_world_axis(direction: DVec3) -> DVec3 {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
+    let near = axes
+        .flat_map(|a| [a, -a])
+        .find(|a| a.dot(direction) > SAME_AXIS.cos());
+    near.unwrap_or(direction)
+}
 
 pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Level, FindError> {
     let mesh = evidence.mesh;
@@ -81,12 +91,13 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Lev
     if facets.is_empty() {
         return Err(FindError::NoSurface);
     }
-    let up = up(&facets, evidence, options);
+    let up = as_world_axis(up(&facets, evidence, options));
     let (height, has_floor) = floor(&facets, up, base, evidence, options);
     if !has_floor {
         return Err(FindError::NoFloor);
     }
-    let along = wall_direction(&facets, up);
+    let along = as_world_axis(wall_direction(&facets, up));
+    let along = along.reject_from_normalized(up).normalize();
     let axes = DMat3::from_cols(along, up.cross(along), up);
     Ok(Level {
         origin: base + height * up,

@@ -170,7 +170,7 @@ pub fn find_interior(
     let (grown, openings) = loop {
         let grown = regions::grown(&columns, &labels);
         let found = openings::openings(&columns, &grown);
-        match openings::open_pair(&found) {
+        match openings::open_pair(&columns, &found) {
             Some((a, b)) => regions::join(&mut labels, a, b),
             None => {
                 let small = regions::drop_small(&columns, &mut labels, &grown, options);
@@ -213,8 +213,6 @@ pub fn find_interior(
 const EYE_HEIGHT: f64 = 1.6;
 /// Boxes begin below the floor and end above the ceiling by this, in metres: surfaces are rough.
 const HEADROOM: f64 = 0.1;
-/// The world's axes and the walls are the same within this; radians.
-const SAME_AXES: f64 = 0.01;
 
 fn interior(
     evidence: &Evidence,
@@ -229,7 +227,7 @@ fn interior(
         .map(|label| outline::outline(columns, &grown.labels, label))
         .collect();
     outline::snap(&mut outlines, &mut openings, 2.5 * columns.step);
-    let along_world = level.is_along_world(SAME_AXES);
+    let along_world = level.is_along_world();
     let mut cells = Vec::new();
     for (i, outline) in outlines.iter().enumerate() {
         let top = columns.top_of(&grown.labels, i as u32 + 1) * options.meter;

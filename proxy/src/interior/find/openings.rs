@@ -4,6 +4,7 @@ use super::columns::{Columns, band, bin_at, height_of};
 use super::regions::Grown;
 use glam::DVec2;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// A rectangle that one sees through, upright, across an axis of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,9 @@ impl Opening {
     }
 }
 
+/// A square's side that parts two rooms: where it is on the axis across it, and along it.
+type Edge = (usize, usize);
+
 /// A straight part of what parts two rooms.
 pub(super) struct Side {
     rooms: [u32; 2],
@@ -46,6 +50,8 @@ pub(super) struct Side {
     open: usize,
     /// How much of that has a lintel.
     lintel: usize,
+    /// How much of it is wall.
+    walled: usize,
     pub(super) openings: Vec<Opening>,
 }
 
@@ -64,11 +70,15 @@ const NO_CEILING: f64 = 2.2;
 /// Rooms are one if this much of what parts them is open, and this much of that below a beam.
 const ALL_OPEN: f64 = 0.85;
 const BELOW_BEAM: f64 = 0.5;
+/// What is open on less than this below a lintel is a doorway, not a beam's room; metres.
+const WIDEST_DOORWAY: f64 = 3.0;
+/// Longer sides than this with hardly a wall part nothing; metres.
+const UNMARKED: f64 = 2.6;
 
 /// All that rooms share, in order.
 pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
     // 1. Where labels change: across an axis, at a place on it, from one square to the next.
-    let mut edges: BTreeMap<([u32; 2], usize), Vec<(usize, usize)>> = BTreeMap::new();
+    let mut edges: BTreeMap<([u32; 2], usize), Vec<Edge>> = BTreeMap::new();
     let [width, height] = columns.size;
     for y in 0..height {
         for x in 0..width {
@@ -116,23 +126,30 @@ pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
     sides
 }
 
-/// Two rooms that nothing but a beam parts.
-pub(super) fn open_pair(sides: &[Side]) -> Option<(u32, u32)> {
-    let mut pairs: BTreeMap<(u32, u32), [usize; 3]> = BTreeMap::new();
+/// Two rooms that nothing but a beam parts, or nothing at all.
+pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)> {
+    let mut pairs: BTreeMap<(u32, u32), [usize; 4]> = BTreeMap::new();
     for side in sides {
         let [a, b] = side.rooms;
         let sums = pairs.entry((a.min(b), a.max(b))).or_default();
-        let of = [side.length, side.open, side.lintel];
+        let of = [side.length, side.open, side.lintel, side.walled];
         sums.iter_mut().zip(of).for_each(|(sum, n)| *sum += n);
     }
-    let is_open = |[length, open, lintel]: [usize; 3]| {
-        open as f64 > ALL_OPEN * length as f64 && lintel as f64 > BELOW_BEAM * open as f64
+    let widest = columns.squares(UNMARKED);
+    let is_open = |[length, open, lintel, walled]: [usize; 4]| {
+        let below_beam = lintel as f64 > BELOW_BEAM * open as f64;
+        // What is as narrow as a doorway is one, though no wall was seen beside it.
+        let is_wide = open as f64 > columns.squares(WIDEST_DOORWAY);
+        let is_beam = is_wide && open as f64 > ALL_OPEN * length as f64 && below_beam;
+        // Where not all is seen, what is unknown looks like a bottleneck.
+        let is_gap = !below_beam && length as f64 > widest && 4 * walled < length;
+        is_beam || is_gap
     };
     let found = pairs.into_iter().find(|(_, sums)| is_open(*sums));
     found.map(|(pair, _)| pair)
 }
 
-fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<(usize, usize)>) -> Side {
+fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Side {
     let index = |at: usize, along: usize| match axis {
         0 => along * columns.size[0] + at,
         _ => at * columns.size[0] + along,
@@ -218,6 +235,7 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<(usize, usiz
         length: alongs.len(),
         open: open_count,
         lintel: lintel_count,
+        walled: walls.len(),
         openings: holes.into_iter().map(opening).collect(),
     }
 }
@@ -251,25 +269,66 @@ fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
                     stack.push((s, bin + 1));
                 }
             }
-            // 2. Its rectangle: what is open by half as much as where it is most.
-            let tall = |s: usize| piece[s].count_ones() as usize;
-            let wide = |bin: usize| piece.iter().filter(|p| **p >> bin & 1 == 1).count();
-            let span = |count: usize, of: &dyn Fn(usize) -> usize| {
-                let most = (0..count).map(of).max().unwrap_or(0);
-                let is_much = |i: &usize| 2 * of(*i) >= most;
-                let from = (0..count).find(is_much).unwrap_or(0);
-                let to = (0..count).rev().find(is_much).unwrap_or(0) + 1;
-                (from, to)
-            };
-            let (from, to) = span(piece.len(), &tall);
-            let (sill, head) = span(bins, &wide);
-            let (width, height) = ((to - from) as f64 * step, height_of(head) - height_of(sill));
-            let area = piece.iter().map(|p| p.count_ones()).sum::<u32>();
-            let area = f64::from(area) * step * (height_of(1) - height_of(0));
-            if width >= LEAST && height >= LEAST && area >= LEAST_AREA {
-                found.push([from, to, sill, head]);
+            // 2. Its rectangle: what is open by half as much as where it is most. Where a screen
+            // stands in it, its tall parts first.
+            let least = (LEAST / step).ceil() as usize;
+            loop {
+                let tall = |s: usize| piece[s].count_ones() as usize;
+                let highest = (0..piece.len()).map(tall).max().unwrap_or(0);
+                let is_tall = |s: &usize| 3 * tall(*s) >= 2 * highest && highest > 0;
+                let run = longest_run(piece.len(), is_tall);
+                let rest = (0..piece.len()).filter(|s| tall(*s) > 0).count();
+                if highest == 0 {
+                    break;
+                }
+                // Ragged ends belong to it.
+                let range = if rest < run.len() + 2 * least {
+                    0..piece.len()
+                } else {
+                    run
+                };
+                let mut part = vec![0; piece.len()];
+                part[range.clone()].copy_from_slice(&piece[range.clone()]);
+                piece[range].fill(0);
+                found.extend(rectangle(&part, step));
             }
         }
     }
     found
+}
+
+/// The longest run of numbers that are so.
+fn longest_run(count: usize, is_so: impl Fn(&usize) -> bool) -> Range<usize> {
+    let mut best = 0..0;
+    let mut start = 0;
+    for i in 0..=count {
+        if i < count && is_so(&i) {
+            continue;
+        }
+        if i - start > best.len() {
+            best = start..i;
+        }
+        start = i + 1;
+    }
+    best
+}
+
+/// About the rectangle that a piece fills, if it is large enough.
+fn rectangle(piece: &[u128], step: f64) -> Option<[usize; 4]> {
+    let tall = |s: usize| piece[s].count_ones() as usize;
+    let wide = |bin: usize| piece.iter().filter(|p| **p >> bin & 1 == 1).count();
+    let span = |count: usize, of: &dyn Fn(usize) -> usize| {
+        let most = (0..count).map(of).max().unwrap_or(0);
+        let is_much = |i: &usize| 2 * of(*i) >= most;
+        let from = (0..count).find(is_much).unwrap_or(0);
+        let to = (0..count).rev().find(is_much).unwrap_or(0) + 1;
+        (from, to)
+    };
+    let (from, to) = span(piece.len(), &tall);
+    let (sill, head) = span(bin_at(f64::INFINITY), &wide);
+    let (width, height) = ((to - from) as f64 * step, height_of(head) - height_of(sill));
+    let area = piece.iter().map(|p| p.count_ones()).sum::<u32>();
+    let area = f64::from(area) * step * (height_of(1) - height_of(0));
+    let is_large = width >= LEAST && height >= LEAST && area >= LEAST_AREA;
+    is_large.then_some([from, to, sill, head])
 }

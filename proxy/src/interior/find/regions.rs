@@ -11,6 +11,8 @@ const HALF_WALL: f64 = 0.26;
 const INTO_WALL: f64 = 0.06;
 /// What stands before walls belongs to the room up to this depth; metres.
 const FURNITURE: f64 = 1.0;
+/// Half the width of the narrowest room; metres.
+const LEAST_HALF_WIDTH: f64 = 0.3;
 /// A region with nothing around so much of it is no room, where all floor is known.
 const OPEN_OUTLINE: f64 = 0.25;
 
@@ -40,7 +42,7 @@ pub(super) fn regions(columns: &Columns, options: &FindOptions) -> Labels {
     let width = columns.size[0];
     for i in order {
         let i = i as usize;
-        // The grid has a margin, so there are always eight.
+        // Nothing is free on the grid's border, so there are always eight.
         let around = [
             i - 1,
             i + 1,
@@ -51,21 +53,33 @@ pub(super) fn regions(columns: &Columns, options: &FindOptions) -> Labels {
             i + width - 1,
             i + width + 1,
         ];
-        let mut own: Option<u32> = None;
-        for j in around.into_iter().filter(|j| labels[*j] != 0) {
-            let other = basins.root(labels[j]);
-            own = match own {
-                None => Some(other),
-                Some(first) if first != other => {
-                    Some(basins.meet(first, other, distances[i], options))
+        // Uphill: where basins meet, they do not run along each other's shores.
+        let known = around.into_iter().filter(|j| labels[*j] != 0);
+        let uphill = known.clone().reduce(|best, j| {
+            if distances[j] > distances[best] {
+                j
+            } else {
+                best
+            }
+        });
+        labels[i] = match uphill {
+            None => basins.begin(distances[i]),
+            Some(uphill) => {
+                let own = labels[uphill];
+                for j in known {
+                    basins.meet(own, labels[j], distances[i], options);
                 }
-                same => same,
-            };
-        }
-        labels[i] = own.unwrap_or_else(|| basins.begin(distances[i]));
+                own
+            }
+        };
     }
     for label in labels.iter_mut().filter(|l| **l != 0) {
-        *label = basins.root(*label);
+        let root = basins.root(*label);
+        // Between the two faces of a wall is no room.
+        *label = match basins.peaks[root as usize - 1] < LEAST_HALF_WIDTH {
+            true => 0,
+            false => root,
+        };
     }
     let mut found = Labels { labels, count: 0 };
     if columns.seen.is_none() {
@@ -99,17 +113,17 @@ impl Basins {
         at
     }
 
-    /// Two basins meet at a saddle: the one that the saddle belongs to.
-    fn meet(&mut self, a: u32, b: u32, saddle: f64, options: &FindOptions) -> u32 {
+    /// Two basins meet at a saddle, and become one unless it is narrow.
+    fn meet(&mut self, a: u32, b: u32, saddle: f64, options: &FindOptions) {
+        let (a, b) = (self.root(a), self.root(b));
         let (high, low) = match self.peaks[a as usize - 1] >= self.peaks[b as usize - 1] {
             true => (a, b),
             false => (b, a),
         };
         let is_narrow = saddle < options.bottleneck * self.peaks[low as usize - 1];
-        if !(is_narrow && 2.0 * saddle <= options.max_passage) {
+        if high != low && !(is_narrow && 2.0 * saddle <= options.max_passage) {
             self.parents[low as usize - 1] = high;
         }
-        high
     }
 }
 
