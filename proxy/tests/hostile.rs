@@ -180,7 +180,7 @@ fn with_json(glb: &[u8], change: impl FnOnce(&str) -> String) -> Vec<u8> {
     let word = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
     let end = 20 + word(12);
     let mut json = change(std::str::from_utf8(&glb[20..end]).unwrap());
-    while json.len() % 4 > 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(' ');
     }
     let length = 20 + json.len() + glb.len() - end;

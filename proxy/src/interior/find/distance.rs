@@ -78,14 +78,13 @@ impl Envelope {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::interior::find::distance::squared_distances;
+    use super::squared_distances;
 
     #[test]
     fn distances_are_those_of_trying_all() {
         let size = [23, 17];
         for seed in 0..20_usize {
-            let is_source = |i: usize| (i * 7919 + seed * 104_729) % 61 == 0 && seed > 0;
+            let is_source = |i: usize| seed > 0 && (i * 7919 + seed * 104_729).is_multiple_of(61);
             let (distances, nearest) = squared_distances(size, is_source);
             for i in 0..size[0] * size[1] {
                 let from = |j: usize| {
