@@ -1,37 +1,104 @@
 //! `lumigraph interior`
 
 use super::Usage;
+use super::options::triple;
 use super::output::{print, say};
+use super::session::spinner;
 use anyhow::Context;
 use datasets::in_new_folder;
+use glam::DVec3;
+use image::ImageFormat;
+use lumigraph::scene::{Scene, SceneInterior};
+use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, Interior, interior_from_nodes, read_interior, read_rooms, write_interior,
+    Contents, Interior, InteriorError, InteriorWarning, interior_from_nodes, read_interior,
+    read_rooms, write_interior,
 };
-use proxy::mesh::{MeshFileError, parse_model};
+use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// Make an interior of a model: cells joined by portals
+/// Make an interior of a model or a capture: cells joined by portals
 ///
-/// Where its rooms and openings are is told by --rooms (boxes and outlines), or by the names of
-/// the model's nodes: `cell:NAME` for a room and all below it, `portal:A|B` for the flat mesh of
-/// an opening between two of them.
+/// Rooms and doorways are found in the surface: that of the model, or that of a capture's depth
+/// maps, fused and coloured from the photos. Look at floor-plan.svg, and correct interior.json
+/// where it is wrong. Of a model they can be told instead: by --rooms (boxes and outlines), or by
+/// the names of its nodes: `cell:NAME` for a room and all below it, `portal:A|B` for the flat mesh
+/// of an opening between two of them.
 ///
+///     lumigraph interior house.glb -o house
+///     lumigraph interior my-rgbd-walk -o office
 ///     lumigraph interior house.glb --rooms rooms.json -o house
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// The model, textured: .glb
+    /// The model, textured: .glb; or a scene or capture with depth maps
+    #[arg(value_name = "MODEL|SCENE")]
     model: PathBuf,
     /// Rooms and openings: {"version": 1, "rooms": [{"name", "min", "max"}], "openings":
     /// [{"name", "between": ["A", "B"], "polygon": [[x, y, z], …]}]}
     #[arg(long, value_name = "FILE")]
     rooms: Option<PathBuf>,
+    /// Find the rooms even where nodes name them
+    #[arg(long, conflicts_with = "rooms")]
+    find: bool,
+    /// Which way is up in the world [default: as cameras had it, else the way the floor says]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true,
+        conflicts_with = "rooms")]
+    up: Option<DVec3>,
+    /// How many world units a metre is
+    #[arg(
+        long,
+        value_name = "UNITS",
+        default_value_t = 1.0,
+        conflicts_with = "rooms"
+    )]
+    meter: f64,
     /// The interior's folder: interior.json, and the model beside it
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
+/// What a capture's model is called.
+const MODEL: &str = "model.glb";
+
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if !(args.meter > 0.0 && args.meter.is_finite()) {
+        let text = format!("--meter is {}; expected a positive number", args.meter);
+        return Err(Usage(text).into());
+    }
+    if args.up.is_some_and(|up| up.try_normalize().is_none()) {
+        return Err(Usage("--up: expected a direction such as 0,1,0".to_owned()).into());
+    }
+    let options = FindOptions {
+        up: args.up,
+        meter: args.meter,
+        ..FindOptions::default()
+    };
+    match args.model.is_dir() {
+        true => run_scene(args, &options),
+        false => run_model(args, &options),
+    }
+}
+
+fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
+    if args.rooms.is_some() {
+        let text = "--rooms is for models; of a capture, edit the interior.json that is written";
+        return Err(Usage(text.to_owned()).into());
+    }
+    let named = || args.model.display().to_string();
+    let (scene, warnings) = Scene::open(&args.model, false)?;
+    super::options::print_warnings(&warnings);
+    let busy = spinner("fusing depth maps and finding rooms");
+    let made = scene.interior(MODEL, options);
+    busy.finish_and_clear();
+    let SceneInterior { model, found, .. } = made.with_context(named)?;
+    let bytes = model_to_glb(&model).with_context(named)?;
+    let (interior, warnings, pictures) = taken_apart(found)?;
+    finish(args, MODEL, &bytes, &model, interior, warnings, &pictures)
+}
+
+fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     // A .glb is one file, and can be copied as it is.
     let is_glb = args
         .model
@@ -39,7 +106,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !is_glb {
         let found = args.model.display();
-        return Err(Usage(format!("{found}: interiors are made of .glb models")).into());
+        let text = format!("{found}: interiors are made of .glb models, or of folders of photos");
+        return Err(Usage(text).into());
     }
     // The copy is of what was read.
     let unreadable = |e| MeshFileError::Io(args.model.clone(), e);
@@ -50,15 +118,59 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let file = args.model.file_name().unwrap_or_default().to_string_lossy();
     let named = || args.model.display().to_string();
-    let (interior, warnings) = match &args.rooms {
-        Some(rooms) => read_rooms(rooms, &file)?,
-        None => interior_from_nodes(&model, &file).with_context(named)?,
+    let told = match &args.rooms {
+        Some(rooms) => Some(read_rooms(rooms, &file)?),
+        None if args.find || args.up.is_some() => None,
+        None => match interior_from_nodes(&model, &file) {
+            Err(InteriorError::NoCellNodes) => None,
+            told => Some(told.with_context(named)?),
+        },
     };
-    let (contents, more) = Contents::new(&interior, &model).with_context(named)?;
+    let (interior, warnings, pictures) = match told {
+        Some((interior, warnings)) => (interior, warnings, Vec::new()),
+        None => {
+            let busy = spinner("finding rooms");
+            let evidence = Evidence {
+                mesh: &model.mesh,
+                cameras: &[],
+                sights: &[],
+            };
+            let found = find_interior(&evidence, &file, options);
+            busy.finish_and_clear();
+            taken_apart(found.with_context(named)?)?
+        }
+    };
+    finish(args, &file, &bytes, &model, interior, warnings, &pictures)
+}
+
+/// Files beside the model.
+type Pictures = Vec<(&'static str, Vec<u8>)>;
+
+fn taken_apart(found: FoundInterior) -> anyhow::Result<(Interior, Vec<InteriorWarning>, Pictures)> {
+    let mut png = Cursor::new(Vec::new());
+    found.picture().write_to(&mut png, ImageFormat::Png)?;
+    let pictures = vec![
+        (PLAN_SVG, found.svg().into_bytes()),
+        (PLAN_PNG, png.into_inner()),
+    ];
+    Ok((found.interior, found.warnings, pictures))
+}
+
+fn finish(
+    args: &Args,
+    file: &str,
+    bytes: &[u8],
+    model: &Model,
+    interior: Interior,
+    warnings: Vec<InteriorWarning>,
+    pictures: &Pictures,
+) -> anyhow::Result<()> {
+    let named = || args.model.display().to_string();
+    let (contents, more) = Contents::new(&interior, model).with_context(named)?;
     for warning in warnings.into_iter().chain(more) {
         say!("warning: {warning}");
     }
-    write(args, &bytes, &interior)?;
+    write(args, file, bytes, &interior, pictures)?;
     let mut table = String::new();
     for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
         table += &format!("{:>9} triangles  {}\n", triangles.len(), cell.name);
@@ -69,20 +181,42 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         interior.cells.len(),
         interior.portals.len(),
         model.mesh.triangles.len()
-    ))
+    ))?;
+    if !pictures.is_empty() {
+        say!(
+            "note: rooms were found, not given; check them by {}",
+            args.output.join(PLAN_SVG).display()
+        );
+    }
+    Ok(())
 }
 
-/// Writes the model and what was made of it. An interior that is there already is replaced, if it
-/// is nothing else.
-fn write(args: &Args, model: &[u8], interior: &Interior) -> anyhow::Result<()> {
+/// Fills a folder that takes its name only when it is complete. An interior that is there
+/// already is replaced, if it is nothing else.
+fn write(
+    args: &Args,
+    file: &str,
+    model: &[u8],
+    interior: &Interior,
+    pictures: &Pictures,
+) -> anyhow::Result<()> {
     in_new_folder(&args.output, is_ours, |folder| {
-        let beside = folder.join(args.model.file_name().unwrap_or_default());
-        std::fs::write(&beside, model)
-            .with_context(|| format!("{}: cannot write", beside.display()))?;
+        let put = |name: &str, bytes: &[u8]| {
+            let beside = folder.join(name);
+            std::fs::write(&beside, bytes)
+                .with_context(|| format!("{}: cannot write", beside.display()))
+        };
+        put(file, model)?;
+        for (name, bytes) in pictures {
+            put(name, bytes)?;
+        }
         Ok(write_interior(&folder.join(INTERIOR), interior)?)
     })
 }
 
+/// To check found rooms by.
+const PLAN_SVG: &str = "floor-plan.svg";
+const PLAN_PNG: &str = "floor-plan.png";
 /// The interior's own file in its folder.
 const INTERIOR: &str = "interior.json";
 
@@ -99,15 +233,22 @@ pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
     Ok((path, interior))
 }
 
-/// Whether a folder holds an interior and one model, and nothing else.
+/// Whether a folder holds an interior, one model and perhaps a floor plan, and nothing else.
 fn is_ours(folder: &Path) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return false;
     };
-    let names: Vec<_> = entries.map(|e| e.map(|e| e.file_name())).collect();
-    let is_interior = |name: &std::ffi::OsString| name == INTERIOR;
-    let is_model = |name: &std::ffi::OsString| Path::new(name).extension() == Some("glb".as_ref());
-    let has_interior = names.iter().flatten().any(is_interior);
-    let is_known = |name: &std::ffi::OsString| is_interior(name) || is_model(name);
-    has_interior && names.len() <= 2 && names.iter().all(|n| n.as_ref().is_ok_and(is_known))
+    let Ok(names) = entries
+        .map(|e| e.map(|e| e.file_name()))
+        .collect::<Result<Vec<_>, _>>()
+    else {
+        return false;
+    };
+    let is_model =
+        |name: &std::ffi::OsString| Path::new(name).extension().is_some_and(|e| e == "glb");
+    let is_known = |name: &std::ffi::OsString| {
+        name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG || is_model(name)
+    };
+    let models = names.iter().filter(|name| is_model(name)).count();
+    names.iter().any(|name| name == INTERIOR) && models <= 1 && names.iter().all(is_known)
 }

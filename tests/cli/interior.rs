@@ -101,13 +101,41 @@ fn an_interior_is_made_of_a_model() {
         std::fs::write(here.join("rooms.json"), rooms).unwrap();
         failed("interior house/house.glb --rooms rooms.json -o two", said);
     }
-    let unnamed = "interior house/house.glb -o two";
-    failed(unnamed, "no node is called `cell:NAME`");
+    let lost = "interior house/house.glb --meter 1000 -o two";
+    failed(lost, "house/house.glb: no rooms");
     std::fs::write(here.join("empty.glb"), "").unwrap();
     failed("interior empty.glb -o two", "empty.glb: not a glTF file");
     let left = ["empty.glb", "house", "mine", "one", "rooms.json"];
     assert_eq!(names(here), left);
     failed("plan nowhere", "nowhere: ");
+}
+
+#[test]
+fn rooms_that_nobody_names_are_found() {
+    let folder = with_house();
+    let here = folder.path();
+    let line = "interior house/house.glb -o found";
+    // The second time it takes the first one's place, byte for byte.
+    let ran = lumigraph(here, line).ok();
+    let first = std::fs::read(here.join("found/interior.json")).unwrap();
+    assert!(ran.stdout.contains("found: 2 cells, "), "{}", ran.stdout);
+    assert!(
+        ran.stderr.contains("found/floor-plan.svg"),
+        "{}",
+        ran.stderr
+    );
+    lumigraph(here, &format!("--threads 1 {line}")).ok();
+    assert!(std::fs::read(here.join("found/interior.json")).unwrap() == first);
+    let files = [
+        "floor-plan.png",
+        "floor-plan.svg",
+        "house.glb",
+        "interior.json",
+    ];
+    assert_eq!(names(&here.join("found")), files);
+    // It can be walked through at once.
+    let walk = "walk found --tour --frames 2 --size 32x24 -o out";
+    lumigraph(here, walk).ok();
 }
 
 #[test]

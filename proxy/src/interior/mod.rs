@@ -9,6 +9,7 @@ mod check;
 mod contents;
 mod error;
 mod file;
+pub mod find;
 mod locate;
 mod overlap;
 mod polygon;

@@ -8,6 +8,7 @@ mod look;
 mod model;
 mod model_glb;
 mod obj;
+mod paint;
 mod pieces;
 mod ply;
 mod ply_header;
@@ -20,6 +21,7 @@ pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
 pub use model::{Material, Model, ModelNode, Part, Wrap};
 pub use model_glb::model_to_glb;
+pub use paint::Painting;
 pub use ply::to_ply;
 
 use glam::{DMat4, DVec3};

@@ -1,0 +1,297 @@
+//! Rooms and doorways found in a surface.
+//!
+//! The surface and what cameras saw past it become columns over a floor grid (`columns`, in the
+//! frame that `level` estimates). Walls are columns that are taken at eye height or below the
+//! ceiling; rooms are the basins of the distance to them (`regions`), so doorways are its
+//! bottlenecks, as robots' maps are segmented (Bormann et al. 2016, "Room segmentation: survey,
+//! implementation, and analysis", the distance-transform and Voronoi methods). A lintel is a
+//! wall, too, so that wide doorways part rooms; a beam parts nothing, for below it everything is
+//! open (`openings`). Rooms reach to the middle of their walls, and every hole there is a portal.
+
+mod columns;
+mod distance;
+mod level;
+mod openings;
+mod outline;
+mod picture;
+mod regions;
+mod sights;
+mod stubs;
+
+pub use level::Level;
+pub use sights::sights;
+
+use super::{
+    Cell, CellId, Content, Extra, Interior, InteriorError, InteriorWarning, Polygon, Portal,
+    RoomBox, interior_from_rooms,
+};
+use crate::mesh::Mesh;
+use columns::Columns;
+use glam::{DVec2, DVec3};
+use openings::Opening;
+
+/// How rooms are looked for. Lengths are in metres; [`Self::meter`] says what that is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FindOptions {
+    /// Which way is up in the world, where it is known.
+    pub up: Option<DVec3>,
+    /// A metre in world units.
+    pub meter: f64,
+    /// Side of the floor grid's squares, in metres; coarser where the floor is vast.
+    pub cell_size: f64,
+    /// A passage parts two rooms if it is narrower than this share of the narrower one.
+    pub bottleneck: f64,
+    /// What passages may measure across at most, in metres, where no lintel marks them.
+    pub max_passage: f64,
+    /// Smaller ones are no rooms; square metres.
+    pub min_area: f64,
+}
+
+impl Default for FindOptions {
+    fn default() -> Self {
+        Self {
+            up: None,
+            meter: 1.0,
+            cell_size: 0.05,
+            bottleneck: 0.7,
+            max_passage: 2.2,
+            min_area: 1.5,
+        }
+    }
+}
+
+/// What is known of a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// Its surface, in the world.
+    pub mesh: &'a Mesh,
+    /// Where cameras stood, and which way was up for them; none of a model.
+    pub cameras: &'a [(DVec3, DVec3)],
+    /// From a camera to where it met a surface: what is between is free. Where there are any,
+    /// only what they pass counts as free.
+    pub sights: &'a [[DVec3; 2]],
+}
+
+/// What a square of a floor plan is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Nothing is known of it.
+    Unknown,
+    /// Wall, at eye height.
+    Wall,
+    /// Open at eye height, wall above.
+    Lintel,
+    /// Free, and part of no room.
+    Free,
+    /// Part of a room.
+    Room(CellId),
+}
+
+/// The floor grid, to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FloorPlan {
+    /// Its frame.
+    pub level: Level,
+    /// Squares along its first axis, and along its second.
+    pub size: [usize; 2],
+    /// Where the first square's first corner is, in the frame of [`Self::level`].
+    pub origin: DVec2,
+    /// The squares' side, in world units.
+    pub cell_size: f64,
+    /// Row by row, the first axis fastest.
+    pub places: Vec<Place>,
+}
+
+/// Rooms and doorways, and how they were found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundInterior {
+    /// Cells with boxes, and floors where rooms are no boxes along the world's axes.
+    pub interior: Interior,
+    /// What is odd about it.
+    pub warnings: Vec<InteriorWarning>,
+    /// To check it by.
+    pub plan: FloorPlan,
+    /// Height of the ceiling over the floor, in world units, where one was found.
+    pub ceiling: Option<f64>,
+}
+
+/// Why there are no rooms.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FindError {
+    /// There is nothing.
+    #[error("the surface has no triangles of any size; rooms are found in a mesh or depth maps")]
+    NoSurface,
+    /// No floor.
+    #[error("no floor: nothing level lies below; say which way is up, or give the rooms by hand")]
+    NoFloor,
+    /// A floor, but nobody could stand there.
+    #[error(
+        "no rooms: over the floor nothing of {0} m² or more is free at eye height and enclosed; \
+         is the scale right (a metre is {1} world units), and which way is up?"
+    )]
+    NoRooms(f64, f64),
+    /// An option is out of range.
+    #[error("{0} is {1}; expected a positive number")]
+    Option(&'static str, f64),
+    /// What was found contradicts itself.
+    #[error(transparent)]
+    Interior(#[from] InteriorError),
+}
+
+/// Finds the rooms of one storey and the openings between them. `model` is the file of the
+/// surface, beside the `interior.json` to be.
+///
+/// The same for any number of threads; moving and turning the world moves the result with it,
+/// but for the rounding of the floor grid.
+///
+/// # Errors
+/// A surface without floor or rooms; options out of range.
+pub fn find_interior(
+    evidence: &Evidence,
+    model: &str,
+    options: &FindOptions,
+) -> Result<FoundInterior, FindError> {
+    let lengths = [
+        ("the metre", options.meter),
+        ("the cells' size", options.cell_size),
+        ("the bottleneck's share", options.bottleneck),
+        ("the widest passage", options.max_passage),
+        ("the least area", options.min_area),
+    ];
+    if let Some((name, value)) = lengths.iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+        return Err(FindError::Option(name, *value));
+    }
+    // 1. Where the floor is.
+    let level = level::estimate(evidence, options)?;
+    // 2. What is free over it.
+    let columns = Columns::new(evidence, &level, options)?;
+    // 3. Rooms, and the holes between them; those with hardly a wall between them are one.
+    let mut labels = regions::regions(&columns, options);
+    let (grown, openings) = loop {
+        let grown = regions::grown(&columns, &labels);
+        let found = openings::openings(&columns, &grown);
+        match openings::open_pair(&columns, &found) {
+            Some((a, b)) => regions::join(&mut labels, a, b),
+            None => {
+                let small = regions::drop_small(&columns, &mut labels, &grown, options);
+                if !small {
+                    let openings = found.into_iter().flat_map(|side| side.openings).collect();
+                    break (grown, openings);
+                }
+            }
+        }
+    };
+    if grown.count == 0 {
+        return Err(FindError::NoRooms(options.min_area, options.meter));
+    }
+    // 4. Cells and portals.
+    let interior = interior(evidence, &columns, &grown, openings, model, options)?;
+    let (interior, warnings) = interior_from_rooms(interior)?;
+    let place = |i: usize| match grown.labels[i] {
+        _ if columns.is_wall(i) => Place::Wall,
+        _ if columns.is_lintel(i) => Place::Lintel,
+        0 if columns.is_free(i) => Place::Free,
+        0 => Place::Unknown,
+        label => Place::Room(CellId(label - 1)),
+    };
+    let plan = FloorPlan {
+        level,
+        size: columns.size,
+        origin: columns.origin,
+        cell_size: columns.step,
+        places: (0..columns.count()).map(place).collect(),
+    };
+    Ok(FoundInterior {
+        interior,
+        warnings,
+        plan,
+        ceiling: columns.ceiling.map(|height| height * options.meter),
+    })
+}
+
+/// Eyes are this high where no camera says otherwise, in metres.
+const EYE_HEIGHT: f64 = 1.6;
+/// Boxes begin below the floor and end above the ceiling by this, in metres: surfaces are rough.
+const HEADROOM: f64 = 0.1;
+
+fn interior(
+    evidence: &Evidence,
+    columns: &Columns,
+    grown: &regions::Grown,
+    mut openings: Vec<Opening>,
+    model: &str,
+    options: &FindOptions,
+) -> Result<Interior, FindError> {
+    let level = columns.level;
+    let mut outlines: Vec<Vec<DVec2>> = (1..=grown.count)
+        .map(|label| outline::outline(columns, &grown.labels, label))
+        .collect();
+    outline::snap(&mut outlines, &mut openings, 2.5 * columns.step);
+    let along_world = level.is_along_world();
+    let mut cells = Vec::new();
+    for (i, outline) in outlines.iter().enumerate() {
+        let top = columns.top_of(&grown.labels, i as u32 + 1) * options.meter;
+        let heights = [-HEADROOM * options.meter, top + HEADROOM * options.meter];
+        let corners = outline
+            .iter()
+            .flat_map(|p| heights.map(|h| level.to_world(*p, h)));
+        let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+            (l.min(p), h.max(p))
+        });
+        let is_box = along_world && outline.len() == 4;
+        let floor = match is_box {
+            true => None,
+            false => {
+                let corners = outline.iter().map(|p| level.to_world(*p, heights[0]));
+                Polygon::new(corners.collect()).ok()
+            }
+        };
+        cells.push(Cell {
+            name: format!("room {}", i + 1),
+            content: Content::Box(RoomBox { min, max }),
+            floor,
+            other: Extra::new(),
+        });
+    }
+    let mut portals = Vec::new();
+    for opening in &openings {
+        let [from, to] = opening.ends();
+        let corners = vec![
+            level.to_world(from, opening.sill),
+            level.to_world(to, opening.sill),
+            level.to_world(to, opening.head),
+            level.to_world(from, opening.head),
+        ];
+        let kind = match opening.sill > 0.0 {
+            true => "window",
+            false => "doorway",
+        };
+        // The outline's front is the side that the plan's axes say, not where boxes are.
+        let polygon = Polygon::new(corners);
+        let Ok(mut polygon) = polygon else { continue };
+        let inwards = level.direction(opening.normal());
+        if polygon.normal().dot(inwards) < 0.0 {
+            polygon = polygon.reversed();
+        }
+        portals.push(Portal {
+            name: format!("{kind} {}", portals.len() + 1),
+            polygon,
+            cells: opening.rooms.map(|label| Some(CellId(label - 1))),
+            radius: None,
+            other: Extra::new(),
+        });
+    }
+    let heights = evidence.cameras.iter().map(|(c, _)| level.height(*c));
+    let mut heights: Vec<f64> = heights.filter(|h| *h > 0.0).collect();
+    heights.sort_by(f64::total_cmp);
+    let usual = EYE_HEIGHT * options.meter;
+    let eye_height = heights.get(heights.len() / 2).copied().unwrap_or(usual);
+    Ok(Interior {
+        model: Some(model.to_owned()),
+        up: level.up(),
+        eye_height,
+        cells,
+        portals,
+        other: Extra::new(),
+    })
+}

@@ -1,0 +1,334 @@
+//! Holes in what parts two rooms.
+
+use super::columns::{Columns, band, bin_at, height_of};
+use super::regions::Grown;
+use glam::DVec2;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A rectangle that one sees through, upright, across an axis of the plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Opening {
+    /// The label in front of it, on the greater side of its axis, and behind.
+    pub(super) rooms: [u32; 2],
+    /// The axis of the plan that it lies across.
+    pub(super) axis: usize,
+    /// Where it is on that axis, in world units of the level's frame; all others, too.
+    pub(super) at: f64,
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) sill: f64,
+    pub(super) head: f64,
+}
+
+impl Opening {
+    pub(super) fn ends(&self) -> [DVec2; 2] {
+        [self.from, self.to].map(|along| match self.axis {
+            0 => DVec2::new(self.at, along),
+            _ => DVec2::new(along, self.at),
+        })
+    }
+
+    /// Towards the first room.
+    pub(super) fn normal(&self) -> DVec2 {
+        match self.axis {
+            0 => DVec2::X,
+            _ => DVec2::Y,
+        }
+    }
+}
+
+/// A square's side that parts two rooms: where it is on the axis across it, and along it.
+type Edge = (usize, usize);
+
+/// A straight part of what parts two rooms.
+pub(super) struct Side {
+    rooms: [u32; 2],
+    /// In squares.
+    length: usize,
+    /// How much of it is open at eye height.
+    open: usize,
+    /// How much of that has a lintel.
+    lintel: usize,
+    /// How much of it is wall.
+    walled: usize,
+    pub(super) openings: Vec<Opening>,
+}
+
+/// Sides of two rooms are one if they lie within this; metres.
+const SAME_PLANE: f64 = 0.2;
+/// Walls are looked for on both sides of where rooms meet; metres.
+const REACH: f64 = 0.35;
+/// Openings' least width, height and area; metres.
+const LEAST: f64 = 0.35;
+const LEAST_AREA: f64 = 0.15;
+/// Floors are rough: an opening that begins lower begins at the floor; metres.
+const THRESHOLD: f64 = 0.3;
+const ROUGH: f64 = 0.15;
+/// The highest an opening is believed without a ceiling; metres.
+const NO_CEILING: f64 = 2.2;
+/// Rooms are one if this much of what parts them is open, and this much of that below a beam.
+const ALL_OPEN: f64 = 0.85;
+const BELOW_BEAM: f64 = 0.5;
+/// What is open on less than this below a lintel is a doorway, not a beam's room; metres.
+const WIDEST_DOORWAY: f64 = 3.0;
+/// Longer sides than this with hardly a wall part nothing; metres.
+const UNMARKED: f64 = 2.6;
+
+/// All that rooms share, in order.
+pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
+    // 1. Where labels change: across an axis, at a place on it, from one square to the next.
+    let mut edges: BTreeMap<([u32; 2], usize), Vec<Edge>> = BTreeMap::new();
+    let [width, height] = columns.size;
+    for y in 0..height {
+        for x in 0..width {
+            let i = y * width + x;
+            let ways = [(0, x + 1 < width, i + 1), (1, y + 1 < height, i + width)];
+            for (axis, is_in, j) in ways {
+                if !is_in || grown.labels[i] == 0 {
+                    continue;
+                }
+                let rooms = [grown.labels[j], grown.labels[i]];
+                if rooms[0] != 0 && rooms[0] != rooms[1] {
+                    let (at, along) = if axis == 0 { (x + 1, y) } else { (y + 1, x) };
+                    edges.entry((rooms, axis)).or_default().push((at, along));
+                }
+            }
+        }
+    }
+    // 2. Straight sides, the longest first.
+    let mut sides = Vec::new();
+    let reach = columns.squares(SAME_PLANE).round() as usize;
+    for ((rooms, axis), mut left) in edges {
+        loop {
+            let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+            left.iter()
+                .for_each(|(at, _)| *counts.entry(*at).or_default() += 1);
+            let around = |at: usize| -> usize {
+                let near = counts.range(at.saturating_sub(reach)..=at + reach);
+                near.map(|(_, n)| n).sum()
+            };
+            let best = counts
+                .keys()
+                .copied()
+                .max_by_key(|at| (around(*at), counts[at]));
+            let Some(best) = best else { break };
+            if (around(best) as f64) < columns.squares(LEAST) {
+                break;
+            }
+            let (near, rest) = left
+                .into_iter()
+                .partition(|(at, _)| at.abs_diff(best) <= reach);
+            left = rest;
+            sides.push(side(columns, rooms, axis, near));
+        }
+    }
+    sides
+}
+
+/// Two rooms that nothing but a beam parts, or nothing at all.
+pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)> {
+    let mut pairs: BTreeMap<(u32, u32), [usize; 4]> = BTreeMap::new();
+    for side in sides {
+        let [a, b] = side.rooms;
+        let sums = pairs.entry((a.min(b), a.max(b))).or_default();
+        let of = [side.length, side.open, side.lintel, side.walled];
+        sums.iter_mut().zip(of).for_each(|(sum, n)| *sum += n);
+    }
+    let widest = columns.squares(UNMARKED);
+    let is_open = |[length, open, lintel, walled]: [usize; 4]| {
+        let below_beam = lintel as f64 > BELOW_BEAM * open as f64;
+        // What is as narrow as a doorway is one, though no wall was seen beside it.
+        let is_wide = open as f64 > columns.squares(WIDEST_DOORWAY);
+        let is_beam = is_wide && open as f64 > ALL_OPEN * length as f64 && below_beam;
+        // Where not all is seen, what is unknown looks like a bottleneck.
+        let is_gap = !below_beam && length as f64 > widest && 4 * walled < length;
+        is_beam || is_gap
+    };
+    let found = pairs.into_iter().find(|(_, sums)| is_open(*sums));
+    found.map(|(pair, _)| pair)
+}
+
+fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Side {
+    let index = |at: usize, along: usize| match axis {
+        0 => along * columns.size[0] + at,
+        _ => at * columns.size[0] + along,
+    };
+    let most = columns.size[axis];
+    let mut places: Vec<usize> = edges.iter().map(|(at, _)| *at).collect();
+    places.sort_unstable();
+    let middle = places[places.len() / 2];
+    let mut alongs: Vec<usize> = edges.iter().map(|(_, along)| *along).collect();
+    alongs.sort_unstable();
+    alongs.dedup();
+    // 1. How thick the wall is, and where its middle is.
+    let reach = columns.squares(REACH).round() as usize;
+    let around = middle.saturating_sub(reach)..(middle + reach).min(most);
+    let mut walls: Vec<(usize, usize)> = Vec::new();
+    for along in &alongs {
+        let is_wall = |at: &usize| {
+            let i = index(*at, *along);
+            columns.is_wall(i) || columns.is_lintel(i)
+        };
+        let mut of = around.clone().filter(is_wall);
+        if let Some(first) = of.next() {
+            walls.push((first, of.next_back().unwrap_or(first) + 1));
+        }
+    }
+    let median = |pick: fn(&(usize, usize)) -> usize| {
+        let mut all: Vec<usize> = walls.iter().map(pick).collect();
+        all.sort_unstable();
+        all.get(all.len() / 2).copied().unwrap_or(middle)
+    };
+    let (low, high) = (median(|w| w.0), median(|w| w.1));
+    let at = 0.5 * (low + high) as f64;
+    let across = low.saturating_sub(1)..(high + 1).min(most);
+    // 2. What is open, square by square along it.
+    let first = alongs[0];
+    let length = alongs[alongs.len() - 1] - first + 1;
+    let mut open = vec![0_u128; length];
+    let (mut open_count, mut lintel_count) = (0, 0);
+    let top = columns.lintel_band().unwrap_or(0);
+    let range = band([ROUGH, columns.ceiling.unwrap_or(NO_CEILING)]);
+    for along in &alongs {
+        let all = across.clone().map(|at| index(at, *along));
+        let taken = all.clone().fold(0, |t, i| t | columns.taken[i]);
+        let mut free = !taken & range;
+        let mut is_open = columns.is_open_at_eye(taken);
+        if let Some(seen) = &columns.seen {
+            free &= all.fold(0, |s, i| s | seen[i]);
+            is_open &= !columns.is_open_at_eye(free);
+        }
+        open[along - first] = free;
+        open_count += usize::from(is_open);
+        let has_top = 2 * (taken & top).count_ones() >= top.count_ones() && top != 0;
+        lintel_count += usize::from(is_open && has_top);
+    }
+    // 3. Its holes.
+    let unit = columns.step;
+    let [along_origin, at_origin] = match axis {
+        0 => [columns.origin.y, columns.origin.x],
+        _ => [columns.origin.x, columns.origin.y],
+    };
+    let highest = columns.ceiling.unwrap_or(NO_CEILING);
+    let opening = |hole: [usize; 4]| {
+        let [from, to, sill, head] = hole;
+        let sill = height_of(sill);
+        let head = height_of(head);
+        Opening {
+            rooms,
+            axis,
+            at: at_origin + at * unit,
+            from: along_origin + (first + from) as f64 * unit,
+            to: along_origin + (first + to) as f64 * unit,
+            sill: if sill < THRESHOLD {
+                0.0
+            } else {
+                sill * columns.meter
+            },
+            head: head.min(highest) * columns.meter,
+        }
+    };
+    let holes = holes(&open, columns.step_m);
+    Side {
+        rooms,
+        length: alongs.len(),
+        open: open_count,
+        lintel: lintel_count,
+        walled: walls.len(),
+        openings: holes.into_iter().map(opening).collect(),
+    }
+}
+
+/// Rectangles of what hangs together: from and to along, and bins from and to.
+fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
+    let bins = bin_at(f64::INFINITY);
+    let mut left = open.to_vec();
+    let mut found = Vec::new();
+    for first in 0..left.len() {
+        while left[first] != 0 {
+            // 1. All that hangs together.
+            let mut piece = vec![0_u128; left.len()];
+            let mut stack = vec![(first, left[first].trailing_zeros())];
+            while let Some((s, bin)) = stack.pop() {
+                if left[s] >> bin & 1 == 0 {
+                    continue;
+                }
+                left[s] &= !(1 << bin);
+                piece[s] |= 1 << bin;
+                if s > 0 {
+                    stack.push((s - 1, bin));
+                }
+                if s + 1 < left.len() {
+                    stack.push((s + 1, bin));
+                }
+                if bin > 0 {
+                    stack.push((s, bin - 1));
+                }
+                if (bin as usize) + 1 < bins {
+                    stack.push((s, bin + 1));
+                }
+            }
+            // 2. Its rectangle: what is open by half as much as where it is most. Where a screen
+            // stands in it, its tall parts first.
+            let least = (LEAST / step).ceil() as usize;
+            loop {
+                let tall = |s: usize| piece[s].count_ones() as usize;
+                let highest = (0..piece.len()).map(tall).max().unwrap_or(0);
+                let is_tall = |s: &usize| 3 * tall(*s) >= 2 * highest && highest > 0;
+                let run = longest_run(piece.len(), is_tall);
+                let rest = (0..piece.len()).filter(|s| tall(*s) > 0).count();
+                if highest == 0 {
+                    break;
+                }
+                // Ragged ends belong to it.
+                let range = if rest < run.len() + 2 * least {
+                    0..piece.len()
+                } else {
+                    run
+                };
+                let mut part = vec![0; piece.len()];
+                part[range.clone()].copy_from_slice(&piece[range.clone()]);
+                piece[range].fill(0);
+                found.extend(rectangle(&part, step));
+            }
+        }
+    }
+    found
+}
+
+/// The longest run of numbers that are so.
+fn longest_run(count: usize, is_so: impl Fn(&usize) -> bool) -> Range<usize> {
+    let mut best = 0..0;
+    let mut start = 0;
+    for i in 0..=count {
+        if i < count && is_so(&i) {
+            continue;
+        }
+        if i - start > best.len() {
+            best = start..i;
+        }
+        start = i + 1;
+    }
+    best
+}
+
+/// About the rectangle that a piece fills, if it is large enough.
+fn rectangle(piece: &[u128], step: f64) -> Option<[usize; 4]> {
+    let tall = |s: usize| piece[s].count_ones() as usize;
+    let wide = |bin: usize| piece.iter().filter(|p| **p >> bin & 1 == 1).count();
+    let span = |count: usize, of: &dyn Fn(usize) -> usize| {
+        let most = (0..count).map(of).max().unwrap_or(0);
+        let is_much = |i: &usize| 2 * of(*i) >= most;
+        let from = (0..count).find(is_much).unwrap_or(0);
+        let to = (0..count).rev().find(is_much).unwrap_or(0) + 1;
+        (from, to)
+    };
+    let (from, to) = span(piece.len(), &tall);
+    let (sill, head) = span(bin_at(f64::INFINITY), &wide);
+    let (width, height) = ((to - from) as f64 * step, height_of(head) - height_of(sill));
+    let area = piece.iter().map(|p| p.count_ones()).sum::<u32>();
+    let area = f64::from(area) * step * (height_of(1) - height_of(0));
+    let is_large = width >= LEAST && height >= LEAST && area >= LEAST_AREA;
+    is_large.then_some([from, to, sill, head])
+}

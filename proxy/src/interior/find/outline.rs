@@ -1,0 +1,215 @@
+//! Rooms' outlines on the plan.
+
+use super::columns::Columns;
+use super::openings::Opening;
+use glam::DVec2;
+
+/// A room that fills this much of a rectangle is one.
+const RECTANGLE: f64 = 0.9;
+/// Outlines are simplified by this, in metres; more until they have few enough corners.
+const SIMPLER: f64 = 0.15;
+const MOST_CORNERS: usize = 120;
+
+/// A room's outline, counter-clockwise, in the level's frame: a rectangle if it is about one.
+pub(super) fn outline(columns: &Columns, labels: &[u32], label: u32) -> Vec<DVec2> {
+    let at = |p: [f64; 2]| columns.origin + columns.step * DVec2::from_array(p);
+    // 1. The rectangle whose sides are where most of the outline's are.
+    let [width, height] = columns.size;
+    let ends = |count: usize, length: usize, index: &dyn Fn(usize, usize) -> usize| {
+        let (mut first, mut last) = (Vec::new(), Vec::new());
+        for line in 0..count {
+            let mut of = (0..length).filter(|k| labels[index(line, *k)] == label);
+            if let Some(from) = of.next() {
+                first.push(from);
+                last.push(of.next_back().unwrap_or(from) + 1);
+            }
+        }
+        first.sort_unstable();
+        last.sort_unstable();
+        let median = |list: &[usize]| list.get(list.len() / 2).copied().unwrap_or(0);
+        [median(&first), median(&last)]
+    };
+    let [x0, x1] = ends(height, width, &|y, x| y * width + x);
+    let [y0, y1] = ends(width, height, &|x, y| y * width + x);
+    let is_in = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        x >= x0 && x < x1 && y >= y0 && y < y1
+    };
+    let mine = || (0..labels.len()).filter(|i| labels[*i] == label);
+    let (all, inside) = (mine().count(), mine().filter(|i| is_in(*i)).count());
+    let rectangle = x1.saturating_sub(x0) * y1.saturating_sub(y0);
+    let shared = inside as f64 / (all + rectangle - inside).max(1) as f64;
+    if shared >= RECTANGLE {
+        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        return corners.map(|p| at(p.map(|x| x as f64))).to_vec();
+    }
+    // 2. The longest way around it.
+    let around = longest_loop(columns, labels, label);
+    let mut within = columns.squares(SIMPLER);
+    loop {
+        let simple = simplified(&around, within);
+        if simple.len() <= MOST_CORNERS {
+            return simple.into_iter().map(at).collect();
+        }
+        within *= 1.5;
+    }
+}
+
+/// Follows squares' sides with the room on the left; turns left where two squares touch at a
+/// corner only.
+fn longest_loop(columns: &Columns, labels: &[u32], label: u32) -> Vec<[f64; 2]> {
+    let [width, height] = columns.size;
+    let is_in = |x: isize, y: isize| {
+        let is_there = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
+        is_there && labels[y as usize * width + x as usize] == label
+    };
+    // The squares on the left and right of a step from a corner.
+    const WAYS: [(isize, isize); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+    let sides = |x: isize, y: isize, way: usize| match way {
+        0 => (is_in(x, y), is_in(x, y - 1)),
+        1 => (is_in(x - 1, y), is_in(x, y)),
+        2 => (is_in(x - 1, y - 1), is_in(x - 1, y)),
+        _ => (is_in(x, y - 1), is_in(x - 1, y - 1)),
+    };
+    let goes = |x: isize, y: isize, way: usize| {
+        let (left, right) = sides(x, y, way);
+        left && !right
+    };
+    let mut is_done = vec![false; width * height];
+    let mut best: Vec<[f64; 2]> = Vec::new();
+    let mut best_area = 0.0;
+    for i in 0..width * height {
+        // Each loop has a step along the first axis, with a square of the room over it.
+        let (x, y) = ((i % width) as isize, (i / width) as isize);
+        if is_done[i] || !goes(x, y, 0) {
+            continue;
+        }
+        let mut corners: Vec<[f64; 2]> = Vec::new();
+        let (mut px, mut py, mut way) = (x, y, 0);
+        let mut area = 0.0;
+        loop {
+            if way == 0 {
+                is_done[py as usize * width + px as usize] = true;
+            }
+            corners.push([px as f64, py as f64]);
+            let (nx, ny) = (px + WAYS[way].0, py + WAYS[way].1);
+            area += 0.5 * (px * ny - nx * py) as f64;
+            (px, py) = (nx, ny);
+            let turns = [(way + 1) % 4, way, (way + 3) % 4];
+            let next = turns.into_iter().find(|w| goes(px, py, *w));
+            let Some(next) = next else { break };
+            way = next;
+            if (px, py, way) == (x, y, 0) {
+                break;
+            }
+        }
+        if area > best_area {
+            best_area = area;
+            best = corners;
+        }
+    }
+    best
+}
+
+/// A closed line with fewer corners, nowhere farther from it than said (Douglas and Peucker
+/// 1973, between two corners far apart).
+fn simplified(corners: &[[f64; 2]], within: f64) -> Vec<[f64; 2]> {
+    let n = corners.len();
+    if n < 5 {
+        return corners.to_vec();
+    }
+    let p = |i: usize| DVec2::from_array(corners[i % n]);
+    let extreme = |key: &dyn Fn(DVec2) -> f64| {
+        (0..n).fold(0, |b, i| if key(p(i)) < key(p(b)) { i } else { b })
+    };
+    let a = extreme(&|p| p.x + p.y);
+    let b = extreme(&|q| -q.distance_squared(p(a)));
+    let (a, b) = (a.min(b), a.max(b));
+    let mut keep = vec![false; n];
+    keep[a] = true;
+    keep[b] = true;
+    let mut stack = vec![(a, b), (b, a + n)];
+    while let Some((from, to)) = stack.pop() {
+        let (start, end) = (p(from), p(to));
+        let along = (end - start).normalize_or_zero();
+        let off = |i: usize| {
+            let d = p(i) - start;
+            let t = d.dot(along).clamp(0.0, start.distance(end));
+            d.distance(t * along)
+        };
+        let far = (from + 1..to).fold(None, |best: Option<(usize, f64)>, i| match best {
+            Some((_, most)) if off(i) <= most => best,
+            _ => Some((i, off(i))),
+        });
+        if let Some((i, most)) = far
+            && most > within
+        {
+            keep[i % n] = true;
+            stack.push((from, i));
+            stack.push((i, to));
+        }
+    }
+    (0..n).filter(|i| keep[*i]).map(|i| corners[i]).collect()
+}
+
+/// Makes what nearly lines up line up: sides of rooms with those of their neighbours, and
+/// with the openings between them.
+pub(super) fn snap(outlines: &mut [Vec<DVec2>], openings: &mut [Opening], within: f64) {
+    for axis in 0..2 {
+        let of_rooms = outlines.iter().flatten().map(|p| (p[axis], false));
+        let of_openings = openings.iter().filter(|o| o.axis == axis);
+        let mut all: Vec<(f64, bool)> = of_rooms.chain(of_openings.map(|o| (o.at, true))).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // From the first of a group to its last, and what takes their place.
+        let mut groups: Vec<([f64; 2], f64)> = Vec::new();
+        let mut start = 0;
+        for i in 1..=all.len() {
+            if i < all.len() && all[i].0 - all[start].0 <= within {
+                continue;
+            }
+            let Some(group) = all.get(start..i).filter(|g| !g.is_empty()) else {
+                break;
+            };
+            let has_opening = group.iter().any(|g| g.1);
+            let of = group.iter().filter(|g| g.1 == has_opening);
+            let (sum, count) = of.fold((0.0, 0.0), |(s, n), g| (s + g.0, n + 1.0));
+            groups.push(([group[0].0, group[group.len() - 1].0], sum / count));
+            start = i;
+        }
+        let moved = |x: f64| {
+            let group = groups.iter().find(|g| g.0[0] <= x && x <= g.0[1]);
+            group.map_or(x, |g| g.1)
+        };
+        for point in outlines.iter_mut().flatten() {
+            point[axis] = moved(point[axis]);
+        }
+        for opening in openings.iter_mut().filter(|o| o.axis == axis) {
+            opening.at = moved(opening.at);
+        }
+    }
+    for outline in outlines {
+        tidy(outline);
+    }
+}
+
+/// Removes corners that are the same or on a line.
+fn tidy(outline: &mut Vec<DVec2>) {
+    let mut at = 0;
+    let mut kept = 0;
+    while outline.len() > 3 && kept < outline.len() {
+        let n = outline.len();
+        let i = at % n;
+        let (a, b, c) = (outline[(i + n - 1) % n], outline[i], outline[(i + 1) % n]);
+        let is_needless = (b - a).perp_dot(c - b).abs()
+            < 1e-9 * (c - a).length_squared().max(1e-18)
+            || a.distance(b) < 1e-9;
+        if is_needless {
+            outline.remove(i);
+            kept = 0;
+            at = i.saturating_sub(1);
+        } else {
+            kept += 1;
+            at = i + 1;
+        }
+    }
+}

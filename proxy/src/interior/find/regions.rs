@@ -1,0 +1,232 @@
+//! Rooms as regions of the floor grid.
+
+use super::FindOptions;
+use super::columns::Columns;
+use super::distance::squared_distances;
+use std::collections::BTreeMap;
+
+/// Walls thinner than twice this lie between two rooms; metres.
+const HALF_WALL: f64 = 0.26;
+/// How far a room goes into a wall with nothing behind it; metres.
+const INTO_WALL: f64 = 0.06;
+/// What stands before walls belongs to the room up to this depth; metres.
+const FURNITURE: f64 = 1.0;
+/// Half the width of the narrowest room; metres.
+const LEAST_HALF_WIDTH: f64 = 0.3;
+/// A region with nothing around so much of it is no room, where all floor is known.
+const OPEN_OUTLINE: f64 = 0.25;
+
+/// Free squares by room, from 1; 0 is none.
+pub(super) struct Labels {
+    pub(super) labels: Vec<u32>,
+    pub(super) count: u32,
+}
+
+/// The same with rooms up to the middle of their walls.
+pub(super) struct Grown {
+    pub(super) labels: Vec<u32>,
+    pub(super) count: u32,
+}
+
+/// The basins of the distance to walls, those joined that no bottleneck parts (watershed by
+/// flooding from the peaks, Vincent and Soille 1991).
+pub(super) fn regions(columns: &Columns, options: &FindOptions) -> Labels {
+    let (squared, _) = squared_distances(columns.size, |i| !columns.is_free(i));
+    let distances: Vec<f64> = squared.iter().map(|d| d.sqrt() * columns.step_m).collect();
+    let mut order: Vec<u32> = (0..columns.count() as u32)
+        .filter(|i| columns.is_free(*i as usize) && distances[*i as usize].is_finite())
+        .collect();
+    order.sort_by(|a, b| distances[*b as usize].total_cmp(&distances[*a as usize]));
+    let mut basins = Basins::default();
+    let mut labels = vec![0_u32; columns.count()];
+    let width = columns.size[0];
+    for i in order {
+        let i = i as usize;
+        // Nothing is free on the grid's border, so there are always eight.
+        let around = [
+            i - 1,
+            i + 1,
+            i - width,
+            i + width,
+            i - width - 1,
+            i - width + 1,
+            i + width - 1,
+            i + width + 1,
+        ];
+        // Uphill: where basins meet, they do not run along each other's shores.
+        let known = around.into_iter().filter(|j| labels[*j] != 0);
+        let uphill = known.clone().reduce(|best, j| {
+            if distances[j] > distances[best] {
+                j
+            } else {
+                best
+            }
+        });
+        labels[i] = match uphill {
+            None => basins.begin(distances[i]),
+            Some(uphill) => {
+                let own = labels[uphill];
+                for j in known {
+                    basins.meet(own, labels[j], distances[i], options);
+                }
+                own
+            }
+        };
+    }
+    for label in labels.iter_mut().filter(|l| **l != 0) {
+        let root = basins.root(*label);
+        // Between the two faces of a wall is no room.
+        *label = match basins.peaks[root as usize - 1] < LEAST_HALF_WIDTH {
+            true => 0,
+            false => root,
+        };
+    }
+    let mut found = Labels { labels, count: 0 };
+    if columns.seen.is_none() {
+        drop_outside(columns, &mut found);
+    }
+    renumber(&mut found);
+    found
+}
+
+#[derive(Default)]
+struct Basins {
+    /// By label less one.
+    parents: Vec<u32>,
+    peaks: Vec<f64>,
+}
+
+impl Basins {
+    fn begin(&mut self, peak: f64) -> u32 {
+        self.parents.push(self.parents.len() as u32 + 1);
+        self.peaks.push(peak);
+        self.parents.len() as u32
+    }
+
+    fn root(&mut self, label: u32) -> u32 {
+        let mut at = label;
+        while self.parents[at as usize - 1] != at {
+            let above = self.parents[at as usize - 1];
+            self.parents[at as usize - 1] = self.parents[above as usize - 1];
+            at = above;
+        }
+        at
+    }
+
+    /// Two basins meet at a saddle, and become one unless it is narrow.
+    fn meet(&mut self, a: u32, b: u32, saddle: f64, options: &FindOptions) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (high, low) = match self.peaks[a as usize - 1] >= self.peaks[b as usize - 1] {
+            true => (a, b),
+            false => (b, a),
+        };
+        let is_narrow = saddle < options.bottleneck * self.peaks[low as usize - 1];
+        if high != low && !(is_narrow && 2.0 * saddle <= options.max_passage) {
+            self.parents[low as usize - 1] = high;
+        }
+    }
+}
+
+/// Regions that nothing encloses: gardens, and floor around a house.
+fn drop_outside(columns: &Columns, found: &mut Labels) {
+    let mut sides: BTreeMap<u32, (usize, usize)> = BTreeMap::new();
+    for i in (0..columns.count()).filter(|i| found.labels[*i] != 0) {
+        let (open, all) = sides.entry(found.labels[i]).or_default();
+        for j in columns.beside(i).filter(|j| !columns.is_free(*j)) {
+            *all += 1;
+            *open += usize::from(!columns.is_wall(j) && !columns.is_lintel(j));
+        }
+    }
+    let is_outside = |label: &u32| {
+        let of = sides.get(label);
+        of.is_some_and(|(open, all)| *open as f64 > OPEN_OUTLINE * *all as f64)
+    };
+    let outside: Vec<u32> = sides.keys().copied().filter(is_outside).collect();
+    for label in &mut found.labels {
+        if outside.binary_search(label).is_ok() {
+            *label = 0;
+        }
+    }
+}
+
+/// Numbers regions in the order of their first squares.
+fn renumber(found: &mut Labels) {
+    let mut names: BTreeMap<u32, u32> = BTreeMap::new();
+    for label in found.labels.iter_mut().filter(|l| **l != 0) {
+        let next = names.len() as u32 + 1;
+        *label = *names.entry(*label).or_insert(next);
+    }
+    found.count = names.len() as u32;
+}
+
+/// Makes two regions one.
+pub(super) fn join(found: &mut Labels, a: u32, b: u32) {
+    for label in found.labels.iter_mut().filter(|l| **l == b) {
+        *label = a;
+    }
+    renumber(found);
+}
+
+/// Rooms with what stands in them and half of their walls.
+pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
+    let (squared, nearest) = squared_distances(columns.size, |i| found.labels[i] != 0);
+    // 1. Furniture that is open above: what is free above it is of the room.
+    let top = columns.lintel_band();
+    let depth = columns.squares(FURNITURE).powi(2);
+    let is_room = |i: usize| {
+        let is_thing = top.is_some_and(|top| {
+            squared[i] <= depth && columns.is_wall(i) && columns.taken[i] & top == 0
+        });
+        found.labels[i] != 0 || is_thing
+    };
+    // 2. Walls between rooms: gaps in all of them together. Other walls: a little of them.
+    let mut is_in = columns.closed(HALF_WALL, is_room);
+    let skin = columns.squares(INTO_WALL).powi(2);
+    for i in 0..columns.count() {
+        is_in[i] |= squared[i] <= skin;
+    }
+    let label = |i: usize| match is_in[i] && nearest[i] != u32::MAX {
+        true => found.labels[nearest[i] as usize],
+        false => 0,
+    };
+    Grown {
+        labels: (0..columns.count()).map(label).collect(),
+        count: found.count,
+    }
+}
+
+/// Joins regions that are too small for rooms to the one they touch most, or drops them;
+/// whether there was one.
+pub(super) fn drop_small(
+    columns: &Columns,
+    found: &mut Labels,
+    grown: &Grown,
+    options: &FindOptions,
+) -> bool {
+    let mut areas = vec![0.0; found.count as usize + 1];
+    for label in &grown.labels {
+        areas[*label as usize] += columns.step_m * columns.step_m;
+    }
+    let small = (1..=found.count).find(|l| areas[*l as usize] < options.min_area);
+    let Some(small) = small else {
+        return false;
+    };
+    let mut touched: BTreeMap<u32, usize> = BTreeMap::new();
+    for i in (0..columns.count()).filter(|i| found.labels[*i] == small) {
+        for j in columns.beside(i) {
+            let other = found.labels[j];
+            if other != 0 && other != small {
+                *touched.entry(other).or_default() += 1;
+            }
+        }
+    }
+    let into = touched
+        .iter()
+        .max_by_key(|(label, n)| (**n, u32::MAX - **label));
+    let into = into.map_or(0, |(label, _)| *label);
+    for label in found.labels.iter_mut().filter(|l| **l == small) {
+        *label = into;
+    }
+    renumber(found);
+    true
+}

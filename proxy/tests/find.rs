@@ -1,0 +1,385 @@
+//! Rooms found in models and captures, against what is known of them.
+
+mod common;
+mod house;
+
+use glam::{DMat4, DQuat, DVec2, DVec3};
+use house::small_house;
+use proxy::Mesh;
+use proxy::interior::find::{
+    Evidence, FindError, FindOptions, FoundInterior, find_interior, sights,
+};
+use proxy::interior::{CellId, Content, Interior, RoomBox, parse_rooms};
+
+fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
+    let evidence = Evidence {
+        mesh,
+        cameras: &[],
+        sights: &[],
+    };
+    find_interior(&evidence, "model.glb", options)
+}
+
+/// How a found interior compares with the truth.
+#[derive(Debug)]
+struct Score {
+    /// Of each true cell with the found one that it is matched with, by plan area.
+    iou: Vec<f64>,
+    extra_rooms: usize,
+    /// True portals with a found one between the same cells, within the tolerance.
+    portals: usize,
+    missed_portals: Vec<String>,
+    extra_portals: Vec<String>,
+}
+
+/// A cell's boundaries on the ground: a box, and the outline in it.
+fn is_over(interior: &Interior, id: CellId, p: DVec3) -> bool {
+    let cell = interior.cell(id);
+    let Content::Box(RoomBox { min, max }) = cell.content else {
+        return false;
+    };
+    let in_box = p.x >= min.x && p.x <= max.x && p.z >= min.z && p.z <= max.z;
+    let foot = |floor: &proxy::interior::Polygon| {
+        p - floor.normal() * ((p - floor.center()).dot(floor.normal()))
+    };
+    in_box && cell.floor.as_ref().is_none_or(|f| f.covers(foot(f), 0.0))
+}
+
+fn score(truth: &Interior, found: &Interior, tolerance: f64) -> Score {
+    // 1. Areas, by sampling the ground (y is up).
+    let boxes = truth
+        .cells
+        .iter()
+        .chain(&found.cells)
+        .map(|c| match c.content {
+            Content::Box(room) => room,
+            _ => panic!("boxes"),
+        });
+    let (low, high) = boxes.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), b| {
+        (l.min(b.min), h.max(b.max))
+    });
+    let (n, m) = (truth.cells.len(), found.cells.len());
+    let mut shared = vec![vec![0_usize; m]; n];
+    let (mut of_truth, mut of_found) = (vec![0_usize; n], vec![0_usize; m]);
+    let step = 0.05;
+    let counts = [high.x - low.x, high.z - low.z].map(|e| (e / step) as usize + 1);
+    for i in 0..counts[0] * counts[1] {
+        let at = DVec2::new((i % counts[0]) as f64 + 0.5, (i / counts[0]) as f64 + 0.5) * step;
+        let p = DVec3::new(low.x + at.x, 0.0, low.z + at.y);
+        let inside = |interior: &Interior, n: usize| -> Vec<usize> {
+            (0..n)
+                .filter(|i| is_over(interior, CellId(*i as u32), p))
+                .collect()
+        };
+        let (a, b) = (inside(truth, n), inside(found, m));
+        a.iter().for_each(|t| of_truth[*t] += 1);
+        b.iter().for_each(|f| of_found[*f] += 1);
+        for t in &a {
+            b.iter().for_each(|f| shared[*t][*f] += 1);
+        }
+    }
+    let iou = |t: usize, f: usize| {
+        shared[t][f] as f64 / (of_truth[t] + of_found[f] - shared[t][f]).max(1) as f64
+    };
+    let mut matched: Vec<Option<usize>> = vec![None; m];
+    let mut best = vec![0.0; n];
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
+    pairs.sort_by(|a, b| iou(b.0, b.1).total_cmp(&iou(a.0, a.1)));
+    for (t, f) in pairs {
+        if best[t] == 0.0 && matched[f].is_none() && iou(t, f) > 0.0 {
+            best[t] = iou(t, f);
+            matched[f] = Some(t);
+        }
+    }
+    // 2. Portals: middles and widths.
+    let mut left: Vec<usize> = (0..found.portals.len()).collect();
+    let mut missed = Vec::new();
+    for portal in &truth.portals {
+        let near = left.iter().position(|i| {
+            let other = &found.portals[*i];
+            let off = other.polygon.center() - portal.polygon.center();
+            let wider = other.width(found.up) - portal.width(truth.up);
+            off.abs().max_element() <= tolerance && wider.abs() <= 2.0 * tolerance
+        });
+        match near {
+            Some(i) => drop(left.remove(i)),
+            None => missed.push(format!(
+                "{} at {} width {:.2}",
+                portal.name,
+                portal.polygon.center(),
+                portal.width(truth.up)
+            )),
+        }
+    }
+    let extra = left.iter().map(|i| {
+        let portal = &found.portals[*i];
+        let width = portal.width(found.up);
+        format!(
+            "{} at {} width {width:.2}",
+            portal.name,
+            portal.polygon.center()
+        )
+    });
+    Score {
+        iou: best,
+        extra_rooms: matched.iter().filter(|m| m.is_none()).count(),
+        portals: truth.portals.len() - missed.len(),
+        missed_portals: missed,
+        extra_portals: extra.collect(),
+    }
+}
+
+fn bounds(found: &FoundInterior, cell: usize) -> RoomBox {
+    match found.interior.cells[cell].content {
+        Content::Box(room) => room,
+        _ => panic!("found cells are boxes"),
+    }
+}
+
+/// For looking at, where a folder is named.
+fn look_at(found: &FoundInterior, name: &str) {
+    if let Ok(folder) = std::env::var("FLOOR_PLANS") {
+        let path = format!("{folder}/{name}.png");
+        found.picture().save(path).unwrap();
+    }
+}
+
+#[test]
+fn rooms_and_openings_of_procedural_houses_are_found() {
+    for (rooms, seed) in [(2, 1), (5, 2), (9, 3), (19, 1)] {
+        let (house, _) = small_house(rooms, seed);
+        let found = find(&house.model.mesh, &FindOptions::default()).unwrap();
+        look_at(&found, &format!("house-{rooms}"));
+        let score = score(&house.interior, &found.interior, 0.2);
+        let worst = score.iou.iter().copied().fold(1.0, f64::min);
+        let mean = score.iou.iter().sum::<f64>() / rooms as f64;
+        eprintln!("{rooms} rooms: IoU {mean:.3}, least {worst:.3}; {score:?}");
+        assert!(worst > 0.93, "{score:?}");
+        assert_eq!(score.extra_rooms, 0);
+        assert_eq!(score.portals, house.interior.portals.len());
+        assert_eq!(score.missed_portals, Vec::<String>::new());
+        assert_eq!(score.extra_portals, Vec::<String>::new());
+        assert_eq!(found.warnings, []);
+        let svg = found.svg();
+        assert!(svg.starts_with("<svg ") && svg.contains("room 2"));
+    }
+}
+
+#[test]
+fn turning_and_shifting_the_world_turns_and_shifts_the_rooms() {
+    let (house, _) = small_house(5, 4);
+    let there = DMat4::from_rotation_translation(
+        DQuat::from_euler(glam::EulerRot::XYZ, 0.9, 0.5, -0.7),
+        DVec3::new(310.0, -40.0, 95.0),
+    );
+    let mut mesh = house.model.mesh.clone();
+    mesh.transform(&there);
+    // Up is not known, and y is not it.
+    let found = find(&mesh, &FindOptions::default()).unwrap();
+    let up = there.transform_vector3(DVec3::Y);
+    assert!(found.interior.up.dot(up) > 0.99999, "{}", found.interior.up);
+    assert_eq!(found.interior.cells.len(), 5);
+    let back = there.inverse();
+    let mut left: Vec<DVec3> = house
+        .interior
+        .portals
+        .iter()
+        .map(|p| p.polygon.center())
+        .collect();
+    for portal in &found.interior.portals {
+        let center = back.transform_point3(portal.polygon.center());
+        let near = left.iter().position(|c| c.distance(center) < 0.15);
+        left.remove(near.unwrap_or_else(|| panic!("{} at {center}", portal.name)));
+    }
+    assert_eq!(left, []);
+    // Outlines, and boxes around them.
+    for cell in &found.interior.cells {
+        assert!(cell.floor.is_some(), "{}", cell.name);
+    }
+    // Another scale, said to be one.
+    let mut mesh = house.model.mesh.clone();
+    mesh.transform(&DMat4::from_scale(DVec3::splat(40.0)));
+    let options = FindOptions {
+        meter: 40.0,
+        ..FindOptions::default()
+    };
+    let larger = find(&mesh, &options).unwrap();
+    assert_eq!(larger.interior.cells.len(), 5);
+    assert_eq!(larger.interior.portals.len(), house.interior.portals.len());
+}
+
+/// A room without ceiling or floor, as may be, from faces of a box.
+fn open_box(min: DVec3, max: DVec3, faces: &[usize]) -> Mesh {
+    let mut mesh = Mesh::default();
+    for face in faces {
+        let (axis, side) = (face / 2, face % 2);
+        let corner = |u: bool, v: bool| {
+            let mut p = if side == 0 { min } else { max };
+            p[(axis + 1) % 3] = if u { max } else { min }[(axis + 1) % 3];
+            p[(axis + 2) % 3] = if v { max } else { min }[(axis + 2) % 3];
+            if side == 0 {
+                p[axis] = min[axis];
+            }
+            p
+        };
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([
+            corner(false, false),
+            corner(true, false),
+            corner(true, true),
+            corner(false, true),
+        ]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.triangles.push([first, first + 2, first + 3]);
+    }
+    mesh
+}
+
+#[test]
+fn one_room_is_one_cell_and_two_apart_are_two() {
+    let size = DVec3::new(5.0, 2.6, 4.0);
+    let one = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let found = find(&one, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 1);
+    assert_eq!(found.interior.portals.len(), 0);
+    let room = bounds(&found, 0);
+    for (a, b) in [(room.min, DVec3::ZERO), (room.max, size)] {
+        assert!((a - b).abs().max_element() < 0.2, "{room:?}");
+    }
+    // Without a ceiling.
+    let open = open_box(DVec3::ZERO, size, &[0, 1, 2, 4, 5]);
+    let found = find(&open, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 1);
+    // Apart.
+    let mut two = one.clone();
+    let shift = DVec3::X * 9.0;
+    two.append(&open_box(shift, shift + size, &[0, 1, 2, 3, 4, 5]));
+    let found = find(&two, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 2);
+    assert_eq!(found.interior.portals.len(), 0);
+}
+
+#[test]
+fn what_is_no_room_is_told() {
+    let none = find(&Mesh::default(), &FindOptions::default()).unwrap_err();
+    assert_eq!(none, FindError::NoSurface);
+    let triangle = Mesh {
+        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Z],
+        triangles: vec![[0, 1, 2]],
+    };
+    let error = find(&triangle, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+    let nan = Mesh {
+        positions: vec![DVec3::NAN, DVec3::X, DVec3::Z],
+        triangles: vec![[0, 1, 2]],
+    };
+    assert_eq!(
+        find(&nan, &FindOptions::default()).unwrap_err(),
+        FindError::NoSurface
+    );
+    // A field is no room: nothing encloses it.
+    let field = open_box(DVec3::ZERO, DVec3::new(30.0, 0.0, 30.0), &[2]);
+    let error = find(&field, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+    let options = FindOptions {
+        meter: 0.0,
+        ..FindOptions::default()
+    };
+    assert_eq!(
+        find(&field, &options).unwrap_err(),
+        FindError::Option("the metre", 0.0)
+    );
+}
+
+#[test]
+fn rooms_of_a_modelled_house_are_where_its_description_says() {
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
+    let found = find(&model.mesh, &FindOptions::default()).unwrap();
+    look_at(&found, "house");
+    // Bedroom and study. Folding doors without panes and a balcony's open front part nothing.
+    let said = [[-9.3, -3.1, -2.5, 1.5], [-9.3, 1.5, -2.5, 5.4]];
+    for [x0, z0, x1, z1] in said {
+        let is_there = (0..found.interior.cells.len()).any(|i| {
+            let RoomBox { min, max } = bounds(&found, i);
+            let off = [min.x - x0, min.z - z0, max.x - x1, max.z - z1];
+            off.iter().all(|o| o.abs() < 0.2)
+        });
+        assert!(is_there, "{:?}", found.interior.cells);
+    }
+    // One sees from both into the living room.
+    let doors = found.interior.portals.iter().filter(|p| {
+        let at = p.polygon.center();
+        (at.x + 2.5).abs() < 0.2 && at.z > -0.6 && at.z < 2.8
+    });
+    let width: f64 = doors.map(|p| p.width(found.interior.up)).sum();
+    assert!((width - 3.4).abs() < 0.2, "{width}");
+}
+
+/// Rooms found in a capture's fused depth maps.
+fn found_in(name: &str) -> Option<FoundInterior> {
+    let capture = common::capture(&common::find_capture(name)?);
+    let all: Vec<_> = capture.used.iter().chain(&capture.held_out).collect();
+    let frame = |i: usize| common::decode(all[i]);
+    let options = proxy::depth::Options {
+        voxel_size: Some(0.05),
+        ..proxy::depth::Options::default()
+    };
+    let fusion = proxy::depth::fuse(all.len(), frame, &options).unwrap();
+    let cameras: Vec<_> = all.iter().map(|(v, _)| (v.center(), v.up())).collect();
+    let mut lines = Vec::new();
+    for each in &all {
+        let (view, map) = common::decode(each).unwrap();
+        lines.extend(sights(&view, &map, 4));
+    }
+    let evidence = Evidence {
+        mesh: &fusion.mesh,
+        cameras: &cameras,
+        sights: &lines,
+    };
+    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
+    look_at(&found, name);
+    for (i, cell) in found.interior.cells.iter().enumerate() {
+        eprintln!("{name}: {} {:?}", cell.name, bounds(&found, i));
+    }
+    for portal in &found.interior.portals {
+        let width = portal.width(found.interior.up);
+        eprintln!(
+            "{name}: {} at {} width {width:.2}",
+            portal.name,
+            portal.polygon.center()
+        );
+    }
+    Some(found)
+}
+
+#[test]
+fn a_capture_of_the_house_has_the_same_rooms_as_its_model() {
+    let Some(found) = found_in("house-walk") else {
+        return;
+    };
+    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
+    assert!((found.interior.eye_height - 1.55).abs() < 0.1);
+    // Bedroom, study, and the rest; their wall is where the model has it.
+    assert_eq!(found.interior.cells.len(), 3);
+    let partition = found.interior.portals.iter().filter(|p| {
+        let z = p.polygon.center().z;
+        p.polygon.normal().z.abs() > 0.9 && (z - 1.475).abs() < 0.2
+    });
+    assert!(partition.count() >= 1);
+}
+
+#[test]
+fn the_hall_of_an_office_is_found() {
+    let Some(found) = found_in("office-walk") else {
+        return;
+    };
+    let rooms = include_bytes!("data/office-walk-rooms.json");
+    let (truth, _) = parse_rooms("rooms.json".as_ref(), rooms, "model.glb").unwrap();
+    let score = score(&truth, &found.interior, 0.3);
+    eprintln!("office-walk: {score:?}");
+    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
+    assert!(score.iou[0] > 0.8, "{score:?}");
+}
