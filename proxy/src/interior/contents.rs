@@ -8,9 +8,9 @@ use rayon::prelude::*;
 /// The triangles of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contents {
-    /// By [`CellId`], in order; a triangle may be in several cells.
+    /// By [`CellId`](super::CellId), in order; a triangle may be in several cells.
     pub triangles: Vec<Vec<u32>>,
-    /// By [`CellId`]: the cell's box, or what its triangles span; none of a scene.
+    /// By [`CellId`](super::CellId): the cell's box, or what its triangles span; none of a scene.
     pub bounds: Vec<Option<RoomBox>>,
     /// Triangles of no cell, in order: they are drawn whatever is visible.
     pub elsewhere: Vec<u32>,

@@ -6,7 +6,7 @@
 //! makes one of the [`Reference`](crate::interior::Reference) images of a portal's semicircle;
 //! [`ordered`] draws it as the papers do, in an order that needs no depths; [`free`] in any
 //! order, which is the default and the better picture; [`ClipTree`] tells which of its columns
-//! one can see; [`read`] and [`write`] keep it.
+//! one can see; [`read()`] and [`write()`] keep it.
 
 mod clip;
 mod construct;
