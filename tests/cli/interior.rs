@@ -151,7 +151,7 @@ fn a_house_is_walked_through() {
         .iter()
         .map(|w| w["portals"].as_str().unwrap())
         .collect();
-    assert_eq!(kinds, ["geometry", "texture", "warp1", "warp2"]);
+    assert_eq!(kinds, ["geometry", "texture", "warp1", "warp2", "ldi"]);
     let mut skipped = 0;
     for walk in walks {
         let frames = walk["frames"].as_array().unwrap();
@@ -171,12 +171,15 @@ fn a_house_is_walked_through() {
     let [texture, warp1, warp2] = [1, 2, 3].map(|i| &walks[i]);
     assert!(made(texture) > 0 && made(warp1) == 0);
     assert_eq!(made(texture), texture["references_used"].as_u64().unwrap());
-    let all: u64 = walks.iter().map(made).sum();
-    assert_eq!(all, warp2["references_used"].as_u64().unwrap());
-    assert_eq!(all, made(&report));
+    let of_images: u64 = walks[..4].iter().map(made).sum();
+    assert_eq!(of_images, warp2["references_used"].as_u64().unwrap());
+    // Of each LDI's 13 those that are there serve it, too.
+    let ldi = &walks[4];
+    assert!(made(ldi) > 0 && made(ldi) < 13 * ldi["references_used"].as_u64().unwrap());
+    assert_eq!(of_images + made(ldi), made(&report));
     assert_eq!(report["device"], "CPU");
     let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
-    assert_eq!(svg.matches("<polyline").count(), 4);
+    assert_eq!(svg.matches("<polyline").count(), 5);
     // Its path once more, byte for byte, on one thread; one kind needs no folder of its own.
     // Nor does a budget for images show.
     let again = "--threads 1 walk house/interior.json --path out/path.json --portals warp2 \
@@ -237,8 +240,8 @@ fn usage_errors_exit_with_2() {
         ("plan house --views 4", "an odd number"),
         ("plan house --span 180", "less than 180"),
         (
-            "walk house --portals ldi -o x",
-            "geometry, texture, warp1, warp2, or all",
+            "walk house --portals none -o x",
+            "geometry, texture, warp1, warp2, ldi, or all",
         ),
         ("walk house --reference-views 4 -o x", "an odd number"),
         ("walk house --near NaN -o x", "--near"),
