@@ -150,9 +150,12 @@ fn main() {
         }
         sums
     };
+    // As far as samples in any order are drawn.
+    let reach = f64::from(FreeOptions::default().reach());
     let mut scratch = Ordered::default();
     let mut loose = Free::default();
     let mut target = Target::default();
+    let mut free_target = Target::default();
     let mut rows: Vec<Value> = Vec::new();
     println!("{} views of {} x {}", looks.len(), SIZE[0], SIZE[1]);
     println!(
@@ -170,22 +173,24 @@ fn main() {
         );
         rows.push(json!({"name": name, "cpu_ms": one[0], "wall_ms": one[1], "two_cpu_ms": two[0], "two_wall_ms": two[1]}));
     };
+    let mut draw = |look: &Look, stamp: Stamp, fragments: usize| {
+        let (ldi, _) = &ldis[look.ldi];
+        target.clear(SIZE[0], SIZE[1]);
+        ordered(
+            ldi,
+            &Clipped::whole(ldi),
+            &look.camera,
+            &look.window,
+            &OrderedOptions { stamp, fragments },
+            &mut scratch,
+            &mut target,
+        )
+    };
     for (name, stamp) in STAMPS {
         let [one, two] = [(0, 1), (1, 8)].map(|(k, fragments)| {
             pools[k].install(|| {
                 timed(&mut |look| {
-                    let (ldi, _) = &ldis[look.ldi];
-                    target.clear(SIZE[0], SIZE[1]);
-                    let options = OrderedOptions { stamp, fragments };
-                    ordered(
-                        ldi,
-                        &Clipped::whole(ldi),
-                        &look.camera,
-                        &look.window,
-                        &options,
-                        &mut scratch,
-                        &mut target,
-                    );
+                    draw(look, stamp, fragments);
                 })
             })
         });
@@ -198,9 +203,9 @@ fn main() {
                     let (ldi, tree) = &ldis[look.ldi];
                     let columns = match clip {
                         false => Clipped::whole(ldi),
-                        true => tree.columns(ldi, &look.camera, &look.window, 4.0),
+                        true => tree.columns(ldi, &look.camera, &look.window, reach),
                     };
-                    target.clear(SIZE[0], SIZE[1]);
+                    free_target.clear(SIZE[0], SIZE[1]);
                     let options = FreeOptions::default();
                     free(
                         ldi,
@@ -209,7 +214,7 @@ fn main() {
                         &look.window,
                         &options,
                         &mut loose,
-                        &mut target,
+                        &mut free_target,
                     );
                 })
             })
@@ -234,21 +239,7 @@ fn main() {
         // Of the mean area.
         let [mut least, mut most, mut buffer, mut again] = [0.0; 4];
         for look in &looks {
-            let (ldi, _) = &ldis[look.ldi];
-            target.clear(SIZE[0], SIZE[1]);
-            let options = OrderedOptions {
-                stamp: Stamp::Five,
-                fragments,
-            };
-            let cost = ordered(
-                ldi,
-                &Clipped::whole(ldi),
-                &look.camera,
-                &look.window,
-                &options,
-                &mut scratch,
-                &mut target,
-            );
+            let cost = draw(look, Stamp::Five, fragments);
             let mean = cost.samples as f64 / cost.areas.len() as f64;
             let share = 1.0 / looks.len() as f64;
             let area = |n: Option<&usize>| n.map_or(0.0, |n| *n as f64 / mean) * share;
@@ -259,21 +250,7 @@ fn main() {
         }
         let [cpu, ..] = pools[0].install(|| {
             timed(&mut |look| {
-                let (ldi, _) = &ldis[look.ldi];
-                target.clear(SIZE[0], SIZE[1]);
-                let options = OrderedOptions {
-                    stamp: Stamp::Five,
-                    fragments,
-                };
-                ordered(
-                    ldi,
-                    &Clipped::whole(ldi),
-                    &look.camera,
-                    &look.window,
-                    &options,
-                    &mut scratch,
-                    &mut target,
-                );
+                draw(look, Stamp::Five, fragments);
             })
         });
         println!(
@@ -282,16 +259,16 @@ fn main() {
         fragments_rows.push(json!({"fragments": fragments, "least_area": least, "most_area": most, "buffer_percent": buffer, "again_percent": again, "cpu_ms": cpu}));
     }
     // Clipping.
-    let mut kept = Vec::new();
-    let clip = timed(&mut |look| {
+    let clipped = |look: &Look| {
         let (ldi, tree) = &ldis[look.ldi];
-        let columns = tree.columns(ldi, &look.camera, &look.window, 4.0);
-        kept.push(columns.is_empty());
-    });
+        tree.columns(ldi, &look.camera, &look.window, reach)
+    };
+    let mut any_left = true;
+    let clip = timed(&mut |look| any_left &= !clipped(look).is_empty());
+    assert!(any_left, "a whole portal is in sight");
     let share = |look: &Look| {
-        let (ldi, tree) = &ldis[look.ldi];
-        let columns = tree.columns(ldi, &look.camera, &look.window, 4.0);
-        100.0 * columns.samples(ldi) as f64 / ldi.len() as f64
+        let (ldi, _) = &ldis[look.ldi];
+        100.0 * clipped(look).samples(ldi) as f64 / ldi.len() as f64
     };
     let shares: Vec<f64> = looks.iter().map(share).collect();
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;

@@ -4,7 +4,7 @@
 //! same bytes.
 
 mod asked;
-mod lanes;
+pub(crate) mod lanes;
 mod mark;
 mod shade;
 mod source;

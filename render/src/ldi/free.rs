@@ -8,8 +8,9 @@
 
 use super::fill::fill;
 use super::look::Sizes;
-use super::project::{Block, LANES, Projection, vectorised};
+use super::project::{Block, LANES, Projection};
 use super::{Clipped, Layered};
+use crate::cpu::lanes::vectorised;
 use crate::interior::{Pinhole, Target, Window};
 use rayon::prelude::*;
 use std::ops::Range;

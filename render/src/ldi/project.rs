@@ -7,19 +7,9 @@
 use super::Layered;
 use crate::interior::{Pinhole, Warp};
 use glam::DVec3;
-use pulp::Arch;
-use std::sync::LazyLock;
 
 /// Samples worked on together.
 pub(super) const LANES: usize = 32;
-
-/// Runs a function, which and all it calls should be `inline(always)`, with the widest vector
-/// instructions that there are.
-#[inline]
-pub(super) fn vectorised<R>(f: impl FnOnce() -> R) -> R {
-    static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
-    ARCH.dispatch(f)
-}
 
 /// The warp from an LDI to a desired image.
 #[derive(Clone, Copy)]
