@@ -20,4 +20,5 @@
 
 pub use {calibrate, capture, datasets, proxy, render};
 
+pub mod bench;
 pub mod scene;

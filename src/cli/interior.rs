@@ -218,7 +218,7 @@ fn write(
 const PLAN_SVG: &str = "floor-plan.svg";
 const PLAN_PNG: &str = "floor-plan.png";
 /// The interior's own file in its folder.
-const INTERIOR: &str = "interior.json";
+pub(super) const INTERIOR: &str = "interior.json";
 
 /// Opens an interior, its folder or its file, says what is odd, and where the file is.
 pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {

@@ -1,6 +1,7 @@
 //! One file a subcommand. Options, progress, reports and messages live here and nowhere
 //! else; results go to stdout, all else to stderr.
 
+mod bench;
 mod demo;
 mod evaluate;
 mod export;
@@ -54,6 +55,7 @@ enum Command {
     Render(render::Args),
     Field(field::Args),
     Evaluate(evaluate::Args),
+    Bench(bench::Args),
     Export(export::Args),
     Interior(interior::Args),
     Plan(plan::Args),
@@ -100,6 +102,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => render::run(&args),
         Command::Field(args) => field::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),

@@ -223,7 +223,7 @@ pub(super) struct DrawArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum DeviceName {
+pub(super) enum DeviceName {
     Auto,
     Gpu,
     Cpu,
@@ -231,14 +231,30 @@ enum DeviceName {
     Reference,
 }
 
+impl DeviceName {
+    pub(super) fn choice(self) -> DeviceChoice {
+        match self {
+            Self::Auto => DeviceChoice::Auto,
+            Self::Gpu => DeviceChoice::Gpu,
+            Self::Cpu => DeviceChoice::Cpu,
+            Self::Reference => DeviceChoice::Reference,
+        }
+    }
+
+    /// As the command line spells it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+            Self::Reference => "reference",
+        }
+    }
+}
+
 impl DrawArgs {
     pub(super) fn device(&self) -> DeviceChoice {
-        match self.device {
-            DeviceName::Auto => DeviceChoice::Auto,
-            DeviceName::Gpu => DeviceChoice::Gpu,
-            DeviceName::Cpu => DeviceChoice::Cpu,
-            DeviceName::Reference => DeviceChoice::Reference,
-        }
+        self.device.choice()
     }
 
     /// A view at the size asked for.

@@ -78,7 +78,7 @@ pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
 }
 
 /// 1, 2 or 5 times a power of ten, so that there are up to ten rows.
-fn step(greatest: f64) -> f64 {
+pub(super) fn step(greatest: f64) -> f64 {
     if !(greatest > 0.0 && greatest.is_finite()) {
         return 1.0;
     }

@@ -60,7 +60,10 @@ impl Scene {
     }
 
     /// The same, its photos reduced to `long_side` pixels along the longer side.
-    pub(super) fn reduced_lumigraph(
+    ///
+    /// # Errors
+    /// As [`Self::lumigraph`].
+    pub fn reduced_lumigraph(
         &self,
         without: &BTreeSet<String>,
         proxy: Proxy,

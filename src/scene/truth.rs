@@ -65,6 +65,11 @@ impl Truth {
         }
     }
 
+    /// The photo: straight alpha.
+    pub fn picture(&self) -> &RgbaImage {
+        &self.pixels
+    }
+
     /// The same in another size, reduced by area.
     #[must_use]
     pub fn resized(self, width: u32, height: u32) -> Self {

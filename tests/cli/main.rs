@@ -1,6 +1,7 @@
 //! The built program, end to end, on small synthetic captures.
 
 mod bad_input;
+mod bench;
 mod captures;
 mod degenerate;
 mod evaluate;

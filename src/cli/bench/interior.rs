@@ -1,0 +1,263 @@
+//! An interior measured: what portals show, against the model drawn whole.
+
+use super::measure::{Effort, Measured, Pictures, Subject, Times, timed};
+use anyhow::Context;
+use calibrate::{Lens, View};
+use glam::{DVec2, DVec3};
+use image::{Rgba, RgbaImage};
+use indicatif::ProgressBar;
+use proxy::interior::{Contents, Interior, SemicircleOptions, semicircles};
+use proxy::mesh::Model;
+use render::DeviceChoice;
+use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
+use render::score::{PSNR_CAP_DB, score};
+use std::collections::BTreeMap;
+
+/// What pictures are made with.
+#[derive(Clone, Debug)]
+struct Setting {
+    knob: &'static str,
+    value: String,
+    fill: PortalFill,
+    options: WalkOptions,
+}
+
+impl Setting {
+    fn name(&self) -> String {
+        format!("{} {}", self.knob, self.value)
+            .trim_end()
+            .to_owned()
+    }
+}
+
+/// The default, and one thing changed at a time. Images are what is changed, so they are those that
+/// layered depth images are made of.
+fn settings(thorough: bool) -> Vec<Setting> {
+    let base = Setting {
+        knob: "default",
+        value: String::new(),
+        fill: PortalFill::Geometry,
+        options: WalkOptions::default(),
+    };
+    let mut all = vec![base.clone()];
+    let mut add = |knob, value: String, fill, change: &dyn Fn(&mut WalkOptions)| {
+        let mut setting = Setting {
+            knob,
+            value,
+            fill,
+            ..base.clone()
+        };
+        change(&mut setting.options);
+        all.push(setting);
+    };
+    for fill in PortalFill::ALL
+        .into_iter()
+        .filter(|f| *f != PortalFill::Geometry)
+    {
+        add("portals", fill.name().to_owned(), fill, &|_| {});
+    }
+    let ldi = PortalFill::Ldi;
+    let views: &[usize] = if thorough { &[3, 5, 9, 25] } else { &[5] };
+    for &count in views {
+        add("ldi of views", count.to_string(), ldi, &|o| {
+            o.library.semicircles.views = count
+        });
+    }
+    let sides: &[u32] = if thorough { &[128, 384, 512] } else { &[128] };
+    for &side in sides {
+        add("ldi of pixels", side.to_string(), ldi, &|o| {
+            o.library.size = [side, side]
+        });
+    }
+    for splat in [1, 3] {
+        let fill = PortalFill::Warp2;
+        add("warp2 splat", splat.to_string(), fill, &|o| {
+            o.splat = Splat::Fixed(splat)
+        });
+    }
+    all
+}
+
+/// Views through portals, from a little beyond their semicircles, as many on each angle off their
+/// axis.
+fn views(interior: &Interior, contents: &Contents, effort: Effort) -> Vec<View> {
+    let mut wide = interior.clone();
+    for portal in &mut wide.portals {
+        portal.radius = Some(1.25 * portal.semicircle_radius(interior.up));
+    }
+    let options = SemicircleOptions {
+        views: 5,
+        span: 90_f64.to_radians(),
+    };
+    let width = effort.long_side;
+    let size = DVec2::new(f64::from(width), f64::from(width * 4 / 5));
+    let is_free = |eye: DVec3, cell: Option<proxy::interior::CellId>| {
+        let bounds = cell.and_then(|id| contents.bounds[id.0 as usize]);
+        bounds.is_some_and(|room| {
+            // A cell reaches into its walls, where nobody stands.
+            let within = 0.3 * (DVec3::ONE - interior.up.abs());
+            let (low, high) = (room.min + within, room.max - within);
+            low.cmple(high).all() && eye.clamp(low, high) == eye
+        })
+    };
+    let all: Vec<View> = semicircles(&wide, &options)
+        .into_iter()
+        .filter(|place| {
+            let eye = place.camera_from_world.center();
+            is_free(eye, place.from) && contents.locate(interior, eye) == place.from
+        })
+        .map(|place| View {
+            lens: Lens::pinhole(DVec2::splat(0.7 * size.x), 0.5 * size),
+            width,
+            height: width * 4 / 5,
+            camera_from_world: place.camera_from_world,
+        })
+        .collect();
+    let count = (2 * effort.views).min(all.len());
+    (0..count)
+        .map(|i| all[(2 * i + 1) * all.len() / (2 * count)].clone())
+        .collect()
+}
+
+/// Measures an interior.
+pub(super) fn measure(
+    interior: &Interior,
+    contents: &Contents,
+    model: &Model,
+    name: &str,
+    effort: Effort,
+    device: DeviceChoice,
+    bar: &ProgressBar,
+) -> anyhow::Result<(Subject, Pictures)> {
+    let views = views(interior, contents, effort);
+    let first_view = views.first();
+    let first_view =
+        first_view.context("no portal can be looked through from where one can stand")?;
+    let settings = settings(effort.thorough);
+    bar.set_length(settings.len() as u64 * (1 + effort.repeats as u64));
+    bar.set_message(format!("{name}: measuring"));
+    let walk = |options: WalkOptions| {
+        Walk::with(
+            Painter::open(device, model),
+            interior,
+            contents,
+            model,
+            options,
+        )
+    };
+
+    // 1. The truth, then each setting's first picture, with making its images, and its error.
+    let mut whole = walk(WalkOptions {
+        whole_cells: true,
+        ..WalkOptions::default()
+    });
+    let mut truths = Vec::new();
+    for view in &views {
+        whole.draw(view, PortalFill::Geometry)?;
+        truths.push(whole.picture().picture());
+    }
+    let mut walks = Vec::new();
+    let mut measured = Vec::new();
+    let mut pictures = None;
+    for setting in &settings {
+        let mut walk = walk(setting.options);
+        let (drawn, first) = timed(|| walk.draw(first_view, setting.fill).map(drop));
+        drawn?;
+        let (image_bytes, images_made) = {
+            let residency = walk.library().residency();
+            (residency.held, residency.loads as usize)
+        };
+        let (mut psnr, mut ssim, mut coverage) = (0.0, 0.0, 0.0);
+        let (mut squared, mut holes) = (0.0, 0);
+        for (i, (view, truth)) in views.iter().zip(&truths).enumerate() {
+            walk.draw(view, setting.fill)?;
+            let picture = walk.picture().picture();
+            let scored = score(&picture, truth)?;
+            psnr += scored.psnr.min(PSNR_CAP_DB);
+            ssim += scored.ssim;
+            coverage += scored.coverage;
+            squared += 255.0_f64.powi(2) * 10.0_f64.powf(-0.1 * scored.psnr);
+            let pairs = picture.pixels().zip(truth.pixels());
+            holes += pairs
+                .filter(|(ours, theirs)| ours.0[3] == 0 && theirs.0[3] > 0)
+                .count();
+            if i == 0 && setting.fill == PortalFill::Ldi && pictures.is_none() {
+                pictures = Some(Pictures {
+                    truth: truth.clone(),
+                    default: picture,
+                    exact: truth.clone(),
+                });
+            }
+        }
+        let count = views.len() as f64;
+        let steps = (squared / count).sqrt();
+        let pixels = count * f64::from(first_view.width) * f64::from(first_view.height);
+        measured.push(Measured {
+            name: setting.name(),
+            knob: setting.knob.to_owned(),
+            value: setting.value.clone(),
+            frame: Times::default(),
+            cpu_ms_range: [0.0; 2],
+            first,
+            image_bytes,
+            images_made,
+            psnr: psnr / count,
+            ssim: ssim / count,
+            coverage: coverage / count,
+            holes: Some(holes as f64 / pixels),
+            steps_from_exact: steps,
+            psnr_to_exact: (20.0 * (255.0 / steps).log10()).min(PSNR_CAP_DB),
+        });
+        walks.push(walk);
+        bar.inc(1);
+    }
+
+    // 2. Times, in turn.
+    let mut repeats: Vec<Vec<Times>> = vec![Vec::new(); settings.len()];
+    for repeat in 0..effort.repeats {
+        for step in 0..settings.len() {
+            let i = (step + repeat * settings.len() / effort.repeats) % settings.len();
+            let mut sum = Times::default();
+            for view in &views {
+                let (drawn, times) = timed(|| walks[i].draw(view, settings[i].fill).map(drop));
+                drawn?;
+                sum.cpu_ms += times.cpu_ms / views.len() as f64;
+                sum.wall_ms += times.wall_ms / views.len() as f64;
+            }
+            repeats[i].push(sum);
+            bar.inc(1);
+        }
+    }
+    for (measured, repeats) in measured.iter_mut().zip(&repeats) {
+        measured.set_times(repeats);
+    }
+    let about = format!(
+        "{} cells, {} portals, {} triangles; {} views through portals, up to 45° off their axis, \
+         {} × {}; geometry drawn by {}",
+        interior.cells.len(),
+        interior.portals.len(),
+        model.mesh.triangles.len(),
+        views.len(),
+        first_view.width,
+        first_view.height,
+        whole.painter().description(),
+    );
+    let result = Subject {
+        name: name.to_owned(),
+        is_interior: true,
+        about,
+        views: (0..views.len()).map(|i| i.to_string()).collect(),
+        size: [first_view.width, first_view.height],
+        start_up: None,
+        skips: None,
+        settings: measured,
+        failed: BTreeMap::new(),
+    };
+    let none = RgbaImage::from_pixel(1, 1, Rgba([0; 4]));
+    let pictures = pictures.unwrap_or_else(|| Pictures {
+        truth: none.clone(),
+        default: none.clone(),
+        exact: none,
+    });
+    Ok((result, pictures))
+}
