@@ -3,7 +3,7 @@
 use crate::frame::FrameSource;
 use crate::surface::{FacetMap, NO_FACET};
 use calibrate::{Distortion, Pixel, View};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// The factor between inverse distances that are tried, and how many on either side.
@@ -24,6 +24,48 @@ fn sees(source: &FrameSource, ray: DVec3, s: f64) -> bool {
         .project(source.rotation * ray + source.translation * s);
     let [width, height] = source.size;
     pixel.is_some_and(|p| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height)
+}
+
+/// Pixels along a side of a tile.
+const TILE: usize = 8;
+
+/// Which source views what was moved was moved to, by parts of the picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Seers {
+    across: usize,
+    /// Tiles of 8 × 8 pixels, row by row: the views, in order. Empty where nothing was moved.
+    tiles: Vec<Vec<u32>>,
+}
+
+impl Seers {
+    fn new([width, height]: [usize; 2]) -> Self {
+        let across = width.div_ceil(TILE);
+        Self {
+            across,
+            tiles: vec![Vec::new(); across * height.div_ceil(TILE)],
+        }
+    }
+
+    fn note(&mut self, (x, y): (usize, usize), source_idx: u32) {
+        let tile = &mut self.tiles[y / TILE * self.across + x / TILE];
+        if let Err(at) = tile.binary_search(&source_idx) {
+            tile.insert(at, source_idx);
+        }
+    }
+
+    /// Those of all tiles that a rectangle touches, with repeats.
+    pub(crate) fn within(&self, least: DVec2, most: DVec2) -> impl Iterator<Item = u32> {
+        let tile = |at: f64| (at.max(0.0) / TILE as f64) as usize;
+        let down = self.tiles.len().checked_div(self.across).unwrap_or(0);
+        let columns = tile(least.x)..(tile(most.x) + 1).min(self.across);
+        let rows = tile(least.y)..(tile(most.y) + 1).min(down);
+        rows.flat_map(move |row| {
+            let row = &self.tiles[row * self.across..(row + 1) * self.across];
+            row.get(columns.clone()).unwrap_or_default()
+        })
+        .flatten()
+        .copied()
+    }
 }
 
 /// Moves what no source view has in its image along its ray, to the nearest inverse distance at
@@ -80,15 +122,21 @@ pub(crate) fn within_sight(mut map: FacetMap, desired: &View, sources: &[FrameSo
                     continue;
                 }
                 if let Some(s) = nearest_seen(s, &mut seen) {
-                    moved.push((x, ray * (s / ray.length_squared())));
+                    // The last that was found to see anything sees that.
+                    moved.push((x, ray * (s / ray.length_squared()), last as u32));
                 }
             }
         }
         moved
     };
-    let moved: Vec<Vec<(usize, DVec3)>> = (0..height).into_par_iter().map(moved_in_row).collect();
+    let moved: Vec<Vec<(usize, DVec3, u32)>> =
+        (0..height).into_par_iter().map(moved_in_row).collect();
+    if moved.iter().any(|row| !row.is_empty()) {
+        map.seers = Seers::new([width, height]);
+    }
     for (y, row) in moved.into_iter().enumerate() {
-        for (x, plane) in row {
+        for (x, plane, source_idx) in row {
+            map.seers.note((x, y), source_idx);
             map.facet_of[y * width + x] = map.planes.len() as u32;
             map.planes.push(plane);
         }
@@ -134,7 +182,6 @@ fn nearest_seen(s: f64, seen: &mut impl FnMut(f64) -> bool) -> Option<f64> {
 mod tests {
     use super::*;
     use calibrate::{Lens, Rigid3};
-    use glam::DVec2;
 
     /// Looks along z from a place on the x axis, 45° to either side.
     fn view(x: f64) -> View {
@@ -154,6 +201,7 @@ mod tests {
             facet_of: vec![0; 1600],
             size: [40, 40],
             moved_from: 1,
+            seers: Seers::default(),
         }
     }
 
@@ -184,6 +232,13 @@ mod tests {
         }
         // The plane is 4 wide, and the camera stands 1 aside.
         assert_eq!(moved, 10 * 40);
+        let seers = |x: f64, y: f64| {
+            map.seers
+                .within(DVec2::new(x, y), DVec2::new(x + 4.0, y + 4.0))
+        };
+        assert_eq!(seers(1.0, 33.0).collect::<Vec<_>>(), [0]);
+        assert_eq!(seers(30.0, 3.0).count() + seers(90.0, 90.0).count(), 0);
+        assert!(seers(-9.0, -9.0).count() <= 1);
     }
 
     #[test]

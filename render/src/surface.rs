@@ -2,7 +2,7 @@
 
 use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
-use crate::sight::within_sight;
+use crate::sight::{Seers, within_sight};
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::{Facets, Plane, Proxy, Scan, Solid, fit_plane_for_view, points};
@@ -33,6 +33,8 @@ pub struct FacetMap {
     pub(crate) size: [u32; 2],
     /// From this facet on they are pixels' own, moved to where a photo has them.
     pub(crate) moved_from: u32,
+    /// Which photos have what was moved.
+    pub(crate) seers: Seers,
 }
 
 impl Surface {
@@ -179,6 +181,7 @@ impl FacetMap {
                 moved_from: planes.len() as u32,
                 planes,
                 facet_of: scan.triangle_of,
+                seers: Seers::default(),
                 size: [desired.width, desired.height],
             };
         }
@@ -210,6 +213,7 @@ impl FacetMap {
             moved_from: planes.len() as u32,
             planes,
             facet_of: rows.concat(),
+            seers: Seers::default(),
             size: [desired.width, desired.height],
         }
     }

@@ -95,6 +95,34 @@ fn every_engine_draws_the_same_picture() {
     }
 }
 
+/// Where a sliver of the view lies beyond all photos, a few pixels are moved into some photo's
+/// border, and lie between all points that a triangle asks about.
+#[test]
+fn slivers_beyond_all_photos_are_painted_by_the_triangulated_field_too() {
+    let shot = Shot::of("shelf", 4, None);
+    let lumigraph = lumigraph(&shot);
+    let middle = shot.views[0].between(&shot.views[3], 0.45);
+    let mut moved = 0;
+    for step in 0..24 {
+        let angle = 0.02 * f64::from(step);
+        let turned = DQuat::from_rotation_x(angle) * DQuat::from_rotation_z(0.5 * angle);
+        let desired = View {
+            camera_from_world: calibrate::Rigid3::new(turned, DVec3::ZERO)
+                * middle.camera_from_world,
+            ..middle.clone()
+        };
+        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        if let Surface::Facets(map) = &frame.surface {
+            moved += usize::from(map.moved().any(|moved| moved));
+        }
+        let [exact, triangulated] = METHODS.map(|m| cpu::render(&frame, m).unwrap());
+        let holes = exact.pixels().zip(triangulated.pixels());
+        let holes = holes.filter(|(e, t)| e.0[3] > 0 && t.0[3] == 0).count();
+        assert_eq!(holes, 0, "{angle}");
+    }
+    assert!(moved > 5, "{moved}");
+}
+
 #[test]
 fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
     let shot = Shot::of("shelf", 9, None);

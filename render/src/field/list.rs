@@ -5,7 +5,7 @@ use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
 use crate::near::Near;
-use crate::surface::Surface;
+use crate::surface::{FacetMap, Surface};
 use crate::view_tree::Ball;
 use calibrate::Pixel;
 use std::cell::OnceCell;
@@ -294,16 +294,26 @@ impl Triangle<'_> {
         views
     }
 
-    /// The source views that count at any point of a triangle in which some were moved; none where
-    /// none were. In order.
+    /// The source views that count at any point of a triangle in which some were moved, and those
+    /// that pixels nearby were moved to; none where none were. In order.
     fn seen_where_moved(&self) -> Vec<usize> {
-        let frame = self.frame;
-        if !matches!(frame.surface, Surface::Facets(_)) || !self.patch().is_moved {
+        let Surface::Facets(map) = &self.frame.surface else {
             return Vec::new();
+        };
+        // Few pixels may have been moved, between all that are asked.
+        let mut seen: BTreeSet<usize> = self.moved_to(map).collect();
+        if !seen.is_empty() || self.patch().is_moved {
+            let candidates = self.asked().iter().flat_map(|near| &near.candidates);
+            seen.extend(candidates.map(|c| c.source_idx));
         }
-        let candidates = self.asked().iter().flat_map(|near| &near.candidates);
-        let seen: BTreeSet<usize> = candidates.map(|c| c.source_idx).collect();
         seen.into_iter().collect()
+    }
+
+    /// The source views that pixels around were moved to.
+    fn moved_to(&self, map: &FacetMap) -> impl Iterator<Item = usize> {
+        let [a, b, c] = self.corners.map(|corner| corner.at);
+        let seers = map.seers.within(a.min(b).min(c), a.max(b).max(c));
+        seers.map(|source_idx| source_idx as usize)
     }
 
     /// The best rank, by difference, that listed views have among those of them that count at a
@@ -315,6 +325,10 @@ impl Triangle<'_> {
                 .is_ok()
         };
         let mut ranks = BTreeMap::new();
+        if let Surface::Facets(map) = &self.frame.surface {
+            // For some pixel it is the only one.
+            ranks.extend(self.moved_to(map).map(|source_idx| (source_idx, 0)));
+        }
         for near in self.asked() {
             let candidates = near.candidates.iter().filter(|c| is_listed(c.source_idx));
             let mut seeing: Vec<(f64, usize)> =
