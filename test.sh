@@ -66,6 +66,9 @@ RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 step "tests"
 LUMIGRAPH_REQUIRE_GPU=1 LUMIGRAPH_REQUIRE_TOOLS=1 cargo test --workspace
 
+step "planted faults"
+tests/planted.sh
+
 if [ "$(uname -s)" = Linux ]; then
     step "tests on the graphics device, by OpenGL"
     export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1

@@ -5,6 +5,7 @@ pub(crate) mod every_lens;
 
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
+use crate::planted::{Fault, is_planted};
 use crate::surface::Surface;
 use crate::tally::{Scored, Tally};
 use crate::time::Moment;
@@ -432,7 +433,11 @@ fn footprint_difference(center: DVec3, point: &ProxyPoint, g: f64) -> f64 {
     let excess =
         (s * s * center.length_squared() - 2.0 * s * ray.dot(center)) / ray.length_squared();
     let squares = (g * g - 1.0) + g * g * excess;
-    (squares / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)).max(0.0)
+    let difference = (squares / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)).max(0.0);
+    match is_planted(Fault::TurnedPenalty) {
+        true => -difference,
+        false => difference,
+    }
 }
 
 /// max(0, |p − c| − |p − d|), by the same trick; finite at infinity too.

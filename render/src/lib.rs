@@ -23,6 +23,7 @@ mod options;
 pub mod path;
 mod photos;
 pub mod picture;
+mod planted;
 mod pyramid;
 mod raster;
 mod rays;

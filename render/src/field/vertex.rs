@@ -3,6 +3,7 @@
 use crate::blend::{Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::near::Near;
+use crate::planted::{Fault, is_planted};
 use crate::surface::{NO_FACET, Surface};
 use calibrate::Pixel;
 use glam::DVec2;
@@ -36,7 +37,11 @@ impl Vertex {
     /// The triangles around it are about the size of a `cell`, in pixels. The guess is of the
     /// difference that matters; see [`Frame::near`].
     pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: &mut f64) -> Self {
-        let point = point_at(frame, at, cell);
+        let seen_at = match is_planted(Fault::ShiftedField) {
+            true => at + DVec2::new(0.5, 0.0),
+            false => at,
+        };
+        let point = point_at(frame, seen_at, cell);
         let near = point.map_or_else(Near::default, |point| {
             frame.near(&point, extent(frame, at, cell, &point), guess)
         });

@@ -10,6 +10,7 @@
 
 use super::Layered;
 use crate::interior::{Pinhole, Warp};
+use crate::planted::{Fault, is_planted};
 use std::ops::Range;
 
 /// Rows, or columns, one after the other.
@@ -45,6 +46,7 @@ impl Traversal {
         let center = Warp::new(&ldi.camera, desired).center;
         let [width, height] = ldi.size();
         let is_in_front = center.z >= 0.0;
+        let is_towards = is_in_front != is_planted(Fault::FrontToBack);
         let axis = |axis: usize, count: u32| {
             // At infinity it is before all or after all; 0/0, where nothing moves along the axis,
             // is wherever one likes.
@@ -52,7 +54,7 @@ impl Traversal {
             let at = if is_in_front { at } else { -at };
             let at = at * ldi.camera.focal[axis] + ldi.camera.principal[axis];
             let at = if at.is_nan() { 0.0 } else { at };
-            runs(at, count, is_in_front)
+            runs(at, count, is_towards)
         };
         Self {
             columns: axis(0, width),

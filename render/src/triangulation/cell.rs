@@ -3,6 +3,7 @@
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 
 use super::lattice::{Piece, Point, in_circle, orient};
+use crate::planted::{Fault, is_planted};
 
 /// A triangle of indices into a list of points, clockwise on the screen.
 pub(super) type Triangle = [u32; 3];
@@ -33,6 +34,9 @@ pub(super) fn delaunay(points: &[Point], pieces: &[Piece]) -> (Vec<Triangle>, us
         .map(|[a, b]| [index(a) as u32, index(b) as u32])
         .collect();
     constraints.sort_unstable();
+    if is_planted(Fault::MissingConstraint) {
+        constraints.pop();
+    }
     let edges = constraints
         .iter()
         .map(|edge| edge.map(|i| i as usize))
