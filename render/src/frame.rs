@@ -88,7 +88,13 @@ impl FrameSource {
     }
 
     /// A source view as a desired one has it, without feather and alike in footprint.
+    #[cfg(test)]
     pub(crate) fn of(view: &View, desired: &View) -> Self {
+        Self::at(view.center(), view, desired)
+    }
+
+    /// As `desired` sees a view, which is at `center` in the world.
+    fn at(center: DVec3, view: &View, desired: &View) -> Self {
         let View {
             lens,
             width,
@@ -98,7 +104,7 @@ impl FrameSource {
         let desired_rotation = desired.camera_from_world.matrix();
         // Centres are subtracted in the world before anything else: there the digits are,
         // however far away the origin is.
-        let offset_in_world = camera_from_world.center() - desired.center();
+        let offset_in_world = center - desired.center();
         Self {
             rotation: camera_from_world.matrix() * desired_rotation.transpose(),
             translation: camera_from_world.rotation * -offset_in_world,
@@ -111,6 +117,17 @@ impl FrameSource {
             time_penalty: 0.0,
         }
     }
+}
+
+/// A centre comes of a rotation and a translation: a few roundings, relative to its size.
+const ONE_PLACE: f64 = 16.0 * f64::EPSILON;
+
+/// Whether two centres may be apart by rounding alone. Of photos taken at one place, one after the
+/// other, or at the viewer's, what they differ by would be noise: it would decide which of more than
+/// [`MAX_CONTRIBUTORS`](crate::MAX_CONTRIBUTORS) contribute, and by how much.
+fn is_one_place(a: DVec3, b: DVec3) -> bool {
+    let size = a.length().max(b.length());
+    a.distance(b) <= ONE_PLACE * size
 }
 
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
@@ -166,12 +183,18 @@ impl<'a> Frame<'a> {
             .fold(0.0, f64::max);
         let desired_focal = desired.lens.mean_focal().min(longest);
 
+        let here = desired.center();
+        let mut last = here;
         let sources = lumigraph
             .sources
             .iter()
             .enumerate()
             .map(|(i, source)| {
                 let View { width, height, .. } = source.view;
+                // Ties are ties only where places are the same to the last digit.
+                let center = source.view.center();
+                let same = [here, last].into_iter().find(|c| is_one_place(*c, center));
+                last = same.unwrap_or(center);
                 FrameSource {
                     time_penalty: if gone == Some(i) { f64::INFINITY } else { 0.0 },
                     footprint_ratio: match options.resolution {
@@ -179,7 +202,7 @@ impl<'a> Frame<'a> {
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
-                    ..FrameSource::of(&source.view, &desired)
+                    ..FrameSource::at(last, &source.view, &desired)
                 }
             })
             .collect::<Vec<FrameSource>>();

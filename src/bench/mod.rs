@@ -3,6 +3,7 @@
 mod exponent;
 mod front;
 pub mod made_up;
+pub mod stress;
 
 pub use exponent::{Exponent, fit_exponent};
 pub use front::{Cost, front};

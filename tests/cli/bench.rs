@@ -125,3 +125,14 @@ fn scenes_of_one_name_and_none_are_refused() {
     assert!(twice.contains("have the same name"), "{twice}");
     assert!(!folder.path().join("out").exists());
 }
+
+#[test]
+fn scenes_that_try_to_break_things_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = lumigraph(folder.path(), "bench --stress 0.01 --seed 7 --json").ok();
+    let result = ran.json();
+    assert_eq!(result["first"], 7);
+    assert!(result["scenes"].as_u64() > Some(0) && result["bad"].as_array().unwrap().is_empty());
+    let both = lumigraph(folder.path(), "bench wall --stress 1");
+    assert_eq!(both.code, 2);
+}

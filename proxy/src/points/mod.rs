@@ -42,6 +42,9 @@ const MARGIN: f64 = 1.1;
 /// The widest ring; what lies behind it is not seen.
 const WIDEST: f64 = 2.8;
 
+/// Likenesses that differ by less, relatively, are the same.
+const TIED: f64 = 1e-9;
+
 /// A view counts fully from so much more likeness on, relatively, than the first that does
 /// not count.
 const FADE: f64 = 0.1;
@@ -167,8 +170,12 @@ fn views_most_like(center: DVec3, sources: &[View], in_sight: &[(Node, &SparsePo
     }
     let mut order: Vec<usize> = (0..sources.len()).filter(|&i| likeness[i] > 0.0).collect();
     order.sort_by(|&i, &j| likeness[j].total_cmp(&likeness[i]).then(i.cmp(&j)));
-    let least = order.get(VIEWS).map_or(0.0, |&i| likeness[i]);
-    order.truncate(VIEWS);
+    // Views of one place are alike to the last digits: none of them takes another's place.
+    let last = order.get(VIEWS - 1).map_or(0.0, |&i| likeness[i]);
+    let count = order.partition_point(|&i| likeness[i] > (1.0 - TIED) * last);
+    let count = count.max(VIEWS.min(order.len()));
+    let least = order.get(count).map_or(0.0, |&i| likeness[i]);
+    order.truncate(count);
     let mut chosen = vec![0.0; sources.len()];
     for i in order {
         chosen[i] = ((likeness[i] - least) / (FADE * likeness[i])).min(1.0);

@@ -147,6 +147,19 @@ fn only_the_views_most_alike_give_their_points() {
     assert!((depth - 5.0).abs() < 1e-9, "{depth}");
 }
 
+/// As from a tripod, or in a burst: which of them is the seventh is a matter of rounding.
+#[test]
+fn any_number_of_views_of_one_place_give_their_points() {
+    let mut points = surface(|_, _| 5.0);
+    points
+        .iter_mut()
+        .for_each(|p| p.seen_by = (0..40).collect());
+    let sources = vec![view(DVec3::X); 40];
+    let facets = facets(&view(DVec3::ZERO), &sources, &points).unwrap();
+    let depth = depth(&facets, &view(DVec3::ZERO), 80.0, 60.0).unwrap();
+    assert!((depth - 5.0).abs() < 1e-9, "{depth}");
+}
+
 #[test]
 fn too_little_is_no_surface() {
     let desired = view(DVec3::ZERO);

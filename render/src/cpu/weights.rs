@@ -23,7 +23,7 @@ impl Term {
     }
 }
 
-/// Below this, f32 differences are noise: they count as equal to it, and share.
+/// Up to this, differences are noise: they count as none, and such views share all the weight.
 const SMALLEST: f32 = SAME_RAY as f32;
 /// Keeps diff/t defined where every diff is zero.
 const SMALLEST_THRESHOLD: f32 = 1e-30;
@@ -39,11 +39,20 @@ pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) -> Lane {
 
 #[inline(always)]
 fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
+    for term in terms.iter_mut() {
+        term.diff = each(|k| {
+            if term.diff[k] > SMALLEST {
+                term.diff[k]
+            } else {
+                0.0
+            }
+        });
+    }
     let t = match options.blend {
         Blend::Consistent => consistent_threshold(terms, options.full_weight() as f32),
         Blend::Paper => each(|k| nth_smallest(terms, k, options.k)),
     };
-    let mut reach = t;
+    let mut reach = each(|k| t[k].max(SMALLEST));
     if options.blend == Blend::Paper {
         let mut candidates = [0; LANES];
         for term in terms.iter() {
@@ -56,7 +65,13 @@ fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
     let mut sum = [0.0; LANES];
     for term in terms.iter_mut() {
         for k in 0..LANES {
-            let near = (1.0 - term.diff[k] / t[k]).max(0.0);
+            // Where so many tie at zero that they are the threshold, none is nearer than it.
+            let ratio = if t[k] > SMALLEST_THRESHOLD {
+                term.diff[k] / t[k]
+            } else {
+                1.0
+            };
+            let near = (1.0 - ratio).max(0.0);
             let weight = match options.blend {
                 Blend::Consistent => term.a[k] * near / term.diff[k].max(SMALLEST),
                 Blend::Paper => term.a[k] * near,

@@ -450,6 +450,16 @@ fn relevance(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
     return a;
 }
 
+// Up to this, a difference is noise: it counts as none.
+fn without_noise(diff: f32) -> f32 {
+    return select(0.0, diff, diff > SAME_RAY);
+}
+
+// max(0, 1 - diff/t); where so many tie at zero that they are the threshold, none is nearer.
+fn nearness(diff: f32, t: f32) -> f32 {
+    return select(0.0, max(1.0 - diff / t, 0.0), t > SMALLEST_THRESHOLD);
+}
+
 // angDiff + beta * resDiff, and what time adds.
 fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
     let center = source_data(source_idx, CENTER);

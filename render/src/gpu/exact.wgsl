@@ -19,7 +19,7 @@ fn nearest_sources(ray: vec3f, s: f32, plane: vec3f) -> Nearest {
         if a <= 0.0 {
             continue;
         }
-        let diff = difference(i, ray, s);
+        let diff = without_noise(difference(i, ray, s));
         var at = nearest.count;
         if at == LISTED {
             if diff >= nearest.diff[LISTED - 1u] {
@@ -75,7 +75,7 @@ fn weigh(nearest: ptr<function, Nearest>) -> u32 {
     var tied = 0u;
     for (var n = 0u; n < count; n++) {
         let diff = (*nearest).diff[n];
-        var relevance = max(1.0 - diff / t, 0.0);
+        var relevance = nearness(diff, t);
         if params.blend == BLEND_CONSISTENT {
             relevance /= max(diff, SAME_RAY);
         }
@@ -95,7 +95,7 @@ fn weigh(nearest: ptr<function, Nearest>) -> u32 {
     }
     for (var n = 0u; n < count; n++) {
         let diff = (*nearest).diff[n];
-        var relevance = max(1.0 - diff / t, 0.0);
+        var relevance = nearness(diff, t);
         if params.blend == BLEND_CONSISTENT {
             relevance /= max(diff, SAME_RAY);
         }

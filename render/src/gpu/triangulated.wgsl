@@ -98,7 +98,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         let sight = see(source_idx, ray, s);
         let a = relevance(source_idx, sight, ray, plane.xyz);
         if a > 0.0 {
-            let diff = max(dot(in.shares, listed.yzw), 0.0);
+            let diff = without_noise(dot(in.shares, listed.yzw));
             nearest = min(nearest, diff);
             terms.diff[count] = diff;
             terms.a[count] = a;
@@ -115,7 +115,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
         let diff = terms.diff[n];
-        var weight = terms.a[n] * max(1.0 - diff / t, 0.0);
+        var weight = terms.a[n] * nearness(diff, t);
         if params.blend == BLEND_CONSISTENT {
             weight /= max(diff, SAME_RAY);
         }

@@ -7,6 +7,7 @@ mod report;
 mod scaling;
 mod scatter;
 mod settings;
+mod stress;
 
 use super::Usage;
 use super::options::DeviceName;
@@ -53,6 +54,14 @@ pub(super) struct Args {
     /// Also how time grows with the number of photos, pixels, faces and threads
     #[arg(long)]
     scaling: bool,
+    /// Instead of measuring, draw scenes that try to break things for so many minutes, and check
+    /// what must hold of all
+    #[arg(long, value_name = "MINUTES", value_parser = super::options::positive,
+        conflicts_with_all = ["scenes", "quick", "full", "scaling", "long_side"])]
+    stress: Option<f64>,
+    /// The number of the first of these scenes
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "stress")]
+    seed: u64,
     /// Pixels along the longer side of the pictures [default: 480, with --full 960]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(32..=8192))]
     long_side: Option<u32>,
@@ -85,6 +94,9 @@ struct Plan {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if let Some(minutes) = args.stress {
+        return stress::run(minutes, args.seed, args.json);
+    }
     let effort = match args.full {
         true => Effort {
             thorough: true,
