@@ -197,7 +197,7 @@ fn crowd_of(crowd: usize, lens: usize, random: &mut Random) -> Vec<View> {
     // Few, more than a hierarchy begins with, or rarely very many.
     let count = match (crowd, random.below(40)) {
         (0, _) => 1,
-        (1, 0) => 5000,
+        (1, 0) => 1000,
         (_, 1..12) => 60 + random.below(200),
         _ => 2 + random.below(12),
     };
