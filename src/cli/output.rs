@@ -40,8 +40,13 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     name.push(".tmp");
     let temporary = path.with_file_name(name);
     let failed = || format!("{}: cannot write", path.display());
-    std::fs::write(&temporary, bytes).with_context(failed)?;
-    std::fs::rename(&temporary, path).with_context(failed)
+    let written = std::fs::write(&temporary, bytes);
+    let written = written.and_then(|()| std::fs::rename(&temporary, path));
+    if written.is_err() {
+        // There is nothing to do about it where this fails, too.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written.with_context(failed)
 }
 
 /// Makes the folder that a file is to lie in.

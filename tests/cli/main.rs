@@ -7,6 +7,7 @@ mod degenerate;
 mod evaluate;
 mod export;
 mod exposure;
+mod faults;
 mod field;
 mod formats;
 mod gpu;

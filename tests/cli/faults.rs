@@ -1,0 +1,175 @@
+//! What goes wrong around the program while it works.
+#![cfg(unix)]
+
+use crate::run::{Ran, files, lumigraph, with_wall};
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_lumigraph");
+
+/// Starts the program in a folder.
+fn start(folder: &Path, line: &str) -> Child {
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder).args(line.split(' '));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Waits until there is something in a folder, or the program has ended.
+fn wait_for(child: &mut Child, folder: &Path) {
+    let start = Instant::now();
+    let is_empty = || fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
+    while is_empty() && child.try_wait().unwrap().is_none() {
+        let waited = start.elapsed();
+        assert!(waited < Duration::from_secs(120), "{}", folder.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn stderr_of(mut child: Child) -> (Option<i32>, String) {
+    let mut text = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut text)
+        .unwrap();
+    (child.wait().unwrap().code(), text)
+}
+
+/// Every picture with a picture's name can be read: nothing is half there.
+fn all_whole(folder: &Path) -> usize {
+    let pngs = files(folder)
+        .into_keys()
+        .filter(|f| f.extension().is_some_and(|e| e == "png"));
+    let pngs: Vec<PathBuf> = pngs.collect();
+    for png in &pngs {
+        image::open(folder.join(png)).unwrap_or_else(|e| panic!("{}: {e}", png.display()));
+    }
+    pngs.len()
+}
+
+/// Runs the program where no file may grow beyond a kilobyte: a full disk, but for its error.
+fn on_a_full_disk(folder: &Path, line: &str) -> Ran {
+    let script = format!("trap '' XFSZ; ulimit -f 1; exec {PROGRAM} {line}");
+    let output = Command::new("bash")
+        .args(["-c", &script])
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    Ran {
+        code: output.status.code().expect("the program was not killed"),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+#[test]
+fn a_full_disk_is_told_and_leaves_nothing_half_written() {
+    let folder = with_wall();
+    let lines = [
+        "import wall -o scene",
+        "render wall --proxy plane --path sweep --frames 3 --device cpu -o frames",
+        "proxy wall carved -o carved.glb",
+        "generate shelf --size 64x48 -o shelf",
+        "export wall --format transforms -o transforms.json",
+    ];
+    for line in lines {
+        let before = files(folder.path());
+        let ran = on_a_full_disk(folder.path(), line);
+        let error = ran.error(1);
+        assert!(error.contains("File too large"), "{line}: {error}");
+        let after = files(folder.path());
+        let left: Vec<_> = after.keys().filter(|f| !before.contains_key(*f)).collect();
+        assert!(left.is_empty(), "{line}: {left:?}");
+        all_whole(folder.path());
+        // With room again the same command works.
+        lumigraph(folder.path(), line).ok();
+    }
+    // Whoever reads may not be able to take it all.
+    let script = format!("{PROGRAM} info wall --json > /dev/full");
+    let output = Command::new("bash")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .output();
+    let output = output.unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("No space left"), "{text}");
+}
+
+#[test]
+fn what_stands_in_the_way_of_the_output_is_named() {
+    let folder = with_wall();
+    fs::write(folder.path().join("taken"), "a file").unwrap();
+    for line in [
+        "render wall --proxy plane --path sweep --frames 2 -o taken/frames",
+        "import wall -o taken/scene",
+        "bench wall --device cpu --long-side 48 -o taken/out",
+    ] {
+        let error = lumigraph(folder.path(), line).error(1);
+        assert!(error.contains("taken"), "{line}: {error}");
+    }
+    assert_eq!(fs::read(folder.path().join("taken")).unwrap(), b"a file");
+}
+
+#[test]
+fn a_photo_that_goes_away_meanwhile_is_left_out() {
+    let folder = with_wall();
+    // A budget of nothing: every frame decodes its photos again.
+    let line = "render wall --proxy plane --path sweep --frames 40 --device cpu --cpu-memory 1 \
+                --json -o frames";
+    let mut child = start(
+        folder.path(),
+        &line.split_whitespace().collect::<Vec<_>>().join(" "),
+    );
+    wait_for(&mut child, &folder.path().join("frames"));
+    let photos = folder.path().join("wall/images");
+    fs::remove_file(photos.join("0003.png")).unwrap();
+    let cut = fs::read(photos.join("0004.png")).unwrap();
+    fs::write(photos.join("0004.png"), &cut[..cut.len() / 2]).unwrap();
+    let (code, text) = stderr_of(child);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(!text.contains("panicked"), "{text}");
+    assert_eq!(all_whole(&folder.path().join("frames")), 40);
+}
+
+#[test]
+fn a_command_that_is_stopped_leaves_whole_files_and_can_be_run_again() {
+    let folder = with_wall();
+    let house = "generate house --rooms 2 --triangles 2000 -o house";
+    lumigraph(folder.path(), house).ok();
+    for (line, first) in [
+        (
+            "render wall --proxy plane --path sweep --frames 300 --device cpu -o frames",
+            "frames",
+        ),
+        (
+            "walk house --frames 300 --size 64x48 --device cpu -o walk",
+            "walk",
+        ),
+        // At once: it has hardly begun.
+        ("generate shelf --size 320x240 -o shelf", "."),
+        ("bench wall --device cpu --long-side 64 -o bench", "bench"),
+    ] {
+        let mut child = start(folder.path(), line);
+        wait_for(&mut child, &folder.path().join(first));
+        assert!(child.try_wait().unwrap().is_none(), "{line}: it has ended");
+        let mut stop = Command::new("kill");
+        stop.args(["-TERM", &child.id().to_string()]);
+        assert!(stop.status().unwrap().success());
+        stderr_of(child);
+        all_whole(folder.path());
+    }
+    for line in [
+        "render wall --proxy plane --path sweep --frames 2 --device cpu -o frames",
+        "walk house --frames 2 --size 64x48 --device cpu -o walk",
+        "generate shelf --size 64x48 -o shelf",
+    ] {
+        lumigraph(folder.path(), line).ok();
+    }
+    all_whole(folder.path());
+}
