@@ -3,7 +3,7 @@ use std::ffi::OsStr;
 use std::fs::{self, OpenOptions};
 use std::io::{self, BufRead, BufReader, PipeReader, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 
 /// How many of the last lines that a program printed an error quotes.
 const LINES_QUOTED: usize = 8;
@@ -150,6 +150,42 @@ impl Tool {
         let status = child.wait().map_err(|source| self.run_error(source))?;
         self.check(arguments, status, last_lines, None)?;
         lines.and(read).map_err(|source| self.run_error(source))
+    }
+
+    /// Runs the program; what `write_stdin` writes, on a thread of its own, is its input. What it
+    /// prints is only kept for its error.
+    ///
+    /// # Errors
+    /// The program is missing, cannot be started or fails, or `write_stdin` does.
+    pub fn feed(
+        &self,
+        arguments: &[impl AsRef<OsStr>],
+        write_stdin: impl FnOnce(ChildStdin) -> io::Result<()> + Send,
+    ) -> Result<(), ToolError> {
+        let mut command = self.command(arguments);
+        command.stdin(Stdio::piped()).stdout(Stdio::null());
+        command.stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|source| self.run_error(source))?;
+        let (stdin, stderr) = (child.stdin.take(), child.stderr.take());
+        let (Some(stdin), Some(stderr)) = (stdin, stderr) else {
+            return Err(self.run_error(io::Error::other("its input is not to be had")));
+        };
+        let mut last_lines = LastLines::default();
+        let (written, lines) = std::thread::scope(|scope| {
+            let writer = scope.spawn(move || write_stdin(stdin));
+            let lines = for_each_line(stderr, |line| last_lines.push(line));
+            let panicked = |_| Err(io::Error::other("writing its input panicked"));
+            (writer.join().unwrap_or_else(panicked), lines)
+        });
+        let status = child.wait().map_err(|source| self.run_error(source))?;
+        // A program that fails closes its input: that is the consequence, not the cause.
+        match written {
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                return Err(self.run_error(error));
+            }
+            _ => self.check(arguments, status, last_lines, None)?,
+        }
+        lines.and(written).map_err(|source| self.run_error(source))
     }
 
     fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {

@@ -7,6 +7,7 @@ mod evaluate;
 mod export;
 mod exposure;
 mod field;
+mod film;
 mod frames;
 mod generate;
 mod import;

@@ -1,6 +1,7 @@
 //! `lumigraph render`
 
 use super::exposure::ExposureArgs;
+use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{NamedView, ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
@@ -25,10 +26,10 @@ pub(super) struct Args {
     scene: SceneArgs,
     #[command(flatten)]
     views: ViewArgs,
-    /// Frames of a derived path
-    #[arg(long, value_name = "N", default_value_t = 30,
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
+    /// Frames of a derived path; or which of a path's are drawn, counted from 0, so that several
+    /// runs share a film: 120..240, or 120..240/300 of a derived path
+    #[arg(long, value_name = "N|A..B", default_value = "30", value_parser = frame_choice)]
+    frames: FrameChoice,
     #[command(flatten)]
     hold_out: HoldOutArgs,
     #[command(flatten)]
@@ -49,6 +50,8 @@ pub(super) struct Args {
     time: TimeArgs,
     #[command(flatten)]
     at: AtArgs,
+    #[command(flatten)]
+    film: FilmArgs,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -71,34 +74,48 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     session.max_error = args.max_error;
     let points = || session.points();
-    let frames = frames(&args.views, args.frames, session.lumigraph(), points)?;
+    let frames = frames(&args.views, args.frames.count, session.lumigraph(), points)?;
+    let frames = args.frames.of(frames)?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
+    let is_there = args.film.begin(&args.output, &files)?;
     session.prepare()?;
 
-    let bar = progress(frames.len(), "rendering");
+    let missing: Vec<usize> = (0..files.len()).filter(|i| !is_there[*i]).collect();
+    let bar = progress(missing.len(), "rendering");
     let view = |frame: &NamedView| {
         let moment = session.moment(&frame.name, frame.time_s)?;
         Ok((args.draw.resized(frame.view.clone()), moment))
     };
-    let views = frames
+    let views = missing
         .iter()
-        .map(view)
+        .map(|&i| view(&frames[i]))
         .collect::<anyhow::Result<Vec<_>>>()?;
     session.draw_all(&views, |i, picture| {
-        capture::write_png(&files[i], &picture)?;
+        args.film.write(&files[missing[i]], picture)?;
         bar.inc(1);
         Ok(())
     })?;
     bar.finish_and_clear();
+    args.film.finish(&files)?;
 
     let report = Report::new(&session, &start);
     if args.json {
-        let listed = frames.iter().zip(&files).enumerate().map(|(i, (frame, file))| {
-            json!({"name": frame.name, "file": file, "cost": session.cost_json(i)})
-        });
+        let listed = frames
+            .iter()
+            .zip(&files)
+            .enumerate()
+            .map(|(i, (frame, file))| {
+                // Those that were there cost nothing.
+                let cost = missing
+                    .binary_search(&i)
+                    .ok()
+                    .map(|drawn| session.cost_json(drawn));
+                json!({"name": frame.name, "file": file, "cost": cost})
+            });
         return print_json(&json!({
             "frames": listed.collect::<Vec<_>>(),
+            "video": args.film.video(),
             "proxy": session.proxy.json(),
             "exposure": session.exposure.json(),
             "report": report,
@@ -108,8 +125,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     say!("exposure: {}", session.exposure.text());
     say!("{}", report.text());
     print(&format!(
-        "{}: {} frames\n",
+        "{}: {} frames{}\n",
         args.output.display(),
-        files.len()
+        files.len(),
+        match files.len() - missing.len() {
+            0 => String::new(),
+            there => format!(", {there} of them from before"),
+        }
     ))
 }

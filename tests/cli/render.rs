@@ -1,6 +1,6 @@
 //! Frames and where they come from.
 
-use crate::run::{files, lumigraph, with_wall};
+use crate::run::{files, lumigraph, run, with_wall};
 use calibrate::{Rigid3, colmap};
 use render::path::{CameraPath, PathFrame};
 use std::fs;
@@ -158,4 +158,88 @@ fn a_view_that_sees_nothing_is_transparent() {
         .unwrap()
         .into_rgba8();
     assert!(frame.pixels().all(|p| p.0 == [0; 4]));
+}
+
+#[test]
+fn a_film_is_shared_resumed_and_made() {
+    let folder = with_wall();
+    let render = "render wall --proxy plane --path sweep --size 47x35 --background #204060";
+    let whole = format!("{render} --frames 6 -o whole --video films/sweep.mp4 --fps 12");
+    lumigraph(folder.path(), &whole).ok();
+    let frames = files(&folder.path().join("whole"));
+    assert_eq!(frames.len(), 6);
+    let some = image::open(
+        folder
+            .path()
+            .join("whole")
+            .join(frames.keys().next().unwrap()),
+    );
+    assert!(some.unwrap().to_rgba8().pixels().all(|p| p.0[3] == 255));
+    // Others can tell what is in it.
+    let film = folder.path().join("films/sweep.mp4");
+    let probe = std::process::Command::new("ffprobe")
+        .args(["-v", "error", "-count_frames", "-show_entries"])
+        .args([
+            "stream=nb_read_frames,width,height,r_frame_rate",
+            "-of",
+            "csv=p=0",
+        ])
+        .arg(&film)
+        .output()
+        .unwrap();
+    let probed = String::from_utf8_lossy(&probe.stdout).trim().to_owned();
+    assert_eq!(probed, "48,36,12/1,6");
+    assert_eq!(files(&folder.path().join("films")).len(), 1);
+
+    // In parts, and after an interruption, the bytes are the same.
+    for part in ["0..2/6", "2..6/6"] {
+        let line = format!("{render} --frames {part} -o parts --resume");
+        lumigraph(folder.path(), &line).ok();
+    }
+    let lost = folder
+        .path()
+        .join("parts")
+        .join(frames.keys().nth(3).unwrap());
+    std::fs::remove_file(&lost).unwrap();
+    let line = format!("{render} --frames 6 -o parts --resume");
+    let again = lumigraph(folder.path(), &line).ok();
+    assert!(
+        again.stdout.contains("6 frames, 5 of them from before"),
+        "{}",
+        again.stdout
+    );
+    let mut parts = files(&folder.path().join("parts"));
+    assert!(parts.remove(std::path::Path::new("resume.json")).is_some());
+    assert!(parts == frames);
+
+    // Frames of something else are not mixed in.
+    let other = format!("{render} --frames 6 --k 2 -o parts --resume");
+    let error = lumigraph(folder.path(), &other).error(1);
+    assert!(error.contains("another command line"), "{error}");
+    let error = lumigraph(
+        folder.path(),
+        &format!("{render} --frames 6 -o whole --resume"),
+    )
+    .error(1);
+    assert!(error.contains("without --resume"), "{error}");
+    let beyond = lumigraph(
+        folder.path(),
+        &format!("{render} --frames 5..7/6 -o beyond"),
+    );
+    assert_eq!(beyond.code, 2);
+    assert!(
+        beyond.stderr.contains("the path has 6 frames"),
+        "{}",
+        beyond.stderr
+    );
+}
+
+#[test]
+fn without_ffmpeg_a_film_fails_before_anything_is_drawn() {
+    let folder = with_wall();
+    let line = "render wall --proxy plane --path sweep -o frames --video film.mp4";
+    let words: Vec<&str> = line.split(' ').collect();
+    let error = run(folder.path(), &words, &[("PATH", "/nowhere")]).error(1);
+    assert!(error.contains("apt-get install ffmpeg"), "{error}");
+    assert!(!folder.path().join("frames").exists());
 }

@@ -25,8 +25,10 @@ pub use error::VideoError;
 pub use list::VideoFrame;
 pub use scan::{scan, sharpness};
 
-use crate::Tool;
+use crate::{Tool, ToolError};
+use std::ffi::OsString;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A step of an extraction, for progress.
@@ -58,6 +60,65 @@ pub fn ffmpeg() -> Tool {
         install: "install ffmpeg: `apt-get install ffmpeg` on Debian and Ubuntu, `brew install \
                   ffmpeg` on macOS, elsewhere from https://ffmpeg.org/download.html",
     }
+}
+
+/// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
+/// what else ffmpeg takes the file's name to mean. An odd width or height gains a black column or row.
+/// The video appears complete or not at all.
+///
+/// # Errors
+/// `ffmpeg` is missing or fails; a frame cannot be had or has another size.
+pub fn encode(
+    video: &Path,
+    (width, height): (u32, u32),
+    frames_per_second: f64,
+    frames: impl Iterator<Item = std::io::Result<Vec<u8>>> + Send,
+) -> Result<(), ToolError> {
+    let name = video.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = video.with_file_name(format!(".partial-{name}"));
+    let mut arguments: Vec<OsString> = Vec::new();
+    let size = format!("{width}x{height}");
+    let rate = frames_per_second.to_string();
+    let given = [
+        "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size,
+    ];
+    arguments.extend(given.map(OsString::from));
+    // The frames are sRGB with full range; players expect BT.709.
+    let filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv";
+    let made = ["-r", &rate, "-i", "-", "-vf", filter, "-pix_fmt", "yuv420p"];
+    arguments.extend(made.map(OsString::from));
+    let marked = [
+        "-colorspace",
+        "bt709",
+        "-color_primaries",
+        "bt709",
+        "-color_trc",
+        "bt709",
+    ];
+    arguments.extend(marked.map(OsString::from));
+    arguments.push(temporary.clone().into());
+    let expected = 3 * width as usize * height as usize;
+    let made = ffmpeg().feed(&arguments, move |mut stdin| {
+        for frame in frames {
+            let frame = frame?;
+            if frame.len() != expected {
+                return Err(std::io::Error::other("a frame has another size"));
+            }
+            stdin.write_all(&frame)?;
+        }
+        Ok(())
+    });
+    let renamed = made.and_then(|()| {
+        std::fs::rename(&temporary, video).map_err(|source| ToolError::Log {
+            path: video.to_owned(),
+            source,
+        })
+    });
+    if renamed.is_err() {
+        // There is nothing to do about it where this fails, too.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    renamed
 }
 
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are

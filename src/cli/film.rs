@@ -1,0 +1,267 @@
+//! Films of frames: which of them are made now, what is behind them, and the video.
+
+use super::Usage;
+use super::options::positive;
+use super::output::write_file;
+use anyhow::{Context, bail};
+use image::{Rgba, RgbaImage};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Which frames: so many of a derived path, or a part of a path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FrameChoice {
+    /// Of a derived path.
+    pub(super) count: u32,
+    /// Those that are drawn; `None` for all.
+    range: Option<Range<usize>>,
+}
+
+/// Frames of a derived path where nobody says.
+const COUNT: u32 = 30;
+const MOST: u32 = 100_000;
+
+/// `60`, `120..240` or `120..240/300`.
+pub(super) fn frame_choice(text: &str) -> Result<FrameChoice, String> {
+    let parse = || {
+        let count = |text: &str| text.parse().ok().filter(|n| (1..=MOST).contains(n));
+        let Some((first, rest)) = text.split_once("..") else {
+            let count = count(text)?;
+            return Some(FrameChoice { count, range: None });
+        };
+        let (last, all) = rest
+            .split_once('/')
+            .map_or((rest, None), |(l, n)| (l, Some(n)));
+        let count = all.map_or(Some(COUNT), count)?;
+        let range: Range<usize> = first.parse().ok()?..last.parse().ok()?;
+        (!range.is_empty()).then_some(FrameChoice {
+            count,
+            range: Some(range),
+        })
+    };
+    parse().ok_or_else(|| {
+        format!(
+            "expected a number of frames up to {MOST}, as in 60; frames of a path from the first \
+             (counted from 0) to before the last, as in 120..240; or 120..240/300 of a derived path"
+        )
+    })
+}
+
+impl FrameChoice {
+    /// Keeps the frames that are to be drawn.
+    pub(super) fn of<T>(&self, mut frames: Vec<T>) -> anyhow::Result<Vec<T>> {
+        let Some(range) = &self.range else {
+            return Ok(frames);
+        };
+        let count = frames.len();
+        if range.end > count {
+            let text = format!(
+                "--frames {}..{}: the path has {count} frames",
+                range.start, range.end
+            );
+            return Err(Usage(text).into());
+        }
+        frames.truncate(range.end);
+        frames.drain(..range.start);
+        Ok(frames)
+    }
+}
+
+/// A film of the frames.
+#[derive(clap::Args)]
+pub(super) struct FilmArgs {
+    /// Also make a film of the frames, with ffmpeg: .mp4, .webm, .mkv, …
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
+    /// Its frames a second [default: 30]
+    #[arg(long, value_name = "N", value_parser = positive, requires = "video")]
+    fps: Option<f64>,
+    /// What is seen where no photo shows anything: #RRGGBB, or transparent; in a film transparent
+    /// is black
+    #[arg(long, value_name = "COLOR", default_value = "transparent", value_parser = background)]
+    background: Background,
+    /// Go on where an interrupted run with --resume stopped: frames that are there stay
+    #[arg(long)]
+    resume: bool,
+}
+
+/// What is behind the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Background(Option<[u8; 3]>);
+
+fn background(text: &str) -> Result<Background, String> {
+    if text == "transparent" {
+        return Ok(Background(None));
+    }
+    let parse = || {
+        let digits = text
+            .strip_prefix('#')
+            .filter(|d| d.len() == 6 && d.is_ascii())?;
+        let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
+        Some([channel(0)?, channel(1)?, channel(2)?])
+    };
+    let color = parse().ok_or("expected transparent or a colour, as in #20242c")?;
+    Ok(Background(Some(color)))
+}
+
+impl Background {
+    fn behind(self, picture: &mut RgbaImage) {
+        let Some(color) = self.0 else { return };
+        for Rgba([r, g, b, a]) in picture.pixels_mut() {
+            let alpha = u32::from(*a);
+            for (own, behind) in [r, g, b].into_iter().zip(color) {
+                let sum = u32::from(*own) * alpha + u32::from(behind) * (255 - alpha);
+                *own = ((sum + 127) / 255) as u8;
+            }
+            *a = 255;
+        }
+    }
+}
+
+/// What the frames of a folder were made with.
+#[derive(PartialEq, Serialize, Deserialize)]
+struct Plan {
+    version: String,
+    arguments: Vec<String>,
+}
+
+/// Where a run with `--resume` says what it makes.
+const PLAN: &str = "resume.json";
+
+impl Plan {
+    /// This run's, without what decides no pixel.
+    fn own() -> Self {
+        const ALONE: [&str; 2] = ["--resume", "--json"];
+        const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
+        let mut arguments = Vec::new();
+        let mut given = std::env::args().skip(1);
+        while let Some(argument) = given.next() {
+            if WITH_VALUE.contains(&argument.as_str()) {
+                // How many frames a derived path has does.
+                let value = given.next();
+                let all = value.filter(|_| argument == "--frames");
+                let all = all.map(|v| v.split_once('/').map_or(v.clone(), |(_, n)| n.to_owned()));
+                arguments.extend(all.filter(|v| !v.contains("..")));
+            } else if !ALONE.contains(&argument.as_str()) {
+                arguments.push(argument);
+            }
+        }
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            arguments,
+        }
+    }
+}
+
+impl FilmArgs {
+    /// Fails early where a film cannot be made, and says which frames are there already.
+    pub(super) fn begin(&self, folder: &Path, files: &[PathBuf]) -> anyhow::Result<Vec<bool>> {
+        if self.video.is_some() {
+            capture::video::ffmpeg().text(&["-version"])?;
+        }
+        if !self.resume {
+            return Ok(vec![false; files.len()]);
+        }
+        let file = folder.join(PLAN);
+        let own = Plan::own();
+        match std::fs::read(&file) {
+            Ok(bytes) => {
+                let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
+                if plan.as_ref() != Some(&own) {
+                    bail!(
+                        "{}: the frames in this folder were made by another command line; choose \
+                         another folder, or remove this one",
+                        file.display()
+                    );
+                }
+            }
+            Err(_) if files.iter().any(|f| f.exists()) => bail!(
+                "{}: there are frames here that a run without --resume made; choose another folder, \
+                 or remove this one",
+                folder.display()
+            ),
+            Err(_) => write_file(&file, &serde_json::to_vec_pretty(&own)?)?,
+        }
+        // A frame appears complete or not at all.
+        Ok(files.iter().map(|f| f.exists()).collect())
+    }
+
+    /// Writes a frame.
+    pub(super) fn write(&self, file: &Path, mut picture: RgbaImage) -> anyhow::Result<()> {
+        self.background.behind(&mut picture);
+        Ok(capture::write_png(file, &picture)?)
+    }
+
+    /// Makes the film of written frames, if one is asked for.
+    pub(super) fn finish(&self, files: &[PathBuf]) -> anyhow::Result<()> {
+        let (Some(video), Some(first)) = (&self.video, files.first()) else {
+            return Ok(());
+        };
+        let read = |file: &PathBuf| {
+            let opened = image::open(file);
+            let mut picture = opened
+                .with_context(|| file.display().to_string())?
+                .to_rgba8();
+            Background(Some([0; 3])).behind(&mut picture);
+            anyhow::Ok(picture)
+        };
+        let size = read(first)?.dimensions();
+        let frames = files.iter().map(|file| {
+            let picture = read(file).map_err(std::io::Error::other)?;
+            if picture.dimensions() != size {
+                let text = format!("{}: not as large as the first frame", file.display());
+                return Err(std::io::Error::other(text));
+            }
+            let rgb = picture.pixels().flat_map(|p| [p.0[0], p.0[1], p.0[2]]);
+            Ok(rgb.collect())
+        });
+        super::output::make_parent(video)?;
+        capture::video::encode(video, size, self.fps.unwrap_or(30.0), frames)
+            .with_context(|| video.display().to_string())
+    }
+
+    /// The film, if one is asked for.
+    pub(super) fn video(&self) -> Option<&Path> {
+        self.video.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_counted_or_chosen() {
+        let all = |count| FrameChoice { count, range: None };
+        assert_eq!(frame_choice("60"), Ok(all(60)));
+        let part = frame_choice("2..4").unwrap();
+        assert_eq!(part.of(vec![0, 1, 2, 3, 4]).unwrap(), [2, 3]);
+        assert_eq!(
+            part.of(vec![0, 1, 2]).unwrap_err().to_string(),
+            "--frames 2..4: the path has 3 frames"
+        );
+        assert_eq!(frame_choice("1..2/7").unwrap().count, 7);
+        for bad in [
+            "", "0", "4..4", "5..2", "-1..3", "1..", "100001", "1..2/0", "a..b",
+        ] {
+            assert!(frame_choice(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_background_shows_as_far_as_the_picture_does_not() {
+        assert_eq!(background("#0a10ff"), Ok(Background(Some([10, 16, 255]))));
+        assert!(
+            ["#12345", "red", "#12345g", "#1234567", "#ßßß"]
+                .iter()
+                .all(|b| background(b).is_err())
+        );
+        let mut picture = RgbaImage::from_pixel(1, 1, Rgba([100, 200, 0, 51]));
+        background("#0a10ff").unwrap().behind(&mut picture);
+        assert_eq!(picture.get_pixel(0, 0).0, [28, 53, 204, 255]);
+        let kept = picture.clone();
+        background("transparent").unwrap().behind(&mut picture);
+        assert_eq!(picture, kept);
+    }
+}
