@@ -25,6 +25,8 @@ mod session;
 mod surface;
 mod time;
 mod uncalibrated;
+#[cfg(feature = "window")]
+mod view;
 mod walk;
 
 use clap::error::ErrorKind;
@@ -58,6 +60,8 @@ enum Command {
     Interior(interior::Args),
     Plan(plan::Args),
     Walk(walk::Args),
+    #[cfg(feature = "window")]
+    View(view::Args),
     Generate(generate::Args),
 }
 
@@ -104,6 +108,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Walk(args) => walk::run(&args),
+        #[cfg(feature = "window")]
+        Command::View(args) => view::run(&args),
         Command::Generate(args) => generate::run(&args),
     }
 }

@@ -214,7 +214,7 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
     Ok(once)
 }
 
-fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model> {
+pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model> {
     let Some(name) = &interior.model else {
         bail!(
             "{}: it has no model; cells that are scenes are not drawn yet",

@@ -1,0 +1,49 @@
+//! Loading goes on behind the window, and tells it how far it is.
+
+use crate::content::Content;
+use std::sync::Arc;
+
+/// What loading has to say.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// What is being done.
+    Doing(String),
+    /// Something to show, in place of what was there before.
+    Show(Content),
+    /// Something people should know.
+    Note(String),
+    /// All is there.
+    Done,
+    /// There will be nothing (more), and why.
+    Failed(String),
+}
+
+/// By which loading speaks to the window.
+#[derive(Clone)]
+pub struct Teller {
+    tell: Arc<dyn Fn(Progress) + Send + Sync>,
+}
+
+impl Teller {
+    /// Speaks by a function.
+    pub fn new(tell: impl Fn(Progress) + Send + Sync + 'static) -> Self {
+        Self {
+            tell: Arc::new(tell),
+        }
+    }
+
+    /// Says what is being done.
+    pub fn doing(&self, text: impl Into<String>) {
+        self.say(Progress::Doing(text.into()));
+    }
+
+    /// Shows something, in place of what was there before.
+    pub fn show(&self, content: Content) {
+        self.say(Progress::Show(content));
+    }
+
+    /// Says something else.
+    pub fn say(&self, progress: Progress) {
+        (self.tell)(progress);
+    }
+}
