@@ -90,12 +90,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     // What cannot be opened is said where it was asked for, not in a window.
     let load = loader(args)?;
+    // Threads of its own: pictures must not wait until a piece of the fitting is done.
+    let threads = rayon::current_num_threads();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()?;
     view::run(options, move |teller| {
-        if let Err(error) = load(teller) {
-            teller.say(Progress::Failed(super::one_line(&error)));
-        } else {
-            teller.say(Progress::Done);
-        }
+        teller.say(match pool.install(|| load(teller)) {
+            Ok(()) => Progress::Done,
+            Err(error) => Progress::Failed(super::one_line(&error)),
+        });
     })?;
     Ok(())
 }

@@ -77,11 +77,12 @@ pub(crate) fn panel(
     egui::Window::new("lumigraph")
         .anchor(Align2::RIGHT_TOP, [-8.0, 8.0])
         .resizable(false)
-        .default_width(230.0)
+        .default_size([230.0, height])
         .open(&mut is_open)
         .show(context, |ui| {
             egui::ScrollArea::vertical()
-                .max_height((height - 70.0).max(60.0))
+                .max_height((height - 64.0).max(60.0))
+                .min_scrolled_height((height - 64.0).max(60.0))
                 .show(ui, |ui| contents(ui, state, shows, shown, &mut commands));
         });
     shows.panel &= is_open;
@@ -112,8 +113,8 @@ fn contents(
     });
     ui.horizontal(|ui| {
         for (action, name, hint) in [
-            (Action::Previous, "◀", "The camera (room) before: B"),
-            (Action::Next, "▶", "The next camera (room): N"),
+            (Action::Previous, "Before", "The camera (room) before: B"),
+            (Action::Next, "Next", "The next camera (room): N"),
             (Action::Home, "Back", "Where photos show something: R"),
         ] {
             if ui.button(name).on_hover_text(hint).clicked() {
@@ -259,10 +260,18 @@ fn path(ui: &mut Ui, state: &mut State, commands: &mut Vec<Command>) {
                 commands.push(Command::Act(Action::StepKeyframe(true)));
             }
         }
-        if ui.button("⬅").on_hover_text("Earlier").clicked() {
+        if ui
+            .button("Earlier")
+            .on_hover_text("The chosen one, in the order")
+            .clicked()
+        {
             state.keyframes.shift(false);
         }
-        if ui.button("➡").on_hover_text("Later").clicked() {
+        if ui
+            .button("Later")
+            .on_hover_text("The chosen one, in the order")
+            .clicked()
+        {
             state.keyframes.shift(true);
         }
     });

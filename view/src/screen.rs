@@ -127,12 +127,18 @@ impl Screen {
         }
     }
 
+    /// Lets textures go that the frame before was the last to need.
+    pub(crate) fn free(&mut self, textures: &TexturesDelta) {
+        for id in &textures.free {
+            self.renderer.free_texture(id);
+        }
+    }
+
     /// Draws a frame and shows it.
     pub(crate) fn present(
         &mut self,
         primitives: &[ClippedPrimitive],
         pixels_per_point: f32,
-        textures: &TexturesDelta,
     ) -> Presented {
         if self.is_lost.load(Ordering::Acquire) {
             return Presented::Lost;
@@ -201,9 +207,6 @@ impl Screen {
         commands.push(encoder.finish());
         self.queue.submit(commands);
         self.queue.present(frame);
-        for id in &textures.free {
-            self.renderer.free_texture(id);
-        }
         Presented::Yes
     }
 }

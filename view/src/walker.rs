@@ -1,6 +1,6 @@
 //! Walking at eye height: walls stop one, openings let one through.
 //!
-//! Seen from above, whatever reaches into the band between a step's height and the eyes is cut
+//! Seen from above, whatever reaches into the band between half the eyes' height and the eyes is cut
 //! into line segments, and who walks is a disc that they keep out. A doorway is where there are
 //! none.
 
@@ -9,8 +9,9 @@ use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
 use std::collections::BTreeMap;
 
-/// Heights at which things are cut, in eye heights over the floor. Lower ones are stepped over.
-const CUTS: [f64; 4] = [0.25, 0.45, 0.65, 0.9];
+/// Heights at which things are cut, in eye heights over the floor. Tables and beds are lower:
+/// walking through them is better than being caught between them; hatches are not walked through.
+const CUTS: [f64; 3] = [0.5, 0.7, 0.9];
 /// How wide who walks is, in eye heights: 22 cm about an axis at 1.6 m.
 const RADIUS: f64 = 0.14;
 

@@ -112,8 +112,12 @@ pub fn run(
 /// The first line of what winit says, without where in its code that was.
 fn without_place(text: &str) -> String {
     let line = text.lines().next().unwrap_or_default();
-    let said = line.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
-    said.map_or(line, |(_, said)| said).trim_end_matches('.').to_owned()
+    let said = line
+        .split_once(".rs:")
+        .and_then(|(_, rest)| rest.split_once(": "));
+    said.map_or(line, |(_, said)| said)
+        .trim_end_matches('.')
+        .to_owned()
 }
 
 /// Proxies may be used by one thread at a time.
@@ -137,6 +141,14 @@ struct Pane {
     input: egui_winit::State,
     picture: Option<TextureHandle>,
     photo: Option<TextureHandle>,
+}
+
+impl Drop for Pane {
+    fn drop(&mut self) {
+        (self.picture, self.photo) = (None, None);
+        // egui insists that nothing is left to be done.
+        self.context.tex_manager().write().take_delta().clear();
+    }
 }
 
 struct App {
@@ -454,7 +466,7 @@ impl App {
         let textures = [&pane.picture, &pane.photo].map(|t| t.as_ref().map(TextureHandle::id));
         let (state, status, shown) = (&mut self.state, &self.status, self.shown.as_ref());
         let plan = self.plan.as_ref();
-        let output = pane.context.run_pass(input, |context| {
+        let mut output = pane.context.run_pass(input, |context| {
             paint(context, state, shows, shown, plan, textures);
             panel::texts(context, state, shows, status, shown);
             if shows.panel {
@@ -479,9 +491,9 @@ impl App {
         pane.screen.upload(&output.textures_delta);
         let upload_ms = ms_since(start);
         let start = Instant::now();
-        let presented = pane
-            .screen
-            .present(&primitives, pixels_per_point, &output.textures_delta);
+        let presented = pane.screen.present(&primitives, pixels_per_point);
+        pane.screen.free(&output.textures_delta);
+        output.textures_delta.clear();
         let draw_ms = ms_since(start);
         self.frames += 1;
         let steps = [
