@@ -81,7 +81,7 @@ impl Obstacles {
         }
         // Triangles of two cells, and walls cut at several heights.
         for list in floor.squares.values_mut() {
-            list.sort_by(|a, b| a.map(key).cmp(&b.map(key)));
+            list.sort_by_key(|ends| ends.map(key));
             list.dedup();
         }
         floor

@@ -125,7 +125,7 @@ impl Worker {
 /// What there is to do next.
 enum Job {
     Show(Content, u64),
-    Draw(Request),
+    Draw(Box<Request>),
     Shoot,
     End,
 }
@@ -140,7 +140,7 @@ fn next_job(shared: &Shared) -> Job {
             return Job::Show(content, revision);
         }
         if let Some(request) = inbox.request.take() {
-            return Job::Draw(request);
+            return Job::Draw(Box::new(request));
         }
         if inbox.shots > 0 {
             inbox.shots -= 1;
@@ -163,7 +163,7 @@ fn run(shared: &Shared, options: &WorkerOptions, tell: &dyn Fn(News)) {
                 Job::End => return,
                 Job::Show(content, revision) => Some((content, revision)),
                 Job::Draw(request) => {
-                    last = Some(request);
+                    last = Some(*request);
                     None
                 }
                 Job::Shoot => None,
@@ -283,14 +283,14 @@ impl<'s> Desk<'s> {
         let mut kept: Option<(Request, RgbaImage)> = None;
         loop {
             let job = match again.take() {
-                Some(request) => Job::Draw(request),
+                Some(request) => Job::Draw(Box::new(request)),
                 None => next_job(self.shared),
             };
             match job {
                 Job::End => return None,
                 Job::Show(content, revision) => return Some((content, revision)),
                 Job::Draw(request) => {
-                    *self.last = Some(request.clone());
+                    *self.last = Some((*request).clone());
                     let start = Instant::now();
                     let reduction = if request.is_moving { self.reduction } else { 1 };
                     match draw(self.tell, &request, reduction) {
@@ -299,7 +299,7 @@ impl<'s> Desk<'s> {
                             (self.tell)(News::Shown(Box::new(shown)));
                             self.adapt(&request, start.elapsed());
                             if reduction == 1 {
-                                kept = Some((request, picture));
+                                kept = Some((*request, picture));
                             }
                         }
                         Err(error) => (self.tell)(News::Trouble(error)),
