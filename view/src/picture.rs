@@ -246,10 +246,15 @@ impl DepthGrid {
     /// The point of the world at a pixel of the view, `otherwise` so deep where nothing is known.
     pub fn point(&self, view: &View, pixel: Pixel, otherwise: f64) -> DVec3 {
         let depth = self.at(view, pixel).map_or(otherwise, |s| 1.0 / s);
-        let ray = view.lens.unproject(pixel).filter(|ray| ray.z > 1e-6);
-        let ray = ray.map_or(DVec3::Z, |ray| ray / ray.z);
-        view.camera_from_world.inverse() * (ray * depth)
+        on_ray(view, pixel, depth)
     }
+}
+
+/// The point of the world that a pixel of a view sees so deep.
+pub(crate) fn on_ray(view: &View, pixel: Pixel, depth: f64) -> DVec3 {
+    let ray = view.lens.unproject(pixel).filter(|ray| ray.z > 1e-6);
+    let ray = ray.map_or(DVec3::Z, |ray| ray / ray.z);
+    view.camera_from_world.inverse() * (ray * depth)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::camera::{Glide, level_axes, moved, orbited, pose_of, turned, zoomed};
 use crate::compose::nearest_stop;
 use crate::content::{Content, Space};
 use crate::keyframes::Keyframes;
-use crate::picture::{DepthGrid, Look, Request, Shown};
+use crate::picture::{DepthGrid, Look, Request, Shown, on_ray};
 use calibrate::{Lens, Pixel, Rigid3, View};
 use glam::{DVec2, DVec3};
 use proxy::interior::CellId;
@@ -356,13 +356,24 @@ impl State {
 
     /// The point of the world at a pixel, by the last picture's depths.
     fn under(&self, view: &View, at: Pixel, otherwise: f64) -> DVec3 {
-        match &self.depths {
-            // Of a picture from a little while ago, which is near enough.
-            Some((of, depths)) if (of.width, of.height) == (view.width, view.height) => {
-                depths.point(view, at, otherwise)
+        let Some((of, depths)) = &self.depths else {
+            return on_ray(view, at, otherwise);
+        };
+        let mut point = on_ray(view, at, otherwise);
+        // That picture may be of a while ago: what lies where the point would be in it tells a
+        // better depth.
+        for _ in 0..8 {
+            let Some(pixel) = of.project(point) else {
+                break;
+            };
+            let seen = depths.point(of, pixel, otherwise);
+            let depth = (view.camera_from_world * seen).z;
+            if !(depth > 1e-6 * otherwise) {
+                break;
             }
-            _ => DepthGrid::default().point(view, at, otherwise),
+            point = on_ray(view, at, depth);
         }
+        point
     }
 
     /// Does something once.

@@ -722,6 +722,12 @@ impl App {
             return;
         };
         let key = match &event {
+            // With the focus come keys that were pressed elsewhere.
+            WindowEvent::KeyboardInput {
+                event,
+                is_synthetic: true,
+                ..
+            } if event.state == ElementState::Pressed => None,
             WindowEvent::KeyboardInput { event, .. } => match event.physical_key {
                 PhysicalKey::Code(code) => keys::of(code, self.modifiers),
                 PhysicalKey::Unidentified(_) => None,
