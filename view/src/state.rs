@@ -102,10 +102,16 @@ const TURN_PER_SECOND: f64 = 1.2;
 const ZOOM_PER_NOTCH: f64 = 0.12;
 /// How much faster with Shift.
 const FAST: f64 = 4.0;
+/// What is under the cursor counts as so far away at most, in typical depths, or in distances from
+/// where photos were taken.
+const FAR: f64 = 2.5;
 /// A stall must not become a leap, in seconds.
 const LONGEST_STEP_S: f64 = 0.1;
-/// For so long one must be still before the picture is drawn in full.
+/// For so long one must be still before the picture is drawn in full; and longer where that takes
+/// long, as it holds up what comes next, in shares of its time.
 const STILL_S: f64 = 0.12;
+const STILL_SHARE: f64 = 0.25;
+const STILL_MOST_S: f64 = 0.8;
 
 /// A preview of the film.
 struct Playing {
@@ -158,6 +164,8 @@ pub struct State {
     still_s: f64,
     asked: Option<Request>,
     asked_count: u64,
+    /// What a picture in full takes, about, in seconds.
+    full_s: f64,
     /// Of the last picture shown.
     depths: Option<(View, DepthGrid)>,
     /// See [`Support::share`](crate::picture::Support::share); 1 where unknown.
@@ -185,9 +193,10 @@ impl State {
             glide: None,
             stop: None,
             pointer: None,
-            still_s: STILL_S,
+            still_s: STILL_MOST_S,
             asked: None,
             asked_count: 0,
+            full_s: 0.0,
             depths: None,
             support: 1.0,
         }
@@ -373,7 +382,17 @@ impl State {
             }
             point = on_ray(view, at, depth);
         }
-        point
+        // About a far dome one would be flung around.
+        let depth = (view.camera_from_world * point).z;
+        on_ray(view, at, depth.min(FAR * self.reach(view).max(otherwise)))
+    }
+
+    /// How far away the middle of all stops is.
+    fn reach(&self, view: &View) -> f64 {
+        let stops = self.space.as_ref().map_or(&[][..], |s| &s.stops);
+        let sum: DVec3 = stops.iter().map(|s| s.view.center()).sum();
+        let reach = (sum / stops.len().max(1) as f64).distance(view.center());
+        if reach.is_finite() { reach } else { 0.0 }
     }
 
     /// Does something once.
@@ -575,7 +594,7 @@ impl State {
         let view = self.view()?;
         self.look.options.beta = self.beta / self.alpha.max(1e-6);
         self.look.photo = self.wipe.is_some();
-        let is_moving = self.still_s < STILL_S;
+        let is_moving = self.still_s < (STILL_SHARE * self.full_s).clamp(STILL_S, STILL_MOST_S);
         let pointer = self.pointer.filter(|_| self.tells_weights && !is_moving);
         let (count, look) = (self.asked_count + 1, self.look.clone());
         let request = Request {
@@ -603,6 +622,8 @@ impl State {
     pub fn shown(&mut self, shown: &Shown) {
         self.depths = Some((shown.view.clone(), shown.depths.clone()));
         self.support = shown.support.map_or(1.0, |s| s.share());
+        let pixels = f64::from(shown.reduction).powi(2);
+        self.full_s = 1e-3 * shown.time_ms() * pixels;
     }
 
     /// Whether a picture is the last one asked for, in full.

@@ -341,10 +341,11 @@ impl<'s> Desk<'s> {
     /// How large the next picture will be that is drawn while one moves.
     fn adapt(&mut self, request: &Request, time: Duration) {
         let ms = 1e3 * time.as_secs_f64();
-        // What takes its time at full size would while one moves.
-        let reduction = if request.is_moving { self.reduction } else { 1 };
-        if ms > SLOW_MS && reduction >= self.reduction {
-            self.reduction = (reduction + 1).min(MOST_REDUCED);
+        let drawn = if request.is_moving { self.reduction } else { 1 };
+        if ms > SLOW_MS {
+            // As if time went by pixels.
+            let needed = f64::from(drawn) * (ms / SLOW_MS).sqrt();
+            self.reduction = self.reduction.max(needed.ceil() as u32).min(MOST_REDUCED);
         } else if ms < FAST_MS && request.is_moving {
             self.reduction = (self.reduction - 1).max(1);
         }
