@@ -60,6 +60,7 @@ pub(super) fn fit(
 
 impl ProxyArgs {
     /// Whether none is asked for, so that a scene's own is taken.
+    #[cfg(feature = "window")]
     pub(super) fn is_default(&self) -> bool {
         self.proxy.is_none()
     }

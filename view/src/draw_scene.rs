@@ -27,7 +27,8 @@ const ASKED: (u32, u32) = (8, 6);
 /// Draws a lumigraph, and keeps what the next picture may need again.
 pub(crate) struct SceneDrawer<'a> {
     lumigraph: &'a Lumigraph,
-    space: Space,
+    space: &'a Space,
+    no_skip: bool,
     ready: Option<Ready<'a>>,
     palette: Vec<[u8; 3]>,
     /// A photo that cannot be decoded.
@@ -47,10 +48,11 @@ pub(crate) type Drawn = (RgbaImage, Shown);
 
 impl<'a> SceneDrawer<'a> {
     /// Nothing is drawn yet.
-    pub(crate) fn new(lumigraph: &'a Lumigraph, space: Space) -> Self {
+    pub(crate) fn new(lumigraph: &'a Lumigraph, space: &'a Space, no_skip: bool) -> Self {
         Self {
             lumigraph,
             space,
+            no_skip,
             ready: None,
             palette: Vec::new(),
             gone: None,
@@ -105,7 +107,12 @@ impl<'a> SceneDrawer<'a> {
         if !self.ready.as_ref().is_some_and(is_same) {
             self.ready = None;
             let frame = timed(&mut stages, "surface", || {
-                Frame::without(self.lumigraph, view.clone(), look.options, self.gone)
+                let frame = Frame::without(self.lumigraph, view.clone(), look.options, self.gone);
+                if self.no_skip {
+                    frame.without_skipping()
+                } else {
+                    frame
+                }
             });
             let prepared = timed(&mut stages, "field", || Prepared::new(&frame, look.method))?;
             self.ready = Some(Ready {

@@ -50,7 +50,7 @@ pub(crate) fn of(code: KeyCode, held: ModifiersState) -> Option<Key> {
     if held.control_key() || held.super_key() {
         return match code {
             KeyCode::KeyS => Some(Key::SavePath),
-            KeyCode::KeyQ | KeyCode::KeyW => Some(Key::Close),
+            KeyCode::KeyQ => Some(Key::Close),
             KeyCode::F12 => Some(Key::LoseDevice),
             _ => None,
         };

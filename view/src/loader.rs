@@ -1,6 +1,6 @@
 //! Loading goes on behind the window, and tells it how far it is.
 
-use crate::content::Content;
+use crate::content::{Content, Space};
 use std::sync::Arc;
 
 /// What loading has to say.
@@ -9,7 +9,7 @@ pub enum Progress {
     /// What is being done.
     Doing(String),
     /// Something to show, in place of what was there before.
-    Show(Content),
+    Show(Content, Arc<Space>),
     /// Something people should know.
     Note(String),
     /// All is there.
@@ -37,9 +37,11 @@ impl Teller {
         self.say(Progress::Doing(text.into()));
     }
 
-    /// Shows something, in place of what was there before.
+    /// Shows something, in place of what was there before. What moving about in it needs to know is
+    /// found here, not on the window's thread.
     pub fn show(&self, content: Content) {
-        self.say(Progress::Show(content));
+        let space = Arc::new(Space::of(&content));
+        self.say(Progress::Show(content, space));
     }
 
     /// Says something else.

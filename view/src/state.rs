@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3};
 use proxy::interior::CellId;
 use render::PathFrame;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// How hands move the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,7 +136,7 @@ struct Drag {
 /// Where one is, how one moves, and what is to be shown.
 pub struct State {
     content: Option<Content>,
-    space: Option<Space>,
+    space: Option<Arc<Space>>,
     pose: Rigid3,
     /// In pixels.
     size: (u32, u32),
@@ -204,8 +205,7 @@ impl State {
 
     /// Shows a content: the first from its first photo's camera or in its first room, others from
     /// where one is.
-    pub fn show(&mut self, content: Content) {
-        let space = Space::of(&content);
+    pub fn show(&mut self, content: Content, space: Arc<Space>) {
         if self.space.is_none() {
             if let Some(first) = space.stops.first() {
                 self.pose = first.view.camera_from_world;
@@ -223,7 +223,7 @@ impl State {
 
     /// What is known of the space one moves in.
     pub fn space(&self) -> Option<&Space> {
-        self.space.as_ref()
+        self.space.as_deref()
     }
 
     /// What is shown.
@@ -298,7 +298,10 @@ impl State {
     /// The pointer is over a pixel, or left.
     pub fn point(&mut self, at: Option<Pixel>) {
         self.pointer = at;
-        let (Some(at), Some(mut drag)) = (at, self.drag.take()) else {
+        let Some(at) = at else {
+            return;
+        };
+        let Some(mut drag) = self.drag.take() else {
             return;
         };
         let (dx, dy) = (at.x - drag.at.x, at.y - drag.at.y);
@@ -644,7 +647,6 @@ mod tests {
     use proxy::interior::Contents;
     use proxy::{Plane, Proxy};
     use render::{Lumigraph, PhotoStore, SourceView};
-    use std::sync::Arc;
 
     fn wall() -> Content {
         let source = |x: f64| SourceView {
@@ -674,8 +676,15 @@ mod tests {
     fn looking_at_a_wall() -> State {
         let mut state = State::new(Look::default());
         state.resize(400, 300);
-        state.show(wall());
+        state.show_alone(wall());
         state
+    }
+
+    impl State {
+        fn show_alone(&mut self, content: Content) {
+            let space = Arc::new(Space::of(&content));
+            self.show(content, space);
+        }
     }
 
     fn step(state: &mut State, seconds: f64) {
@@ -688,7 +697,7 @@ mod tests {
     fn it_begins_at_the_first_photo_and_stays_when_more_is_known() {
         let mut state = State::new(Look::default());
         assert!(state.view().is_none() && state.wanted().is_none());
-        state.show(wall());
+        state.show_alone(wall());
         assert!(state.view().is_none(), "nothing to draw on");
         state.resize(400, 300);
         let view = state.view().unwrap();
@@ -705,7 +714,7 @@ mod tests {
         state.act(Action::Go(2));
         step(&mut state, 2.0);
         let there = *state.pose();
-        state.show(wall());
+        state.show_alone(wall());
         assert_eq!(*state.pose(), there);
         assert!(state.wanted().is_some(), "the new content's picture");
     }
@@ -802,7 +811,7 @@ mod tests {
         assert_eq!(state.support, 0.0);
         let at = Pixel::new(300.0, 100.0);
         let view = state.view().unwrap();
-        let point = state.under(&view, at, 1.0);
+        let point = state.under(&view, at, 4.0);
         assert!((point.z - 4.0).abs() < 1e-9);
         let seen = |state: &State| state.view().unwrap().project(point).unwrap();
         // The wheel.
@@ -881,7 +890,7 @@ mod tests {
         let house = House::new(made.interior, contents, made.model);
         let mut state = State::new(Look::default());
         state.resize(320, 240);
-        state.show(Content::Interior(Arc::new(house)));
+        state.show_alone(Content::Interior(Arc::new(house)));
         assert_eq!(state.mode, Mode::Walk);
         assert!(state.cell().is_some());
         let start = state.pose().center();

@@ -281,14 +281,14 @@ impl App {
                 self.status.doing = None;
                 self.status.failed = Some(text);
             }
-            Event::Progress(Progress::Show(content)) => {
+            Event::Progress(Progress::Show(content, space)) => {
                 self.revision += 1;
                 self.plan = match &content {
                     Content::Interior(house) => Some(Plan::new(house)),
                     Content::Scene(_) => None,
                 };
-                self.state.show(content.clone());
-                self.worker.show(content, self.revision);
+                self.state.show(content.clone(), Arc::clone(&space));
+                self.worker.show(content, space, self.revision);
             }
             Event::News(News::Shown(shown)) => {
                 self.state.shown(&shown);
@@ -729,6 +729,10 @@ impl App {
                 ..
             } if event.state == ElementState::Pressed => None,
             WindowEvent::KeyboardInput { event, .. } => match event.physical_key {
+                // What was pressed must be released, whatever else is held by then.
+                PhysicalKey::Code(code) if event.state == ElementState::Released => {
+                    keys::of(code, ModifiersState::empty())
+                }
                 PhysicalKey::Code(code) => keys::of(code, self.modifiers),
                 PhysicalKey::Unidentified(_) => None,
             },

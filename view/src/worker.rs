@@ -32,6 +32,8 @@ pub struct WorkerOptions {
     pub device: DeviceChoice,
     /// For photos on the device, in bytes; none for no limit.
     pub gpu_memory: Option<u64>,
+    /// Asks every photo about every ray: the same pictures, later.
+    pub no_skip: bool,
     /// Of walks.
     pub walk: WalkOptions,
     /// The folder for screenshots.
@@ -45,9 +47,12 @@ const FAST_MS: f64 = 18.0;
 /// Times that a picture is drawn smaller at most, each way.
 const MOST_REDUCED: u32 = 4;
 
+/// A content, what is known of the space in it, and its number.
+type Given = (Content, Arc<Space>, u64);
+
 #[derive(Default)]
 struct Inbox {
-    content: Option<(Content, u64)>,
+    content: Option<Given>,
     request: Option<Request>,
     shots: usize,
     is_over: bool,
@@ -86,8 +91,8 @@ impl Worker {
     }
 
     /// What is to be drawn from now on; `revision` comes back with each picture.
-    pub fn show(&self, content: Content, revision: u64) {
-        self.tell(|inbox| inbox.content = Some((content, revision)));
+    pub fn show(&self, content: Content, space: Arc<Space>, revision: u64) {
+        self.tell(|inbox| inbox.content = Some((content, space, revision)));
     }
 
     /// Asks for a picture, in place of the one asked for before if that was not begun.
@@ -124,7 +129,7 @@ impl Worker {
 
 /// What there is to do next.
 enum Job {
-    Show(Content, u64),
+    Show(Given),
     Draw(Box<Request>),
     Shoot,
     End,
@@ -136,8 +141,8 @@ fn next_job(shared: &Shared) -> Job {
         if inbox.is_over {
             return Job::End;
         }
-        if let Some((content, revision)) = inbox.content.take() {
-            return Job::Show(content, revision);
+        if let Some(given) = inbox.content.take() {
+            return Job::Show(given);
         }
         if let Some(request) = inbox.request.take() {
             return Job::Draw(Box::new(request));
@@ -156,24 +161,24 @@ fn next_job(shared: &Shared) -> Job {
 fn run(shared: &Shared, options: &WorkerOptions, tell: &dyn Fn(News)) {
     let mut engine: Option<Engine> = None;
     let mut last: Option<Request> = None;
-    let mut showing: Option<(Content, u64)> = None;
+    let mut showing: Option<Given> = None;
     loop {
         let next = match showing.take() {
             None => match next_job(shared) {
                 Job::End => return,
-                Job::Show(content, revision) => Some((content, revision)),
+                Job::Show(given) => Some(given),
                 Job::Draw(request) => {
                     last = Some(*request);
                     None
                 }
                 Job::Shoot => None,
             },
-            Some((Content::Scene(lumigraph), revision)) => {
+            Some((Content::Scene(lumigraph), space, revision)) => {
                 let engine = engine.get_or_insert_with(|| open(options, tell));
                 let mut desk = Desk::new(shared, options, tell, revision, &mut last);
-                desk.serve_scene(&lumigraph, engine)
+                desk.serve_scene(&lumigraph, &space, engine)
             }
-            Some((Content::Interior(house), revision)) => {
+            Some((Content::Interior(house), _, revision)) => {
                 let mut desk = Desk::new(shared, options, tell, revision, &mut last);
                 desk.serve_house(&house)
             }
@@ -228,10 +233,10 @@ impl<'s> Desk<'s> {
     fn serve_scene(
         &mut self,
         lumigraph: &Lumigraph,
+        space: &Space,
         engine: &mut Engine,
-    ) -> Option<(Content, u64)> {
-        let space = Space::of_scene(lumigraph);
-        let mut drawer = SceneDrawer::new(lumigraph, space);
+    ) -> Option<Given> {
+        let mut drawer = SceneDrawer::new(lumigraph, space, self.options.no_skip);
         let mut notes = engine.notes().len();
         let mut gone = None;
         self.serve(|tell, request, reduction| {
@@ -252,7 +257,7 @@ impl<'s> Desk<'s> {
         })
     }
 
-    fn serve_house(&mut self, house: &House) -> Option<(Content, u64)> {
+    fn serve_house(&mut self, house: &House) -> Option<Given> {
         let painter = Painter::open(self.options.device, &house.model);
         let mut walk = Walk::with(
             painter,
@@ -276,7 +281,7 @@ impl<'s> Desk<'s> {
     fn serve(
         &mut self,
         mut draw: impl FnMut(&dyn Fn(News), &Request, u32) -> Result<Drawn, String>,
-    ) -> Option<(Content, u64)> {
+    ) -> Option<Given> {
         // What was asked for of the content before is wanted of this one, too.
         let mut again = self.last.take();
         // As files have it, at full size.
@@ -288,7 +293,7 @@ impl<'s> Desk<'s> {
             };
             match job {
                 Job::End => return None,
-                Job::Show(content, revision) => return Some((content, revision)),
+                Job::Show(given) => return Some(given),
                 Job::Draw(request) => {
                     *self.last = Some((*request).clone());
                     let start = Instant::now();
@@ -416,6 +421,12 @@ mod tests {
         }
     }
 
+    fn show(worker: &Worker, red: u8, revision: u64) {
+        let content = Content::Scene(wall(red));
+        let space = Arc::new(Space::of(&content));
+        worker.show(content, space, revision);
+    }
+
     #[test]
     fn pictures_are_those_that_render_makes_and_shots_give_them_back() {
         let folder = tempfile::tempdir().unwrap();
@@ -423,13 +434,14 @@ mod tests {
         let options = WorkerOptions {
             device: DeviceChoice::Cpu,
             gpu_memory: None,
+            no_skip: false,
             walk: WalkOptions::default(),
             output: folder.path().join("shots"),
         };
         let mut worker = Worker::start(options, move |news| send.send(news).unwrap());
         // Asked before there is anything: drawn as soon as there is.
         worker.ask(request(1, 0.25));
-        worker.show(Content::Scene(wall(0)), 1);
+        show(&worker, 0, 1);
         let wait = || news.recv_timeout(Duration::from_secs(60)).unwrap();
         let News::Shown(shown) = wait() else {
             panic!("a picture");
@@ -441,7 +453,7 @@ mod tests {
         assert_eq!(hover.weights[0].0, 1, "the nearer photo first");
         assert!((hover.weights.iter().map(|w| w.1).sum::<f64>() - 1.0).abs() < 1e-9);
         // A new content is drawn without being asked for.
-        worker.show(Content::Scene(wall(100)), 2);
+        show(&worker, 100, 2);
         let News::Shown(shown) = wait() else {
             panic!("a picture");
         };
@@ -462,8 +474,9 @@ mod tests {
     #[test]
     fn every_layer_and_size_is_drawn() {
         let lumigraph = wall(0);
+        let space = Space::of_scene(&lumigraph);
         let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
-        let mut drawer = SceneDrawer::new(&lumigraph, Space::of_scene(&lumigraph));
+        let mut drawer = SceneDrawer::new(&lumigraph, &space, true);
         for layer in Layer::ALL {
             for (reduction, method) in [
                 (1, render::Method::Exact),

@@ -126,7 +126,7 @@ pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), PathFileError>
     write_whole(path, &text)
 }
 
-/// What [`write`] writes, for files of another kind that hold a path, such as a picture that knows
+/// What [`write()`] writes, for files of another kind that hold a path, such as a picture that knows
 /// where it was taken from.
 ///
 /// # Errors
@@ -191,7 +191,7 @@ pub fn read_keyframes(path: &Path) -> Result<Option<KeyframeFile>, PathFileError
     }))
 }
 
-/// Writes keyframes, one a line, in the way of [`write`]. What [`read`] makes of them is what
+/// Writes keyframes, one a line, in the way of [`write()`]. What [`read`] makes of them is what
 /// [`CameraPath::from_keyframes`] makes of these, bit for bit where their poses are those of
 /// frames (see [`PathFrame::new`]).
 ///
