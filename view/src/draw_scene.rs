@@ -64,6 +64,40 @@ impl<'a> SceneDrawer<'a> {
         self.gone
     }
 
+    /// The photo itself, half as large, for a view from its own camera: there before anything else
+    /// is decoded. `None` for views from elsewhere.
+    pub(crate) fn preview(&self, request: &Request) -> Option<Shown> {
+        let asked = &request.view;
+        let stops = &self.space.stops;
+        let nearest = nearest_stop(stops, asked, self.space.depth)?;
+        let source = &stops[nearest].view;
+        if source.center().distance(asked.center()) > 1e-6 * self.space.depth {
+            return None;
+        }
+        let view = asked.resized(asked.width.div_ceil(2), asked.height.div_ceil(2));
+        let mut stages = Vec::new();
+        let image = timed(&mut stages, "photo", || {
+            let photo = self.lumigraph.photos.get(nearest).ok()?;
+            Some(photo_picture(&photo, source, &view))
+        });
+        Some(Shown {
+            id: request.id,
+            view: asked.clone(),
+            reduction: 2,
+            image: Arc::new(image?),
+            photo: None,
+            lines: Lines::default(),
+            depths: DepthGrid::default(),
+            support: None,
+            hover: None,
+            cell: None,
+            stages,
+            skipped: "all but the first photo".to_owned(),
+            device: "CPU".to_owned(),
+            revision: 0,
+        })
+    }
+
     /// Draws what is asked for, `reduction` times smaller. A photo that cannot be decoded is left
     /// out from then on.
     ///

@@ -205,7 +205,9 @@ impl State {
 
     /// Shows a content: the first from its first photo's camera or in its first room, others from
     /// where one is.
-    pub fn show(&mut self, content: Content, space: Arc<Space>) {
+    ///
+    /// Returns what was shown before: letting go of it may take a while.
+    pub fn show(&mut self, content: Content, space: Arc<Space>) -> Option<Content> {
         if self.space.is_none() {
             if let Some(first) = space.stops.first() {
                 self.pose = first.view.camera_from_world;
@@ -216,9 +218,9 @@ impl State {
             }
         }
         self.space = Some(space);
-        self.content = Some(content);
         // Its pictures differ.
         self.asked = None;
+        self.content.replace(content)
     }
 
     /// What is known of the space one moves in.
@@ -683,7 +685,7 @@ mod tests {
     impl State {
         fn show_alone(&mut self, content: Content) {
             let space = Arc::new(Space::of(&content));
-            self.show(content, space);
+            let _ = self.show(content, space);
         }
     }
 

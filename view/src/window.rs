@@ -13,11 +13,12 @@ use crate::state::{Action, Button, State};
 use crate::trace::Trace;
 use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
-use egui::{Color32, Rect, TextureHandle, TextureOptions, pos2};
+use egui::{Color32, Rect, TextureHandle, TextureOptions, TexturesDelta, pos2};
 use render::path::{KeyframeFile, write_keyframes};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
@@ -72,6 +73,8 @@ enum Event {
 const FRAME: Duration = Duration::from_millis(8);
 /// How long closing waits for the picture that is just being drawn.
 const PATIENCE: Duration = Duration::from_millis(150);
+/// The longest side of egui's textures, in texels. With another, fonts would be read again.
+const TEXTURE_SIDE: usize = 8192;
 /// A device that is lost more often is not opened again.
 const MOST_LOSSES: u32 = 5;
 /// So near, in pixels, the wipe is taken hold of.
@@ -141,6 +144,8 @@ struct Pane {
     input: egui_winit::State,
     picture: Option<TextureHandle>,
     photo: Option<TextureHandle>,
+    /// What is to be brought to the device before the next frame's.
+    textures: TexturesDelta,
 }
 
 impl Drop for Pane {
@@ -148,6 +153,7 @@ impl Drop for Pane {
         (self.picture, self.photo) = (None, None);
         // egui insists that nothing is left to be done.
         self.context.tex_manager().write().take_delta().clear();
+        self.textures.clear();
     }
 }
 
@@ -174,6 +180,8 @@ struct App {
     /// egui wants another frame soon.
     wants_frame: bool,
     error: Option<ViewError>,
+    /// Fonts being read.
+    warm: Option<JoinHandle<(egui::Context, TexturesDelta)>>,
 }
 
 impl App {
@@ -208,6 +216,7 @@ impl App {
             losses: 0,
             wants_frame: false,
             error: None,
+            warm: Some(std::thread::spawn(warm_context)),
         }
     }
 
@@ -224,15 +233,17 @@ impl App {
     ) -> Result<(), ViewError> {
         let screen = Screen::open(&window, event_loop.owned_display_handle());
         let screen = screen.map_err(ViewError::NoDevice)?;
-        let context = egui::Context::default();
-        context.set_theme(egui::Theme::Dark);
+        let (context, textures) = match self.warm.take().map(JoinHandle::join) {
+            Some(Ok(warm)) => warm,
+            _ => warm_context(),
+        };
         let input = egui_winit::State::new(
             context.clone(),
             egui::ViewportId::ROOT,
             &window,
             Some(window.scale_factor() as f32),
             None,
-            Some(screen.max_texture_side()),
+            Some(screen.max_texture_side().min(TEXTURE_SIDE)),
         );
         let size = window.inner_size();
         self.state.resize(size.width, size.height);
@@ -245,6 +256,7 @@ impl App {
             input,
             picture: None,
             photo: None,
+            textures,
         });
         self.show_picture();
         self.redraw();
@@ -287,7 +299,9 @@ impl App {
                     Content::Interior(house) => Some(Plan::new(house)),
                     Content::Scene(_) => None,
                 };
-                self.state.show(content.clone(), Arc::clone(&space));
+                let before = self.state.show(content.clone(), Arc::clone(&space));
+                // Gigabytes of photos may go with it.
+                std::thread::spawn(move || drop(before));
                 self.worker.show(content, space, self.revision);
             }
             Event::News(News::Shown(shown)) => {
@@ -488,12 +502,14 @@ impl App {
         let tessellate_ms = ms_since(start);
         // 3. It is painted.
         let start = Instant::now();
-        pane.screen.upload(&output.textures_delta);
+        let mut textures = std::mem::take(&mut pane.textures);
+        textures.append(std::mem::take(&mut output.textures_delta));
+        pane.screen.upload(&textures);
         let upload_ms = ms_since(start);
         let start = Instant::now();
         let presented = pane.screen.present(&primitives, pixels_per_point);
-        pane.screen.free(&output.textures_delta);
-        output.textures_delta.clear();
+        pane.screen.free(&textures);
+        textures.clear();
         let draw_ms = ms_since(start);
         self.frames += 1;
         let steps = [
@@ -602,6 +618,25 @@ impl App {
         self.worker.end(PATIENCE);
         event_loop.exit();
     }
+}
+
+/// Panels that have their fonts: reading them takes longer than a frame may.
+fn warm_context() -> (egui::Context, TexturesDelta) {
+    let context = egui::Context::default();
+    context.set_theme(egui::Theme::Dark);
+    let all: String = (' '..='~').collect();
+    let input = egui::RawInput {
+        max_texture_side: Some(TEXTURE_SIDE),
+        ..egui::RawInput::default()
+    };
+    let mut output = context.run_pass(input, |context| {
+        egui::Area::new(egui::Id::unique("all")).show(context, |ui| {
+            ui.heading(&all);
+            ui.label(&all);
+            ui.label(egui::RichText::new(&all).size(12.0));
+        });
+    });
+    (context, std::mem::take(&mut output.textures_delta))
 }
 
 fn ms_since(start: Instant) -> f64 {

@@ -239,7 +239,13 @@ impl<'s> Desk<'s> {
         let mut drawer = SceneDrawer::new(lumigraph, space, self.options.no_skip);
         let mut notes = engine.notes().len();
         let mut gone = None;
+        // Of what comes later there is a picture on the screen already.
+        let mut is_first = self.revision <= 1;
         self.serve(|tell, request, reduction| {
+            if let (true, Some(preview)) = (is_first, drawer.preview(request)) {
+                tell(News::Shown(Box::new(preview)));
+            }
+            is_first = false;
             let drawn = drawer.draw(engine, request, reduction);
             for note in engine.notes().iter().skip(notes) {
                 tell(News::Trouble(note.clone()));
@@ -446,6 +452,7 @@ mod tests {
         let News::Shown(shown) = wait() else {
             panic!("a picture");
         };
+        // From elsewhere than the first photo there is no preview.
         assert_eq!((shown.id, shown.revision, shown.reduction), (1, 1, 1));
         let support = shown.support.unwrap();
         assert!(support.share() > 0.9, "{support:?}");
@@ -469,6 +476,18 @@ mod tests {
         let expected = engine.render(&frame, render::Method::TRIANGULATED).unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), expected);
         worker.end(Duration::from_secs(10));
+    }
+
+    #[test]
+    fn the_first_photo_is_there_before_any_other() {
+        let lumigraph = wall(0);
+        let space = Space::of_scene(&lumigraph);
+        let drawer = SceneDrawer::new(&lumigraph, &space, false);
+        assert!(drawer.preview(&request(1, 0.5)).is_none());
+        let shown = drawer.preview(&request(1, 1.0)).unwrap();
+        assert_eq!((shown.image.size, shown.reduction), ([20, 15], 2));
+        assert_eq!(shown.image.pixels[0].r(), 50);
+        assert_eq!(lumigraph.photos.decoded(), 1);
     }
 
     #[test]
