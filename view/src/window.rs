@@ -246,7 +246,7 @@ impl App {
             Some(screen.max_texture_side().min(TEXTURE_SIDE)),
         );
         let size = window.inner_size();
-        self.state.resize(size.width, size.height);
+        resize(&mut self.state, &screen, size);
         let points = size.width as f32 / window.scale_factor() as f32;
         self.shows.get_or_insert_with(|| Shows::fitting(points));
         self.pane = Some(Pane {
@@ -620,6 +620,12 @@ impl App {
     }
 }
 
+/// Pictures are as large as the window, or as a texture may be.
+fn resize(state: &mut State, screen: &Screen, size: winit::dpi::PhysicalSize<u32>) {
+    let most = screen.max_texture_side().min(TEXTURE_SIDE) as u32;
+    state.resize(size.width.min(most), size.height.min(most));
+}
+
 /// Panels that have their fonts: reading them takes longer than a frame may.
 fn warm_context() -> (egui::Context, TexturesDelta) {
     let context = egui::Context::default();
@@ -780,7 +786,7 @@ impl App {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
             WindowEvent::Resized(size) => {
                 pane.screen.resize(size.width, size.height);
-                self.state.resize(size.width, size.height);
+                resize(&mut self.state, &pane.screen, size);
             }
             WindowEvent::Focused(false) => self.state.let_go(),
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
