@@ -181,3 +181,16 @@ pub(crate) fn place(of: Rect) -> Rect {
     let corner = pos2(of.left() + 10.0, of.bottom() - 10.0 - side);
     Rect::from_min_size(corner, vec2(side, side))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_leaves_most_of_the_picture_free() {
+        for size in [vec2(800.0, 600.0), vec2(320.0, 240.0), vec2(5000.0, 4000.0)] {
+            let rect = place(Rect::from_min_size(pos2(0.0, 0.0), size));
+            assert!(rect.width() <= 260.0 && rect.height() <= 0.35 * size.y);
+        }
+    }
+}

@@ -25,8 +25,10 @@ pub(crate) struct Screen {
 pub(crate) enum Presented {
     /// It is on the screen.
     Yes,
-    /// Not now: there is no place for it, or the surface changed; again soon.
+    /// Not now: there is no place for it.
     NotNow,
+    /// Not yet: the surface changed.
+    Again,
     /// The device is gone for good.
     Lost,
 }
@@ -158,7 +160,7 @@ impl Screen {
             }
             CurrentSurfaceTexture::Outdated => {
                 self.is_stale = true;
-                return Presented::NotNow;
+                return Presented::Again;
             }
             // A new surface needs a new instance all the same.
             CurrentSurfaceTexture::Lost => return Presented::Lost,
