@@ -388,6 +388,7 @@ fn traced_times_are_there(trace: &Path) {
         for step in ["events", "step", "panels", "tessellate"] {
             longest = longest.max(frame["steps_ms"][step].as_f64().unwrap());
         }
+        assert!(frame["cpu_ms"].as_f64().unwrap() > 0.0);
         assert!(frame["draw_ms"].as_f64().unwrap() >= 0.0);
     }
     assert!(longest > 0.0);

@@ -15,6 +15,7 @@ use crate::state::State;
 use crate::trace::Trace;
 use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
+use cpu_time::ThreadTime;
 use egui::TextureHandle;
 use paint::paint;
 use pane::{Pane, Warm, warm_context};
@@ -265,7 +266,7 @@ impl App {
     /// One frame.
     fn draw(&mut self, event_loop: &ActiveEventLoop) {
         // 1. Time passes.
-        let now = Instant::now();
+        let (now, cpu) = (Instant::now(), ThreadTime::now());
         let seconds = (now - self.last_frame).as_secs_f64();
         self.last_frame = now;
         self.state.step(seconds);
@@ -305,6 +306,8 @@ impl App {
         let pixels_per_point = output.pixels_per_point;
         let primitives = pane.context.tessellate(output.shapes, pixels_per_point);
         let tessellate_ms = ms_since(start);
+        // Without what other threads had of this core meanwhile.
+        let cpu_ms = 1e3 * cpu.elapsed().as_secs_f64();
         // 3. It is painted.
         let start = Instant::now();
         let mut textures = std::mem::take(&mut pane.textures);
@@ -327,7 +330,7 @@ impl App {
         self.status.step_ms = steps.iter().map(|s| s.1).fold(0.0, f64::max);
         self.status.draw_ms = upload_ms + draw_ms;
         if presented == Presented::Yes {
-            self.trace_frame(&steps, upload_ms, draw_ms);
+            self.trace_frame(&steps, cpu_ms, [upload_ms, draw_ms]);
         }
         let start = Instant::now();
         for command in commands {
@@ -367,7 +370,7 @@ impl App {
         }
     }
 
-    fn trace_frame(&self, steps: &[(&str, f64)], upload_ms: f64, draw_ms: f64) {
+    fn trace_frame(&self, steps: &[(&str, f64)], cpu_ms: f64, [upload_ms, draw_ms]: [f64; 2]) {
         let Some(trace) = &self.trace else {
             return;
         };
@@ -413,6 +416,7 @@ impl App {
             "said": self.status.said,
             "losses": self.losses,
             "steps_ms": steps,
+            "cpu_ms": cpu_ms,
             "upload_ms": upload_ms,
             "draw_ms": draw_ms,
         }));
@@ -422,6 +426,7 @@ impl App {
         if let Some(pane) = &self.pane {
             pane.window.set_visible(false);
         }
+        self.trace = None;
         self.worker.end(PATIENCE);
         event_loop.exit();
     }
