@@ -201,9 +201,7 @@ impl PathFrame {
             extra: Map::new(),
         })
     }
-}
 
-impl PathFrame {
     /// A frame of a view, as [`Self::new`] makes it.
     ///
     /// # Errors
