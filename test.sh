@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change goes in: formatting, lints, documentation and
-# all tests, those on the graphics device, by Vulkan and by OpenGL, and with COLMAP and ffmpeg
-# included. On Debian and Ubuntu it installs what is missing of these two and of the software
-# drivers.
+# all tests, those on the graphics device, by Vulkan and by OpenGL, with COLMAP and ffmpeg, and in
+# a window on a virtual screen included. On Debian and Ubuntu it installs what is missing of these
+# programs and of the software drivers.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -32,12 +32,24 @@ has_opengl() {
         grep -E 'libEGL_(mesa|nvidia)\.so\.0' <<<"$libraries" >/dev/null
 }
 
+has_x11() {
+    # What the window looks for when it is opened.
+    local libraries name
+    libraries=$(ldconfig -p 2>/dev/null || /sbin/ldconfig -p)
+    for name in libX11 libX11-xcb libXcursor libXi libxkbcommon libxkbcommon-x11; do
+        grep "$name\.so" <<<"$libraries" >/dev/null || return
+    done
+}
+
 install_missing() {
     local missing=() as_root=()
     has_vulkan_driver && has_vulkan_loader || missing+=(mesa-vulkan-drivers libvulkan1)
     has_opengl || missing+=(libegl1 libegl-mesa0 libgl1-mesa-dri)
     command -v colmap >/dev/null || missing+=(colmap)
     command -v ffmpeg >/dev/null || missing+=(ffmpeg)
+    command -v Xvfb >/dev/null || missing+=(xvfb)
+    command -v xdotool >/dev/null || missing+=(xdotool)
+    has_x11 || missing+=(libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon0 libxkbcommon-x11-0)
     if [ ${#missing[@]} -eq 0 ]; then return; fi
     step "installing ${missing[*]}"
     if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
@@ -59,6 +71,11 @@ step "fuzz targets"
 cargo fmt --manifest-path fuzz/Cargo.toml --check
 CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}" \
     cargo check --manifest-path fuzz/Cargo.toml --no-default-features --features renderer --all-targets
+
+step "without the window"
+cargo clippy --no-default-features -- -D warnings
+without=$(cargo tree --no-default-features -e normal --prefix none)
+if grep -E '^(winit|egui)' <<<"$without"; then exit 1; fi
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// Whether photos are brought to one exposure.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct ExposureArgs {
     /// Blend photos as they were exposed, without matching them
     #[arg(long)]

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 pub(super) struct ViewArgs {
-    /// The views of a COLMAP model, or of a path file
+    /// The views of a COLMAP model, of a path file, or of a screenshot of `view`
     #[arg(long, value_name = "MODEL|FILE")]
     views: Option<PathBuf>,
     /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
@@ -114,9 +114,15 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
     Ok(views)
 }
 
-/// The frames of a path file.
+/// The frames of a path file, or the one that a screenshot was taken of.
 fn of_file(file: &Path) -> anyhow::Result<Vec<NamedView>> {
-    Ok(named(path::read(file)?))
+    let is_shot = file
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    Ok(named(match is_shot {
+        true => path::read_shot(file)?,
+        false => path::read(file)?,
+    }))
 }
 
 fn named(path: CameraPath) -> Vec<NamedView> {

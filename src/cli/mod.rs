@@ -27,6 +27,8 @@ mod session;
 mod surface;
 mod time;
 mod uncalibrated;
+#[cfg(feature = "window")]
+mod view;
 mod walk;
 
 use clap::error::ErrorKind;
@@ -61,6 +63,8 @@ enum Command {
     Interior(interior::Args),
     Plan(plan::Args),
     Walk(walk::Args),
+    #[cfg(feature = "window")]
+    View(view::Args),
     Generate(generate::Args),
 }
 
@@ -108,6 +112,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Walk(args) => walk::run(&args),
+        #[cfg(feature = "window")]
+        Command::View(args) => view::run(&args),
         Command::Generate(args) => generate::run(&args),
     }
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Which surface.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct ProxyArgs {
     /// plane, dominant-plane, view-plane, tunnel, hull, points, carved, depth, dense, auto, or
     /// a file: a proxy's (.json, .ply, .glb) or a mesh (.gltf, .obj) [default: the scene's own, else
@@ -59,6 +59,12 @@ pub(super) fn fit(
 }
 
 impl ProxyArgs {
+    /// Whether none is asked for, so that a scene's own is taken.
+    #[cfg(feature = "window")]
+    pub(super) fn is_default(&self) -> bool {
+        self.proxy.is_none()
+    }
+
     /// The proxy asked for. A fitted one rests on none of the photos in `without`.
     pub(super) fn choose(
         &self,

@@ -27,3 +27,5 @@ mod time;
 mod turntable;
 mod uncalibrated;
 mod undistort;
+#[cfg(feature = "window")]
+mod view;

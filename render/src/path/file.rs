@@ -102,11 +102,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
     let camera_path = match (stored.frames, stored.keyframes) {
         (Some(frames), None) => read_frames(stored.fps, frames),
         (None, Some(keyframes)) => {
-            let interpolation = match stored.interpolation {
-                Some(StoredInterpolation::Linear) => Interpolation::Linear,
-                Some(StoredInterpolation::Spline) | None => Interpolation::Spline,
-            };
-            read_keyframes(keyframes)
+            let interpolation = interpolation_of(stored.interpolation);
+            keyframes_of(keyframes)
                 .and_then(|k| CameraPath::from_keyframes(&k, interpolation, stored.fps))
         }
         (None, None) => return Err(PathFileError::Content(path.to_owned(), "neither")),
@@ -125,6 +122,21 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
 /// # Errors
 /// The file, and what is wrong with it or with the path.
 pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), PathFileError> {
+    let text = content(path, camera_path)?;
+    write_whole(path, &text)
+}
+
+/// What [`write()`] writes, for files of another kind that hold a path, such as a picture that knows
+/// where it was taken from.
+///
+/// # Errors
+/// What is wrong with the path.
+pub fn text(camera_path: &CameraPath) -> Result<String, PathFileError> {
+    content(Path::new("path"), camera_path)
+}
+
+/// `path` is only named in errors.
+fn content(path: &Path, camera_path: &CameraPath) -> Result<String, PathFileError> {
     // What could not be read is not written.
     CameraPath::new(camera_path.fps, camera_path.frames.clone())
         .map_err(|e| PathFileError::Path(path.to_owned(), e))?;
@@ -144,12 +156,105 @@ pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), PathFileError>
         text += &stored;
     }
     text += "\n]}\n";
+    Ok(text)
+}
 
+/// Keyframes as a file has them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyframeFile {
+    /// Frames per second of the path that they make.
+    pub fps: f64,
+    /// In order.
+    pub keyframes: Vec<Keyframe>,
+    /// What happens between them.
+    pub interpolation: Interpolation,
+}
+
+/// Reads a path's keyframes as they are, not sampled; `None` of a path that has frames instead.
+///
+/// # Errors
+/// As for [`read`].
+pub fn read_keyframes(path: &Path) -> Result<Option<KeyframeFile>, PathFileError> {
+    let bytes = std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))?;
+    // All that `read` finds wrong is wrong here.
+    let sampled = parse(path, &bytes)?;
+    let json = |e| PathFileError::Json(path.to_owned(), e);
+    let stored: Stored = serde_json::from_slice(&bytes).map_err(json)?;
+    let Some(keyframes) = stored.keyframes else {
+        return Ok(None);
+    };
+    let keyframes = keyframes_of(keyframes).map_err(|e| PathFileError::Path(path.to_owned(), e))?;
+    Ok(Some(KeyframeFile {
+        fps: sampled.fps,
+        keyframes,
+        interpolation: interpolation_of(stored.interpolation),
+    }))
+}
+
+/// Writes keyframes, one a line, in the way of [`write()`]. What [`read`] makes of them is what
+/// [`CameraPath::from_keyframes`] makes of these, bit for bit where their poses are those of
+/// frames (see [`PathFrame::new`]).
+///
+/// # Errors
+/// The file, and what is wrong with it or with the keyframes.
+pub fn write_keyframes(path: &Path, file: &KeyframeFile) -> Result<(), PathFileError> {
+    CameraPath::from_keyframes(&file.keyframes, file.interpolation, file.fps)
+        .map_err(|e| PathFileError::Path(path.to_owned(), e))?;
+    let json = |e| PathFileError::Json(path.to_owned(), e);
+    let fps = serde_json::to_string(&file.fps).map_err(json)?;
+    let interpolation = match file.interpolation {
+        Interpolation::Spline => "spline",
+        Interpolation::Linear => "linear",
+    };
+    let mut lines = Vec::new();
+    for keyframe in &file.keyframes {
+        let stored = StoredFrame {
+            name: None,
+            t_s: Some(keyframe.t_s),
+            camera_from_world: rows_of(&keyframe.camera_from_world),
+            width: keyframe.camera.width,
+            height: keyframe.camera.height,
+            model: keyframe.camera.model.name().to_owned(),
+            params: keyframe.camera.params.clone(),
+            time_s: keyframe.time_s,
+            extra: Map::new(),
+        };
+        lines.push(serde_json::to_string(&stored).map_err(json)?);
+    }
+    let text = format!(
+        "{{\"version\": 1,\n\"fps\": {fps},\n\"interpolation\": \"{interpolation}\",\n\
+         \"keyframes\": [\n{}\n]}}\n",
+        lines.join(",\n")
+    );
+    write_whole(path, &text)
+}
+
+fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> {
     let io = |e| PathFileError::Io(path.to_owned(), e);
     let mut temporary = path.as_os_str().to_owned();
     temporary.push(".tmp");
     std::fs::write(&temporary, text).map_err(io)?;
     std::fs::rename(&temporary, path).map_err(io)
+}
+
+fn interpolation_of(stored: Option<StoredInterpolation>) -> Interpolation {
+    match stored {
+        Some(StoredInterpolation::Linear) => Interpolation::Linear,
+        Some(StoredInterpolation::Spline) | None => Interpolation::Spline,
+    }
+}
+
+/// A pose as a 4 × 4 matrix, row by row.
+fn rows_of(pose: &Rigid3) -> Vec<f64> {
+    let [x, y, z] = pose.matrix().transpose().to_cols_array_2d();
+    let t = pose.translation;
+    let rows = [
+        [x[0], x[1], x[2], t.x],
+        [y[0], y[1], y[2], t.y],
+        [z[0], z[1], z[2], t.z],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    rows.concat()
 }
 
 fn read_frames(fps: f64, frames: Vec<Value>) -> Result<CameraPath, PathError> {
@@ -172,7 +277,7 @@ fn read_frames(fps: f64, frames: Vec<Value>) -> Result<CameraPath, PathError> {
     CameraPath::new(fps, frames?)
 }
 
-fn read_keyframes(keyframes: Vec<Value>) -> Result<Vec<Keyframe>, PathError> {
+fn keyframes_of(keyframes: Vec<Value>) -> Result<Vec<Keyframe>, PathError> {
     let kind = "keyframe";
     let keyframe = |(index, value): (usize, Value)| {
         let stored = StoredFrame::from_value(kind, index, value)?;
@@ -192,19 +297,10 @@ fn read_keyframes(keyframes: Vec<Value>) -> Result<Vec<Keyframe>, PathError> {
 
 impl StoredFrame {
     fn of(frame: &PathFrame) -> Self {
-        let pose = &frame.view.camera_from_world;
-        let [x, y, z] = pose.matrix().transpose().to_cols_array_2d();
-        let t = pose.translation;
-        let rows = [
-            [x[0], x[1], x[2], t.x],
-            [y[0], y[1], y[2], t.y],
-            [z[0], z[1], z[2], t.z],
-            [0.0, 0.0, 0.0, 1.0],
-        ];
         Self {
             name: Some(frame.name.clone()),
             t_s: None,
-            camera_from_world: rows.concat(),
+            camera_from_world: rows_of(&frame.view.camera_from_world),
             width: frame.camera.width,
             height: frame.camera.height,
             model: frame.camera.model.name().to_owned(),

@@ -1,9 +1,13 @@
 //! Camera paths: the desired views of a film or a list of pictures, frame by frame.
 
 mod file;
+mod shot;
 mod spline;
 
-pub use file::{PathFileError, parse, read, write};
+pub use file::{
+    KeyframeFile, PathFileError, parse, read, read_keyframes, text, write, write_keyframes,
+};
+pub use shot::{SHOT_KEYWORD, ShotError, read_shot, write_shot};
 pub(crate) use spline::{Curve, mean_rotation};
 
 use calibrate::{Camera, CameraError, ModelKind, Rigid3, View};
@@ -196,6 +200,15 @@ impl PathFrame {
             time_s,
             extra: Map::new(),
         })
+    }
+
+    /// A frame of a view, as [`Self::new`] makes it.
+    ///
+    /// # Errors
+    /// The lens is no camera's.
+    pub fn of_view(name: String, view: &View) -> Result<Self, CameraError> {
+        let camera = Camera::of(&view.lens, view.width, view.height);
+        Self::new(name, camera, view.camera_from_world, None)
     }
 }
 

@@ -137,6 +137,45 @@ fn keyframes_in_files_are_sampled() {
 }
 
 #[test]
+fn keyframes_come_back_as_they_were_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.json");
+    let settled = |k: Keyframe| {
+        let (camera, pose) = (k.camera.clone(), k.camera_from_world);
+        let frame = PathFrame::new("a".to_owned(), camera, pose, None).unwrap();
+        Keyframe {
+            camera_from_world: frame.view.camera_from_world,
+            ..k
+        }
+    };
+    let centers = [DVec3::ZERO, DVec3::new(1e5, 0.1, -7.0), DVec3::ONE];
+    let keys = centers.iter().zip(0..);
+    let keyframes: Vec<Keyframe> = keys
+        .map(|(c, i)| settled(key(f64::from(i) / 3.0, *c, 0.7 * f64::from(i))))
+        .collect();
+    for interpolation in [Interpolation::Spline, Interpolation::Linear] {
+        let file = KeyframeFile {
+            fps: 24.0,
+            keyframes: keyframes.clone(),
+            interpolation,
+        };
+        write_keyframes(&path, &file).unwrap();
+        assert_eq!(read_keyframes(&path).unwrap(), Some(file));
+        let sampled = CameraPath::from_keyframes(&keyframes, interpolation, 24.0).unwrap();
+        assert_eq!(read(&path).unwrap(), sampled);
+    }
+    // A path of frames has none, and none make no file.
+    write(&path, &read_text(&frames(&good_frame("")))).unwrap();
+    assert_eq!(read_keyframes(&path).unwrap(), None);
+    let none = KeyframeFile {
+        fps: 24.0,
+        keyframes: Vec::new(),
+        interpolation: Interpolation::Spline,
+    };
+    assert!(write_keyframes(&path, &none).is_err());
+}
+
+#[test]
 fn bad_files_are_named() {
     let bad = |frame_text: String| message(&frames(&format!("{}, {frame_text}", good_frame(""))));
     assert_eq!(

@@ -1,0 +1,484 @@
+//! `lumigraph view` in a real window on a virtual screen, with real keys and a real mouse.
+
+use crate::run::{lumigraph, with_wall};
+use calibrate::{Camera, Lens, Rigid3};
+use glam::{DVec2, DVec3};
+use image::{Rgba, RgbaImage};
+use proxy::interior::{Interior, Portal, read_interior};
+use render::path::{Interpolation, Keyframe, KeyframeFile, PathFrame, write_keyframes};
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// More than anything takes, even on a machine that does much else.
+const PATIENCE: Duration = Duration::from_secs(90);
+const SIZE: (u32, u32) = (320, 240);
+
+/// Whether a virtual screen, someone to type and someone to look at it are installed; where they
+/// are not, says so, or fails if the environment has `LUMIGRAPH_REQUIRE_TOOLS=1`.
+fn has_tools() -> bool {
+    let is_there = |name: &&str| {
+        let mut command = Command::new(name);
+        let command = command.arg("-version").stdout(Stdio::null());
+        command.stderr(Stdio::null()).status().is_ok()
+    };
+    let mut missing = ["Xvfb", "xdotool", "ffmpeg"]
+        .into_iter()
+        .filter(|n| !is_there(n));
+    let Some(name) = missing.next() else {
+        return true;
+    };
+    let required = std::env::var("LUMIGRAPH_REQUIRE_TOOLS").as_deref() == Ok("1");
+    assert!(
+        !required,
+        "LUMIGRAPH_REQUIRE_TOOLS is 1, but there is no {name}"
+    );
+    eprintln!("SKIPPED: {name} is not installed");
+    false
+}
+
+/// A virtual screen.
+struct Screen {
+    server: Child,
+    name: String,
+}
+
+impl Screen {
+    fn open() -> Self {
+        // It chooses a number that is free, and says so.
+        let mut server = Command::new("Xvfb")
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "400x300x24",
+                "-nolisten",
+                "tcp",
+            ])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut number = String::new();
+        let mut said = BufReader::new(server.stdout.take().unwrap());
+        said.read_line(&mut number).unwrap();
+        let name = format!(":{}", number.trim());
+        Self { server, name }
+    }
+
+    fn do_all(&self, words: &str) {
+        let status = Command::new("xdotool")
+            .args(words.split(' '))
+            .env("DISPLAY", &self.name)
+            .stdout(Stdio::null())
+            .status()
+            .unwrap();
+        assert!(status.success(), "xdotool {words}");
+    }
+
+    /// What is on the screen where the window is.
+    fn look(&self, folder: &Path) -> RgbaImage {
+        let file = folder.join("screen.png");
+        let size = format!("{}x{}", SIZE.0, SIZE.1);
+        let mut command = Command::new("ffmpeg");
+        command.args([
+            "-loglevel",
+            "error",
+            "-y",
+            "-f",
+            "x11grab",
+            "-draw_mouse",
+            "0",
+        ]);
+        command.args(["-video_size", &size, "-i", &self.name, "-frames:v", "1"]);
+        assert!(command.arg(&file).status().unwrap().success());
+        image::open(&file).unwrap().into_rgba8()
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// The program with its window.
+struct Window<'s> {
+    screen: &'s Screen,
+    program: Child,
+    trace: PathBuf,
+    /// Lines of the trace that were read.
+    read: usize,
+}
+
+impl<'s> Window<'s> {
+    fn open(screen: &'s Screen, folder: &Path, line: &str) -> Self {
+        let trace = folder.join("trace.jsonl");
+        // Of a window before.
+        let _ = std::fs::remove_file(&trace);
+        let program = Command::new(env!("CARGO_BIN_EXE_lumigraph"))
+            .current_dir(folder)
+            .args(line.split(' '))
+            .args([
+                "--device",
+                "cpu",
+                "--size",
+                "320x240",
+                "--trace",
+                "trace.jsonl",
+            ])
+            .env("DISPLAY", &screen.name)
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .spawn()
+            .unwrap();
+        let mut window = Self {
+            screen,
+            program,
+            trace,
+            read: 0,
+        };
+        window.wait("a picture in full", |frame| {
+            is_settled(frame) && frame["doing"].is_null()
+        });
+        screen.do_all("search --sync --name lumigraph windowfocus --sync");
+        window
+    }
+
+    /// Waits for a frame after those that were waited for before.
+    #[track_caller]
+    fn wait(&mut self, what: &str, is_it: impl Fn(&Value) -> bool) -> Value {
+        let start = Instant::now();
+        let mut last = Value::Null;
+        while start.elapsed() < PATIENCE {
+            let text = std::fs::read_to_string(&self.trace).unwrap_or_default();
+            // The last line may not be complete.
+            let complete = text.rsplit_once('\n').map_or("", |(complete, _)| complete);
+            for line in complete.lines().skip(self.read) {
+                self.read += 1;
+                last = serde_json::from_str(line).unwrap();
+                if is_it(&last) {
+                    return last;
+                }
+            }
+            if let Some(status) = self.program.try_wait().unwrap() {
+                panic!("waiting for {what}: the program ended, {status}");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        panic!("waited for {what}; the last frame was {last}");
+    }
+
+    fn key(&self, keys: &str) {
+        self.screen.do_all(&format!("key {keys}"));
+    }
+
+    /// Takes a screenshot; its file's name.
+    #[track_caller]
+    fn shoot(&mut self, number: u32) -> String {
+        let name = format!("shot_{number:04}.png");
+        self.key("p");
+        self.wait(&name, |f| says(f, &name));
+        name
+    }
+
+    fn close(mut self) -> ExitStatus {
+        self.key("Escape");
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.program.try_wait().unwrap() {
+                return status;
+            }
+            assert!(start.elapsed() < PATIENCE, "it does not close");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Window<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+fn is_settled(frame: &Value) -> bool {
+    frame["picture"]["is_settled"] == true
+}
+
+fn says(frame: &Value, text: &str) -> bool {
+    frame["said"]
+        .as_str()
+        .is_some_and(|said| said.contains(text))
+}
+
+fn triple(frame: &Value, key: &str) -> DVec3 {
+    let at = |i: usize| frame[key][i].as_f64().unwrap();
+    DVec3::new(at(0), at(1), at(2))
+}
+
+fn pixels(path: &Path) -> RgbaImage {
+    image::open(path).unwrap().into_rgba8()
+}
+
+/// The mean difference of colours in columns of two pictures, in steps of 255.
+fn difference(a: &RgbaImage, b: &RgbaImage, columns: std::ops::Range<u32>) -> f64 {
+    let rows = 0..a.height();
+    let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let off = |p: &Rgba<u8>, q: &Rgba<u8>| -> u32 {
+        (0..3).map(|c| u32::from(p.0[c].abs_diff(q.0[c]))).sum()
+    };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (x, y) in all {
+        sum += f64::from(off(a.get_pixel(x, y), b.get_pixel(x, y))) / 3.0;
+        count += 1.0;
+    }
+    sum / count
+}
+
+/// A pose that its file gives back to the last bit.
+fn keyframe(t_s: f64, eye: DVec3, ahead: DVec3, up: DVec3) -> Keyframe {
+    let (width, height) = SIZE;
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    let lens = Lens::pinhole(DVec2::splat(0.7 * size.x), 0.5 * size);
+    let camera = Camera::of(&lens, width, height);
+    let pose = Rigid3::looking_at(eye, eye + ahead, up);
+    let frame = PathFrame::new("a".to_owned(), camera.clone(), pose, None).unwrap();
+    Keyframe {
+        t_s,
+        camera_from_world: frame.view.camera_from_world,
+        camera,
+        time_s: None,
+    }
+}
+
+#[test]
+fn without_a_display_one_line_says_what_to_do() {
+    let folder = with_wall();
+    let output = Command::new(env!("CARGO_BIN_EXE_lumigraph"))
+        .current_dir(folder.path())
+        .args(["view", "wall", "--proxy", "plane"])
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.starts_with("error: no display to open a window on"),
+        "{said}"
+    );
+    assert_eq!(said.lines().count(), 1, "{said}");
+    // What is wrong with the data is said first.
+    let error = lumigraph(folder.path(), "view nothing").error(1);
+    assert!(error.contains("nothing"), "{error}");
+    let error = lumigraph(folder.path(), "view wall --portals mirrors");
+    assert_eq!(error.code, 2, "{}", error.stderr);
+}
+
+#[test]
+fn a_capture_is_looked_at_and_filmed() {
+    if !has_tools() {
+        return;
+    }
+    let folder = with_wall();
+    let here = folder.path();
+    let screen = Screen::open();
+    let mut window = Window::open(&screen, here, "view wall --proxy plane -o out");
+    // It begins at the first photo, and `render` draws the same picture.
+    let shot = window.shoot(1);
+    let line = "render wall --proxy plane --views out/shot_0001.png -o again";
+    lumigraph(here, line).ok();
+    let first = pixels(&here.join("out").join(&shot));
+    assert_eq!(first.dimensions(), SIZE);
+    assert!(
+        first == pixels(&here.join("again").join(&shot)),
+        "not the same picture"
+    );
+    let photo = |name: &str| {
+        let photo = pixels(&here.join("wall/images").join(name));
+        image::imageops::resize(
+            &photo,
+            SIZE.0,
+            SIZE.1,
+            image::imageops::FilterType::Triangle,
+        )
+    };
+    let off = difference(&first, &photo("0000.png"), 8..312);
+    assert!(off < 6.0, "not the first photo: {off}");
+    // The next camera, and a wipe to its photo over the field in colours.
+    window.key("n");
+    window.wait("the second camera", |f| is_settled(f) && f["stop"] == 1);
+    window.key("f o");
+    window.wait("the wipe", |f| is_settled(f) && f["picture"]["photo"] == 1);
+    let seen = screen.look(here);
+    let (left, right) = (
+        difference(&seen, &photo("0001.png"), 8..150),
+        difference(&seen, &photo("0001.png"), 170..312),
+    );
+    assert!(right < 6.0 && left > 20.0, "{left} {right}");
+    window.key("f o");
+    let before = window.wait("no wipe", |f| {
+        is_settled(f) && f["picture"]["photo"].is_null()
+    });
+    // Dragging goes around, the wheel goes nearer.
+
+    screen.do_all("mousemove 160 120 mousedown 1 mousemove 190 125 mouseup 1");
+    let around = window.wait("going around", |f| {
+        is_settled(f) && triple(f, "center").distance(triple(&before, "center")) > 0.1
+    });
+    assert!(triple(&around, "forward").dot(triple(&before, "forward")) < 0.995);
+    screen.do_all("click 4");
+    let near = window.wait("going nearer", |f| {
+        is_settled(f) && triple(f, "center").distance(triple(&around, "center")) > 0.1
+    });
+    let way = triple(&near, "center") - triple(&around, "center");
+    assert!(way.normalize().dot(triple(&around, "forward")) > 0.9);
+    // A path through two cameras, saved, and back to its beginning.
+    window.key("k");
+    window.key("r");
+    window.wait("a camera", |f| is_settled(f) && !f["stop"].is_null());
+    window.key("k");
+    window.key("ctrl+s");
+    window.wait("the path", |f| says(f, "path.json") && f["keyframes"] == 2);
+    window.key("bracketleft");
+    window.wait("the beginning", |f| {
+        is_settled(f) && triple(f, "center").distance(triple(&near, "center")) < 1e-9
+    });
+    let shot = window.shoot(2);
+    window.key("space");
+    window.wait("the film", |f| f["is_playing"] == true);
+    window.wait("its end", |f| f["is_playing"] == false && is_settled(f));
+    let last = window.shoot(3);
+    let line = "render wall --proxy plane --path out/path.json -o film";
+    lumigraph(here, line).ok();
+    let filmed = |name: &str| pixels(&here.join("film").join(name));
+    let shown = |name: &str| pixels(&here.join("out").join(name));
+    assert!(
+        shown(&shot) == filmed("frame_0000.png"),
+        "the beginning differs"
+    );
+    assert!(shown(&last) == filmed("frame_0060.png"), "the end differs");
+    // What windows go through: another size, out of sight, a device that is lost.
+    screen.do_all("search --name lumigraph windowsize 200 1");
+    window.wait("a sliver", |f| f["size"] == serde_json::json!([200, 1]));
+    screen.do_all("search --name lumigraph windowsize 200 150");
+    window.wait("another size", |f| is_settled(f) && f["size"][1] == 150);
+    window.key("ctrl+F12");
+    window.wait("another device", |f| is_settled(f) && f["losses"] == 1);
+    screen.do_all("search --name lumigraph windowunmap windowmap --sync windowfocus --sync");
+    window.key("n");
+    window.wait("it back", |f| is_settled(f) && !f["stop"].is_null());
+    assert!(window.close().success());
+    traced_times_are_there(&here.join("trace.jsonl"));
+}
+
+/// How long is not asserted: machines differ.
+fn traced_times_are_there(trace: &Path) {
+    let text = std::fs::read_to_string(trace).unwrap();
+    let mut longest = 0.0_f64;
+    for line in text.lines() {
+        let frame: Value = serde_json::from_str(line).unwrap();
+        for step in ["events", "step", "panels", "tessellate"] {
+            longest = longest.max(frame["steps_ms"][step].as_f64().unwrap());
+        }
+        assert!(frame["cpu_ms"].as_f64().unwrap() > 0.0);
+        assert!(frame["draw_ms"].as_f64().unwrap() >= 0.0);
+    }
+    assert!(longest > 0.0);
+}
+
+/// A door that leads from room to room.
+fn door(interior: &Interior) -> &Portal {
+    let is_door = |p: &&Portal| {
+        let corners = p.polygon.corners();
+        p.cells.iter().all(Option::is_some)
+            && corners.iter().any(|c| c.dot(interior.up).abs() < 1e-6)
+    };
+    interior.portals.iter().find(is_door).unwrap()
+}
+
+fn with_house() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "generate house --rooms 2 --triangles 1 -o house";
+    lumigraph(folder.path(), line).ok();
+    folder
+}
+
+#[test]
+fn a_house_is_walked_through() {
+    if !has_tools() {
+        return;
+    }
+    let folder = with_house();
+    let here = folder.path();
+    let (interior, _) = read_interior(&here.join("house/interior.json")).unwrap();
+    // Before a door, and before the wall beside it.
+    let (portal, up) = (door(&interior), interior.up);
+    let name = |i: usize| interior.cell(portal.cells[i].unwrap()).name.clone();
+    let normal = portal.polygon.normal();
+    let (center, along) = (portal.polygon.center(), up.cross(normal));
+    let eye = center + up * (interior.eye_height - center.dot(up));
+    let aside = 0.5 * portal.width(up) + 0.4;
+    let before = |side: f64| eye + 0.7 * normal + side * along;
+    let keyframes = vec![
+        keyframe(0.0, before(0.0), -normal, up),
+        keyframe(2.0, before(aside), -normal, up),
+    ];
+    let file = KeyframeFile {
+        fps: 30.0,
+        keyframes,
+        interpolation: Interpolation::Linear,
+    };
+    write_keyframes(&here.join("path.json"), &file).unwrap();
+    let screen = Screen::open();
+    let line = "view house --path path.json -o out";
+    let mut window = Window::open(&screen, here, line);
+    let height = |point: DVec3| portal.polygon.height(point);
+    // Through the door.
+    window.key("bracketright");
+    window.wait("the door", |f| {
+        is_settled(f) && f["cell"] == name(0).as_str()
+    });
+    screen.do_all("keydown w");
+    let through = window.wait("the next room", |f| f["cell"] == name(1).as_str());
+    screen.do_all("keyup w");
+    assert!(height(triple(&through, "center")) < 0.0);
+    // Not through the wall.
+    window.key("bracketright");
+    let from = window.wait("the wall", |f| {
+        is_settled(f) && f["cell"] == name(0).as_str()
+    });
+    screen.do_all("keydown w");
+    let start = height(triple(&from, "center"));
+    window.wait("a wall that is near", |f| {
+        height(triple(f, "center")) < start - 0.3
+    });
+    let mut last = DVec3::NAN;
+    for _ in 0..50 {
+        let frame = window.wait("a frame", |_| true);
+        assert_eq!(frame["cell"], name(0).as_str());
+        last = triple(&frame, "center");
+        assert!(height(last) > 0.15, "{}", height(last));
+    }
+    screen.do_all("keyup w");
+    let frame = window.wait("rest", is_settled);
+    assert!(triple(&frame, "center").distance(last) < 0.05);
+    // And what is seen there is what `walk` draws.
+    let shot = window.shoot(1);
+    let pose = render::path::read_shot(&here.join("out").join(&shot)).unwrap();
+    render::path::write(&here.join("one.json"), &pose).unwrap();
+    lumigraph(here, "walk house --path one.json -o again").ok();
+    let again = pixels(&here.join("again").join(&shot));
+    assert!(
+        pixels(&here.join("out").join(&shot)) == again,
+        "not the same picture"
+    );
+    assert!(window.close().success());
+}

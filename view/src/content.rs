@@ -1,0 +1,224 @@
+//! What the window shows, and what moving about in it needs to know.
+
+use crate::walker::Obstacles;
+use calibrate::{Camera, Lens, Rigid3, View};
+use glam::{DVec2, DVec3};
+use proxy::Proxy;
+use proxy::interior::{CellId, Contents, Interior};
+use proxy::mesh::Model;
+use render::Lumigraph;
+use render::interior::tour;
+use std::sync::Arc;
+
+/// What the window shows.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// Photos over a proxy.
+    Scene(Arc<Lumigraph>),
+    /// Cells and portals.
+    Interior(Arc<House>),
+}
+
+/// An interior, its model, and what of it is in the way.
+#[derive(Debug)]
+pub struct House {
+    /// Its cells and portals.
+    pub interior: Interior,
+    /// What of the model each cell has.
+    pub contents: Contents,
+    /// The model.
+    pub model: Model,
+    /// What stops who walks.
+    pub obstacles: Obstacles,
+}
+
+impl House {
+    /// Finds what is in the way in an interior.
+    pub fn new(interior: Interior, contents: Contents, model: Model) -> Self {
+        let obstacles = Obstacles::new(&interior, &contents, &model);
+        Self {
+            interior,
+            contents,
+            model,
+            obstacles,
+        }
+    }
+}
+
+/// A place to go to by name: a photo's camera, or the middle of a room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
+    /// For people.
+    pub name: String,
+    /// Where it is, and with which lens: of a photo the photo's own.
+    pub view: View,
+}
+
+/// What moving about needs to know of a content.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Space {
+    /// Which way is up, in the world; unit length.
+    pub up: DVec3,
+    /// World units a second for who flies.
+    pub speed: f64,
+    /// How far away things are where nothing else says, in world units.
+    pub depth: f64,
+    /// Photos' cameras, or rooms.
+    pub stops: Vec<Stop>,
+    /// Whether one walks in it.
+    pub is_interior: bool,
+}
+
+/// The tour's own camera; see `lumigraph walk`.
+const ROOM_SIZE: (u32, u32) = (640, 512);
+const ROOM_FOCAL: f64 = 0.7;
+
+impl Space {
+    /// What moving about in a content needs to know.
+    pub fn of(content: &Content) -> Self {
+        match content {
+            Content::Scene(lumigraph) => Self::of_scene(lumigraph),
+            Content::Interior(house) => Self::of_house(house),
+        }
+    }
+
+    /// Of a scene.
+    pub fn of_scene(lumigraph: &Lumigraph) -> Self {
+        let views: Vec<&View> = lumigraph.sources.iter().map(|s| &s.view).collect();
+        let ups: DVec3 = views.iter().map(|v| v.up()).sum();
+        let count = views.len().max(1) as f64;
+        let middle = views.iter().map(|v| v.center()).sum::<DVec3>() / count;
+        let reach = |v: &&View| v.center().distance(middle);
+        let extent = views.iter().map(reach).fold(0.0, f64::max);
+        let depth =
+            typical_depth(lumigraph).unwrap_or(if extent > 0.0 { 2.0 * extent } else { 1.0 });
+        let stop = |s: &render::SourceView| Stop {
+            name: s.name.clone(),
+            view: s.view.clone(),
+        };
+        Self {
+            up: ups.try_normalize().unwrap_or(DVec3::NEG_Y),
+            // What is looked at should be reached in some five seconds, the cameras' region
+            // crossed in ten.
+            speed: 0.2 * depth.min((2.0 * extent).max(0.2 * depth)),
+            depth,
+            stops: lumigraph.sources.iter().map(stop).collect(),
+            is_interior: false,
+        }
+    }
+
+    fn of_house(house: &House) -> Self {
+        let up = house.interior.up;
+        let eye_height = house.interior.eye_height.abs().max(1e-9);
+        let lens = room_lens();
+        let (width, height) = ROOM_SIZE;
+        let view = |camera_from_world: Rigid3| View {
+            lens,
+            width,
+            height,
+            camera_from_world,
+        };
+        // The first room as the tour enters it.
+        let camera = Camera::of(&lens, width, height);
+        let toured = tour(&house.interior, &house.contents, &camera, 64, 15.0);
+        let first = toured
+            .ok()
+            .map(|path| path.frames[0].view.camera_from_world);
+        let first_cell = first.and_then(|pose| {
+            let eye = pose.center();
+            house.contents.locate(&house.interior, eye)
+        });
+        let mut stops = Vec::new();
+        for (i, cell) in house.interior.cells.iter().enumerate() {
+            let id = CellId(i as u32);
+            let pose = match first {
+                Some(pose) if first_cell == Some(id) => Some(pose),
+                _ => middle_of(house, id).map(|eye| {
+                    let ahead = way_out(house, id, eye, up);
+                    Rigid3::looking_at(eye, eye + ahead, up)
+                }),
+            };
+            if let Some(pose) = pose.filter(Rigid3::is_finite) {
+                stops.push(Stop {
+                    name: cell.name.clone(),
+                    view: view(pose),
+                });
+            }
+        }
+        if let Some(index) = first_cell.map(|id| &house.interior.cell(id).name) {
+            let at = stops.iter().position(|s| s.name == *index);
+            stops.rotate_left(at.unwrap_or(0));
+        }
+        if stops.is_empty() {
+            let pose = Rigid3::looking_at(
+                up * eye_height,
+                up * eye_height + up.any_orthonormal_vector(),
+                up,
+            );
+            stops.push(Stop {
+                name: "the origin".to_owned(),
+                view: view(pose),
+            });
+        }
+        Self {
+            up,
+            // A brisk walk: 1.6 m/s at eyes 1.6 m high.
+            speed: eye_height,
+            depth: 1.5 * eye_height,
+            stops,
+            is_interior: true,
+        }
+    }
+}
+
+fn room_lens() -> Lens {
+    let size = DVec2::new(f64::from(ROOM_SIZE.0), f64::from(ROOM_SIZE.1));
+    Lens::pinhole(DVec2::splat(ROOM_FOCAL * size.x), 0.5 * size)
+}
+
+fn middle_of(house: &House, id: CellId) -> Option<DVec3> {
+    let bounds = house.contents.bounds.get(id.0 as usize).copied().flatten();
+    let floor = house.interior.cell(id).floor.as_ref().map(|f| f.center());
+    let middle = floor.or_else(|| bounds.map(|b| b.min.midpoint(b.max)))?;
+    Some(house.obstacles.at_eye_height(Some(id), middle))
+}
+
+/// From a room's middle towards one of its openings.
+fn way_out(house: &House, id: CellId, eye: DVec3, up: DVec3) -> DVec3 {
+    let portals = house.interior.portals_of(Some(id));
+    let ways = portals.filter_map(|(_, portal)| {
+        let way = portal.polygon.center() - eye;
+        (way - up * way.dot(up)).try_normalize()
+    });
+    ways.into_iter()
+        .next()
+        .unwrap_or(up.any_orthonormal_vector())
+}
+
+/// The median depth of what photos see of the sparse points, or the distance to the proxy.
+fn typical_depth(lumigraph: &Lumigraph) -> Option<f64> {
+    let mut depths = Vec::new();
+    // A sample will do.
+    let step = (lumigraph.points.len() / 2000).max(1);
+    for point in lumigraph.points.iter().step_by(step) {
+        for i in &point.seen_by {
+            if let Some(source) = lumigraph.sources.get(*i as usize) {
+                depths.push(source.view.center().distance(point.position));
+            }
+        }
+    }
+    if depths.is_empty() {
+        let ahead = |view: &View| -> Option<f64> {
+            let (center, forward) = (view.center(), view.forward());
+            match &lumigraph.proxy {
+                Proxy::Plane(plane) => Some(plane.intersect(center, forward)?.distance(center)),
+                Proxy::Mesh(solid) => Some(solid.first_hit(center, forward)?.along),
+                _ => None,
+            }
+        };
+        depths.extend(lumigraph.sources.iter().filter_map(|s| ahead(&s.view)));
+    }
+    depths.retain(|d| d.is_finite() && *d > 0.0);
+    depths.sort_by(f64::total_cmp);
+    depths.get(depths.len() / 2).copied()
+}

@@ -1,0 +1,51 @@
+//! Loading goes on behind the window, and tells it how far it is.
+
+use crate::content::{Content, Space};
+use std::sync::Arc;
+
+/// What loading has to say.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// What is being done.
+    Doing(String),
+    /// Something to show, in place of what was there before.
+    Show(Content, Arc<Space>),
+    /// Something people should know.
+    Note(String),
+    /// All is there.
+    Done,
+    /// There will be nothing (more), and why.
+    Failed(String),
+}
+
+/// By which loading speaks to the window.
+#[derive(Clone)]
+pub struct Teller {
+    tell: Arc<dyn Fn(Progress) + Send + Sync>,
+}
+
+impl Teller {
+    /// Speaks by a function.
+    pub fn new(tell: impl Fn(Progress) + Send + Sync + 'static) -> Self {
+        Self {
+            tell: Arc::new(tell),
+        }
+    }
+
+    /// Says what is being done.
+    pub fn doing(&self, text: impl Into<String>) {
+        self.say(Progress::Doing(text.into()));
+    }
+
+    /// Shows something, in place of what was there before. What moving about in it needs to know is
+    /// found here, not on the window's thread.
+    pub fn show(&self, content: Content) {
+        let space = Arc::new(Space::of(&content));
+        self.say(Progress::Show(content, space));
+    }
+
+    /// Says something else.
+    pub fn say(&self, progress: Progress) {
+        (self.tell)(progress);
+    }
+}

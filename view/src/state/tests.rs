@@ -1,0 +1,272 @@
+use super::*;
+use crate::content::House;
+use crate::picture::{Lines, Support};
+use datasets::house::{HouseOptions, house};
+use egui::ColorImage;
+use image::RgbaImage;
+use proxy::interior::Contents;
+use proxy::{Plane, Proxy};
+use render::{Lumigraph, PhotoStore, SourceView};
+
+fn wall() -> Content {
+    let source = |x: f64| SourceView {
+        name: format!("{x}"),
+        view: View {
+            lens: Lens::pinhole(DVec2::splat(40.0), DVec2::new(20.0, 15.0)),
+            width: 40,
+            height: 30,
+            camera_from_world: Rigid3::looking_at(
+                DVec3::X * x,
+                DVec3::new(x, 0.0, 4.0),
+                DVec3::NEG_Y,
+            ),
+        },
+        gain: [1.0; 3],
+        time_s: None,
+    };
+    Content::Scene(Arc::new(Lumigraph {
+        points: Vec::new(),
+        sources: vec![source(0.0), source(1.0), source(2.0)],
+        photos: PhotoStore::from_images(vec![RgbaImage::new(40, 30); 3]),
+        proxy: Proxy::Plane(Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap()),
+        visibility: None,
+    }))
+}
+
+fn looking_at_a_wall() -> State {
+    let mut state = State::new(Look::default());
+    state.resize(400, 300);
+    state.show_alone(wall());
+    state
+}
+
+impl State {
+    fn show_alone(&mut self, content: Content) {
+        let space = Arc::new(Space::of(&content));
+        let _ = self.show(content, space);
+    }
+}
+
+fn step(state: &mut State, seconds: f64) {
+    for _ in 0..(seconds / 0.02) as usize {
+        state.step(0.02);
+    }
+}
+
+#[test]
+fn it_begins_at_the_first_photo_and_stays_when_more_is_known() {
+    let mut state = State::new(Look::default());
+    assert!(state.view().is_none() && state.wanted().is_none());
+    state.show_alone(wall());
+    assert!(state.view().is_none(), "nothing to draw on");
+    state.resize(400, 300);
+    let view = state.view().unwrap();
+    assert_eq!((view.width, view.height, state.stop()), (400, 300, Some(0)));
+    assert!((view.lens.mean_focal() - 400.0).abs() < 1e-9);
+    // A wide window shows the photo's height.
+    state.resize(4000, 300);
+    assert!((state.view().unwrap().lens.mean_focal() - 1400.0).abs() < 1e-9);
+    state.resize(0, 300);
+    assert!(state.view().is_none());
+    state.resize(400, 300);
+    let first = state.wanted().unwrap();
+    assert!(!first.is_moving && state.wanted().is_none());
+    state.act(Action::Go(2));
+    step(&mut state, 2.0);
+    let there = *state.pose();
+    state.show_alone(wall());
+    assert_eq!(*state.pose(), there);
+    assert!(state.wanted().is_some(), "the new content's picture");
+}
+
+#[test]
+fn cameras_are_gone_to_smoothly_one_after_the_other() {
+    let mut state = looking_at_a_wall();
+    let mut last = 0.0;
+    state.act(Action::Next);
+    while state.is_restless() {
+        state.step(0.02);
+        let _ = state.wanted();
+        let x = state.pose().center().x;
+        assert!(x >= last && x - last < 0.15, "{x}");
+        last = x;
+    }
+    assert_eq!((last, state.stop()), (1.0, Some(1)));
+    for (action, x) in [
+        (Action::Next, 2.0),
+        (Action::Next, 0.0),
+        (Action::Previous, 2.0),
+    ] {
+        state.act(action);
+        step(&mut state, 2.0);
+        assert!((state.pose().center().x - x).abs() < 1e-12);
+    }
+    // From wherever, back to the nearest.
+    state.hold(Motion::Left, true);
+    step(&mut state, 1.0);
+    state.hold(Motion::Left, false);
+    assert_eq!(state.stop(), None);
+    let nearest = state.nearest().unwrap();
+    state.act(Action::Home);
+    step(&mut state, 2.0);
+    assert_eq!(state.stop(), Some(nearest));
+    state.act(Action::Go(99));
+    step(&mut state, 2.0);
+    assert_eq!(state.stop(), Some(nearest));
+}
+
+#[test]
+fn what_is_drawn_in_haste_is_drawn_again_at_leisure() {
+    let mut state = looking_at_a_wall();
+    let _ = state.wanted();
+    state.hold(Motion::Forward, true);
+    state.step(0.02);
+    assert!(state.wanted().unwrap().is_moving);
+    state.hold(Motion::Forward, false);
+    state.step(0.02);
+    assert!(state.wanted().is_none() && state.is_restless());
+    step(&mut state, 0.3);
+    let last = state.wanted().unwrap();
+    assert!(!last.is_moving);
+    assert!(!state.is_restless());
+    // A stall is no leap.
+    let before = state.pose().center();
+    state.hold(Motion::Forward, true);
+    state.step(1e9);
+    let speed = state.space().unwrap().speed;
+    assert!(state.pose().center().distance(before) <= 0.11 * speed);
+    state.let_go();
+    assert!(state.held.is_empty());
+}
+
+/// As if a picture of the wall was shown.
+fn with_depths(state: &mut State) {
+    let view = state.view().unwrap();
+    let shown = Shown {
+        id: 1,
+        depths: DepthGrid::new(view.width, view.height, |_| Some(0.25)),
+        view,
+        reduction: 1,
+        image: Arc::new(ColorImage::default()),
+        photo: None,
+        lines: Lines::default(),
+        support: Some(Support {
+            covered: 0.0,
+            difference: 0.0,
+        }),
+        hover: None,
+        cell: None,
+        stages: Vec::new(),
+        skipped: String::new(),
+        device: String::new(),
+        revision: 1,
+    };
+    state.shown(&shown);
+}
+
+#[test]
+fn what_is_under_the_cursor_stays_there() {
+    let mut state = looking_at_a_wall();
+    with_depths(&mut state);
+    assert_eq!(state.support, 0.0);
+    let at = Pixel::new(300.0, 100.0);
+    let view = state.view().unwrap();
+    let point = state.under(&view, at, 4.0);
+    assert!((point.z - 4.0).abs() < 1e-9);
+    let seen = |state: &State| state.view().unwrap().project(point).unwrap();
+    // The wheel.
+    state.wheel(2.0, at);
+    assert!(seen(&state).distance(at) < 1e-6 && state.pose().center().z > 0.5);
+    // Aside.
+    state.press(Button::Left, at, true);
+    state.point(Some(Pixel::new(320.0, 130.0)));
+    assert!(seen(&state).distance(Pixel::new(320.0, 130.0)) < 1.0);
+    assert_eq!(state.release(Button::Left), None, "no click");
+    // Around.
+    let before = seen(&state);
+    state.press(Button::Left, before, false);
+    state.point(Some(Pixel::new(before.x - 60.0, before.y)));
+    assert!(seen(&state).distance(before) < 1.0);
+    assert!(state.pose().center().x > 0.2, "dragging left goes right");
+    state.release(Button::Left);
+    // A click.
+    state.press(Button::Left, at, false);
+    assert_eq!(state.release(Button::Other), None);
+    assert_eq!(state.release(Button::Left), Some(at));
+    // Looking around stays on the spot.
+    state.act(Action::Move(Mode::Fly));
+    let center = state.pose().center();
+    state.press(Button::Left, at, false);
+    state.point(Some(Pixel::new(10.0, 10.0)));
+    assert!(state.pose().center().distance(center) < 1e-12);
+    state.act(Action::Move(Mode::Walk));
+    assert_eq!(state.mode, Mode::Fly, "there is no floor");
+}
+
+#[test]
+fn a_film_is_shown_frame_by_frame_and_ends_at_its_end() {
+    let mut state = looking_at_a_wall();
+    state.act(Action::Play);
+    assert!(!state.is_playing(), "nothing to show");
+    for stop in [0, 2] {
+        state.act(Action::Go(stop));
+        step(&mut state, 2.0);
+        state.act(Action::AddKeyframe);
+    }
+    state.act(Action::Play);
+    let mut frames = 0;
+    while state.is_playing() {
+        state.step(1.0 / 30.0);
+        frames += 1;
+    }
+    assert!((60..=62).contains(&frames), "{frames}");
+    assert_eq!(state.pose(), &state.keyframes.poses()[1]);
+    state.act(Action::StepKeyframe(false));
+    assert_eq!(state.pose(), &state.keyframes.poses()[0]);
+}
+
+#[test]
+fn weights_and_sliders_reach_the_request() {
+    let mut state = looking_at_a_wall();
+    let _ = state.wanted();
+    state.tells_weights = true;
+    state.point(Some(Pixel::new(5.0, 6.0)));
+    assert_eq!(state.wanted().unwrap().hover, Some(Pixel::new(5.0, 6.0)));
+    (state.alpha, state.beta, state.wipe) = (2.0, 0.5, Some(0.5));
+    let asked = state.wanted().unwrap();
+    assert!((asked.look.options.beta - 0.25).abs() < 1e-12 && asked.look.photo);
+    assert_eq!(asked.look.options.check(), Ok(()));
+}
+
+#[test]
+fn one_walks_in_a_house_at_eye_height() {
+    let options = HouseOptions {
+        rooms: 2,
+        triangles: Some(1),
+        ..HouseOptions::default()
+    };
+    let made = house(&options).unwrap();
+    let contents = Contents::new(&made.interior, &made.model).unwrap().0;
+    let house = House::new(made.interior, contents, made.model);
+    let mut state = State::new(Look::default());
+    state.resize(320, 240);
+    state.show_alone(Content::Interior(Arc::new(house)));
+    assert_eq!(state.mode, Mode::Walk);
+    assert!(state.cell().is_some());
+    let start = state.pose().center();
+    assert!((start.y - 1.6).abs() < 1e-9);
+    for motion in [Motion::Forward, Motion::TurnDown, Motion::TurnLeft] {
+        state.hold(motion, true);
+    }
+    step(&mut state, 3.0);
+    let end = state.pose().center();
+    assert!((end.y - 1.6).abs() < 1e-9 && end.distance(start) > 0.1);
+    assert!(state.cell().is_some());
+    // The wheel walks, too.
+    state.let_go();
+    state.wheel(-1.0, Pixel::new(1.0, 1.0));
+    assert!((state.pose().center().y - 1.6).abs() < 1e-9);
+    state.act(Action::Next);
+    step(&mut state, 2.0);
+    assert_eq!(state.stop(), Some(1));
+}

@@ -1,0 +1,374 @@
+//! Walking at eye height: walls stop one, openings let one through.
+//!
+//! Seen from above, whatever reaches into the band between half the eyes' height and the eyes is cut
+//! into line segments, and who walks is a disc that they keep out. A doorway is where there are
+//! none.
+
+use glam::{DVec2, DVec3};
+use proxy::interior::{CellId, Contents, Interior};
+use proxy::mesh::Model;
+use std::collections::BTreeMap;
+
+/// Heights at which things are cut, in eye heights over the floor. Tables and beds are lower:
+/// walking through them is better than being caught between them; hatches are not walked through.
+const CUTS: [f64; 3] = [0.5, 0.7, 0.9];
+/// How wide who walks is, in eye heights: 22 cm about an axis at 1.6 m.
+const RADIUS: f64 = 0.14;
+
+/// What of an interior's model is in the way.
+#[derive(Clone, Debug)]
+pub struct Obstacles {
+    up: DVec3,
+    /// What lies across `up`.
+    axes: [DVec3; 2],
+    eye_height: f64,
+    radius: f64,
+    /// By floor, then by square of the map: ends of segments.
+    floors: Vec<Floor>,
+    /// How high each cell's floor is, along `up`.
+    floor_of_cell: Vec<Option<f64>>,
+}
+
+#[derive(Clone, Debug)]
+struct Floor {
+    height: f64,
+    /// By square of side [`Obstacles::radius`] × 4.
+    squares: BTreeMap<(i32, i32), Vec<[DVec2; 2]>>,
+}
+
+impl Obstacles {
+    /// Cuts the model.
+    pub fn new(interior: &Interior, contents: &Contents, model: &Model) -> Self {
+        let up = interior.up;
+        let across = up.any_orthonormal_vector();
+        let eye_height = interior.eye_height.abs().max(1e-9);
+        let ids = (0..interior.cells.len() as u32).map(CellId);
+        let floor_of_cell: Vec<Option<f64>> =
+            ids.map(|id| floor_height(interior, contents, id)).collect();
+        let mut walker = Self {
+            up,
+            axes: [across, up.cross(across)],
+            eye_height,
+            radius: RADIUS * eye_height,
+            floors: Vec::new(),
+            floor_of_cell,
+        };
+        // Cells whose floors are alike share one.
+        let mut heights: Vec<f64> = walker.floor_of_cell.iter().flatten().copied().collect();
+        heights.sort_by(f64::total_cmp);
+        heights.dedup_by(|a, b| (*a - *b).abs() < 0.05 * eye_height);
+        for height in heights {
+            let floor = walker.cut(height, contents, model);
+            walker.floors.push(floor);
+        }
+        walker
+    }
+
+    fn cut(&self, height: f64, contents: &Contents, model: &Model) -> Floor {
+        let mut floor = Floor {
+            height,
+            squares: BTreeMap::new(),
+        };
+        let lists = contents.triangles.iter().chain([&contents.elsewhere]);
+        for i in lists.flatten() {
+            let corners = model.mesh.corners(*i as usize);
+            let heights = corners.map(|p| p.dot(self.up) - height);
+            for cut in CUTS {
+                if let Some(ends) = cut_triangle(corners, heights, cut * self.eye_height) {
+                    self.insert(&mut floor, ends.map(|p| self.seen_from_above(p)));
+                }
+            }
+        }
+        // Triangles of two cells, and walls cut at several heights.
+        for list in floor.squares.values_mut() {
+            list.sort_by_key(|ends| ends.map(key));
+            list.dedup();
+        }
+        floor
+    }
+
+    fn insert(&self, floor: &mut Floor, ends: [DVec2; 2]) {
+        let [a, b] = ends;
+        // What is within a radius of a square's points must be found from that square.
+        let low = self.square(a.min(b) - self.radius);
+        let high = self.square(a.max(b) + self.radius);
+        for x in low.0..=high.0 {
+            for y in low.1..=high.1 {
+                floor.squares.entry((x, y)).or_default().push(ends);
+            }
+        }
+    }
+
+    fn square(&self, point: DVec2) -> (i32, i32) {
+        let side = 4.0 * self.radius;
+        let index = |v: f64| (v / side).floor() as i32;
+        (index(point.x), index(point.y))
+    }
+
+    fn seen_from_above(&self, point: DVec3) -> DVec2 {
+        DVec2::new(point.dot(self.axes[0]), point.dot(self.axes[1]))
+    }
+
+    /// Who walks' radius, in world units.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Where the eyes are over the floor of a cell.
+    pub fn at_eye_height(&self, cell: Option<CellId>, eye: DVec3) -> DVec3 {
+        let floor = cell.and_then(|id| self.floor_of_cell.get(id.0 as usize).copied().flatten());
+        match floor {
+            Some(floor) => eye + self.up * (floor + self.eye_height - eye.dot(self.up)),
+            None => eye,
+        }
+    }
+
+    /// Where one arrives who stands at `eye` and goes by `motion`, of which only what is level
+    /// counts: along walls, where they are in the way. In short steps, so that no wall is
+    /// jumped.
+    pub fn walk(&self, eye: DVec3, motion: DVec3) -> DVec3 {
+        let level = self.seen_from_above(motion);
+        let length = level.length();
+        if !(length > 0.0) || !length.is_finite() {
+            return eye;
+        }
+        let Some(floor) = self.floor_below(eye) else {
+            return eye + motion - self.up * motion.dot(self.up);
+        };
+        let steps = (length / (0.4 * self.radius)).ceil().clamp(1.0, 10_000.0);
+        let start = self.seen_from_above(eye);
+        let mut at = start;
+        for _ in 0..steps as usize {
+            let next = self.kept_out(floor, at, at + level / steps);
+            if next == at {
+                break;
+            }
+            at = next;
+        }
+        let moved = at - start;
+        eye + self.axes[0] * moved.x + self.axes[1] * moved.y
+    }
+
+    /// One short step from `from` towards `to`: the nearest place with room for who walks. None
+    /// found, or one behind a wall: no step.
+    fn kept_out(&self, floor: &Floor, from: DVec2, to: DVec2) -> DVec2 {
+        let mut at = to;
+        for _ in 0..8 {
+            let Some((nearest, distance)) = self.nearest(floor, at) else {
+                break;
+            };
+            if distance >= self.radius * (1.0 - 1e-9) {
+                break;
+            }
+            at = nearest + (at - nearest).normalize_or_zero() * self.radius;
+        }
+        let room = |at: DVec2| self.nearest(floor, at).map_or(f64::INFINITY, |near| near.1);
+        // Who stands where there is too little room may still go where there is more.
+        let enough = room(from).min(0.99 * self.radius);
+        let is_free = room(at) >= enough && !self.crosses(floor, [from, at]);
+        if is_free { at } else { from }
+    }
+
+    fn crosses(&self, floor: &Floor, [a, b]: [DVec2; 2]) -> bool {
+        let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
+        let Some(list) = floor.squares.get(&self.square(a)) else {
+            return false;
+        };
+        list.iter().any(|&[c, d]| {
+            side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
+        })
+    }
+
+    fn nearest(&self, floor: &Floor, point: DVec2) -> Option<(DVec2, f64)> {
+        let list = floor.squares.get(&self.square(point))?;
+        let on = list.iter().map(|ends| nearest_on(*ends, point));
+        let with_distance = on.map(|p| (p, p.distance(point)));
+        with_distance.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The highest floor under the eyes.
+    fn floor_below(&self, eye: DVec3) -> Option<&Floor> {
+        let height = eye.dot(self.up);
+        let below = |f: &&Floor| f.height <= height - 0.3 * self.eye_height;
+        self.floors.iter().rev().find(below)
+    }
+}
+
+/// How high a cell's floor is, along `up`; none where the cell's place is unknown.
+pub(crate) fn floor_height(interior: &Interior, contents: &Contents, id: CellId) -> Option<f64> {
+    let up = interior.up;
+    if let Some(floor) = &interior.cell(id).floor {
+        let heights = floor.corners().iter().map(|p| p.dot(up));
+        return Some(heights.fold(f64::INFINITY, f64::min));
+    }
+    let room = contents.bounds.get(id.0 as usize).copied().flatten()?;
+    let half = 0.5 * (room.max - room.min);
+    Some(room.min.midpoint(room.max).dot(up) - half.dot(up.abs()))
+}
+
+/// Where a triangle meets a level; `heights` are its corners'.
+fn cut_triangle(corners: [DVec3; 3], heights: [f64; 3], level: f64) -> Option<[DVec3; 2]> {
+    let mut ends = [DVec3::ZERO; 2];
+    let mut count = 0;
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        let (a, b) = (heights[i] - level, heights[j] - level);
+        // Each crossing once: a corner on the level counts as above.
+        if (a < 0.0) != (b < 0.0) && count < 2 {
+            ends[count] = corners[i].lerp(corners[j], a / (a - b));
+            count += 1;
+        }
+    }
+    let is_usable = count == 2 && ends.iter().all(|p| p.is_finite());
+    is_usable.then_some(ends)
+}
+
+fn nearest_on([a, b]: [DVec2; 2], point: DVec2) -> DVec2 {
+    let along = b - a;
+    let squared = along.length_squared();
+    if squared > 0.0 {
+        a + along * ((point - a).dot(along) / squared).clamp(0.0, 1.0)
+    } else {
+        a
+    }
+}
+
+/// Something to sort by that is the same wherever bits are.
+fn key(point: DVec2) -> [u64; 2] {
+    [point.x.to_bits(), point.y.to_bits()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use datasets::house::{HouseOptions, house};
+    use proptest::prelude::*;
+    use proxy::interior::Portal;
+    use std::sync::OnceLock;
+
+    struct Place {
+        interior: Interior,
+        contents: Contents,
+        obstacles: Obstacles,
+    }
+
+    fn place() -> &'static Place {
+        static PLACE: OnceLock<Place> = OnceLock::new();
+        PLACE.get_or_init(|| {
+            let options = HouseOptions {
+                rooms: 3,
+                triangles: Some(1),
+                ..HouseOptions::default()
+            };
+            let made = house(&options).unwrap();
+            let (interior, model) = (made.interior, made.model);
+            let contents = Contents::new(&interior, &model).unwrap().0;
+            let obstacles = Obstacles::new(&interior, &contents, &model);
+            Place {
+                interior,
+                contents,
+                obstacles,
+            }
+        })
+    }
+
+    fn middle(place: &Place, id: CellId) -> DVec3 {
+        let room = place.contents.bounds[id.0 as usize].unwrap();
+        place
+            .obstacles
+            .at_eye_height(Some(id), room.min.midpoint(room.max))
+    }
+
+    /// A door between two cells.
+    fn door(place: &Place) -> &Portal {
+        let obstacles = &place.obstacles;
+        let sill = |p: &Portal| {
+            let heights = p.polygon.corners().iter().map(|c| c.dot(obstacles.up));
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        let is_door = |p: &&Portal| {
+            p.cells.iter().all(Option::is_some) && sill(p) < obstacles.floors[0].height + 0.1
+        };
+        place.interior.portals.iter().find(is_door).unwrap()
+    }
+
+    #[test]
+    fn doorways_let_one_through() {
+        let place = place();
+        let portal = door(place);
+        let center = place
+            .obstacles
+            .at_eye_height(portal.cells[0], portal.polygon.center());
+        let normal = portal.polygon.normal();
+        let from = center + 0.4 * normal;
+        let to = place.obstacles.walk(from, -0.8 * normal);
+        let cell = |p| place.contents.locate(&place.interior, p);
+        assert_eq!((cell(from), cell(to)), (portal.cells[0], portal.cells[1]));
+        assert!(to.distance(center - 0.4 * normal) < 1e-9);
+    }
+
+    #[test]
+    fn walls_stop_one_and_one_slides_along_them() {
+        let place = place();
+        let portal = door(place);
+        let (up, normal) = (place.interior.up, portal.polygon.normal());
+        let along = up.cross(normal);
+        let center = place
+            .obstacles
+            .at_eye_height(portal.cells[0], portal.polygon.center());
+        // Against the wall beside the door, at a slant.
+        let from = center + 0.6 * normal + along * (0.5 * portal.width(up) + 0.5);
+        let straight = place.obstacles.walk(from, -5.0 * normal);
+        assert_eq!(
+            place.contents.locate(&place.interior, straight),
+            portal.cells[0]
+        );
+        let height = portal.polygon.height(straight);
+        assert!(height > place.obstacles.radius * 0.9, "{height}");
+        let aslant = place.obstacles.walk(straight, -along * 0.2 - normal);
+        assert!((aslant - straight).dot(-along) > 0.15);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn no_way_leads_out_of_the_house_or_into_things(
+            ways in prop::collection::vec((0.0..std::f64::consts::TAU, 0.0..6.0), 1..12)
+        ) {
+            let place = place();
+            let obstacles = &place.obstacles;
+            let mut at = middle(place, CellId(0));
+            let height = at.dot(obstacles.up);
+            for (angle, length) in ways {
+                let motion = (obstacles.axes[0] * f64::cos(angle)
+                    + obstacles.axes[1] * f64::sin(angle)) * length;
+                let before = obstacles.seen_from_above(at);
+                let room = obstacles.nearest(&obstacles.floors[0], before);
+                let next = obstacles.walk(at, motion);
+                prop_assert!(next.is_finite() && (next.dot(obstacles.up) - height).abs() < 1e-9);
+                prop_assert!(next.distance(at) <= length * 1.5 + obstacles.radius);
+                let after = obstacles.nearest(&obstacles.floors[0], obstacles.seen_from_above(next));
+                let least = room.map_or(f64::INFINITY, |r| r.1).min(0.98 * obstacles.radius);
+                prop_assert!(after.is_none_or(|a| a.1 >= least));
+                at = next;
+            }
+            // Doors to the outside are as open as others.
+            let is_in = place.contents.locate(&place.interior, at).is_some();
+            let left_by_door = place.interior.portals.iter().any(|p| p.cells.contains(&None));
+            prop_assert!(is_in || left_by_door);
+        }
+    }
+
+    #[test]
+    fn odd_motions_are_none() {
+        let place = place();
+        let eye = middle(place, CellId(0));
+        for motion in [DVec3::ZERO, DVec3::NAN, place.interior.up] {
+            assert_eq!(place.obstacles.walk(eye, motion), eye);
+        }
+        // Nothing to stand on: nothing in the way.
+        let below = eye - 100.0 * place.interior.up;
+        let motion = place.obstacles.axes[0];
+        assert_eq!(place.obstacles.walk(below, motion), below + motion);
+    }
+}

@@ -1,0 +1,227 @@
+//! What keys, buttons and the wheel do to the window and its state.
+
+use super::App;
+use crate::keys::{self, Key};
+use crate::overlay::clicked;
+use crate::panel::Command;
+use crate::state::{Action, Button};
+use calibrate::Pixel;
+use render::path::{KeyframeFile, write_keyframes};
+use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::ActiveEventLoop;
+use winit::keyboard::{ModifiersState, PhysicalKey};
+
+/// So near, in pixels, the wipe is taken hold of.
+const WIPE_PX: f64 = 8.0;
+
+impl App {
+    fn do_key(&mut self, key: Key, is_down: bool, is_repeated: bool) {
+        if let Key::Hold(motion) = key {
+            self.state.hold(motion, is_down);
+            return;
+        }
+        if !is_down || is_repeated {
+            return;
+        }
+        let Some(shows) = &mut self.shows else {
+            return;
+        };
+        let look = &mut self.state.look;
+        let flip = |value: &mut bool| *value = !*value;
+        match key {
+            Key::Hold(_) => {}
+            Key::Act(action) => self.state.act(action),
+            Key::Layer(layer) => {
+                look.layer = if look.layer == layer {
+                    Default::default()
+                } else {
+                    layer
+                };
+            }
+            Key::Triangulation => flip(&mut look.triangulation),
+            Key::Wireframe => flip(&mut look.wireframe),
+            Key::Exact => {
+                look.method = match look.method {
+                    render::Method::Exact => render::Method::TRIANGULATED,
+                    render::Method::Triangulated { .. } => render::Method::Exact,
+                }
+            }
+            Key::Weights => flip(&mut self.state.tells_weights),
+            Key::Wipe => {
+                self.state.wipe = match self.state.wipe {
+                    Some(_) => None,
+                    None => Some(0.5),
+                }
+            }
+            Key::Epipoles => flip(&mut shows.epipoles),
+            Key::Frusta => flip(&mut shows.frusta),
+            Key::Plan => flip(&mut shows.plan),
+            Key::Panel => flip(&mut shows.panel),
+            Key::Hud => flip(&mut shows.hud),
+            Key::Help => flip(&mut shows.help),
+            Key::Shoot => self.do_command(Command::Shoot),
+            Key::SavePath => self.do_command(Command::SavePath),
+            Key::LoseDevice => {
+                if let (Some(pane), true) = (&self.pane, self.trace.is_some()) {
+                    pane.screen.lose();
+                }
+            }
+            Key::Close => {}
+        }
+    }
+
+    pub(super) fn do_command(&mut self, command: Command) {
+        match command {
+            Command::Act(action) => self.state.act(action),
+            Command::Shoot => {
+                // Of where one is now.
+                if let Some(request) = self.state.wanted() {
+                    self.worker.ask(request);
+                }
+                self.worker.shoot();
+            }
+            Command::SavePath => self.status.said = Some(self.save_path()),
+        }
+    }
+
+    fn save_path(&self) -> String {
+        let Some(view) = self.state.view() else {
+            return "there is no view to save a path for".to_owned();
+        };
+        let keyframes = &self.state.keyframes;
+        let folder = &self.options.worker.output;
+        let path = folder.join("path.json");
+        let file = KeyframeFile {
+            fps: keyframes.fps,
+            keyframes: keyframes.stored(&view),
+            interpolation: keyframes.interpolation,
+        };
+        let written = std::fs::create_dir_all(folder)
+            .map_err(|error| format!("{}: {error}", folder.display()))
+            .and_then(|()| write_keyframes(&path, &file).map_err(|error| error.to_string()));
+        match written {
+            Ok(()) => format!("saved {}", path.display()),
+            Err(error) => error,
+        }
+    }
+
+    fn on_pointer(&mut self, at: Option<Pixel>) {
+        self.pointer = at;
+        let width = self
+            .pane
+            .as_ref()
+            .map_or(1, |p| p.window.inner_size().width.max(1));
+        match at {
+            Some(at) if self.holds_wipe => {
+                self.state.wipe = Some((at.x / f64::from(width)).clamp(0.0, 1.0));
+            }
+            _ => self.state.point(at),
+        }
+    }
+
+    fn on_button(&mut self, button: MouseButton, is_down: bool) {
+        let Some(at) = self.pointer else {
+            return;
+        };
+        let width = self
+            .pane
+            .as_ref()
+            .map_or(0, |p| p.window.inner_size().width);
+        let button = match button {
+            MouseButton::Left => Button::Left,
+            _ => Button::Other,
+        };
+        if !is_down {
+            self.holds_wipe = false;
+            let click = self
+                .state
+                .release(button)
+                .filter(|_| button == Button::Left);
+            let has_frusta = self.shows.as_ref().is_some_and(|s| s.frusta);
+            let view = self.shown.as_ref().map(|s| &s.view);
+            if let (Some(at), true, Some(view), Some(space)) =
+                (click, has_frusta, view, self.state.space())
+                && let Some(stop) = clicked(space, view, at).filter(|_| !space.is_interior)
+            {
+                self.state.act(Action::Go(stop));
+            }
+            return;
+        }
+        let wipe = self.state.wipe.map(|share| share * f64::from(width));
+        if wipe.is_some_and(|x| (x - at.x).abs() < WIPE_PX) && button == Button::Left {
+            self.holds_wipe = true;
+        } else {
+            self.state.press(button, at, self.modifiers.shift_key());
+        }
+    }
+
+    /// Whatever else happens to a window than that it is to be drawn.
+    pub(super) fn on_event(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) {
+        let Some(pane) = &mut self.pane else {
+            return;
+        };
+        let key = match &event {
+            // With the focus come keys that were pressed elsewhere.
+            WindowEvent::KeyboardInput {
+                event,
+                is_synthetic: true,
+                ..
+            } if event.state == ElementState::Pressed => None,
+            WindowEvent::KeyboardInput { event, .. } => match event.physical_key {
+                // What was pressed must be released, whatever else is held by then.
+                PhysicalKey::Code(code) if event.state == ElementState::Released => {
+                    keys::of(code, ModifiersState::empty())
+                }
+                PhysicalKey::Code(code) => keys::of(code, self.modifiers),
+                PhysicalKey::Unidentified(_) => None,
+            },
+            _ => None,
+        };
+        // egui would move its focus by it.
+        let is_ours = key == Some(Key::Panel);
+        let consumed = !is_ours && pane.input.on_window_event(&pane.window, &event).consumed;
+        match event {
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
+            WindowEvent::Resized(size) => {
+                pane.screen.resize(size.width, size.height);
+                let (width, height) = pane.size();
+                self.state.resize(width, height);
+            }
+            WindowEvent::Focused(false) => self.state.let_go(),
+            WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
+            WindowEvent::KeyboardInput { event, .. } => {
+                let is_down = event.state == ElementState::Pressed;
+                match key {
+                    Some(Key::Close) if is_down && !consumed => self.close(event_loop),
+                    Some(key) if !consumed || !is_down => {
+                        self.do_key(key, is_down, event.repeat);
+                    }
+                    _ => {}
+                }
+            }
+            WindowEvent::CursorMoved { position, .. } => {
+                let at = Pixel::new(position.x, position.y);
+                self.on_pointer((!consumed).then_some(at));
+                self.pointer = Some(at);
+            }
+            WindowEvent::CursorLeft { .. } => self.on_pointer(None),
+            WindowEvent::MouseInput { state, button, .. } => {
+                let is_down = state == ElementState::Pressed;
+                if !consumed || !is_down {
+                    self.on_button(button, is_down);
+                }
+            }
+            WindowEvent::MouseWheel { delta, .. } if !consumed => {
+                let notches = match delta {
+                    MouseScrollDelta::LineDelta(_, y) => f64::from(y),
+                    MouseScrollDelta::PixelDelta(by) => by.y / 50.0,
+                };
+                if let Some(at) = self.pointer {
+                    self.state.wheel(notches, at);
+                }
+            }
+            _ => {}
+        }
+        self.redraw();
+    }
+}

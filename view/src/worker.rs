@@ -1,0 +1,531 @@
+//! The thread that draws. It takes the newest request; older ones that it did not come to are
+//! dropped.
+
+use crate::content::{Content, House, Space};
+use crate::draw_house::draw_house;
+use crate::draw_scene::{Drawn, SceneDrawer};
+use crate::picture::{Request, Shown};
+use image::RgbaImage;
+use render::interior::{Painter, Walk, WalkOptions};
+use render::path::write_shot;
+use render::{DeviceChoice, Engine, Lumigraph};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What the thread that draws has to say.
+#[derive(Debug)]
+pub enum News {
+    /// A picture.
+    Shown(Box<Shown>),
+    /// A screenshot was written, or why not.
+    Shot(Result<PathBuf, String>),
+    /// What went wrong, for people.
+    Trouble(String),
+}
+
+/// How it draws.
+#[derive(Clone, Debug)]
+pub struct WorkerOptions {
+    /// What draws.
+    pub device: DeviceChoice,
+    /// For photos on the device, in bytes; none for no limit.
+    pub gpu_memory: Option<u64>,
+    /// Asks every photo about every ray: the same pictures, later.
+    pub no_skip: bool,
+    /// Of walks.
+    pub walk: WalkOptions,
+    /// The folder for screenshots.
+    pub output: PathBuf,
+}
+
+/// A coarser picture will do while one moves, if a frame would take longer, in ms.
+const SLOW_MS: f64 = 50.0;
+/// A finer one is tried again where a frame took less.
+const FAST_MS: f64 = 18.0;
+/// Times that a picture is drawn smaller at most, each way.
+const MOST_REDUCED: u32 = 4;
+
+/// A content, what is known of the space in it, and its number.
+type Given = (Content, Arc<Space>, u64);
+
+#[derive(Default)]
+struct Inbox {
+    content: Option<Given>,
+    request: Option<Request>,
+    shots: usize,
+    is_over: bool,
+}
+
+struct Shared {
+    inbox: Mutex<Inbox>,
+    is_there_more: Condvar,
+}
+
+impl Shared {
+    fn inbox(&self) -> MutexGuard<'_, Inbox> {
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A handle to the thread that draws.
+pub struct Worker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// Starts the thread; `tell` is called from it.
+    pub fn start(options: WorkerOptions, tell: impl Fn(News) + Send + 'static) -> Self {
+        let shared = Arc::new(Shared {
+            inbox: Mutex::default(),
+            is_there_more: Condvar::new(),
+        });
+        let of_thread = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || run(&of_thread, &options, &tell));
+        Self {
+            shared,
+            thread: Some(thread),
+        }
+    }
+
+    /// What is to be drawn from now on; `revision` comes back with each picture.
+    pub fn show(&self, content: Content, space: Arc<Space>, revision: u64) {
+        self.tell(|inbox| inbox.content = Some((content, space, revision)));
+    }
+
+    /// Asks for a picture, in place of the one asked for before if that was not begun.
+    pub fn ask(&self, request: Request) {
+        self.tell(|inbox| inbox.request = Some(request));
+    }
+
+    /// Asks for a screenshot of the last request.
+    pub fn shoot(&self) {
+        self.tell(|inbox| inbox.shots += 1);
+    }
+
+    fn tell(&self, change: impl FnOnce(&mut Inbox)) {
+        change(&mut self.shared.inbox());
+        self.shared.is_there_more.notify_all();
+    }
+
+    /// Asks the thread to end, and waits for it, but not for long: one frame may take seconds.
+    pub fn end(&mut self, patience: Duration) {
+        self.tell(|inbox| inbox.is_over = true);
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        let start = Instant::now();
+        while !thread.is_finished() && start.elapsed() < patience {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        if thread.is_finished() {
+            // A panic there was said on stderr.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What there is to do next.
+enum Job {
+    Show(Given),
+    Draw(Box<Request>),
+    Shoot,
+    End,
+}
+
+fn next_job(shared: &Shared) -> Job {
+    let mut inbox = shared.inbox();
+    loop {
+        if inbox.is_over {
+            return Job::End;
+        }
+        if let Some(given) = inbox.content.take() {
+            return Job::Show(given);
+        }
+        if let Some(request) = inbox.request.take() {
+            return Job::Draw(Box::new(request));
+        }
+        if inbox.shots > 0 {
+            inbox.shots -= 1;
+            return Job::Shoot;
+        }
+        inbox = shared
+            .is_there_more
+            .wait(inbox)
+            .unwrap_or_else(PoisonError::into_inner);
+    }
+}
+
+fn run(shared: &Shared, options: &WorkerOptions, tell: &dyn Fn(News)) {
+    let mut engine: Option<Engine> = None;
+    let mut last: Option<Request> = None;
+    let mut showing: Option<Given> = None;
+    loop {
+        let next = match showing.take() {
+            None => match next_job(shared) {
+                Job::End => return,
+                Job::Show(given) => Some(given),
+                Job::Draw(request) => {
+                    last = Some(*request);
+                    None
+                }
+                Job::Shoot => None,
+            },
+            Some((Content::Scene(lumigraph), space, revision)) => {
+                let engine = engine.get_or_insert_with(|| open(options, tell));
+                let mut desk = Desk::new(shared, options, tell, revision, &mut last);
+                desk.serve_scene(&lumigraph, &space, engine)
+            }
+            Some((Content::Interior(house), _, revision)) => {
+                let mut desk = Desk::new(shared, options, tell, revision, &mut last);
+                desk.serve_house(&house)
+            }
+        };
+        if next.is_none() && shared.inbox().is_over {
+            return;
+        }
+        showing = next;
+    }
+}
+
+fn open(options: &WorkerOptions, tell: &dyn Fn(News)) -> Engine {
+    let mut engine = Engine::open(options.device).unwrap_or_else(|error| {
+        tell(News::Trouble(format!("{error}; the CPU draws")));
+        Engine::open(DeviceChoice::Cpu).expect("the CPU always answers")
+    });
+    if let Some(gpu) = engine.gpu_mut() {
+        gpu.set_budget(options.gpu_memory);
+    }
+    engine
+}
+
+/// Draws one content until there is another.
+struct Desk<'s> {
+    shared: &'s Shared,
+    options: &'s WorkerOptions,
+    tell: &'s dyn Fn(News),
+    revision: u64,
+    /// What was asked for last, by whichever content it was drawn.
+    last: &'s mut Option<Request>,
+    reduction: u32,
+}
+
+impl<'s> Desk<'s> {
+    fn new(
+        shared: &'s Shared,
+        options: &'s WorkerOptions,
+        tell: &'s dyn Fn(News),
+        revision: u64,
+        last: &'s mut Option<Request>,
+    ) -> Self {
+        Self {
+            shared,
+            options,
+            tell,
+            revision,
+            last,
+            reduction: 1,
+        }
+    }
+
+    fn serve_scene(
+        &mut self,
+        lumigraph: &Lumigraph,
+        space: &Space,
+        engine: &mut Engine,
+    ) -> Option<Given> {
+        let mut drawer = SceneDrawer::new(lumigraph, space, self.options.no_skip);
+        let mut notes = engine.notes().len();
+        let mut gone = None;
+        // Of what comes later there is a picture on the screen already.
+        let mut is_first = self.revision <= 1;
+        self.serve(|tell, request, reduction| {
+            if let (true, Some(preview)) = (is_first, drawer.preview(request)) {
+                tell(News::Shown(Box::new(preview)));
+            }
+            is_first = false;
+            let drawn = drawer.draw(engine, request, reduction);
+            for note in engine.notes().iter().skip(notes) {
+                tell(News::Trouble(note.clone()));
+            }
+            notes = engine.notes().len();
+            if gone != drawer.gone() {
+                gone = drawer.gone();
+                let name = gone.map(|i| lumigraph.sources[i].name.as_str());
+                let name = name.unwrap_or_default();
+                tell(News::Trouble(format!(
+                    "{name} cannot be decoded and is left out"
+                )));
+            }
+            drawn.map_err(|error| error.to_string())
+        })
+    }
+
+    fn serve_house(&mut self, house: &House) -> Option<Given> {
+        let painter = Painter::open(self.options.device, &house.model);
+        let mut walk = Walk::with(
+            painter,
+            &house.interior,
+            &house.contents,
+            &house.model,
+            self.options.walk,
+        );
+        let mut notes = 0;
+        self.serve(|tell, request, reduction| {
+            let drawn = draw_house(house, &mut walk, request, reduction);
+            for note in walk.painter().notes().iter().skip(notes) {
+                tell(News::Trouble(note.clone()));
+            }
+            notes = walk.painter().notes().len();
+            drawn.map_err(|error| error.to_string())
+        })
+    }
+
+    /// Draws until there is another content, which is returned, or an end.
+    fn serve(
+        &mut self,
+        mut draw: impl FnMut(&dyn Fn(News), &Request, u32) -> Result<Drawn, String>,
+    ) -> Option<Given> {
+        // What was asked for of the content before is wanted of this one, too.
+        let mut again = self.last.take();
+        // As files have it, at full size.
+        let mut kept: Option<(Request, RgbaImage)> = None;
+        loop {
+            let job = match again.take() {
+                Some(request) => Job::Draw(Box::new(request)),
+                None => next_job(self.shared),
+            };
+            match job {
+                Job::End => return None,
+                Job::Show(given) => return Some(given),
+                Job::Draw(request) => {
+                    *self.last = Some((*request).clone());
+                    let start = Instant::now();
+                    let reduction = if request.is_moving { self.reduction } else { 1 };
+                    match draw(self.tell, &request, reduction) {
+                        Ok((picture, mut shown)) => {
+                            shown.revision = self.revision;
+                            (self.tell)(News::Shown(Box::new(shown)));
+                            self.adapt(&request, start.elapsed());
+                            if reduction == 1 {
+                                kept = Some((*request, picture));
+                            }
+                        }
+                        Err(error) => (self.tell)(News::Trouble(error)),
+                    }
+                }
+                Job::Shoot => {
+                    let Some(request) = self.last.clone() else {
+                        continue;
+                    };
+                    if !kept.as_ref().is_some_and(|(of, _)| is_alike(of, &request)) {
+                        match draw(self.tell, &request, 1) {
+                            Ok((picture, _)) => kept = Some((request.clone(), picture)),
+                            Err(error) => {
+                                (self.tell)(News::Trouble(error));
+                                continue;
+                            }
+                        }
+                    }
+                    if let Some((_, picture)) = &kept {
+                        (self.tell)(News::Shot(self.write(&request, picture)));
+                    }
+                }
+            }
+        }
+    }
+
+    fn write(&self, request: &Request, picture: &RgbaImage) -> Result<PathBuf, String> {
+        let folder = &self.options.output;
+        let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let file = free_name(folder);
+        let layer = request.look.layer.name();
+        match write_shot(&file, picture, &request.view, layer) {
+            Ok(()) => Ok(file),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    /// How large the next picture will be that is drawn while one moves.
+    fn adapt(&mut self, request: &Request, time: Duration) {
+        let ms = 1e3 * time.as_secs_f64();
+        let drawn = if request.is_moving { self.reduction } else { 1 };
+        if ms > SLOW_MS {
+            // As if time went by pixels.
+            let needed = f64::from(drawn) * (ms / SLOW_MS).sqrt();
+            self.reduction = self.reduction.max(needed.ceil() as u32).min(MOST_REDUCED);
+        } else if ms < FAST_MS && request.is_moving {
+            self.reduction = (self.reduction - 1).max(1);
+        }
+    }
+}
+
+/// A name in a folder that is not taken: `shot_0001.png` and so on.
+fn free_name(folder: &Path) -> PathBuf {
+    let name = |i: u32| folder.join(format!("shot_{i:04}.png"));
+    let first = (1..u32::MAX).map(name).find(|path| !path.exists());
+    first.unwrap_or_else(|| name(0))
+}
+
+/// Whether two requests are for the same picture as files have it.
+fn is_alike(a: &Request, b: &Request) -> bool {
+    a.view == b.view
+        && a.look.layer == b.look.layer
+        && a.look.options == b.look.options
+        && a.look.method == b.look.method
+        && a.look.portals == b.look.portals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Layer, Look};
+    use calibrate::{Lens, Rigid3, View};
+    use glam::{DVec2, DVec3};
+    use image::Rgba;
+    use proxy::{Plane, Proxy};
+    use render::{Frame, PhotoStore, SourceView};
+    use std::sync::mpsc::channel;
+
+    fn view(x: f64) -> View {
+        let pose = Rigid3::looking_at(DVec3::X * x, DVec3::new(x, 0.0, 4.0), DVec3::NEG_Y);
+        View {
+            lens: Lens::pinhole(DVec2::splat(40.0), DVec2::new(20.0, 15.0)),
+            width: 40,
+            height: 30,
+            camera_from_world: pose,
+        }
+    }
+
+    fn wall(red: u8) -> Arc<Lumigraph> {
+        let source = |x: f64| SourceView {
+            name: format!("{x}"),
+            view: view(x),
+            gain: [1.0; 3],
+            time_s: None,
+        };
+        let photo = |red: u8| RgbaImage::from_fn(40, 30, |x, y| Rgba([red, x as u8, y as u8, 255]));
+        Arc::new(Lumigraph {
+            points: Vec::new(),
+            sources: vec![source(-1.0), source(1.0)],
+            photos: PhotoStore::from_images(vec![photo(red), photo(red + 50)]),
+            proxy: Proxy::Plane(Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap()),
+            visibility: None,
+        })
+    }
+
+    fn request(id: u64, x: f64) -> Request {
+        Request {
+            id,
+            view: view(x),
+            look: Look::default(),
+            is_moving: false,
+            hover: Some(calibrate::Pixel::new(20.0, 15.0)),
+        }
+    }
+
+    fn show(worker: &Worker, red: u8, revision: u64) {
+        let content = Content::Scene(wall(red));
+        let space = Arc::new(Space::of(&content));
+        worker.show(content, space, revision);
+    }
+
+    #[test]
+    fn pictures_are_those_that_render_makes_and_shots_give_them_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let (send, news) = channel();
+        let options = WorkerOptions {
+            device: DeviceChoice::Cpu,
+            gpu_memory: None,
+            no_skip: false,
+            walk: WalkOptions::default(),
+            output: folder.path().join("shots"),
+        };
+        let mut worker = Worker::start(options, move |news| send.send(news).unwrap());
+        // Asked before there is anything: drawn as soon as there is.
+        worker.ask(request(1, 0.25));
+        show(&worker, 0, 1);
+        let wait = || news.recv_timeout(Duration::from_secs(60)).unwrap();
+        let News::Shown(shown) = wait() else {
+            panic!("a picture");
+        };
+        // From elsewhere than the first photo there is no preview.
+        assert_eq!((shown.id, shown.revision, shown.reduction), (1, 1, 1));
+        let support = shown.support.unwrap();
+        assert!(support.share() > 0.9, "{support:?}");
+        let hover = shown.hover.unwrap();
+        assert_eq!(hover.weights[0].0, 1, "the nearer photo first");
+        assert!((hover.weights.iter().map(|w| w.1).sum::<f64>() - 1.0).abs() < 1e-9);
+        // A new content is drawn without being asked for.
+        show(&worker, 100, 2);
+        let News::Shown(shown) = wait() else {
+            panic!("a picture");
+        };
+        assert_eq!((shown.id, shown.revision), (1, 2));
+        worker.shoot();
+        let News::Shot(Ok(file)) = wait() else {
+            panic!("a shot");
+        };
+        let again = render::path::read_shot(&file).unwrap();
+        let lumigraph = wall(100);
+        let frame = Frame::new(&lumigraph, again.frames[0].view.clone(), Default::default());
+        let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
+        let expected = engine.render(&frame, render::Method::TRIANGULATED).unwrap();
+        assert_eq!(image::open(&file).unwrap().into_rgba8(), expected);
+        worker.end(Duration::from_secs(10));
+    }
+
+    #[test]
+    fn the_first_photo_is_there_before_any_other() {
+        let lumigraph = wall(0);
+        let space = Space::of_scene(&lumigraph);
+        let drawer = SceneDrawer::new(&lumigraph, &space, false);
+        assert!(drawer.preview(&request(1, 0.5)).is_none());
+        let shown = drawer.preview(&request(1, 1.0)).unwrap();
+        assert_eq!((shown.image.size, shown.reduction), ([20, 15], 2));
+        assert_eq!(shown.image.pixels[0].r(), 50);
+        assert_eq!(lumigraph.photos.decoded(), 1);
+    }
+
+    #[test]
+    fn every_layer_and_size_is_drawn() {
+        let lumigraph = wall(0);
+        let space = Space::of_scene(&lumigraph);
+        let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
+        let mut drawer = SceneDrawer::new(&lumigraph, &space, true);
+        for layer in Layer::ALL {
+            for (reduction, method) in [
+                (1, render::Method::Exact),
+                (3, render::Method::TRIANGULATED),
+            ] {
+                let mut request = request(1, 0.5);
+                request.look = Look {
+                    layer,
+                    method,
+                    triangulation: true,
+                    wireframe: true,
+                    photo: true,
+                    ..Look::default()
+                };
+                let (picture, shown) = drawer.draw(&mut engine, &request, reduction).unwrap();
+                let size = [
+                    40_usize.div_ceil(reduction as usize),
+                    30_usize.div_ceil(reduction as usize),
+                ];
+                assert_eq!(shown.image.size, size);
+                assert_eq!(picture.width() as usize, size[0]);
+                let photo = shown.photo.unwrap();
+                assert_eq!((photo.0, photo.1.size), (1, size));
+                assert!(!shown.lines.wireframe.is_empty());
+                assert_eq!(shown.lines.triangulation.is_empty(), reduction == 1);
+                let depth = shown
+                    .depths
+                    .at(&shown.view, calibrate::Pixel::new(20.0, 15.0));
+                assert!((depth.unwrap() - 0.25).abs() < 1e-9);
+            }
+        }
+    }
+}
