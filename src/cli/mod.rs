@@ -1,6 +1,7 @@
 //! One file a subcommand. Options, progress, reports and messages live here and nowhere
 //! else; results go to stdout, all else to stderr.
 
+mod captured;
 mod demo;
 mod evaluate;
 mod export;

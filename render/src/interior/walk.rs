@@ -12,11 +12,13 @@ use super::{
     Beyond, CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
     PortalLdi, Reference, Runs, Splat, Target, Window, texture, warp,
 };
+use crate::RenderError;
 use crate::ldi::{Clipped, Free, FreeOptions, free};
 use calibrate::View;
 use glam::DVec3;
 use proxy::interior::{
-    CellId, Contents, Interior, Pass, Portal, Region, Visibility, visible, visible_through,
+    CellId, Contents, Interior, Pass, Portal, Region, Visibility, VisibleCell, visible,
+    visible_through,
 };
 use proxy::mesh::Model;
 use rayon::prelude::*;
@@ -105,6 +107,17 @@ impl FrameCost {
     pub fn time(&self) -> Duration {
         self.visibility + self.geometry + self.fill + self.shade
     }
+}
+
+/// Why a view was not drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WalkError {
+    /// A view that interiors are not drawn for.
+    #[error(transparent)]
+    View(#[from] PinholeError),
+    /// The photos' engine's.
+    #[error(transparent)]
+    Photos(#[from] RenderError),
 }
 
 /// A walker through an interior, and what is kept between frames.
@@ -225,15 +238,18 @@ impl<'a> Walk<'a> {
     /// visible is geometry.
     ///
     /// # Errors
-    /// A view that interiors are not drawn for.
-    pub fn draw(&mut self, view: &View, fill: PortalFill) -> Result<FrameCost, PinholeError> {
+    /// A view that interiors are not drawn for; where photos colour it, their engine's.
+    pub fn draw(&mut self, view: &View, fill: PortalFill) -> Result<FrameCost, WalkError> {
         let camera = Pinhole::new(view)?;
         let mut cost = FrameCost::default();
         // 1. What is visible.
         let start = Instant::now();
         let eye = camera.center;
         let cell = self.contents.locate(self.interior, eye);
-        let visibility = visible(self.interior, cell, view);
+        let visibility = match fill {
+            PortalFill::Whole => self.whole(),
+            _ => visible(self.interior, cell, view),
+        };
         let in_sight = |visibility: Visibility| match self.options.whole_cells {
             true => everywhere(visibility),
             false => visibility,
@@ -248,7 +264,7 @@ impl<'a> Walk<'a> {
         let mut fills: Vec<Filled<'_>> = Vec::new();
         let whole = Window::whole(camera.width, camera.height);
         match cell {
-            Some(_) if fill != PortalFill::Geometry => {
+            Some(_) if fill.references() > 0 || fill == PortalFill::Ldi => {
                 let alone = in_sight(Visibility {
                     cells: visibility.cells.first().into_iter().cloned().collect(),
                     passes: Vec::new(),
@@ -289,7 +305,7 @@ impl<'a> Walk<'a> {
         cost.geometry = start.elapsed();
         // 3. Fills.
         let start = Instant::now();
-        let images = self.images(fill, &fills, eye);
+        let images = self.images(fill, &fills, eye)?;
         cost.references_made = images.made;
         cost.references = start.elapsed();
         let start = Instant::now();
@@ -338,13 +354,18 @@ impl<'a> Walk<'a> {
         cost.fill = start.elapsed();
         // 4. Colours.
         let start = Instant::now();
-        cost.holes = self.compose(&camera, &fills);
+        cost.holes = self.compose(view, &camera, &fills)?;
         cost.shade = start.elapsed();
         Ok(cost)
     }
 
     /// What portals are filled with, made now if it is not in memory.
-    fn images(&mut self, fill: PortalFill, fills: &[Filled<'_>], eye: DVec3) -> Needed {
+    fn images(
+        &mut self,
+        fill: PortalFill,
+        fills: &[Filled<'_>],
+        eye: DVec3,
+    ) -> Result<Needed, RenderError> {
         let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
         if fill == PortalFill::Ldi {
             let side = |f: &Filled<'_>| self.library.side(f.pass.portal, f.pass.from, f.into);
@@ -353,16 +374,17 @@ impl<'a> Walk<'a> {
             for &side in &all {
                 self.is_used[self.library.len() + side] = true;
             }
-            let (ldis, made) = self.library.ldis(&all, interior, model, geometry);
+            let photos = self.painter.captured_mut();
+            let (ldis, made) = self.library.ldis(&all, interior, model, geometry, photos)?;
             let mut ldis = ldis.into_iter();
             let ldi = |side: &Option<usize>| {
                 Images::Ldi(side.and_then(|_| ldis.next()).unwrap_or_default())
             };
             let of_fills = sides.iter().map(ldi);
-            return Needed {
+            return Ok(Needed {
                 of_fills: of_fills.collect(),
                 made,
-            };
+            });
         }
         let nearest = |f: &Filled<'_>| {
             let (id, from) = (f.pass.portal, f.pass.from);
@@ -372,14 +394,29 @@ impl<'a> Walk<'a> {
         let needed: Vec<Vec<usize>> = fills.iter().map(nearest).collect();
         let all: Vec<usize> = needed.iter().flatten().copied().collect();
         all.iter().for_each(|i| self.is_used[*i] = true);
-        let (images, made) = self.library.images(&all, interior, model, geometry);
+        let photos = self.painter.captured_mut();
+        let (images, made) = self
+            .library
+            .images(&all, interior, model, geometry, photos)?;
         let mut images = images.into_iter();
         let of_fills = needed
             .iter()
             .map(|needed| Images::References(images.by_ref().take(needed.len()).collect()));
-        Needed {
+        Ok(Needed {
             of_fills: of_fills.collect(),
             made,
+        })
+    }
+
+    /// All cells, everywhere.
+    fn whole(&self) -> Visibility {
+        let cells = (0..self.interior.cells.len() as u32).map(|id| VisibleCell {
+            cell: CellId(id),
+            regions: vec![Region::ALL],
+        });
+        Visibility {
+            cells: cells.collect(),
+            passes: Vec::new(),
         }
     }
 
@@ -399,7 +436,12 @@ impl<'a> Walk<'a> {
     }
 
     /// The picture; how many pixels of portals nothing was drawn in.
-    fn compose(&mut self, camera: &Pinhole, fills: &[Filled<'_>]) -> usize {
+    fn compose(
+        &mut self,
+        view: &View,
+        camera: &Pinhole,
+        fills: &[Filled<'_>],
+    ) -> Result<usize, RenderError> {
         let width = camera.width as usize;
         let (owners, filled) = (&self.owners, &self.filled);
         let fill_of = |pixel: usize| fills.get(usize::from(owners[pixel]).wrapping_sub(1));
@@ -419,9 +461,9 @@ impl<'a> Walk<'a> {
             }
         };
         self.painter
-            .shade(self.model, camera, &mut self.picture, is_wanted);
+            .shade(self.model, view, camera, &mut self.picture, is_wanted)?;
         if fills.is_empty() {
-            return 0;
+            return Ok(0);
         }
         let painter = &self.painter;
         let colors = self.picture.color.par_chunks_mut(width);
@@ -455,7 +497,7 @@ impl<'a> Walk<'a> {
             }
             holes
         };
-        rows.enumerate().map(row).sum()
+        Ok(rows.enumerate().map(row).sum())
     }
 }
 
