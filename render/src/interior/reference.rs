@@ -1,5 +1,6 @@
 //! Images of what lies beyond a portal, made before it.
 
+use super::walk::all_cells;
 use super::{Beyond, Captured, CellGeometry, Pinhole, Raster, Target, Window};
 use crate::RenderError;
 use calibrate::{Lens, View};
@@ -50,7 +51,7 @@ impl Reference {
         place: &SemicircleView,
         size: [u32; 2],
     ) -> Self {
-        let met = Self::met(interior, model, geometry, place, size);
+        let met = Self::met(interior, model, geometry, place, size, false);
         let Some((_, raster, mut image)) = met else {
             return Self::nothing(place);
         };
@@ -58,7 +59,8 @@ impl Reference {
         image
     }
 
-    /// As [`Self::new`], coloured from photos as far as they show what is seen.
+    /// As [`Self::new`], coloured from photos as far as they show what is seen; of all cells, as a
+    /// capture's walls may be open where no portal was found.
     ///
     /// # Errors
     /// The photos' engine's.
@@ -70,7 +72,7 @@ impl Reference {
         size: [u32; 2],
         captured: &mut Captured,
     ) -> Result<Self, RenderError> {
-        let met = Self::met(interior, model, geometry, place, size);
+        let met = Self::met(interior, model, geometry, place, size, true);
         let Some((view, raster, mut image)) = met else {
             return Ok(Self::nothing(place));
         };
@@ -88,13 +90,15 @@ impl Reference {
         }
     }
 
-    /// What the place's camera meets, not coloured yet; `None` for a place that is none.
+    /// What the place's camera meets, of all cells or of those that portals show; not coloured yet.
+    /// `None` for a place that is none.
     fn met(
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
         place: &SemicircleView,
         [width, height]: [u32; 2],
+        of_all_cells: bool,
     ) -> Option<(View, Raster, Self)> {
         let portal = interior.portal(place.portal);
         let eye = place.camera_from_world.center();
@@ -106,7 +110,10 @@ impl Reference {
         };
         let camera = Pinhole::new(&view).ok()?;
         let region = Region::of(&view);
-        let visibility = visible_through(interior, place.portal, place.into, eye, &region);
+        let visibility = match of_all_cells {
+            true => all_cells(interior, &region),
+            false => visible_through(interior, place.portal, place.into, eye, &region),
+        };
         let runs = geometry.seen(eye, &visibility);
         let beyond = plane_of(&camera, portal, Some(place.into));
         let mut raster = Raster::default();

@@ -247,9 +247,12 @@ impl<'a> Walk<'a> {
         let eye = camera.center;
         let cell = self.contents.locate(self.interior, eye);
         let visibility = match fill {
-            PortalFill::Whole => self.whole(),
+            PortalFill::Whole => all_cells(self.interior, &Region::ALL),
             _ => visible(self.interior, cell, view),
         };
+        // Of a capture walls may be open where no portal was found, so that all cells may be in sight.
+        let is_captured = self.painter.captured().is_some() && fill != PortalFill::Whole;
+        let in_view = is_captured.then(|| all_cells(self.interior, &Region::of(view)));
         let in_sight = |visibility: Visibility| match self.options.whole_cells {
             true => everywhere(visibility),
             false => visibility,
@@ -269,12 +272,13 @@ impl<'a> Walk<'a> {
                     cells: visibility.cells.first().into_iter().cloned().collect(),
                     passes: Vec::new(),
                 });
-                windows.push((geometry.seen(eye, &alone), whole));
+                let own = in_view.as_ref().unwrap_or(&alone);
+                windows.push((geometry.seen(eye, own), whole));
                 for &(pass, into) in &open {
                     let portal = self.interior.portal(pass.portal);
                     let share = self.share_of_image(portal, eye);
                     let window = Window::of(&pass.region, &camera);
-                    if share < 1.0 {
+                    if share < 1.0 && !is_captured {
                         let (id, region) = (pass.portal, &pass.region);
                         let beyond = visible_through(self.interior, id, into, eye, region);
                         let runs = geometry.seen(eye, &in_sight(beyond));
@@ -291,7 +295,10 @@ impl<'a> Walk<'a> {
                     }
                 }
             }
-            _ => windows.push((geometry.seen(eye, &in_sight(visibility.clone())), whole)),
+            _ => {
+                let all = in_view.unwrap_or_else(|| in_sight(visibility.clone()));
+                windows.push((geometry.seen(eye, &all), whole));
+            }
         }
         cost.filled = fills.len();
         cost.visibility = start.elapsed();
@@ -408,18 +415,6 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// All cells, everywhere.
-    fn whole(&self) -> Visibility {
-        let cells = (0..self.interior.cells.len() as u32).map(|id| VisibleCell {
-            cell: CellId(id),
-            regions: vec![Region::ALL],
-        });
-        Visibility {
-            cells: cells.collect(),
-            passes: Vec::new(),
-        }
-    }
-
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
     fn share_of_image(&self, portal: &Portal, eye: DVec3) -> f64 {
         let far = self.options.near * portal.semicircle_radius(self.interior.up);
@@ -466,6 +461,7 @@ impl<'a> Walk<'a> {
             return Ok(0);
         }
         let painter = &self.painter;
+        let is_captured = painter.captured().is_some();
         let colors = self.picture.color.par_chunks_mut(width);
         let rows = colors.zip(self.picture.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
@@ -480,6 +476,10 @@ impl<'a> Walk<'a> {
                     continue;
                 }
                 let mut image = filled.color[pixel];
+                if image[3] == 0 && own.is_some() && is_captured {
+                    // All that might be there was met.
+                    continue;
+                }
                 if image[3] == 0 {
                     holes += usize::from(own.is_none());
                     if last.color.len() == owners.len() {
@@ -511,6 +511,18 @@ fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
     let part = weights[1] / alpha;
     let mix = |k: usize| f64::from(a[k]) + part * (f64::from(b[k]) - f64::from(a[k]));
     [mix(0), mix(1), mix(2), alpha].map(|v| v.round() as u8)
+}
+
+/// All cells, in one region.
+pub(super) fn all_cells(interior: &Interior, region: &Region) -> Visibility {
+    let cells = (0..interior.cells.len() as u32).map(|id| VisibleCell {
+        cell: CellId(id),
+        regions: vec![region.clone()],
+    });
+    Visibility {
+        cells: cells.collect(),
+        passes: Vec::new(),
+    }
 }
 
 /// The same cells, seen everywhere.
