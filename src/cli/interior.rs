@@ -17,6 +17,7 @@ use proxy::interior::{
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Make an interior of a model or a capture: cells joined by portals
 ///
@@ -90,11 +91,14 @@ fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     super::options::print_warnings(&warnings);
     let without = args.hold_out.names(&scene)?;
     // 1. The surface.
+    let start = Instant::now();
     let busy = spinner("fusing depth maps");
     let surface = scene.surface(&without);
     busy.finish_and_clear();
     let surface = surface.with_context(named)?;
+    let fused_s = start.elapsed().as_secs_f64();
     // 2. Its rooms.
+    let start = Instant::now();
     let (mut interior, warnings, pictures) = match &args.rooms {
         Some(rooms) => {
             let (interior, warnings) = read_rooms(rooms, MODEL)?;
@@ -107,12 +111,19 @@ fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
             taken_apart(found.with_context(named)?)?
         }
     };
+    let rooms_s = start.elapsed().as_secs_f64();
     // 3. The photos that show them.
     interior.show_photos(&relative(&args.output, &args.model));
     interior.held_out = without.into_iter().collect();
     let model = &surface.model;
     let bytes = model_to_glb(model).with_context(named)?;
-    finish(args, MODEL, &bytes, model, interior, warnings, &pictures)
+    finish(args, MODEL, &bytes, model, interior, warnings, &pictures)?;
+    let surface = match surface.maps {
+        0 => "the scene's own mesh, coloured".to_owned(),
+        maps => format!("{maps} depth maps fused and coloured"),
+    };
+    say!("{surface} in {fused_s:.1} s, rooms in {rooms_s:.1} s");
+    Ok(())
 }
 
 fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {

@@ -63,9 +63,9 @@ pub(super) struct Args {
     /// Size of the frames in pixels [default: the path's own; of a tour 640x512]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
-    /// Size of the reference images before portals
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "256x256")]
-    reference_size: (u32, u32),
+    /// Size of the reference images before portals [default: 256x256; of a capture's rooms 512x512]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    reference_size: Option<(u32, u32)>,
     /// Reference images before each side of a portal: an odd number
     #[arg(long, value_name = "N", default_value_t = 13)]
     reference_views: usize,
@@ -108,6 +108,9 @@ enum Device {
 
 /// The tour's own size, that of Rafferty et al. 1998.
 const SIZE: (u32, u32) = (640, 512);
+/// Of reference images made of photos: with 256 house-walk's held-out photos lose 0.5 dB to LDIs, with
+/// this 0.2 dB.
+const CAPTURED_REFERENCE_SIZE: [u32; 2] = [512, 512];
 const FPS: f64 = 15.0;
 /// Of a tour's camera, over the picture's width.
 const FOCAL: f64 = 0.7;
@@ -124,7 +127,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--near is {}; expected 0 or more", args.near);
         return Err(Usage(text).into());
     }
-    if args.reference_size.0.max(args.reference_size.1) > 4096 {
+    if args.reference_size.is_some_and(|(w, h)| w.max(h) > 4096) {
         let text = "--reference-size: expected sides of up to 4096".to_owned();
         return Err(Usage(text).into());
     }
@@ -134,7 +137,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         persist: args.persist,
         ..WalkOptions::default()
     };
-    options.library.size = args.reference_size.into();
     options.library.semicircles.views = args.reference_views;
     options.library.budget = args.cpu_memory;
     let device = match args.device {
@@ -153,6 +155,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let photos = match args.no_photos && !args.held_out {
         true => None,
         false => Photos::open(&path, &interior, &args.exposure)?,
+    };
+    options.library.size = match (args.reference_size, &photos) {
+        (Some(size), _) => size.into(),
+        (None, Some(_)) if !args.no_photos => CAPTURED_REFERENCE_SIZE,
+        _ => options.library.size,
     };
     let frames = match args.held_out {
         true => held_out(photos.as_ref(), args.size).with_context(named)?,

@@ -65,6 +65,10 @@ impl Default for WalkOptions {
 /// Where geometry is alone, in shares of where it begins to be mixed in.
 const ALONE: f64 = 2.0 / 3.0;
 
+/// From where on images are shown beyond a capture's other portals once one has come through one, in
+/// radii of its semicircle: whoever changes cells sees all of it as geometry, before and after.
+const ENTERED: f64 = 0.25;
+
 /// What a frame took and what was left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameCost {
@@ -274,9 +278,13 @@ impl<'a> Walk<'a> {
                 });
                 let own = in_view.as_ref().unwrap_or(&alone);
                 windows.push((geometry.seen(eye, own), whole));
+                let entered = match is_captured {
+                    true => self.share_entered(cell, eye),
+                    false => 1.0,
+                };
                 for &(pass, into) in &open {
                     let portal = self.interior.portal(pass.portal);
-                    let share = self.share_of_image(portal, eye);
+                    let share = entered * self.share_of_image(portal, eye);
                     let window = Window::of(&pass.region, &camera);
                     if share < 1.0 && !is_captured {
                         let (id, region) = (pass.portal, &pass.region);
@@ -428,6 +436,18 @@ impl<'a> Walk<'a> {
         } else {
             1.0
         }
+    }
+
+    /// Of images in all that is beyond a cell's portals, 0 to 1, by the eye's distance from the one that
+    /// it may just have come through.
+    fn share_entered(&self, cell: Option<CellId>, eye: DVec3) -> f64 {
+        let portals = self.interior.portals_of(cell).map(|(_, portal)| portal);
+        let ways = portals.filter(|portal| matches!(portal.beyond(cell), Some(Some(_))));
+        let share = |portal: &Portal| {
+            let reach = ENTERED * portal.semicircle_radius(self.interior.up);
+            portal.polygon.distance(eye) / reach
+        };
+        ways.map(share).fold(1.0, f64::min)
     }
 
     /// The picture; how many pixels of portals nothing was drawn in.
