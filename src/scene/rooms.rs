@@ -29,6 +29,8 @@ pub struct SceneSurface {
 const MOST_TRIANGLES: usize = 600_000;
 /// Every so-manieth column and row of a depth map is a line of sight.
 const SIGHTS: u32 = 4;
+/// Holes with a border of so many voxels are closed: sensors miss what is dark or shiny.
+const SMALL_HOLE: f64 = 24.0;
 /// A photo's colours are a corner's within so many voxels.
 const SAME_PLACE: f64 = 3.0;
 
@@ -51,7 +53,8 @@ impl Scene {
                 (solid.mesh().clone(), 0.0, Some(solid))
             }
             _ => {
-                let fusion = fuse_depth(&sources, MOST_TRIANGLES)?;
+                let mut fusion = fuse_depth(&sources, MOST_TRIANGLES)?;
+                fusion.mesh.close_holes(SMALL_HOLE * fusion.voxel_size);
                 (fusion.mesh, SAME_PLACE * fusion.voxel_size, None)
             }
         };
@@ -97,19 +100,20 @@ impl Scene {
 
     /// The mesh that was made for the scene without the photos of the given names.
     fn own_mesh(&self, without: &BTreeSet<String>) -> Result<&Solid, SceneError> {
-        let own = self.proxy.as_ref();
-        let Some((Proxy::Mesh(solid), own)) = own.map(|own| (&own.proxy, own)) else {
+        let own = self
+            .proxy
+            .as_ref()
+            .map(|own| (&own.proxy, &own.fitted_without));
+        let Some((Proxy::Mesh(solid), fitted_without)) = own else {
             return Err(unfit(
                 "the photos have no depth maps, which rooms are found in: give their folder with \
-                 `import --depth`, or make a mesh of the scene (`lumigraph proxy SCENE tunnel`, or \
-                 `carved`), or give a model of the place (.glb) instead of the photos",
+                 `import --depth`, or import them and make a mesh of the scene (`lumigraph proxy SCENE \
+                 tunnel`, or `carved`), or give a model of the place (.glb) instead of the photos",
             ));
         };
-        let knows = |name| !matches!(&own.fitted_without, Some(names) if names.contains(name));
-        if let Some(name) = without
-            .iter()
-            .find(|name| own.fitted_without.is_some() && knows(name))
-        {
+        // A mesh given by hand rests on no photo.
+        let knows = |name: &&String| fitted_without.as_ref().is_some_and(|n| !n.contains(*name));
+        if let Some(name) = without.iter().find(knows) {
             return Err(unfit(format!(
                 "the scene's mesh was made with the photo {name}, which is held out; make it anew with \
                  `lumigraph proxy --hold-out`"

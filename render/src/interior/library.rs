@@ -46,6 +46,9 @@ pub struct PortalLdi {
     pub tree: ClipTree,
 }
 
+/// Of some sides, in order; nothing for one whose images make none.
+type Ldis = Vec<Arc<Option<PortalLdi>>>;
+
 /// The places of all reference images, and those images and LDIs that are in memory.
 #[derive(Debug)]
 pub struct Library {
@@ -197,7 +200,7 @@ impl Library {
         model: &Model,
         geometry: &CellGeometry,
         mut captured: Option<&mut Captured>,
-    ) -> Result<(Vec<Arc<Option<PortalLdi>>>, usize), RenderError> {
+    ) -> Result<(Ldis, usize), RenderError> {
         self.turn += 1;
         let mut made = 0;
         for side in touch(&mut self.ldis, sides, self.turn) {
