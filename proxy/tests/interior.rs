@@ -44,7 +44,10 @@ fn an_interior_comes_back_from_its_file_to_the_last_digit() {
     let mut interior = two_rooms();
     interior.eye_height = 1.0 / 3.0;
     interior.up = DVec3::new(0.1, 0.9, -0.2).normalize();
-    interior.cells[0].content = Content::Scene("../west wing".to_owned());
+    interior.cells[0].content = Content::Scene {
+        folder: "../west wing".to_owned(),
+        room: None,
+    };
     interior.cells[1].content = Content::Box(RoomBox {
         min: DVec3::new(4.0, 0.1 + 0.2, -1e-300),
         max: DVec3::new(5e6 + 0.1, 1.0 / 3.0, 7.0),
@@ -64,11 +67,24 @@ fn an_interior_comes_back_from_its_file_to_the_last_digit() {
     write_interior(&path, &interior).unwrap();
     let (back, _) = proxy::interior::read_interior(&path).unwrap();
     assert_eq!(back, interior);
+    assert_eq!(back.cells[0].content.room(), None);
+    assert_eq!(back.cells[1].content.scene(), None);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     // Again, byte for byte.
     let bytes = std::fs::read(&path).unwrap();
     write_interior(&path, &back).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    // Boxes that photos show, and those that have no say.
+    let room = back.cells[1].content.room();
+    let mut shown = back;
+    shown.show_photos("../east wing");
+    shown.held_out = vec!["a.jpg".to_owned()];
+    assert_eq!(shown.cells[0].content.scene(), Some("../west wing"));
+    assert_eq!(shown.cells[1].content.scene(), Some("../east wing"));
+    assert_eq!(shown.cells[1].content.room(), room);
+    write_interior(&path, &shown).unwrap();
+    let (back, _) = proxy::interior::read_interior(&path).unwrap();
+    assert_eq!(back, shown);
 }
 
 /// What is said of an interior file.
@@ -147,7 +163,7 @@ fn what_is_wrong_is_said() {
         ),
         (
             &with(r#", {"name": "b"}"#, ""),
-            "cell `b` must have one of `box`, `nodes` and `scene`, and has 0",
+            "cell `b` must have one of `box`, `nodes` and `scene`, or `scene` and `box`, and has 0",
         ),
         (
             &with(r#", {"name": "b", "nodes": [], "scene": "s"}"#, ""),

@@ -6,7 +6,8 @@ pub(crate) mod every_lens;
 use crate::lumigraph::Lumigraph;
 use crate::options::{FieldOptions, Resolution};
 use crate::planted::{Fault, is_planted};
-use crate::surface::Surface;
+use crate::sight::within_sight;
+use crate::surface::{FacetMap, Surface};
 use crate::tally::{Scored, Tally};
 use crate::time::Moment;
 use crate::view_tree::ViewTree;
@@ -143,8 +144,8 @@ pub struct Frame<'a> {
     pub sources: Vec<FrameSource>,
     /// The proxy from there.
     pub surface: Surface,
-    /// A source view that takes no part.
-    gone: Option<usize>,
+    /// Source views that take no part.
+    gone: Vec<usize>,
     /// Asks every source view about every ray.
     no_skip: bool,
     /// Made when first asked for.
@@ -159,7 +160,7 @@ impl<'a> Frame<'a> {
     /// # Panics
     /// If the options fail [`FieldOptions::check`]: check them where they come in.
     pub fn new(lumigraph: &'a Lumigraph, desired: View, options: FieldOptions) -> Self {
-        Self::without(lumigraph, desired, options, None)
+        Self::of(lumigraph, desired, options, Vec::new(), None)
     }
 
     /// As [`Self::new`], with a source view of the given index that takes no part. (The
@@ -172,6 +173,34 @@ impl<'a> Frame<'a> {
         desired: View,
         options: FieldOptions,
         gone: Option<usize>,
+    ) -> Self {
+        Self::of(
+            lumigraph,
+            desired,
+            options,
+            gone.into_iter().collect(),
+            None,
+        )
+    }
+
+    /// A desired view of facets that were found for it, in place of what it sees of the
+    /// lumigraph's proxy; without some of the source views.
+    pub(crate) fn over(
+        lumigraph: &'a Lumigraph,
+        desired: View,
+        options: FieldOptions,
+        gone: Vec<usize>,
+        facets: FacetMap,
+    ) -> Self {
+        Self::of(lumigraph, desired, options, gone, Some(facets))
+    }
+
+    fn of(
+        lumigraph: &'a Lumigraph,
+        desired: View,
+        options: FieldOptions,
+        gone: Vec<usize>,
+        facets: Option<FacetMap>,
     ) -> Self {
         assert_eq!(options.check(), Ok(()));
         // A desired view finer than every photo undersamples all of them alike; that is no
@@ -196,7 +225,10 @@ impl<'a> Frame<'a> {
                 let same = [here, last].into_iter().find(|c| is_one_place(*c, center));
                 last = same.unwrap_or(center);
                 FrameSource {
-                    time_penalty: if gone == Some(i) { f64::INFINITY } else { 0.0 },
+                    time_penalty: match gone.contains(&i) {
+                        true => f64::INFINITY,
+                        false => 0.0,
+                    },
                     footprint_ratio: match options.resolution {
                         Resolution::Footprint => desired_focal / source.view.lens.mean_focal(),
                         Resolution::Distance | Resolution::Length => 1.0,
@@ -206,7 +238,10 @@ impl<'a> Frame<'a> {
                 }
             })
             .collect::<Vec<FrameSource>>();
-        let surface = Surface::of(lumigraph, &desired, &sources);
+        let surface = match facets {
+            Some(facets) => Surface::Facets(within_sight(facets, &desired, &sources)),
+            None => Surface::of(lumigraph, &desired, &sources),
+        };
         let mut frame = Self {
             lumigraph,
             desired,
@@ -243,8 +278,8 @@ impl<'a> Frame<'a> {
         for (source, penalty) in self.sources.iter_mut().zip(penalties) {
             source.time_penalty = penalty;
         }
-        if let Some(gone) = self.gone {
-            self.sources[gone].time_penalty = f64::INFINITY;
+        for gone in &self.gone {
+            self.sources[*gone].time_penalty = f64::INFINITY;
         }
         // It has only those that take part.
         self.view_tree = OnceLock::new();

@@ -156,6 +156,26 @@ impl FacetMap {
         (facet != NO_FACET).then(|| self.planes[facet as usize])
     }
 
+    /// Facets, and which of them each pixel's centre sees, row by row; [`NO_FACET`] for none.
+    pub(crate) fn of_pixels(planes: Vec<DVec3>, facet_of: Vec<u32>, desired: &View) -> Self {
+        Self {
+            moved_from: planes.len() as u32,
+            planes,
+            facet_of,
+            seers: Seers::default(),
+            size: [desired.width, desired.height],
+        }
+    }
+
+    /// The plane of a triangle whose corners are relative to the desired centre, in its camera's
+    /// frame.
+    pub(crate) fn plane_through([a, b, c]: [DVec3; 3]) -> DVec3 {
+        let normal = (b - a).cross(c - a);
+        let q = normal / normal.dot(a);
+        // Seen edge on, it is seen nowhere.
+        if q.is_finite() { q } else { DVec3::ZERO }
+    }
+
     fn of_facets(mut facets: Facets, desired: &View) -> Self {
         let planes = std::mem::take(&mut facets.planes);
         Self::new(desired, planes, |ray, last| {
@@ -167,23 +187,12 @@ impl FacetMap {
         let center = desired.center();
         let rotation = desired.camera_from_world.rotation;
         let mesh = solid.mesh();
-        let plane = |i: usize| {
-            let [a, b, c] = mesh.corners(i).map(|p| rotation * (p - center));
-            let normal = (b - a).cross(c - a);
-            let q = normal / normal.dot(a);
-            // Seen edge on, it is seen nowhere.
-            if q.is_finite() { q } else { DVec3::ZERO }
-        };
+        let plane =
+            |i: usize| Self::plane_through(mesh.corners(i).map(|p| rotation * (p - center)));
         let triangles = (0..mesh.triangles.len()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
         if let Some(scan) = solid.scan(desired, 1) {
-            return Self {
-                moved_from: planes.len() as u32,
-                planes,
-                facet_of: scan.triangle_of,
-                seers: Seers::default(),
-                size: [desired.width, desired.height],
-            };
+            return Self::of_pixels(planes, scan.triangle_of, desired);
         }
         let world_from_camera = rotation.conjugate();
         Self::new(desired, planes, |ray, _| {
@@ -209,12 +218,6 @@ impl FacetMap {
                 .collect::<Vec<u32>>()
         };
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
-        Self {
-            moved_from: planes.len() as u32,
-            planes,
-            facet_of: rows.concat(),
-            seers: Seers::default(),
-            size: [desired.width, desired.height],
-        }
+        Self::of_pixels(planes, rows.concat(), desired)
     }
 }

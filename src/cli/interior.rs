@@ -1,14 +1,14 @@
 //! `lumigraph interior`
 
 use super::Usage;
-use super::options::triple;
+use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
 use anyhow::Context;
 use datasets::in_new_folder;
 use glam::DVec3;
 use image::ImageFormat;
-use lumigraph::scene::{Scene, SceneInterior};
+use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
     Contents, Interior, InteriorError, InteriorWarning, interior_from_nodes, read_interior,
@@ -17,14 +17,16 @@ use proxy::interior::{
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Make an interior of a model or a capture: cells joined by portals
 ///
 /// Rooms and doorways are found in the surface: that of the model, or that of a capture's depth
-/// maps, fused and coloured from the photos. Look at floor-plan.svg, and correct interior.json
-/// where it is wrong. Of a model they can be told instead: by --rooms (boxes and outlines), or by
-/// the names of its nodes: `cell:NAME` for a room and all below it, `portal:A|B` for the flat mesh
-/// of an opening between two of them.
+/// maps, fused (without depth maps, a scene's own mesh). Look at floor-plan.svg, and correct
+/// interior.json where it is wrong. They can be told instead: by --rooms (boxes and outlines), or
+/// by the names of a model's nodes: `cell:NAME` for a room and all below it, `portal:A|B` for the
+/// flat mesh of an opening between two of them. The rooms of a capture are drawn from its photos,
+/// which stay where they are.
 ///
 ///     lumigraph interior house.glb -o house
 ///     lumigraph interior my-rgbd-walk -o office
@@ -39,6 +41,8 @@ pub(super) struct Args {
     /// [{"name", "between": ["A", "B"], "polygon": [[x, y, z], …]}]}
     #[arg(long, value_name = "FILE")]
     rooms: Option<PathBuf>,
+    #[command(flatten)]
+    hold_out: HoldOutArgs,
     /// Find the rooms even where nodes name them
     #[arg(long, conflicts_with = "rooms")]
     find: bool,
@@ -82,23 +86,51 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
-    if args.rooms.is_some() {
-        let text = "--rooms is for models; of a capture, edit the interior.json that is written";
-        return Err(Usage(text.to_owned()).into());
-    }
     let named = || args.model.display().to_string();
     let (scene, warnings) = Scene::open(&args.model, false)?;
     super::options::print_warnings(&warnings);
-    let busy = spinner("fusing depth maps and finding rooms");
-    let made = scene.interior(MODEL, options);
+    let without = args.hold_out.names(&scene)?;
+    // 1. The surface.
+    let start = Instant::now();
+    let busy = spinner("fusing depth maps");
+    let surface = scene.surface(&without);
     busy.finish_and_clear();
-    let SceneInterior { model, found, .. } = made.with_context(named)?;
-    let bytes = model_to_glb(&model).with_context(named)?;
-    let (interior, warnings, pictures) = taken_apart(found)?;
-    finish(args, MODEL, &bytes, &model, interior, warnings, &pictures)
+    let surface = surface.with_context(named)?;
+    let fused_s = start.elapsed().as_secs_f64();
+    // 2. Its rooms.
+    let start = Instant::now();
+    let (mut interior, warnings, pictures) = match &args.rooms {
+        Some(rooms) => {
+            let (interior, warnings) = read_rooms(rooms, MODEL)?;
+            (interior, warnings, Vec::new())
+        }
+        None => {
+            let busy = spinner("finding rooms");
+            let found = surface.rooms(MODEL, options);
+            busy.finish_and_clear();
+            taken_apart(found.with_context(named)?)?
+        }
+    };
+    let rooms_s = start.elapsed().as_secs_f64();
+    // 3. The photos that show them.
+    interior.show_photos(&relative(&args.output, &args.model));
+    interior.held_out = without.into_iter().collect();
+    let model = &surface.model;
+    let bytes = model_to_glb(model).with_context(named)?;
+    finish(args, MODEL, &bytes, model, interior, warnings, &pictures)?;
+    let surface = match surface.maps {
+        0 => "the scene's own mesh, coloured".to_owned(),
+        maps => format!("{maps} depth maps fused and coloured"),
+    };
+    say!("{surface} in {fused_s:.1} s, rooms in {rooms_s:.1} s");
+    Ok(())
 }
 
 fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
+    if args.hold_out.hold_out.is_some() {
+        let text = "--hold-out is for captures; a model has no photos";
+        return Err(Usage(text.to_owned()).into());
+    }
     // A .glb is one file, and can be copied as it is.
     let is_glb = args
         .model

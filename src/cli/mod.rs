@@ -2,6 +2,7 @@
 //! else; results go to stdout, all else to stderr.
 
 mod bench;
+mod captured;
 mod demo;
 mod evaluate;
 mod export;

@@ -1,6 +1,7 @@
 //! `lumigraph view`
 
 use super::Usage;
+use super::captured::Photos;
 use super::exposure::ExposureArgs;
 use super::interior::open;
 use super::options::{DrawArgs, FieldArgs, SceneArgs};
@@ -115,6 +116,8 @@ fn loader(args: &Args) -> anyhow::Result<Load> {
             .is_some_and(|name| name == "interior.json");
     if is_interior {
         let (path, interior) = open(&given)?;
+        let (device, budget) = (args.draw.device(), args.draw.cpu_memory);
+        let exposure = args.exposure.clone();
         return Ok(Box::new(move |teller| {
             teller.doing("reading the model");
             let model = model_of(&path, &interior)?;
@@ -123,7 +126,15 @@ fn loader(args: &Args) -> anyhow::Result<Load> {
             if let Some(warning) = warnings.first() {
                 teller.say(Progress::Note(warning.to_string()));
             }
-            let house = House::new(interior, contents, model);
+            let photos = Photos::open(&path, &interior, &exposure)?;
+            let mut house = House::new(interior, contents, model);
+            if let Some(photos) = photos {
+                teller.doing("measuring what photos see");
+                house = house.with_photos(|interior, contents, model| {
+                    let backdrop = photos.add_backdrop(model, contents)?;
+                    photos.painter(device, budget, interior, contents, model, backdrop)
+                })?;
+            }
             teller.show(Content::Interior(Arc::new(house)));
             Ok(())
         }));

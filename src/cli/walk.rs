@@ -1,6 +1,8 @@
 //! `lumigraph walk`
 
 use super::Usage;
+use super::captured::Photos;
+use super::exposure::ExposureArgs;
 use super::interior::open;
 use super::options::{bytes, resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
@@ -9,11 +11,15 @@ use super::session::progress;
 use anyhow::{Context, bail};
 use calibrate::{Camera, Lens, View};
 use clap::ValueEnum;
+use cpu_time::ProcessTime;
 use glam::DVec2;
-use lumigraph::scene::picture_files;
+use lumigraph::scene::{Truth, TruthScore, picture_files};
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
-use render::interior::{FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, tour};
+use render::interior::{
+    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, tour,
+};
+use render::score::mean_of;
 use render::{DeviceChoice, path};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -22,10 +28,13 @@ use std::path::{Path, PathBuf};
 /// Walk through an interior
 ///
 /// The room one is in is drawn as geometry; what lies beyond its portals as geometry too, or out of
-/// images made before the portals: as textures, warped, or as layered depth images. Frames are PNGs; times.svg plots the time
-/// of each frame, path.json is the tour.
+/// images made before the portals: as textures, warped, or as layered depth images. Geometry has
+/// the model's colours, or those of the photos of a capture's rooms. Frames are PNGs; times.svg
+/// plots the time of each frame, path.json is the tour. --held-out draws the photos that were held out
+/// when the interior was made, and scores them as `evaluate` does.
 ///
 ///     lumigraph walk house --portals all -o walk
+///     lumigraph walk office --held-out --portals all,whole -o scored
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -37,12 +46,15 @@ pub(super) struct Args {
     /// Walk through all rooms [default, where there is no --path]
     #[arg(long)]
     tour: bool,
+    /// Draw and score the photos that were held out when the interior was made
+    #[arg(long, conflicts_with_all = ["tour", "path"])]
+    held_out: bool,
     /// Frames of a tour
-    #[arg(long, value_name = "N", default_value_t = 520, conflicts_with = "path",
+    #[arg(long, value_name = "N", default_value_t = 520, conflicts_with_all = ["path", "held_out"],
         value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
     /// What portals show: geometry, texture, warp1, warp2, ldi, several of them, or all; of several,
-    /// each has a folder of its own
+    /// each has a folder of its own. whole draws everything as if there were no cells
     #[arg(
         long,
         value_name = "KIND",
@@ -53,9 +65,9 @@ pub(super) struct Args {
     /// Size of the frames in pixels [default: the path's own; of a tour 640x512]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
-    /// Size of the reference images before portals
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "256x256")]
-    reference_size: (u32, u32),
+    /// Size of the reference images before portals [default: 256x256; of a capture's rooms 512x512]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    reference_size: Option<(u32, u32)>,
     /// Reference images before each side of a portal: an odd number
     #[arg(long, value_name = "N", default_value_t = 13)]
     reference_views: usize,
@@ -69,11 +81,16 @@ pub(super) struct Args {
     /// Keep the last frame's colours where no image shows anything
     #[arg(long)]
     persist: bool,
+    /// Draw the model's own colours, not the photos of a capture's rooms
+    #[arg(long)]
+    no_photos: bool,
+    #[command(flatten)]
+    exposure: ExposureArgs,
     /// What draws geometry; auto is the graphics processor if there is one, else the CPU
     #[arg(long, value_enum, default_value = "auto")]
     device: Device,
-    /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames; those not used
-    /// for longest are made again when they are needed [default: no limit]
+    /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames, and decoded photos,
+    /// too; those not used for longest are made again when they are needed [default: no limit]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     cpu_memory: Option<u64>,
     /// Print times, and what was drawn and skipped, as JSON
@@ -109,7 +126,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--near is {}; expected 0 or more", args.near);
         return Err(Usage(text).into());
     }
-    if args.reference_size.0.max(args.reference_size.1) > 4096 {
+    if args.reference_size.is_some_and(|(w, h)| w.max(h) > 4096) {
         let text = "--reference-size: expected sides of up to 4096".to_owned();
         return Err(Usage(text).into());
     }
@@ -119,7 +136,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         persist: args.persist,
         ..WalkOptions::default()
     };
-    options.library.size = args.reference_size.into();
     options.library.semicircles.views = args.reference_views;
     options.library.budget = args.cpu_memory;
     let device = match args.device {
@@ -129,15 +145,35 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     // 2. What there is.
     let (path, interior) = open(&args.interior)?;
-    let model = model_of(&path, &interior)?;
+    let mut model = model_of(&path, &interior)?;
     let named = || args.interior.display().to_string();
-    let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
+    let (mut contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
     for warning in warnings {
         say!("warning: {warning}");
     }
-    let frames = frames(args, &interior, &contents)?;
+    let photos = match args.no_photos && !args.held_out {
+        true => None,
+        false => Photos::open(&path, &interior, &args.exposure)?,
+    };
+    options.library.size = match (args.reference_size, &photos) {
+        (Some(size), _) => size.into(),
+        (None, Some(_)) if !args.no_photos => CAPTURED_REFERENCE_SIZE,
+        _ => options.library.size,
+    };
+    let frames = match args.held_out {
+        true => held_out(photos.as_ref(), args.size).with_context(named)?,
+        false => frames(args, &interior, &contents)?,
+    };
     // 3. The walks: one walker, so that images are made once for all kinds.
-    let painter = Painter::open(device, &model);
+    let painter = match photos.as_ref().filter(|_| !args.no_photos) {
+        Some(photos) => {
+            say!("exposure: {}", photos.exposure.text());
+            let backdrop = photos.add_backdrop(&mut model, &mut contents)?;
+            let budget = args.cpu_memory;
+            photos.painter(device, budget, &interior, &contents, &model, backdrop)?
+        }
+        None => Painter::open(device, &model),
+    };
     let mut walk = Walk::with(painter, &interior, &contents, &model, options);
     let mut walks = Vec::new();
     for fill in &fills {
@@ -153,6 +189,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let device = walk.painter().description();
     let references = walk.library().residency();
+    let photos = walk.painter().captured();
+    let decoded = photos.map(|captured| captured.lumigraph().photos.residency());
     // 4. What it took.
     let times: Vec<Vec<f64>> = walks.iter().map(Walked::times_ms).collect();
     let lines = walks.iter().zip(&times);
@@ -175,13 +213,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "references_made": references.loads,
             "references_let_go": references.evictions,
             "references_peak_bytes": references.peak,
+            "photos_peak_bytes": decoded.map(|d| d.peak),
+            "photos_decoded": decoded.map(|d| d.loads),
             "walks": walks,
         }));
     }
     let mut text = format!(
-        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7}\n",
+        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7}",
         "portals", "median ms", "95 % ms", "worst ms", "triangles", "samples", "holes", "images"
     );
+    if args.held_out {
+        let titles = ["psnr", "ssim", "coverage", "cpu ms"];
+        text += &titles.map(|title| format!(" {title:>8}")).concat();
+    }
+    text += "\n";
     for walk in &walks {
         text += &walk.line();
     }
@@ -232,6 +277,25 @@ pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model
 struct Named {
     name: String,
     view: View,
+    /// What the frame is to be compared with.
+    truth: Option<Truth>,
+}
+
+/// The photos that were held out.
+fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result<Vec<Named>> {
+    let held_out = photos.map(Photos::held_out).transpose()?;
+    let named = |(name, view, truth): (String, View, Truth)| {
+        let view = resized(view, size);
+        let truth = Some(truth.resized(view.width, view.height));
+        Named { name, view, truth }
+    };
+    let named: Vec<Named> = held_out.into_iter().flatten().map(named).collect();
+    if named.is_empty() {
+        bail!(
+            "no photos were held out when it was made; make it with `interior --hold-out SPLIT.json`"
+        );
+    }
+    Ok(named)
 }
 
 fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Result<Vec<Named>> {
@@ -253,6 +317,7 @@ fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Resu
     let named = |frame: path::PathFrame| Named {
         name: frame.name,
         view: resized(frame.view, args.size),
+        truth: None,
     };
     Ok(path.frames.into_iter().map(named).collect())
 }
@@ -260,9 +325,24 @@ fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Resu
 /// A walk with one kind of portals.
 struct Walked {
     fill: PortalFill,
-    frames: Vec<(String, PathBuf, FrameCost)>,
+    frames: Vec<Drawn>,
     /// How many reference images it used.
     references: usize,
+}
+
+/// A frame of a walk.
+struct Drawn {
+    name: String,
+    file: PathBuf,
+    cost: FrameCost,
+    scored: Option<Scored>,
+}
+
+/// What a held-out photo's picture scores.
+struct Scored {
+    score: TruthScore,
+    /// Processor time for the picture, with all photos and images in memory.
+    cpu_ms: f64,
 }
 
 fn draw(
@@ -276,11 +356,26 @@ fn draw(
     let bar = progress(frames.len(), fill.name());
     let mut drawn = Vec::new();
     for (frame, file) in frames.iter().zip(files) {
-        let cost = walk
-            .draw(&frame.view, fill)
-            .with_context(|| format!("frame {}", frame.name))?;
+        let named = || format!("frame {}", frame.name);
+        let mut cost = walk.draw(&frame.view, fill).with_context(named)?;
+        let mut scored = None;
+        if let Some(truth) = &frame.truth {
+            // Once more, when all that it needs is there.
+            let made = cost.references_made;
+            let start = ProcessTime::now();
+            cost = walk.draw(&frame.view, fill).with_context(named)?;
+            let cpu_ms = ms(start.elapsed());
+            cost.references_made += made;
+            let score = truth.score(&walk.picture().picture())?;
+            scored = Some(Scored { score, cpu_ms });
+        }
         capture::write_png(&file, &walk.picture().picture())?;
-        drawn.push((frame.name.clone(), file, cost));
+        drawn.push(Drawn {
+            name: frame.name.clone(),
+            file,
+            cost,
+            scored,
+        });
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -316,6 +411,16 @@ struct FrameReport<'a> {
     /// Of LDIs, in columns out of sight.
     samples_clipped: usize,
     holes: usize,
+    #[serde(flatten)]
+    scored: Option<ScoreReport>,
+}
+
+/// Of a held-out photo.
+#[derive(Serialize)]
+struct ScoreReport {
+    #[serde(flatten)]
+    score: TruthScore,
+    cpu_ms: f64,
 }
 
 fn ms(time: std::time::Duration) -> f64 {
@@ -324,7 +429,7 @@ fn ms(time: std::time::Duration) -> f64 {
 
 impl Walked {
     fn times_ms(&self) -> Vec<f64> {
-        self.frames.iter().map(|(.., c)| ms(c.time())).collect()
+        self.frames.iter().map(|f| ms(f.cost.time())).collect()
     }
 
     /// The median, what 95 % stay below, and the worst.
@@ -339,14 +444,35 @@ impl Walked {
     }
 
     fn mean(&self, of: impl Fn(&FrameCost) -> usize) -> f64 {
-        let sum: usize = self.frames.iter().map(|(.., c)| of(c)).sum();
+        let sum: usize = self.frames.iter().map(|f| of(&f.cost)).sum();
         sum as f64 / self.frames.len().max(1) as f64
     }
 
+    /// The means over the photos that were held out: their scores, and the processor's time.
+    fn scored(&self) -> Option<ScoreReport> {
+        let scored: Vec<&Scored> = self
+            .frames
+            .iter()
+            .filter_map(|f| f.scored.as_ref())
+            .collect();
+        let scores: Vec<TruthScore> = scored.iter().map(|s| s.score).collect();
+        let times: Vec<f64> = scored.iter().map(|s| s.cpu_ms).collect();
+        Some(ScoreReport {
+            score: TruthScore::mean(&scores)?,
+            cpu_ms: mean_of(&times)?,
+        })
+    }
+
     fn line(&self) -> String {
+        let scored = self.scored().map_or_else(String::new, |s| {
+            let ScoreReport { score, cpu_ms } = s;
+            let score = score.score;
+            let (psnr, ssim, coverage) = (score.psnr, score.ssim, score.coverage);
+            format!(" {psnr:>8.2} {ssim:>8.4} {coverage:>8.4} {cpu_ms:>8.1}")
+        });
         let [median, most, worst] = self.spread();
         format!(
-            "{:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7}\n",
+            "{:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7}{scored}\n",
             self.fill.name(),
             self.mean(|c| c.triangles_tried),
             self.mean(|c| c.samples),
@@ -355,11 +481,15 @@ impl Walked {
         )
     }
 
-    fn json(&self, interior: &Interior) -> Value {
+    fn json<'a>(&'a self, interior: &'a Interior) -> Value {
         let [median, most, worst] = self.spread();
-        let frames = self.frames.iter().map(|(name, file, c)| FrameReport {
-            name,
-            file,
+        let report = |f: &'a Drawn, c: &'a FrameCost| FrameReport {
+            name: &f.name,
+            file: &f.file,
+            scored: f.scored.as_ref().map(|s| ScoreReport {
+                score: s.score,
+                cpu_ms: s.cpu_ms,
+            }),
             cell: c.cell.map(|id| interior.cell(id).name.as_str()),
             ms: ms(c.time()),
             visibility_ms: ms(c.visibility),
@@ -377,7 +507,8 @@ impl Walked {
             samples: c.samples,
             samples_clipped: c.samples_clipped,
             holes: c.holes,
-        });
+        };
+        let frames = self.frames.iter().map(|f| report(f, &f.cost));
         let frames: Vec<FrameReport<'_>> = frames.collect();
         json!({
             "portals": self.fill.name(),
@@ -385,7 +516,8 @@ impl Walked {
             "percentile_95_ms": most,
             "worst_ms": worst,
             "references_used": self.references,
-            "references_made": self.frames.iter().map(|(.., c)| c.references_made).sum::<usize>(),
+            "references_made": self.frames.iter().map(|f| f.cost.references_made).sum::<usize>(),
+            "mean": self.scored(),
             "frames": frames,
         })
     }

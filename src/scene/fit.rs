@@ -158,7 +158,7 @@ impl Scene {
     }
 
     /// The views but those of the given names, and the sparse points they see.
-    fn sparse(
+    pub(super) fn sparse(
         &self,
         without: &BTreeSet<String>,
     ) -> Result<(Vec<View>, Vec<SparsePoint>), SceneError> {
@@ -206,24 +206,13 @@ impl Scene {
     /// The surface of the photos' depth maps, with a shell behind it.
     fn fit_depth(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         let sources = self.sources(without)?;
-        let with_maps: Vec<&(&Photo, View)> = sources
+        let maps = sources
             .iter()
-            .filter(|(photo, _)| photo.depth_map.is_some())
-            .collect();
-        let frame = |i: usize| -> Result<(View, capture::DepthMap), SceneError> {
-            let (photo, view) = with_maps[i];
-            let map = photo.decode_depth((view.width, view.height))?;
-            let map = map.ok_or_else(|| unfit(format!("{}: no depth map", photo.name)))?;
-            Ok((view.clone(), map))
-        };
-        let options = depth::Options {
-            max_triangles: Some(MOST_TRIANGLES),
-            ..depth::Options::default()
-        };
-        let fusion = depth::fuse(with_maps.len(), frame, &options).map_err(unfit)?;
+            .filter(|(p, _)| p.depth_map.is_some())
+            .count();
+        let fusion = fuse_depth(&sources, MOST_TRIANGLES)?;
         let how = format!(
-            "{} depth maps fused in voxels of {:.4}",
-            with_maps.len(),
+            "{maps} depth maps fused in voxels of {:.4}",
             fusion.voxel_size
         );
         let (views, points) = self.sparse(without)?;
@@ -314,6 +303,28 @@ impl Fitted {
 /// Fused depth maps are simplified to about so many triangles: finer ones show no difference,
 /// and rays through them take longer.
 const MOST_TRIANGLES: usize = 200_000;
+
+/// The surface of the depth maps that some photos have, of about so many triangles at most.
+pub(super) fn fuse_depth(
+    sources: &[(&Photo, View)],
+    most_triangles: usize,
+) -> Result<depth::Fusion, SceneError> {
+    let with_maps: Vec<&(&Photo, View)> = sources
+        .iter()
+        .filter(|(photo, _)| photo.depth_map.is_some())
+        .collect();
+    let frame = |i: usize| -> Result<(View, capture::DepthMap), SceneError> {
+        let (photo, view) = with_maps[i];
+        let map = photo.decode_depth((view.width, view.height))?;
+        let map = map.ok_or_else(|| unfit(format!("{}: no depth map", photo.name)))?;
+        Ok((view.clone(), map))
+    };
+    let options = depth::Options {
+        max_triangles: Some(most_triangles),
+        ..depth::Options::default()
+    };
+    depth::fuse(with_maps.len(), frame, &options).map_err(unfit)
+}
 
 /// Why a kind of proxy does not suit a scene.
 pub(super) fn unfit(reason: impl ToString) -> SceneError {

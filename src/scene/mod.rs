@@ -36,7 +36,7 @@ pub use fit::{Fitted, Kind};
 pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
 pub use relative::relative;
-pub use rooms::SceneInterior;
+pub use rooms::SceneSurface;
 pub use split::SplitFile;
 pub use times::TimeSource;
 pub use truth::{Truth, TruthScore};

@@ -229,6 +229,88 @@ fn a_house_is_walked_through() {
     assert!(ran.error(1).contains("it has no model"), "{}", ran.stderr);
 }
 
+const HALVES: &str = r#"{"version": 1, "rooms": [
+    {"name": "front", "min": [-9, -9, -99], "max": [9, 9, -2]},
+    {"name": "back", "min": [-9, -9, -2], "max": [9, 9, 99]}],
+    "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,
+        "polygon": [[-1, 0, -2], [1, 0, -2], [1, 2.4, -2], [-1, 2.4, -2]]}]}"#;
+
+#[test]
+fn a_captures_rooms_are_drawn_from_its_photos() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    let made = "interior hall --rooms halves.json --hold-out hall/split.json -o two";
+    let ran = lumigraph(here, made).ok();
+    assert!(ran.stderr.contains("24 depth maps fused"), "{}", ran.stderr);
+    // Photos are named, not copied.
+    assert_eq!(names(&here.join("two")), ["interior.json", "model.glb"]);
+    let file: Value =
+        serde_json::from_slice(&std::fs::read(here.join("two/interior.json")).unwrap()).unwrap();
+    assert_eq!(file["cells"][1]["scene"], "../hall");
+    assert_eq!(file["held_out"].as_array().unwrap().len(), 4);
+    // Held-out photos are close to what is drawn, much closer than with the model's own colours.
+    let line = "walk two --held-out --portals geometry,ldi,whole --device cpu --json";
+    let scores = |more: &str| -> Vec<f64> {
+        let report = lumigraph(here, &format!("{line} {more}")).ok().json();
+        let walks = report["walks"].as_array().unwrap().clone();
+        assert!(
+            walks
+                .iter()
+                .all(|w| w["frames"].as_array().unwrap().len() == 4)
+        );
+        let score = |w: &Value| w["mean"]["psnr"].as_f64().unwrap();
+        walks.iter().map(score).collect()
+    };
+    let photos = scores("-o scored");
+    let plain = scores("--no-photos -o plain");
+    assert!(
+        photos[0] > 26.0 && photos[0] > plain[0] + 3.0,
+        "{photos:?} {plain:?}"
+    );
+    assert_eq!(photos[0], photos[2]);
+    assert!(photos[1] > photos[2] - 0.5, "{photos:?}");
+    // A walk, byte for byte on one thread.
+    let walk = "walk two --tour --frames 2 --size 48x32 --reference-size 32x32 --portals ldi";
+    lumigraph(here, &format!("{walk} -o a")).ok();
+    lumigraph(here, &format!("--threads 1 {walk} -o b")).ok();
+    for file in ["frame_0000.png", "frame_0001.png"] {
+        let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
+        assert!(read("a") == read("b"), "{file}");
+    }
+    // Photos that are gone are missed by name.
+    std::fs::rename(here.join("hall"), here.join("gone")).unwrap();
+    let error = lumigraph(here, "walk two --tour --frames 1 -o c").error(1);
+    assert!(error.contains("the scene of its cells"), "{error}");
+    lumigraph(
+        here,
+        "walk two --tour --frames 1 --size 48x32 --no-photos -o c",
+    )
+    .ok();
+}
+
+#[test]
+fn a_capture_without_depth_needs_a_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::remove_dir_all(here.join("hall/depth")).unwrap();
+    let error = lumigraph(here, "interior hall -o none").error(1);
+    assert!(error.contains("no depth maps"), "{error}");
+    assert!(error.contains("lumigraph proxy SCENE tunnel"), "{error}");
+    lumigraph(here, "import hall -o scene").ok();
+    lumigraph(here, "proxy scene tunnel").ok();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    lumigraph(here, "interior scene --rooms halves.json -o two").ok();
+    lumigraph(here, "walk two --tour --frames 2 --size 48x32 -o walk").ok();
+    let error = lumigraph(here, "walk two --held-out -o x").error(1);
+    assert!(error.contains("no photos were held out"), "{error}");
+    let line = "interior scene --hold-out hall/split.json -o other";
+    let error = lumigraph(here, line).error(1);
+    assert!(error.contains("which is held out"), "{error}");
+}
+
 #[test]
 fn usage_errors_exit_with_2() {
     let folder = tempfile::tempdir().unwrap();
@@ -236,6 +318,10 @@ fn usage_errors_exit_with_2() {
         (
             "interior house.ply -o x",
             "interiors are made of .glb models",
+        ),
+        (
+            "interior house.glb --hold-out split.json -o x",
+            "--hold-out is for captures",
         ),
         ("plan house --views 4", "an odd number"),
         ("plan house --span 180", "less than 180"),

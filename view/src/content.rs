@@ -7,8 +7,8 @@ use proxy::Proxy;
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
 use render::Lumigraph;
-use render::interior::tour;
-use std::sync::Arc;
+use render::interior::{Painter, tour};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the window shows.
 #[derive(Clone, Debug)]
@@ -30,6 +30,8 @@ pub struct House {
     pub model: Model,
     /// What stops who walks.
     pub obstacles: Obstacles,
+    /// What draws it from photos, where some show it; taken by the first that draws.
+    photos: Mutex<Option<Painter>>,
 }
 
 impl House {
@@ -41,7 +43,28 @@ impl House {
             contents,
             model,
             obstacles,
+            photos: Mutex::new(None),
         }
+    }
+
+    /// The same, drawn from photos. `make` gives what draws it, and may add to the model and its
+    /// contents what is in nobody's way: a backdrop.
+    ///
+    /// # Errors
+    /// What `make` says.
+    pub fn with_photos<E>(
+        mut self,
+        make: impl FnOnce(&Interior, &mut Contents, &mut Model) -> Result<Painter, E>,
+    ) -> Result<Self, E> {
+        let painter = make(&self.interior, &mut self.contents, &mut self.model)?;
+        self.photos = Mutex::new(Some(painter));
+        Ok(self)
+    }
+
+    /// What draws it from photos, the first time.
+    pub(crate) fn take_photos(&self) -> Option<Painter> {
+        let mut photos = self.photos.lock().unwrap_or_else(PoisonError::into_inner);
+        photos.take()
     }
 }
 

@@ -6,7 +6,7 @@ use crate::draw_scene::{Drawn, timed};
 use crate::picture::{DepthGrid, Layer, Lines, Request, Shown};
 use calibrate::Pixel;
 use image::RgbaImage;
-use render::interior::{PinholeError, Walk};
+use render::interior::{Walk, WalkError};
 use std::sync::Arc;
 
 /// Draws what is asked for, `reduction` times smaller.
@@ -18,7 +18,7 @@ pub(crate) fn draw_house(
     walk: &mut Walk<'_>,
     request: &Request,
     reduction: u32,
-) -> Result<Drawn, PinholeError> {
+) -> Result<Drawn, WalkError> {
     let (asked, look) = (&request.view, &request.look);
     let view = match reduction {
         1 => asked.clone(),

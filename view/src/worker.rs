@@ -6,7 +6,7 @@ use crate::draw_house::draw_house;
 use crate::draw_scene::{Drawn, SceneDrawer};
 use crate::picture::{Request, Shown};
 use image::RgbaImage;
-use render::interior::{Painter, Walk, WalkOptions};
+use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, Walk, WalkOptions};
 use render::path::write_shot;
 use render::{DeviceChoice, Engine, Lumigraph};
 use std::path::{Path, PathBuf};
@@ -248,7 +248,7 @@ impl<'s> Desk<'s> {
             is_first = false;
             let drawn = drawer.draw(engine, request, reduction);
             for note in engine.notes().iter().skip(notes) {
-                tell(News::Trouble(note.clone()));
+                tell(News::Trouble((*note).to_owned()));
             }
             notes = engine.notes().len();
             if gone != drawer.gone() {
@@ -264,19 +264,26 @@ impl<'s> Desk<'s> {
     }
 
     fn serve_house(&mut self, house: &House) -> Option<Given> {
-        let painter = Painter::open(self.options.device, &house.model);
+        let mut options = self.options.walk;
+        let painter = match house.take_photos() {
+            Some(photos) => {
+                options.library.size = CAPTURED_REFERENCE_SIZE;
+                photos
+            }
+            None => Painter::open(self.options.device, &house.model),
+        };
         let mut walk = Walk::with(
             painter,
             &house.interior,
             &house.contents,
             &house.model,
-            self.options.walk,
+            options,
         );
         let mut notes = 0;
         self.serve(|tell, request, reduction| {
             let drawn = draw_house(house, &mut walk, request, reduction);
             for note in walk.painter().notes().iter().skip(notes) {
-                tell(News::Trouble(note.clone()));
+                tell(News::Trouble((*note).to_owned()));
             }
             notes = walk.painter().notes().len();
             drawn.map_err(|error| error.to_string())

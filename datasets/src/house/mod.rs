@@ -166,6 +166,7 @@ fn interior(plan: &Plan, seed: u32) -> Interior {
         eye_height: EYE_HEIGHT,
         cells: plan.rooms.iter().enumerate().map(cell).collect(),
         portals: plan.openings.iter().enumerate().map(portal).collect(),
+        held_out: Vec::new(),
         other: Extra::new(),
     };
     let (interior, _) = interior_from_rooms(interior).expect("a plan does not contradict itself");

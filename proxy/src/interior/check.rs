@@ -29,12 +29,12 @@ impl Interior {
         let names = self.portals.iter().map(|p| p.name.as_str());
         unique("portal", "portals", names)?;
         for cell in &self.cells {
-            if let Content::Box(RoomBox { min, max }) = cell.content
+            if let Some(RoomBox { min, max }) = cell.content.room()
                 && !(min.cmplt(max).all() && min.is_finite() && max.is_finite())
             {
                 return Err(InteriorError::Box(cell.name.clone()));
             }
-            if self.model.is_none() && !matches!(cell.content, Content::Scene(_)) {
+            if self.model.is_none() && !matches!(cell.content, Content::Scene { .. }) {
                 return Err(InteriorError::NoModel(cell.name.clone()));
             }
         }
@@ -73,10 +73,8 @@ impl Interior {
         let boxes: Vec<(&str, RoomBox)> = self
             .cells
             .iter()
-            .filter_map(|cell| match cell.content {
-                Content::Box(room) if cell.floor.is_none() => Some((cell.name.as_str(), room)),
-                _ => None,
-            })
+            .filter(|cell| cell.floor.is_none())
+            .filter_map(|cell| Some((cell.name.as_str(), cell.content.room()?)))
             .collect();
         for (i, (name, a)) in boxes.iter().enumerate() {
             for (other, b) in &boxes[..i] {
@@ -98,7 +96,7 @@ impl Interior {
             let center = portal.polygon.center();
             for id in portal.cells.into_iter().flatten() {
                 let cell = self.cell(id);
-                let Content::Box(room) = cell.content else {
+                let Some(room) = cell.content.room() else {
                     continue;
                 };
                 let distance = room.distance(center);
@@ -120,10 +118,9 @@ impl Interior {
     /// About where a cell is, by its own words.
     pub(super) fn middle(&self, id: Option<CellId>) -> Option<DVec3> {
         let cell = self.cells.get(id?.0 as usize)?;
-        match (&cell.content, &cell.floor) {
-            (_, Some(floor)) => Some(floor.center()),
-            (Content::Box(room), None) => Some(room.min.midpoint(room.max)),
-            _ => None,
+        match &cell.floor {
+            Some(floor) => Some(floor.center()),
+            None => cell.content.room().map(|room| room.min.midpoint(room.max)),
         }
     }
 }

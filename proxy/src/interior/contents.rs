@@ -32,8 +32,11 @@ impl Contents {
         let mut contents = Self::default();
         for cell in &interior.cells {
             let (triangles, bounds) = match &cell.content {
-                Content::Scene(_) => (Vec::new(), None),
-                Content::Box(room) => (touching(model, room), Some(*room)),
+                Content::Scene { room: None, .. } => (Vec::new(), None),
+                Content::Scene {
+                    room: Some(room), ..
+                }
+                | Content::Box(room) => (touching(model, room), Some(*room)),
                 Content::Nodes(names) => {
                     let known = |name: &String| model.nodes.iter().any(|n| n.name == *name);
                     if let Some(node) = names.iter().find(|name| !known(name)) {
@@ -61,7 +64,7 @@ impl Contents {
         // 3. What is odd.
         let mut odd = Vec::new();
         for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
-            if triangles.is_empty() && !matches!(cell.content, Content::Scene(_)) {
+            if triangles.is_empty() && !matches!(cell.content, Content::Scene { room: None, .. }) {
                 odd.push(InteriorWarning::Empty(cell.name.clone()));
             }
         }

@@ -35,7 +35,9 @@ pub enum InteriorError {
     )]
     Box(String),
     /// A cell says nothing, or too much, about what is in it.
-    #[error("cell `{0}` must have one of `box`, `nodes` and `scene`, and has {1}")]
+    #[error(
+        "cell `{0}` must have one of `box`, `nodes` and `scene`, or `scene` and `box`, and has {1}"
+    )]
     Content(String, usize),
     /// A length that is none.
     #[error("{0} is {1}; expected a positive number")]

@@ -9,7 +9,7 @@
 //!   "cells": [
 //!     {"name": "hall", "box": {"min": [0, 0, 0], "max": [4, 2.5, 3]}},
 //!     {"name": "study", "nodes": ["cell:study"]},
-//!     {"name": "attic", "scene": "../attic", "floor": [[0, 3, 0], [4, 3, 0], [4, 3, 3]]}
+//!     {"name": "attic", "scene": "../attic", "box": {"min": [0, 3, 0], "max": [4, 5, 3]}}
 //!   ],
 //!   "portals": [
 //!     {"name": "door", "polygon": [[4, 0, 2], [4, 0, 1], [4, 2, 1], [4, 2, 2]],
@@ -20,8 +20,9 @@
 //! ```
 //!
 //! A polygon is counter-clockwise as the first of its cells sees it. Paths are relative to the
-//! file's folder, with `/` between their parts. Keys that this version does not know are kept
-//! when the file is written again.
+//! file's folder, with `/` between their parts. The photos of a `scene` colour the model's triangles
+//! in the box beside it; those that `held_out` names are not drawn from. Keys that this version does
+//! not know are kept when the file is written again.
 
 use super::{
     Cell, CellId, Content, Extra, Interior, InteriorError, InteriorFileError, InteriorWarning,
@@ -43,6 +44,8 @@ pub(super) struct Stored {
     pub eye_height: f64,
     pub cells: Vec<StoredCell>,
     pub portals: Vec<StoredPortal>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_out: Vec<String>,
     #[serde(flatten)]
     pub other: Extra,
 }
@@ -132,21 +135,15 @@ impl Stored {
     fn of(interior: &Interior) -> Self {
         let cell = |cell: &Cell| StoredCell {
             name: cell.name.clone(),
-            scene: match &cell.content {
-                Content::Scene(folder) => Some(folder.clone()),
-                _ => None,
-            },
+            scene: cell.content.scene().map(str::to_owned),
             nodes: match &cell.content {
                 Content::Nodes(names) => Some(names.clone()),
                 _ => None,
             },
-            room: match cell.content {
-                Content::Box(RoomBox { min, max }) => Some(StoredBox {
-                    min: min.to_array(),
-                    max: max.to_array(),
-                }),
-                _ => None,
-            },
+            room: cell.content.room().map(|RoomBox { min, max }| StoredBox {
+                min: min.to_array(),
+                max: max.to_array(),
+            }),
             floor: cell.floor.as_ref().map(corners),
             other: cell.other.clone(),
         };
@@ -165,6 +162,7 @@ impl Stored {
             eye_height: interior.eye_height,
             cells: interior.cells.iter().map(cell).collect(),
             portals: interior.portals.iter().map(portal).collect(),
+            held_out: interior.held_out.clone(),
             other: interior.other.clone(),
         }
     }
@@ -175,13 +173,14 @@ impl Stored {
             let given = usize::from(cell.scene.is_some())
                 + usize::from(cell.nodes.is_some())
                 + usize::from(cell.room.is_some());
-            let content = match (cell.scene, cell.nodes, cell.room) {
-                (Some(folder), None, None) => Content::Scene(folder),
+            let room = cell.room.map(|StoredBox { min, max }| RoomBox {
+                min: DVec3::from_array(min),
+                max: DVec3::from_array(max),
+            });
+            let content = match (cell.scene, cell.nodes, room) {
+                (Some(folder), None, room) => Content::Scene { folder, room },
                 (None, Some(names), None) => Content::Nodes(names),
-                (None, None, Some(StoredBox { min, max })) => Content::Box(RoomBox {
-                    min: DVec3::from_array(min),
-                    max: DVec3::from_array(max),
-                }),
+                (None, None, Some(room)) => Content::Box(room),
                 _ => return Err(InteriorError::Content(cell.name, given)),
             };
             let floor = cell.floor.map(|corners| polygon(&corners)).transpose();
@@ -211,6 +210,7 @@ impl Stored {
             eye_height: self.eye_height,
             cells,
             portals,
+            held_out: self.held_out,
             other: self.other,
         })
     }

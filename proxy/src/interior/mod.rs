@@ -52,6 +52,9 @@ pub struct Interior {
     pub cells: Vec<Cell>,
     /// By [`PortalId`]. No two share a name.
     pub portals: Vec<Portal>,
+    /// Photos of the cells' scenes, by name, that took no part in making this, and are not drawn
+    /// from: pictures can be compared with them.
+    pub held_out: Vec<String>,
     /// What the file says beyond this version's keys.
     pub other: Extra,
 }
@@ -73,12 +76,36 @@ pub struct Cell {
 /// What a cell shows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
-    /// A scene folder's photos, the path relative to the interior's folder.
-    Scene(String),
+    /// A scene's or capture's photos: they colour the model's triangles that touch the box.
+    Scene {
+        /// The scene's folder, relative to the interior's.
+        folder: String,
+        /// Without one the cell has no surface, and nothing of it is drawn.
+        room: Option<RoomBox>,
+    },
     /// The model's nodes of these names, and all below them.
     Nodes(Vec<String>),
     /// All triangles of the model that touch a box; a triangle may be part of several cells.
     Box(RoomBox),
+}
+
+impl Content {
+    /// The box that bounds it, if one does.
+    pub fn room(&self) -> Option<RoomBox> {
+        match self {
+            Self::Scene { room, .. } => *room,
+            Self::Box(room) => Some(*room),
+            Self::Nodes(_) => None,
+        }
+    }
+
+    /// The folder of the scene whose photos show it, relative to the interior's.
+    pub fn scene(&self) -> Option<&str> {
+        match self {
+            Self::Scene { folder, .. } => Some(folder),
+            Self::Box(_) | Self::Nodes(_) => None,
+        }
+    }
 }
 
 /// A box along the world's axes.
@@ -174,6 +201,19 @@ impl Portal {
 }
 
 impl Interior {
+    /// Lets the photos of a scene, by its folder relative to the interior's, show all cells that
+    /// are boxes.
+    pub fn show_photos(&mut self, folder: &str) {
+        for cell in &mut self.cells {
+            if let Content::Box(room) = cell.content {
+                cell.content = Content::Scene {
+                    folder: folder.to_owned(),
+                    room: Some(room),
+                };
+            }
+        }
+    }
+
     /// A cell.
     pub fn cell(&self, id: CellId) -> &Cell {
         &self.cells[id.0 as usize]

@@ -131,6 +131,7 @@ impl Rooms {
             eye_height: self.eye_height,
             cells: self.rooms.into_iter().map(cell).collect(),
             portals: self.openings.into_iter().map(portal).collect(),
+            held_out: Vec::new(),
             other: Extra::new(),
         }
     }
@@ -191,6 +192,7 @@ pub fn interior_from_nodes(
         eye_height: EYE_HEIGHT,
         cells,
         portals: Vec::new(),
+        held_out: Vec::new(),
         other: Extra::new(),
     };
     interior.check()?;

@@ -157,11 +157,8 @@ fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
     let Some(cell) = cell.and_then(|id| interior.cells.get(id.0 as usize)) else {
         return true;
     };
-    let in_box = match cell.content {
-        super::Content::Box(room) => room.contains(place),
-        _ => true,
-    };
-    in_box
+    let room = cell.content.room();
+    room.is_none_or(|room| room.contains(place))
         && cell
             .floor
             .as_ref()
@@ -178,9 +175,9 @@ impl Interior {
             let heights = corners.iter().map(|p| p.dot(up));
             heights.fold(f64::INFINITY, f64::min)
         };
-        match cell.map(|cell| (&cell.floor, &cell.content)) {
+        match cell.map(|cell| (&cell.floor, cell.content.room())) {
             Some((Some(floor), _)) => lowest(floor.corners()),
-            Some((None, super::Content::Box(room))) => {
+            Some((None, Some(room))) => {
                 // The corner farthest down.
                 let corner = |k: usize| match up[k] > 0.0 {
                     true => room.min[k],

@@ -4,6 +4,7 @@ mod error;
 mod file;
 mod glb;
 mod gltf;
+mod holes;
 mod look;
 mod model;
 mod model_glb;

@@ -142,6 +142,26 @@ impl Model {
         self.materials.get(part.material_idx as usize)
     }
 
+    /// Adds white triangles as a node of its own; their indices.
+    pub fn append(&mut self, mesh: &Mesh, node: &str) -> Range<u32> {
+        let first = self.mesh.triangles.len() as u32;
+        self.mesh.append(mesh);
+        self.uvs.resize(self.mesh.positions.len(), [0.0; 2]);
+        self.colors.resize(self.mesh.positions.len(), [255; 4]);
+        let triangles = first..self.mesh.triangles.len() as u32;
+        self.parts.push(Part {
+            triangles: triangles.clone(),
+            node_idx: self.nodes.len() as u32,
+            material_idx: self.materials.len() as u32,
+        });
+        self.nodes.push(ModelNode {
+            name: node.to_owned(),
+            parent_idx: None,
+        });
+        self.materials.push(Material::default());
+        triangles
+    }
+
     /// [`Self::color`], for who has the triangle's material at hand.
     pub fn color_with(
         &self,

@@ -4,7 +4,7 @@
 use calibrate::{Lens, Pixel, Rigid3, View};
 use datasets::house::{House, HouseOptions, house};
 use glam::{DVec2, DVec3};
-use proxy::interior::{CellId, Content, Contents, Interior, Region, RoomBox, Visibility};
+use proxy::interior::{CellId, Contents, Interior, Region, RoomBox, Visibility};
 
 pub(crate) fn view(eye: DVec3, target: DVec3, [width, height]: [u32; 2]) -> View {
     let size = DVec2::new(f64::from(width), f64::from(height));
@@ -28,10 +28,8 @@ pub(crate) fn random(seed: u64) -> impl FnMut() -> f64 {
 }
 
 pub(crate) fn room(interior: &Interior, cell: usize) -> RoomBox {
-    match interior.cells[cell].content {
-        Content::Box(room) => room,
-        _ => panic!("a house's cells are boxes"),
-    }
+    let room = interior.cells[cell].content.room();
+    room.expect("a house's cells are boxes")
 }
 
 /// A viewpoint anywhere in a house, one in eight in a doorway, some on portals' planes.

@@ -13,10 +13,12 @@ pub enum PortalFill {
     Warp2,
     /// A layered depth image made of all of the semicircle's, warped in any order.
     Ldi,
+    /// The whole model as if there were no cells: what culling and images are compared with.
+    Whole,
 }
 
 impl PortalFill {
-    /// All of them.
+    /// All that use portals.
     pub const ALL: [Self; 5] = [
         Self::Geometry,
         Self::Texture,
@@ -33,18 +35,20 @@ impl PortalFill {
             Self::Warp1 => "warp1",
             Self::Warp2 => "warp2",
             Self::Ldi => "ldi",
+            Self::Whole => "whole",
         }
     }
 
     /// The fill of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|fill| fill.name() == name)
+        let mut all = Self::ALL.into_iter().chain([Self::Whole]);
+        all.find(|fill| fill.name() == name)
     }
 
     /// How many reference images a frame takes. An LDI is made of all of them once.
     pub fn references(self) -> usize {
         match self {
-            Self::Geometry | Self::Ldi => 0,
+            Self::Geometry | Self::Ldi | Self::Whole => 0,
             Self::Texture | Self::Warp1 => 1,
             Self::Warp2 => 2,
         }

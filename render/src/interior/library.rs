@@ -1,6 +1,7 @@
 //! The reference images of an interior and the LDIs of them, made when they are first asked for.
 
-use super::{CellGeometry, REFERENCE_SIZE, Reference};
+use super::{Captured, CellGeometry, REFERENCE_SIZE, Reference};
+use crate::RenderError;
 use crate::ldi::{ClipTree, ConstructOptions, Layered, construct};
 use crate::residency::Residency;
 use glam::DVec3;
@@ -44,6 +45,9 @@ pub struct PortalLdi {
     /// What tells which of its columns are in sight.
     pub tree: ClipTree,
 }
+
+/// Of some sides, in order; nothing for one whose images make none.
+type Ldis = Vec<Arc<Option<PortalLdi>>>;
 
 /// The places of all reference images, and those images and LDIs that are in memory.
 #[derive(Debug)]
@@ -151,14 +155,19 @@ impl Library {
     }
 
     /// The images of a frame's places, in their order, and how many were made for it. Others go,
-    /// those not used for longest first, as far as the budget asks.
+    /// those not used for longest first, as far as the budget asks. Where photos are given, they colour
+    /// what is made.
+    ///
+    /// # Errors
+    /// The photos' engine's.
     pub fn images(
         &mut self,
         places: &[usize],
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
-    ) -> (Vec<Arc<Reference>>, usize) {
+        mut captured: Option<&mut Captured>,
+    ) -> Result<(Vec<Arc<Reference>>, usize), RenderError> {
         self.turn += 1;
         // 1. What stays is no candidate for leaving.
         let missing = touch(&mut self.images, places, self.turn);
@@ -166,7 +175,8 @@ impl Library {
         self.make_room(missing.len() as u64 * bytes);
         // 2. What is missing.
         for &place in &missing {
-            let made = self.make(place, interior, model, geometry);
+            let captured = captured.as_deref_mut();
+            let made = self.make(place, interior, model, geometry, captured)?;
             self.images[place] = Some(Kept {
                 what: Arc::new(made),
                 bytes,
@@ -175,18 +185,22 @@ impl Library {
             self.residency.change(bytes, 0);
             self.residency.loads += 1;
         }
-        (found(&self.images, places), missing.len())
+        Ok((found(&self.images, places), missing.len()))
     }
 
     /// The LDIs of a frame's sides, in their order, and how many reference images were made for
     /// them; nothing for a side whose images make none. Others go as for [`Self::images`].
+    ///
+    /// # Errors
+    /// The photos' engine's.
     pub fn ldis(
         &mut self,
         sides: &[usize],
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
-    ) -> (Vec<Arc<Option<PortalLdi>>>, usize) {
+        mut captured: Option<&mut Captured>,
+    ) -> Result<(Ldis, usize), RenderError> {
         self.turn += 1;
         let mut made = 0;
         for side in touch(&mut self.ldis, sides, self.turn) {
@@ -194,13 +208,15 @@ impl Library {
             let range = self.sides[side].clone();
             let images: Vec<Arc<Reference>> = range
                 .map(|place| match &self.images[place] {
-                    Some(kept) => kept.what.clone(),
+                    Some(kept) => Ok(kept.what.clone()),
                     None => {
                         made += 1;
-                        Arc::new(self.make(place, interior, model, geometry))
+                        let captured = captured.as_deref_mut();
+                        let image = self.make(place, interior, model, geometry, captured)?;
+                        Ok(Arc::new(image))
                     }
                 })
-                .collect();
+                .collect::<Result<_, RenderError>>()?;
             let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
             let constructed = construct(&images, &self.options.ldi).ok();
             let ldi = constructed.map(|made| PortalLdi {
@@ -217,7 +233,7 @@ impl Library {
             self.residency.change(bytes, 0);
         }
         self.residency.loads += made as u64;
-        (found(&self.ldis, sides), made)
+        Ok((found(&self.ldis, sides), made))
     }
 
     fn make(
@@ -226,9 +242,15 @@ impl Library {
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
-    ) -> Reference {
-        let size = self.options.size;
-        Reference::new(interior, model, geometry, &self.places[place], size)
+        captured: Option<&mut Captured>,
+    ) -> Result<Reference, RenderError> {
+        let (place, size) = (&self.places[place], self.options.size);
+        match captured {
+            Some(captured) => {
+                Reference::of_photos(interior, model, geometry, place, size, captured)
+            }
+            None => Ok(Reference::new(interior, model, geometry, place, size)),
+        }
     }
 
     fn make_room(&mut self, bytes: u64) {

@@ -1,10 +1,11 @@
 //! Walking through an interior.
 //!
-//! The cell that a viewer is in is drawn as geometry; what lies behind its portals as geometry,
+//! The cell that a viewer is in is drawn as geometry, coloured by the model or by photos of it; what lies behind its portals as geometry,
 //! too, or out of images that were made before the portals (Rafferty et al. 1998, "3D image
 //! warping in architectural walkthroughs" and "Images for accelerating architectural
 //! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
 
+mod captured;
 mod fill;
 mod geometry;
 mod library;
@@ -19,17 +20,18 @@ mod walk;
 mod warp;
 mod window;
 
+pub use captured::Captured;
 pub use fill::PortalFill;
 pub use geometry::{CellGeometry, Runs};
 pub use library::{Library, LibraryOptions, PortalLdi};
 pub use painter::Painter;
 pub use pinhole::{Pinhole, PinholeError};
 pub use raster::{Beyond, Raster};
-pub use reference::{REFERENCE_SIZE, Reference};
+pub use reference::{CAPTURED_REFERENCE_SIZE, REFERENCE_SIZE, Reference};
 pub use target::Target;
 pub use texture::texture;
 pub use tour::{TourError, tour};
-pub use walk::{FrameCost, Walk, WalkOptions};
+pub use walk::{FrameCost, Walk, WalkError, WalkOptions};
 pub use warp::{Splat, Warp, Warped, warp};
 pub use window::Window;
 

@@ -1,8 +1,11 @@
-//! One door to the two that draw triangles: the CPU's raster and a graphics device.
+//! One door to those that draw triangles: the CPU's raster, a graphics device, and the lumigraph
+//! where photos show them.
 
-use super::{Pinhole, Raster, Runs, Target, Window};
+use super::{Captured, Pinhole, Raster, Runs, Target, Window};
+use crate::RenderError;
 use crate::engine::DeviceChoice;
 use crate::gpu::{DeviceLimits, GpuRaster};
+use calibrate::View;
 use proxy::mesh::Model;
 
 /// Draws the geometry of cells. What a graphics device cannot draw the CPU draws.
@@ -12,6 +15,8 @@ pub struct Painter {
     raster: Raster,
     /// What the device drew of this frame; none where the CPU draws it.
     drawn: Option<Target>,
+    /// What photos show of it.
+    captured: Option<Box<Captured>>,
     notes: Vec<String>,
 }
 
@@ -19,6 +24,24 @@ impl Painter {
     /// Draws with the CPU.
     pub fn cpu() -> Self {
         Self::default()
+    }
+
+    /// Finds surfaces with the CPU and colours them from photos, as far as those show them.
+    pub fn of_photos(captured: Captured) -> Self {
+        Self {
+            captured: Some(Box::new(captured)),
+            ..Self::default()
+        }
+    }
+
+    /// The photos that colour what is drawn, if any do.
+    pub fn captured(&self) -> Option<&Captured> {
+        self.captured.as_deref()
+    }
+
+    /// See [`Self::captured`].
+    pub(super) fn captured_mut(&mut self) -> Option<&mut Captured> {
+        self.captured.as_deref_mut()
     }
 
     /// Brings a model to a graphics device: with [`DeviceChoice::Auto`] to a real one only. Where
@@ -47,13 +70,24 @@ impl Painter {
     }
 
     /// What it draws with, for people.
-    pub fn description(&self) -> &str {
-        self.gpu.as_ref().map_or("CPU", |gpu| gpu.description())
+    pub fn description(&self) -> String {
+        if let Some(captured) = &self.captured {
+            let photos = captured.lumigraph().sources.len();
+            return format!("{}, from {photos} photos", captured.engine().description());
+        }
+        let gpu = self.gpu.as_ref();
+        gpu.map_or("CPU", |gpu| gpu.description()).to_owned()
     }
 
-    /// What became of the graphics device and what it could not draw, for people; each once.
-    pub fn notes(&self) -> &[String] {
-        &self.notes
+    /// What became of the graphics device, what it could not draw, and which photos were left out, for
+    /// people; each once.
+    pub fn notes(&self) -> Vec<&str> {
+        let of_photos = self.captured.iter().flat_map(|captured| captured.notes());
+        self.notes
+            .iter()
+            .chain(of_photos)
+            .map(String::as_str)
+            .collect()
     }
 
     /// See [`GpuRaster::lose`].
@@ -112,16 +146,23 @@ impl Painter {
     }
 
     /// Colours what was met, but for pixels that `is_wanted` declines.
+    ///
+    /// # Errors
+    /// See [`Captured::shade`]; none without photos.
     pub(super) fn shade(
-        &self,
+        &mut self,
         model: &Model,
+        view: &View,
         camera: &Pinhole,
         target: &mut Target,
         is_wanted: impl Fn(usize, f32) -> bool + Sync,
-    ) {
+    ) -> Result<(), RenderError> {
+        if let Some(captured) = &mut self.captured {
+            return captured.shade(model, &self.raster, view, camera, target, is_wanted);
+        }
         let Some(drawn) = &self.drawn else {
             self.raster.shade(model, camera, target, is_wanted);
-            return;
+            return Ok(());
         };
         for (pixel, s) in drawn.inverse_depth.iter().enumerate() {
             if *s > 0.0 && is_wanted(pixel, *s) {
@@ -129,5 +170,6 @@ impl Painter {
                 target.inverse_depth[pixel] = *s;
             }
         }
+        Ok(())
     }
 }

@@ -1,6 +1,8 @@
 //! Images of what lies beyond a portal, made before it.
 
-use super::{Beyond, CellGeometry, Pinhole, Raster, Target, Window};
+use super::walk::all_cells;
+use super::{Beyond, Captured, CellGeometry, Pinhole, Raster, Target, Window};
+use crate::RenderError;
 use calibrate::{Lens, View};
 use glam::{DVec2, DVec3};
 use proxy::interior::{CellId, Interior, Portal, Region, SemicircleView, visible_through};
@@ -19,6 +21,11 @@ pub struct Reference {
 
 /// A reference image's width and height by default: those of Rafferty et al. 1998, §4.1.
 pub const REFERENCE_SIZE: [u32; 2] = [256, 256];
+
+/// Of reference images made of photos: with 256 house-walk's held-out photos lose 0.5 dB to LDIs, with
+/// this 0.2 dB.
+pub const CAPTURED_REFERENCE_SIZE: [u32; 2] = [512, 512];
+
 /// Pixels that are left around the portal.
 const ROOM: f64 = 1.0;
 /// The most that an image spans to each side of its axis, as x / z.
@@ -38,7 +45,7 @@ impl Reference {
         COLOR_AND_DEPTH * (width * height + width + height)
     }
 
-    /// Draws the image of a place before a portal.
+    /// Draws the image of a place before a portal, in the model's own colours.
     ///
     /// What is in the way on the viewer's side is left out, so the place need not be free, or
     /// even in the viewer's cell.
@@ -47,8 +54,57 @@ impl Reference {
         model: &Model,
         geometry: &CellGeometry,
         place: &SemicircleView,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
     ) -> Self {
+        let met = Self::met(interior, model, geometry, place, size, false);
+        let Some((_, raster, mut image)) = met else {
+            return Self::nothing(place);
+        };
+        raster.shade(model, &image.camera, &mut image.seen, |_, _| true);
+        image
+    }
+
+    /// As [`Self::new`], coloured from photos as far as they show what is seen; of all cells, as a
+    /// capture's walls may be open where no portal was found.
+    ///
+    /// # Errors
+    /// The photos' engine's.
+    pub fn of_photos(
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        place: &SemicircleView,
+        size: [u32; 2],
+        captured: &mut Captured,
+    ) -> Result<Self, RenderError> {
+        let met = Self::met(interior, model, geometry, place, size, true);
+        let Some((view, raster, mut image)) = met else {
+            return Ok(Self::nothing(place));
+        };
+        let (camera, seen) = (&image.camera, &mut image.seen);
+        captured.shade(model, &raster, &view, camera, seen, |_, _| true)?;
+        Ok(image)
+    }
+
+    /// A place that is no place sees nothing.
+    fn nothing(place: &SemicircleView) -> Self {
+        Self {
+            place: place.clone(),
+            camera: Pinhole::nowhere(),
+            seen: Target::default(),
+        }
+    }
+
+    /// What the place's camera meets, of all cells or of those that portals show; not coloured yet.
+    /// `None` for a place that is none.
+    fn met(
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        place: &SemicircleView,
+        [width, height]: [u32; 2],
+        of_all_cells: bool,
+    ) -> Option<(View, Raster, Self)> {
         let portal = interior.portal(place.portal);
         let eye = place.camera_from_world.center();
         let view = View {
@@ -57,20 +113,12 @@ impl Reference {
             height,
             camera_from_world: place.camera_from_world,
         };
-        let mut seen = Target::new(width, height);
-        // A place that is no place sees nothing.
-        let camera = match Pinhole::new(&view) {
-            Ok(camera) => camera,
-            Err(_) => {
-                return Self {
-                    place: place.clone(),
-                    camera: Pinhole::nowhere(),
-                    seen: Target::default(),
-                };
-            }
-        };
+        let camera = Pinhole::new(&view).ok()?;
         let region = Region::of(&view);
-        let visibility = visible_through(interior, place.portal, place.into, eye, &region);
+        let visibility = match of_all_cells {
+            true => all_cells(interior, &region),
+            false => visible_through(interior, place.portal, place.into, eye, &region),
+        };
         let runs = geometry.seen(eye, &visibility);
         let beyond = plane_of(&camera, portal, Some(place.into));
         let mut raster = Raster::default();
@@ -84,12 +132,12 @@ impl Reference {
             let window = Window::of_cone(&edges, &camera);
             raster.draw(model, &runs.lists, &camera, &window, Some(&beyond));
         }
-        raster.shade(model, &camera, &mut seen, |_, _| true);
-        Self {
+        let image = Self {
             place: place.clone(),
             camera,
-            seen,
-        }
+            seen: Target::new(width, height),
+        };
+        Some((view, raster, image))
     }
 }
 

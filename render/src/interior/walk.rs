@@ -12,11 +12,13 @@ use super::{
     Beyond, CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
     PortalLdi, Reference, Runs, Splat, Target, Window, texture, warp,
 };
+use crate::RenderError;
 use crate::ldi::{Clipped, Free, FreeOptions, free};
 use calibrate::View;
 use glam::DVec3;
 use proxy::interior::{
-    CellId, Contents, Interior, Pass, Portal, Region, Visibility, visible, visible_through,
+    CellId, Contents, Interior, Pass, Portal, Region, Visibility, VisibleCell, visible,
+    visible_through,
 };
 use proxy::mesh::Model;
 use rayon::prelude::*;
@@ -63,6 +65,10 @@ impl Default for WalkOptions {
 /// Where geometry is alone, in shares of where it begins to be mixed in.
 const ALONE: f64 = 2.0 / 3.0;
 
+/// From where on images are shown beyond a capture's other portals once one has come through one, in
+/// radii of its semicircle: whoever changes cells sees all of it as geometry, before and after.
+const ENTERED: f64 = 0.25;
+
 /// What a frame took and what was left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameCost {
@@ -105,6 +111,17 @@ impl FrameCost {
     pub fn time(&self) -> Duration {
         self.visibility + self.geometry + self.fill + self.shade
     }
+}
+
+/// Why a view was not drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WalkError {
+    /// A view that interiors are not drawn for.
+    #[error(transparent)]
+    View(#[from] PinholeError),
+    /// The photos' engine's.
+    #[error(transparent)]
+    Photos(#[from] RenderError),
 }
 
 /// A walker through an interior, and what is kept between frames.
@@ -225,15 +242,21 @@ impl<'a> Walk<'a> {
     /// visible is geometry.
     ///
     /// # Errors
-    /// A view that interiors are not drawn for.
-    pub fn draw(&mut self, view: &View, fill: PortalFill) -> Result<FrameCost, PinholeError> {
+    /// A view that interiors are not drawn for; where photos colour it, their engine's.
+    pub fn draw(&mut self, view: &View, fill: PortalFill) -> Result<FrameCost, WalkError> {
         let camera = Pinhole::new(view)?;
         let mut cost = FrameCost::default();
         // 1. What is visible.
         let start = Instant::now();
         let eye = camera.center;
         let cell = self.contents.locate(self.interior, eye);
-        let visibility = visible(self.interior, cell, view);
+        let visibility = match fill {
+            PortalFill::Whole => all_cells(self.interior, &Region::ALL),
+            _ => visible(self.interior, cell, view),
+        };
+        // Of a capture walls may be open where no portal was found, so that all cells may be in sight.
+        let is_captured = self.painter.captured().is_some() && fill != PortalFill::Whole;
+        let in_view = is_captured.then(|| all_cells(self.interior, &Region::of(view)));
         let in_sight = |visibility: Visibility| match self.options.whole_cells {
             true => everywhere(visibility),
             false => visibility,
@@ -248,17 +271,22 @@ impl<'a> Walk<'a> {
         let mut fills: Vec<Filled<'_>> = Vec::new();
         let whole = Window::whole(camera.width, camera.height);
         match cell {
-            Some(_) if fill != PortalFill::Geometry => {
+            Some(_) if fill.references() > 0 || fill == PortalFill::Ldi => {
                 let alone = in_sight(Visibility {
                     cells: visibility.cells.first().into_iter().cloned().collect(),
                     passes: Vec::new(),
                 });
-                windows.push((geometry.seen(eye, &alone), whole));
+                let own = in_view.as_ref().unwrap_or(&alone);
+                windows.push((geometry.seen(eye, own), whole));
+                let entered = match is_captured {
+                    true => self.share_entered(cell, eye),
+                    false => 1.0,
+                };
                 for &(pass, into) in &open {
                     let portal = self.interior.portal(pass.portal);
-                    let share = self.share_of_image(portal, eye);
+                    let share = entered * self.share_of_image(portal, eye);
                     let window = Window::of(&pass.region, &camera);
-                    if share < 1.0 {
+                    if share < 1.0 && !is_captured {
                         let (id, region) = (pass.portal, &pass.region);
                         let beyond = visible_through(self.interior, id, into, eye, region);
                         let runs = geometry.seen(eye, &in_sight(beyond));
@@ -275,7 +303,10 @@ impl<'a> Walk<'a> {
                     }
                 }
             }
-            _ => windows.push((geometry.seen(eye, &in_sight(visibility.clone())), whole)),
+            _ => {
+                let all = in_view.unwrap_or_else(|| in_sight(visibility.clone()));
+                windows.push((geometry.seen(eye, &all), whole));
+            }
         }
         cost.filled = fills.len();
         cost.visibility = start.elapsed();
@@ -289,7 +320,7 @@ impl<'a> Walk<'a> {
         cost.geometry = start.elapsed();
         // 3. Fills.
         let start = Instant::now();
-        let images = self.images(fill, &fills, eye);
+        let images = self.images(fill, &fills, eye)?;
         cost.references_made = images.made;
         cost.references = start.elapsed();
         let start = Instant::now();
@@ -338,13 +369,18 @@ impl<'a> Walk<'a> {
         cost.fill = start.elapsed();
         // 4. Colours.
         let start = Instant::now();
-        cost.holes = self.compose(&camera, &fills);
+        cost.holes = self.compose(view, &camera, &fills)?;
         cost.shade = start.elapsed();
         Ok(cost)
     }
 
     /// What portals are filled with, made now if it is not in memory.
-    fn images(&mut self, fill: PortalFill, fills: &[Filled<'_>], eye: DVec3) -> Needed {
+    fn images(
+        &mut self,
+        fill: PortalFill,
+        fills: &[Filled<'_>],
+        eye: DVec3,
+    ) -> Result<Needed, RenderError> {
         let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
         if fill == PortalFill::Ldi {
             let side = |f: &Filled<'_>| self.library.side(f.pass.portal, f.pass.from, f.into);
@@ -353,16 +389,17 @@ impl<'a> Walk<'a> {
             for &side in &all {
                 self.is_used[self.library.len() + side] = true;
             }
-            let (ldis, made) = self.library.ldis(&all, interior, model, geometry);
+            let photos = self.painter.captured_mut();
+            let (ldis, made) = self.library.ldis(&all, interior, model, geometry, photos)?;
             let mut ldis = ldis.into_iter();
             let ldi = |side: &Option<usize>| {
                 Images::Ldi(side.and_then(|_| ldis.next()).unwrap_or_default())
             };
             let of_fills = sides.iter().map(ldi);
-            return Needed {
+            return Ok(Needed {
                 of_fills: of_fills.collect(),
                 made,
-            };
+            });
         }
         let nearest = |f: &Filled<'_>| {
             let (id, from) = (f.pass.portal, f.pass.from);
@@ -372,15 +409,18 @@ impl<'a> Walk<'a> {
         let needed: Vec<Vec<usize>> = fills.iter().map(nearest).collect();
         let all: Vec<usize> = needed.iter().flatten().copied().collect();
         all.iter().for_each(|i| self.is_used[*i] = true);
-        let (images, made) = self.library.images(&all, interior, model, geometry);
+        let photos = self.painter.captured_mut();
+        let (images, made) = self
+            .library
+            .images(&all, interior, model, geometry, photos)?;
         let mut images = images.into_iter();
         let of_fills = needed
             .iter()
             .map(|needed| Images::References(images.by_ref().take(needed.len()).collect()));
-        Needed {
+        Ok(Needed {
             of_fills: of_fills.collect(),
             made,
-        }
+        })
     }
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
@@ -398,8 +438,25 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Of images in all that is beyond a cell's portals, 0 to 1, by the eye's distance from the one that
+    /// it may just have come through.
+    fn share_entered(&self, cell: Option<CellId>, eye: DVec3) -> f64 {
+        let portals = self.interior.portals_of(cell).map(|(_, portal)| portal);
+        let ways = portals.filter(|portal| matches!(portal.beyond(cell), Some(Some(_))));
+        let share = |portal: &Portal| {
+            let reach = ENTERED * portal.semicircle_radius(self.interior.up);
+            portal.polygon.distance(eye) / reach
+        };
+        ways.map(share).fold(1.0, f64::min)
+    }
+
     /// The picture; how many pixels of portals nothing was drawn in.
-    fn compose(&mut self, camera: &Pinhole, fills: &[Filled<'_>]) -> usize {
+    fn compose(
+        &mut self,
+        view: &View,
+        camera: &Pinhole,
+        fills: &[Filled<'_>],
+    ) -> Result<usize, RenderError> {
         let width = camera.width as usize;
         let (owners, filled) = (&self.owners, &self.filled);
         let fill_of = |pixel: usize| fills.get(usize::from(owners[pixel]).wrapping_sub(1));
@@ -419,11 +476,12 @@ impl<'a> Walk<'a> {
             }
         };
         self.painter
-            .shade(self.model, camera, &mut self.picture, is_wanted);
+            .shade(self.model, view, camera, &mut self.picture, is_wanted)?;
         if fills.is_empty() {
-            return 0;
+            return Ok(0);
         }
         let painter = &self.painter;
+        let is_captured = painter.captured().is_some();
         let colors = self.picture.color.par_chunks_mut(width);
         let rows = colors.zip(self.picture.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
@@ -438,6 +496,10 @@ impl<'a> Walk<'a> {
                     continue;
                 }
                 let mut image = filled.color[pixel];
+                if image[3] == 0 && own.is_some() && is_captured {
+                    // All that might be there was met.
+                    continue;
+                }
                 if image[3] == 0 {
                     holes += usize::from(own.is_none());
                     if last.color.len() == owners.len() {
@@ -455,7 +517,7 @@ impl<'a> Walk<'a> {
             }
             holes
         };
-        rows.enumerate().map(row).sum()
+        Ok(rows.enumerate().map(row).sum())
     }
 }
 
@@ -469,6 +531,18 @@ fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
     let part = weights[1] / alpha;
     let mix = |k: usize| f64::from(a[k]) + part * (f64::from(b[k]) - f64::from(a[k]));
     [mix(0), mix(1), mix(2), alpha].map(|v| v.round() as u8)
+}
+
+/// All cells, in one region.
+pub(super) fn all_cells(interior: &Interior, region: &Region) -> Visibility {
+    let cells = (0..interior.cells.len() as u32).map(|id| VisibleCell {
+        cell: CellId(id),
+        regions: vec![region.clone()],
+    });
+    Visibility {
+        cells: cells.collect(),
+        passes: Vec::new(),
+    }
 }
 
 /// The same cells, seen everywhere.

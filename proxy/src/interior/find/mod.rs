@@ -292,6 +292,7 @@ fn interior(
         eye_height,
         cells,
         portals,
+        held_out: Vec::new(),
         other: Extra::new(),
     })
 }

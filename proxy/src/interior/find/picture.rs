@@ -1,6 +1,5 @@
 //! Floor plans to look at: seen from above, the level's first axis to the right.
 
-use super::super::Content;
 use super::{FoundInterior, Place};
 use glam::{DVec2, DVec3};
 use image::{Rgb, RgbImage};
@@ -43,9 +42,9 @@ impl FoundInterior {
         let plan = &self.plan;
         let place = |p: DVec3| (plan.level.to_level(p).truncate() - plan.origin) / plan.cell_size;
         let outlines = self.interior.cells.iter().map(|cell| {
-            let corners: Vec<DVec3> = match (&cell.floor, &cell.content) {
+            let corners: Vec<DVec3> = match (&cell.floor, cell.content.room()) {
                 (Some(floor), _) => floor.corners().to_vec(),
-                (None, Content::Box(room)) => {
+                (None, Some(room)) => {
                     // A box without a floor lies along the level's axes.
                     let [a, b] = [room.min, room.max].map(|p| plan.level.to_level(p));
                     let (low, high) = (a.min(b), a.max(b));
@@ -58,7 +57,7 @@ impl FoundInterior {
                     let world = |(x, y)| plan.level.to_world(DVec2::new(x, y), 0.0);
                     corners.map(world).to_vec()
                 }
-                _ => Vec::new(),
+                (None, None) => Vec::new(),
             };
             corners.into_iter().map(place).collect()
         });
