@@ -101,9 +101,12 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
 fn which_photos_are_held_out() {
     let folder = with_wall();
     let evaluated = |line: &str| {
-        let result = lumigraph(folder.path(), &format!("evaluate {line} --json"))
-            .ok()
-            .json();
+        let result = lumigraph(
+            folder.path(),
+            &format!("evaluate {line} --proxy plane --json"),
+        )
+        .ok()
+        .json();
         names(&result).join(" ")
     };
     assert_eq!(evaluated("wall --every 3"), "0000.png 0003.png 0006.png");
@@ -130,7 +133,8 @@ fn which_photos_are_held_out() {
 fn held_out_photos_are_nowhere_used() {
     let folder = with_wall();
     let evaluate = |out: &str| {
-        let line = format!("evaluate wall --hold-out wall/split.json --json -o {out}");
+        let line =
+            format!("evaluate wall --proxy plane --hold-out wall/split.json --json -o {out}");
         lumigraph(folder.path(), &line).ok().json()
     };
     let honest = evaluate("a");
@@ -187,7 +191,7 @@ fn smaller_pictures_score_against_reduced_photos() {
 fn every_renderer_and_blend_scores_about_alike() {
     let folder = with_wall();
     let psnr = |options: &str| {
-        let line = format!("evaluate wall --json {options}");
+        let line = format!("evaluate wall --proxy plane --json {options}");
         let result = lumigraph(folder.path(), &line).ok().json();
         result["mean"]["psnr_covered"].as_f64().unwrap()
     };

@@ -98,13 +98,13 @@ fn known_gains_are_found_and_seams_go() {
 #[test]
 fn photos_of_one_exposure_are_drawn_as_they_are() {
     let folder = with_wall();
-    let with = evaluate(folder.path(), "wall -o with");
+    let with = evaluate(folder.path(), "wall --proxy plane -o with");
     assert_eq!(
         with["exposure"]["how"], "not measurable",
         "{}",
         with["exposure"]
     );
-    evaluate(folder.path(), "wall --no-exposure -o without");
+    evaluate(folder.path(), "wall --proxy plane --no-exposure -o without");
     assert!(files(&folder.path().join("with")) == files(&folder.path().join("without")));
     lumigraph(folder.path(), "import wall -o scene").ok();
     assert!(gains(folder.path()).iter().all(Option::is_none));

@@ -81,13 +81,13 @@ fn what_masks_cover_is_not_seen() {
     );
     lumigraph(folder.path(), "import wall --no-masks -o without").ok();
 
-    let clean = lumigraph(with_wall().path(), "evaluate wall --json")
+    let clean = lumigraph(with_wall().path(), "evaluate wall --proxy plane --json")
         .ok()
         .json();
     let clean = clean["mean"]["psnr"].as_f64().unwrap();
     for device in ["cpu", "reference"] {
         let evaluate = |scene: &str, out: &str| {
-            let line = format!("evaluate {scene} --json --device {device} -o {out}");
+            let line = format!("evaluate {scene} --proxy plane --json --device {device} -o {out}");
             lumigraph(folder.path(), &line).ok().json()
         };
         let with = evaluate("scene", &format!("with-{device}"));

@@ -22,7 +22,7 @@ fn a_source_view_gives_its_photo_back() {
 fn held_out_photos_do_not_paint() {
     let folder = with_wall();
     let render = |options: &str, out: &str| {
-        let line = format!("render wall --views wall --json -o {out}{options}");
+        let line = format!("render wall --proxy plane --views wall --json -o {out}{options}");
         lumigraph(folder.path(), &line).ok().json()
     };
     assert_eq!(render("", "all")["report"]["photos_total"], 9);
@@ -51,9 +51,21 @@ fn path_files_render_what_they_say() {
     let path = CameraPath::new(30.0, frames).unwrap();
     render::path::write(&folder.path().join("path.json"), &path).unwrap();
 
-    lumigraph(folder.path(), "render wall --views wall -o model").ok();
-    lumigraph(folder.path(), "render wall --views path.json -o views").ok();
-    lumigraph(folder.path(), "render wall --path path.json -o path").ok();
+    lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views wall -o model",
+    )
+    .ok();
+    lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views path.json -o views",
+    )
+    .ok();
+    lumigraph(
+        folder.path(),
+        "render wall --proxy plane --path path.json -o path",
+    )
+    .ok();
     let [of_model, of_views, of_path] =
         ["model", "views/sub", "path/sub"].map(|out| files(&folder.path().join(out)));
     assert_eq!(of_model.len(), 9);
@@ -67,7 +79,11 @@ fn path_files_render_what_they_say() {
     }
 
     fs::write(folder.path().join("bad.json"), "{}").unwrap();
-    let error = lumigraph(folder.path(), "render wall --path bad.json -o bad").error(1);
+    let error = lumigraph(
+        folder.path(),
+        "render wall --proxy plane --path bad.json -o bad",
+    )
+    .error(1);
     assert!(error.starts_with("bad.json: "), "{error}");
     assert!(!folder.path().join("bad").exists());
 }
@@ -76,7 +92,9 @@ fn path_files_render_what_they_say() {
 fn derived_paths_stay_within_cover() {
     let folder = with_wall();
     for kind in ["orbit", "dolly", "sweep"] {
-        let line = format!("render wall --path {kind} --frames 4 --size 64x48 --json -o {kind}");
+        let line = format!(
+            "render wall --proxy plane --path {kind} --frames 4 --size 64x48 --json -o {kind}"
+        );
         let result = lumigraph(folder.path(), &line).ok().json();
         assert_eq!(result["frames"].as_array().unwrap().len(), 4);
         let frames = files(&folder.path().join(kind));
@@ -98,7 +116,11 @@ fn names_that_clash_are_refused_before_rendering() {
         image.name = name.to_owned();
     }
     colmap::write_text(&model, &folder.path().join("views")).unwrap();
-    let error = lumigraph(folder.path(), "render wall --views views -o out").error(1);
+    let error = lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views views -o out",
+    )
+    .error(1);
     assert!(
         error.contains("a/x.jpg") && error.contains("a/x.png") && error.contains("rename"),
         "{error}"
@@ -107,7 +129,11 @@ fn names_that_clash_are_refused_before_rendering() {
 
     model.images.values_mut().next().unwrap().name = "../../x.png".to_owned();
     colmap::write_text(&model, &folder.path().join("views")).unwrap();
-    let error = lumigraph(folder.path(), "render wall --views views -o out").error(1);
+    let error = lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views views -o out",
+    )
+    .error(1);
     assert!(error.contains("leads out of the output folder"), "{error}");
 }
 
@@ -125,7 +151,7 @@ fn only_photos_in_use_are_decoded() {
     }
     colmap::write_text(&model, &folder.path().join("one")).unwrap();
     let render = |options: &str| {
-        let line = format!("render wall --views one --json -o out{options}");
+        let line = format!("render wall --proxy plane --views one --json -o out{options}");
         lumigraph(folder.path(), &line).ok().json()["report"].clone()
     };
     let lazy = render("");

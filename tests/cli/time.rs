@@ -22,7 +22,7 @@ fn with_helicopter() -> TempDir {
 fn held_out_photos_score_better_at_their_own_times() {
     let folder = with_helicopter();
     let evaluate = |options: &str| {
-        let line = format!("evaluate helicopter --json{options}");
+        let line = format!("evaluate helicopter --proxy points --json{options}");
         lumigraph(folder.path(), &line).ok()
     };
     let psnr = |options: &str| evaluate(options).json()["mean"]["psnr"].as_f64().unwrap();
@@ -46,7 +46,9 @@ fn held_out_photos_score_better_at_their_own_times() {
 fn frames_show_their_moment() {
     let folder = with_helicopter();
     let render = |options: &str, out: &str| {
-        let line = format!("render helicopter --path orbit --frames 2 -o {out} --json{options}");
+        let line = format!(
+            "render helicopter --proxy points --path orbit --frames 2 -o {out} --json{options}"
+        );
         let ran = lumigraph(folder.path(), &line).ok();
         (files(&folder.path().join(out)), ran.json())
     };
