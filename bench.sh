@@ -110,6 +110,6 @@ if command -v valgrind >/dev/null; then
         line="$(arguments "$name" 1) --size 160x120"
         a=$(count "$old" "$line") b=$(count "$new" "$line")
         awk -v name="$name" -v a="$a" -v b="$b" \
-            'BEGIN { printf "%-14s %14d  %.4f\n", name, a, b / a }'
+            'BEGIN { printf "%-14s %14.0f  %.4f\n", name, a, b / a }'
     done
 fi
