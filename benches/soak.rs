@@ -6,6 +6,7 @@
 
 use clap::Parser;
 use datasets::Options;
+use lumigraph::bench::Random;
 use lumigraph::scene::{Kind, Scene};
 use render::{
     Blend, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, RenderError,
@@ -268,16 +269,4 @@ fn resident_mib() -> Option<f64> {
     let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
     let kib: f64 = line.split_whitespace().next()?.parse().ok()?;
     Some(kib / 1024.0)
-}
-
-/// Pseudo-random numbers, the same everywhere: SplitMix64 (Steele et al. 2014).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % count as u64) as usize
-    }
 }

@@ -9,11 +9,10 @@ use calibrate::{Camera, Lens, Rigid3, View};
 use clap::Parser;
 use cpu_time::ProcessTime;
 use datasets::house::{self, HouseOptions};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use image::RgbaImage;
-use proxy::interior::{
-    Contents, Interior, SemicircleOptions, SemicircleView, read_rooms, semicircles,
-};
+use lumigraph::bench::before_doorways;
+use proxy::interior::{Contents, Interior, SemicircleOptions, SemicircleView, read_rooms};
 use proxy::mesh::{Model, read_model};
 use render::DeviceChoice;
 use render::interior::{
@@ -49,8 +48,6 @@ struct Args {
 }
 
 const SIZE: [u32; 2] = [640, 512];
-/// How far from its cell's sides an eye stands, in metres.
-const IN_WALL: f64 = 0.3;
 const ANGLES: [f64; 5] = [0.0, 15.0, 30.0, 45.0, 60.0];
 
 fn lens() -> Lens {
@@ -227,29 +224,14 @@ fn through_doors(
             .map(|f| format!("{:>20}", f.name()))
             .concat()
     );
-    // The same semicircles, wider.
-    let mut wide = interior.clone();
-    for portal in &mut wide.portals {
-        portal.radius = Some(1.25 * portal.semicircle_radius(interior.up));
-    }
     for angle in ANGLES {
         let options = SemicircleOptions {
             views: if angle > 0.0 { 3 } else { 1 },
             span: (2.0 * angle).to_radians(),
         };
-        let places = semicircles(&wide, &options);
-        let is_meant = |place: &&SemicircleView| {
-            let off = (place.angle.abs().to_degrees() - angle).abs();
-            let eye = place.camera_from_world.center();
-            let bounds = place.from.and_then(|id| contents.bounds[id.0 as usize]);
-            // A cell reaches into its walls, where nobody stands.
-            let is_free = bounds.is_some_and(|room| {
-                let low = room.min + IN_WALL * (DVec3::ONE - interior.up.abs());
-                let high = room.max - IN_WALL * (DVec3::ONE - interior.up.abs());
-                eye.clamp(low, high) == eye
-            });
-            off < 1e-6 && is_free && contents.locate(interior, eye) == place.from
-        };
+        let places = before_doorways(interior, &contents, 1.25, &options);
+        let is_meant =
+            |place: &&SemicircleView| (place.angle.abs().to_degrees() - angle).abs() < 1e-6;
         // Squared error, pixels and holes.
         let mut sums = [[0.0; 3]; PortalFill::ALL.len()];
         let mut views = 0;

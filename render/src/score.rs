@@ -228,8 +228,8 @@ fn capped_option<S: Serializer>(psnr: &Option<f64>, serializer: S) -> Result<S::
     psnr.map(|p| p.min(PSNR_CAP_DB)).serialize(serializer)
 }
 
-/// The colours over black, rounded to the nearest byte.
-fn on_black(image: &RgbaImage) -> Vec<[u8; 3]> {
+/// The colours over black, row by row, rounded to the nearest byte.
+pub fn on_black(image: &RgbaImage) -> Vec<[u8; 3]> {
     let pixels = image.pixels().map(|p| {
         let [r, g, b, a] = p.0;
         [r, g, b].map(|v| ((u32::from(v) * u32::from(a) + 127) / 255) as u8)

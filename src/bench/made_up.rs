@@ -38,7 +38,7 @@ impl Surroundings {
     fn proxy(self) -> Proxy {
         match self {
             Self::Ball { sides } => {
-                let ball = globe(sides.max(3), sides.max(3));
+                let ball = ball(DVec3::ZERO, 1.0, sides.max(3), sides.max(3));
                 Proxy::Mesh(Arc::new(Solid::new(MeshKind::Hull, ball)))
             }
             Self::Tunnel => Proxy::Mesh(Arc::new(Solid::new(MeshKind::Tunnel, hallway()))),
@@ -137,16 +137,16 @@ fn photo(view: &View, proxy: &Proxy) -> RgbaImage {
     })
 }
 
-/// A ball around the origin of 2·around·(down − 1) faces.
-fn globe(around: u32, down: u32) -> Mesh {
+/// A ball of 2·around·(down − 1) faces.
+pub(super) fn ball(center: DVec3, radius: f64, around: u32, down: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for row in 0..=down {
         for column in 0..around {
             let theta = std::f64::consts::PI * f64::from(row) / f64::from(down);
             let phi = std::f64::consts::TAU * f64::from(column) / f64::from(around);
             let (sin, cos) = theta.sin_cos();
-            mesh.positions
-                .push(DVec3::new(sin * phi.cos(), cos, sin * phi.sin()));
+            let out = DVec3::new(sin * phi.cos(), cos, sin * phi.sin());
+            mesh.positions.push(center + radius * out);
         }
     }
     for row in 0..down {

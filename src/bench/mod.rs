@@ -1,12 +1,16 @@
 //! What measuring needs: which settings nothing beats, how time grows, and photo sets of any size.
 
+mod doorways;
 mod exponent;
 mod front;
 pub mod made_up;
+mod random;
 pub mod stress;
 
+pub use doorways::before_doorways;
 pub use exponent::{Exponent, fit_exponent};
 pub use front::{Cost, front};
+pub use random::Random;
 
 /// The middle one of some values, the mean of the two in the middle where they are even in
 /// number; `None` of nothing.

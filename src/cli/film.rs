@@ -5,6 +5,7 @@ use super::options::positive;
 use super::output::write_file;
 use anyhow::{Context, bail};
 use image::{Rgba, RgbaImage};
+use render::score::on_black;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -135,7 +136,14 @@ impl Plan {
         const ALONE: [&str; 2] = ["--resume", "--json"];
         const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
         let mut arguments = Vec::new();
-        let mut given = std::env::args().skip(1);
+        // `--fps=30` is `--fps 30`.
+        let apart = |argument: String| match argument.split_once('=') {
+            Some((name, value)) if name.starts_with("--") => {
+                vec![name.to_owned(), value.to_owned()]
+            }
+            _ => vec![argument],
+        };
+        let mut given = std::env::args().skip(1).flat_map(apart);
         while let Some(argument) = given.next() {
             if WITH_VALUE.contains(&argument.as_str()) {
                 // How many frames a derived path has does.
@@ -200,11 +208,11 @@ impl FilmArgs {
         };
         let read = |file: &PathBuf| {
             let opened = image::open(file);
-            let mut picture = opened
-                .with_context(|| file.display().to_string())?
-                .to_rgba8();
-            Background(Some([0; 3])).behind(&mut picture);
-            anyhow::Ok(picture)
+            anyhow::Ok(
+                opened
+                    .with_context(|| file.display().to_string())?
+                    .to_rgba8(),
+            )
         };
         let size = read(first)?.dimensions();
         let frames = files.iter().map(|file| {
@@ -213,8 +221,7 @@ impl FilmArgs {
                 let text = format!("{}: not as large as the first frame", file.display());
                 return Err(std::io::Error::other(text));
             }
-            let rgb = picture.pixels().flat_map(|p| [p.0[0], p.0[1], p.0[2]]);
-            Ok(rgb.collect())
+            Ok(on_black(&picture).into_iter().flatten().collect())
         });
         super::output::make_parent(video)?;
         capture::video::encode(video, size, self.fps.unwrap_or(30.0), frames)

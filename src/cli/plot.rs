@@ -27,11 +27,7 @@ pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
     let (left, above, right, below) = ROOM;
     let x = |i: f64| left + (width - left - right) * i / count.saturating_sub(1).max(1) as f64;
     let y = |v: f64| height - below - (height - above - below) * v / top;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
-    );
+    let mut svg = opened(SIZE);
     // Writing to a string cannot fail.
     let rows = (top / step).round() as usize;
     for row in 0..=rows {
@@ -75,6 +71,15 @@ pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
         );
     }
     svg + "</svg>\n"
+}
+
+/// The beginning of a plot of so many pixels.
+pub(super) fn opened((width, height): (f64, f64)) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+    )
 }
 
 /// 1, 2 or 5 times a power of ten, so that there are up to ten rows.

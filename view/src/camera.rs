@@ -15,6 +15,11 @@ pub(crate) fn pose_of(camera_from_world: DQuat, center_in_world: DVec3) -> Rigid
     }
 }
 
+/// The angle between two directions, in radians, however small.
+pub(crate) fn angle_between(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
 /// The pose after going around `pivot_in_world`, which stays where it is in the picture:
 /// by `yaw` radians about `up` (positive: the camera goes to the right, what it sees to the left)
 /// and by `pitch` about its own right axis (positive: upwards), as far as the line of sight stays off `up`.

@@ -1,5 +1,6 @@
 //! From a layer's values to what the window shows.
 
+use crate::camera::angle_between;
 use crate::content::Stop;
 use crate::picture::Layer;
 use calibrate::{Pixel, View};
@@ -134,7 +135,7 @@ pub(crate) fn nearest_stop(stops: &[Stop], view: &View, depth: f64) -> Option<us
     let (center, forward) = (view.center(), view.forward());
     let off = |other: &View| {
         let aside: DVec3 = other.center() - center;
-        let angle = other.forward().dot(forward).clamp(-1.0, 1.0).acos();
+        let angle = angle_between(other.forward(), forward);
         aside.length() / depth + angle
     };
     let offs = stops.iter().map(|stop| off(&stop.view)).enumerate();

@@ -2,7 +2,7 @@
 
 mod hands;
 
-use crate::camera::{Glide, pose_of};
+use crate::camera::{Glide, angle_between, pose_of};
 use crate::compose::nearest_stop;
 use crate::content::{Content, Space};
 use crate::keyframes::Keyframes;
@@ -346,7 +346,7 @@ impl State {
             ..view.clone()
         };
         let far = view.center().distance(target.center()) / space.depth;
-        let angle = view.forward().dot(target.forward()).clamp(-1.0, 1.0).acos();
+        let angle = angle_between(view.forward(), target.forward());
         let duration_s = (0.3 + 0.3 * (far + angle)).min(1.2);
         self.playing = None;
         self.glide = Some(Glide::new(view, target, duration_s));

@@ -1,13 +1,13 @@
 //! Scenes that try to break things, and what must hold of every one.
 
-mod random;
 mod scene;
 
 pub use scene::{Case, Placement};
 
+use super::Random;
 use glam::DVec3;
 use image::RgbaImage;
-use random::Random;
+use render::score::on_black;
 use render::{FieldOptions, Frame, MAX_CONTRIBUTORS, Method, RenderError, cpu, reference};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -228,18 +228,11 @@ fn weights(frame: &Frame<'_>, seed: u64) -> Result<(), String> {
 
 /// `share`: of the pixels, so many may be off by more than so many steps.
 fn same(ours: &RgbaImage, theirs: &RgbaImage, (share, steps): (f64, u8)) -> Result<(), String> {
-    let pairs = ours.pixels().zip(theirs.pixels());
-    let premultiplied = |p: &image::Rgba<u8>| {
-        let [r, g, b, a] = p.0.map(u32::from);
-        [r, g, b].map(|c| ((c * a + 127) / 255) as u8)
-    };
-    let apart = |(a, b): (&image::Rgba<u8>, &image::Rgba<u8>)| {
-        let (x, y) = (premultiplied(a), premultiplied(b));
-        (0..3)
-            .map(|c| x[c].abs_diff(y[c]))
-            .fold(a.0[3].abs_diff(b.0[3]), u8::max)
-    };
-    let apart: Vec<u8> = pairs.map(apart).collect();
+    let colors = on_black(ours).into_iter().zip(on_black(theirs));
+    let of_color = colors.map(|(a, b)| (0..3).map(|c| a[c].abs_diff(b[c])).fold(0, u8::max));
+    let alphas = ours.pixels().zip(theirs.pixels());
+    let of_alpha = alphas.map(|(a, b)| a.0[3].abs_diff(b.0[3]));
+    let apart: Vec<u8> = of_color.zip(of_alpha).map(|(c, a)| c.max(a)).collect();
     let off = apart.iter().filter(|d| **d > steps).count();
     let most = apart.iter().max().copied().unwrap_or(0);
     if off as f64 > share * apart.len() as f64 {

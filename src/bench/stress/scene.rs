@@ -1,6 +1,6 @@
 //! Scenes that try to break things.
 
-use super::random::Random;
+use crate::bench::{Random, made_up};
 use calibrate::{Distortion, Lens, Pixel, Rigid3, View};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
@@ -282,6 +282,7 @@ fn proxy_of(
         Proxy::Plane(plane.expect("finite numbers, a unit normal"))
     };
     let mesh = |mesh: Mesh| Proxy::Mesh(Arc::new(Solid::new(MeshKind::Hull, mesh)));
+    let ball = |center, radius| made_up::ball(center, radius, 8, 7);
     let tilted = |random: &mut Random| DVec3::NEG_Z + random.vector(0.5);
     let proxy = match kind {
         0 => plane(ahead, tilted(random)),
@@ -314,35 +315,6 @@ fn proxy_of(
         Vec::new()
     };
     (proxy, points)
-}
-
-/// A ball of 96 faces.
-fn ball(center: DVec3, radius: f64) -> Mesh {
-    let (around, down) = (8, 7);
-    let mut mesh = Mesh::default();
-    for row in 0..=down {
-        for column in 0..around {
-            let (theta, phi) = (
-                std::f64::consts::PI * f64::from(row) / f64::from(down),
-                std::f64::consts::TAU * f64::from(column) / f64::from(around),
-            );
-            let out = DVec3::new(
-                theta.sin() * phi.cos(),
-                theta.cos(),
-                theta.sin() * phi.sin(),
-            );
-            mesh.positions.push(center + radius * out);
-        }
-    }
-    for row in 0..down {
-        for column in 0..around {
-            let at = |r: i32, c: i32| (r * around + c % around) as u32;
-            let (a, b) = (at(row, column), at(row, column + 1));
-            let (c, d) = (at(row + 1, column), at(row + 1, column + 1));
-            mesh.triangles.extend([[a, b, c], [b, d, c]]);
-        }
-    }
-    mesh
 }
 
 /// Triangles thousands of times longer than wide, degenerate ones among them, before a wall.

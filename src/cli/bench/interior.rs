@@ -1,12 +1,13 @@
 //! An interior measured: what portals show, against the model drawn whole.
 
-use super::measure::{Effort, Measured, Pictures, Subject, Times, timed};
+use super::measure::{Effort, Measured, Pictures, Subject, Times, in_turn, timed};
 use anyhow::Context;
 use calibrate::{Lens, View};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use image::{Rgba, RgbaImage};
 use indicatif::ProgressBar;
-use proxy::interior::{Contents, Interior, SemicircleOptions, semicircles};
+use lumigraph::bench::before_doorways;
+use proxy::interior::{Contents, Interior, SemicircleOptions};
 use proxy::mesh::Model;
 use render::DeviceChoice;
 use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
@@ -81,31 +82,14 @@ fn settings(thorough: bool) -> Vec<Setting> {
 /// Views through portals, from a little beyond their semicircles, as many on each angle off their
 /// axis.
 fn views(interior: &Interior, contents: &Contents, effort: Effort) -> Vec<View> {
-    let mut wide = interior.clone();
-    for portal in &mut wide.portals {
-        portal.radius = Some(1.25 * portal.semicircle_radius(interior.up));
-    }
     let options = SemicircleOptions {
         views: 5,
         span: 90_f64.to_radians(),
     };
     let width = effort.long_side;
     let size = DVec2::new(f64::from(width), f64::from(width * 4 / 5));
-    let is_free = |eye: DVec3, cell: Option<proxy::interior::CellId>| {
-        let bounds = cell.and_then(|id| contents.bounds[id.0 as usize]);
-        bounds.is_some_and(|room| {
-            // A cell reaches into its walls, where nobody stands.
-            let within = 0.3 * (DVec3::ONE - interior.up.abs());
-            let (low, high) = (room.min + within, room.max - within);
-            low.cmple(high).all() && eye.clamp(low, high) == eye
-        })
-    };
-    let all: Vec<View> = semicircles(&wide, &options)
+    let all: Vec<View> = before_doorways(interior, contents, 1.25, &options)
         .into_iter()
-        .filter(|place| {
-            let eye = place.camera_from_world.center();
-            is_free(eye, place.from) && contents.locate(interior, eye) == place.from
-        })
         .map(|place| View {
             lens: Lens::pinhole(DVec2::splat(0.7 * size.x), 0.5 * size),
             width,
@@ -213,21 +197,13 @@ pub(super) fn measure(
     }
 
     // 2. Times, in turn.
-    let mut repeats: Vec<Vec<Times>> = vec![Vec::new(); settings.len()];
-    for repeat in 0..effort.repeats {
-        for step in 0..settings.len() {
-            let i = (step + repeat * settings.len() / effort.repeats) % settings.len();
-            let mut sum = Times::default();
-            for view in &views {
-                let (drawn, times) = timed(|| walks[i].draw(view, settings[i].fill).map(drop));
-                drawn?;
-                sum.cpu_ms += times.cpu_ms / views.len() as f64;
-                sum.wall_ms += times.wall_ms / views.len() as f64;
-            }
-            repeats[i].push(sum);
-            bar.inc(1);
-        }
-    }
+    let repeats = in_turn(
+        settings.len(),
+        effort.repeats,
+        views.len(),
+        bar,
+        |i, view| Ok(walks[i].draw(&views[view], settings[i].fill).map(drop)?),
+    )?;
     for (measured, repeats) in measured.iter_mut().zip(&repeats) {
         measured.set_times(repeats);
     }

@@ -341,22 +341,16 @@ pub(super) fn measure(
     }
 
     // 5. Times: all settings in turn, over and over, each time beginning with another.
-    let mut repeats: Vec<Vec<Times>> = vec![Vec::new(); settings.len()];
-    for repeat in 0..effort.repeats {
-        for step in 0..settings.len() {
-            let i = (step + repeat * settings.len() / effort.repeats) % settings.len();
-            let mut sum = Times::default();
-            for HeldOut { view, .. } in &held_out {
-                let lumigraph = &sets[of_setting[i]].1;
-                let (drawn, times) = timed(|| draw(&mut engine, lumigraph, view, &settings[i]));
-                drawn?;
-                sum.cpu_ms += times.cpu_ms / held_out.len() as f64;
-                sum.wall_ms += times.wall_ms / held_out.len() as f64;
-            }
-            repeats[i].push(sum);
-            bar.inc(1);
-        }
-    }
+    let repeats = in_turn(
+        settings.len(),
+        effort.repeats,
+        held_out.len(),
+        bar,
+        |i, view| {
+            let (lumigraph, view) = (&sets[of_setting[i]].1, &held_out[view].view);
+            Ok(draw(&mut engine, lumigraph, view, &settings[i]).map(drop)?)
+        },
+    )?;
 
     let measured = settings.iter().enumerate().map(|(i, setting)| {
         let (score, steps) = scored[i];
@@ -401,6 +395,33 @@ pub(super) fn measure(
         failed,
     };
     Ok((result, pictures.context("the default was drawn")?))
+}
+
+/// Times of settings, each of which draws all views: by setting, the mean over the views of each
+/// repeat. All take turns, over and over, each time beginning with another.
+pub(super) fn in_turn(
+    settings: usize,
+    repeats: usize,
+    views: usize,
+    bar: &ProgressBar,
+    mut draw: impl FnMut(usize, usize) -> anyhow::Result<()>,
+) -> anyhow::Result<Vec<Vec<Times>>> {
+    let mut all: Vec<Vec<Times>> = vec![Vec::new(); settings];
+    for repeat in 0..repeats {
+        for step in 0..settings {
+            let i = (step + repeat * settings / repeats) % settings;
+            let mut sum = Times::default();
+            for view in 0..views {
+                let (drawn, times) = timed(|| draw(i, view));
+                drawn?;
+                sum.cpu_ms += times.cpu_ms / views as f64;
+                sum.wall_ms += times.wall_ms / views as f64;
+            }
+            all[i].push(sum);
+            bar.inc(1);
+        }
+    }
+    Ok(all)
 }
 
 /// The photos that judge, spread evenly over those held out, reduced.
@@ -471,7 +492,7 @@ fn start_up(
     view: &View,
     [read_ms, exposure_ms, fit_ms]: [f64; 3],
 ) -> anyhow::Result<StartUp> {
-    let default = &settings(false, &[])[0];
+    let default = &Setting::default_one();
     let start = Instant::now();
     let lumigraph = variants.lumigraph(default)?;
     let frame = Frame::new(&lumigraph, view.clone(), default.options);
@@ -507,7 +528,7 @@ fn decode_all(lumigraph: &Lumigraph, photos: &[usize]) -> anyhow::Result<f64> {
 
 fn skips(variants: &Variants<'_>, view: &View) -> anyhow::Result<Skips> {
     const REPEATS: usize = 3;
-    let default = &settings(false, &[])[0];
+    let default = &Setting::default_one();
     let lumigraph = variants.lumigraph(default)?;
     let mut engine = Engine::open(DeviceChoice::Cpu)?;
     let mut render = |asking_all: bool| {

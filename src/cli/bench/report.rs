@@ -8,7 +8,8 @@ use anyhow::Context;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use image::codecs::jpeg::JpegEncoder;
-use image::{Rgb, RgbImage, RgbaImage};
+use image::{Rgb, RgbImage};
+use render::score::on_black;
 use std::fmt::Write;
 
 /// Differences are shown so many times as large.
@@ -27,13 +28,11 @@ pub(super) fn thumbnails(pictures: &Pictures) -> anyhow::Result<Thumbnails> {
         default,
         exact,
     } = pictures;
-    let on_black = |picture: &RgbaImage| {
-        RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
-            let [r, g, b, a] = picture.get_pixel(x, y).0.map(u32::from);
-            Rgb([r, g, b].map(|c| ((c * a + 127) / 255) as u8))
-        })
-    };
-    let [truth, default, exact] = [truth, default, exact].map(on_black);
+    let [truth, default, exact] = [truth, default, exact].map(|picture| {
+        let pixels = on_black(picture).into_iter().flatten().collect();
+        let (width, height) = picture.dimensions();
+        RgbImage::from_raw(width, height, pixels).expect("three bytes a pixel")
+    });
     let difference = |other: &RgbImage, times: i32| {
         RgbImage::from_fn(default.width(), default.height(), |x, y| {
             let (a, b) = (default.get_pixel(x, y).0, other.get_pixel(x, y).0);

@@ -1,5 +1,6 @@
 //! Points over two logarithmic or even axes, as SVG.
 
+use super::super::plot;
 use std::fmt::Write;
 
 /// A point: what it is, which family its colour tells, and where it lies.
@@ -66,7 +67,7 @@ impl Scale {
     /// Round values along it.
     fn ticks(&self) -> Vec<f64> {
         if !self.is_log {
-            let step = super::super::plot::step(self.high - self.low);
+            let step = plot::step(self.high - self.low);
             let first = (self.low / step).ceil() as i64;
             let last = (self.high / step).floor() as i64;
             return (first..=last).map(|i| i as f64 * step).collect();
@@ -97,11 +98,7 @@ pub(super) fn scatter(
     };
     let x = Scale::new(of(0), across.is_log, left, width - right);
     let y = Scale::new(of(1), up.is_log, height - below, above);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
-    );
+    let mut svg = plot::opened(SIZE);
     // Writing to a string cannot fail.
     for value in x.ticks() {
         let at = x.place(value);

@@ -28,7 +28,8 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    fn default_one() -> Self {
+    /// What nobody changed.
+    pub(super) fn default_one() -> Self {
         Self {
             knob: "default",
             value: String::new(),

@@ -1,7 +1,8 @@
 use glam::{DQuat, DVec3};
 
-/// Pseudo-random numbers, the same everywhere: SplitMix64 (Steele et al. 2014).
-pub(super) struct Random(pub(super) u64);
+/// Pseudo-random numbers, the same everywhere, from a seed: SplitMix64 (Steele et al. 2014).
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
 
 impl Random {
     fn next(&mut self) -> u64 {
@@ -12,23 +13,23 @@ impl Random {
     }
 
     /// Evenly in low…high.
-    pub(super) fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Below `count`.
-    pub(super) fn below(&mut self, count: usize) -> usize {
+    pub fn below(&mut self, count: usize) -> usize {
         (self.next() % count as u64) as usize
     }
 
     /// Evenly in the cube of half side `reach`.
-    pub(super) fn vector(&mut self, reach: f64) -> DVec3 {
+    pub fn vector(&mut self, reach: f64) -> DVec3 {
         let mut coordinate = || self.within(-reach, reach);
         DVec3::new(coordinate(), coordinate(), coordinate())
     }
 
     /// About any axis by any angle.
-    pub(super) fn rotation(&mut self) -> DQuat {
+    pub fn rotation(&mut self) -> DQuat {
         let axis = self.vector(1.0).try_normalize().unwrap_or(DVec3::X);
         DQuat::from_axis_angle(axis, self.within(-3.1, 3.1))
     }
