@@ -7,7 +7,7 @@ use std::time::Duration;
 const SCENES: u64 = 144;
 
 /// Scenes that something was wrong with once.
-const FOUND: [(u64, &str); 3] = [
+const FOUND: [(u64, &str); 10] = [
     (
         145,
         "f32's rounding decided how photos at the viewer's place share",
@@ -20,6 +20,13 @@ const FOUND: [(u64, &str); 3] = [
         209,
         "seven and more photos at one place gave no points at all",
     ),
+    (3437, "the photos' order"),
+    (3622, "the photos' order"),
+    (3689, "the photos' order"),
+    (3841, "the photos' order"),
+    (3985, "the photos' order"),
+    (4345, "the photos' order"),
+    (4993, "the photos' order"),
 ];
 
 #[test]

@@ -3,7 +3,7 @@
 #[cfg(test)]
 pub(crate) mod every_lens;
 
-use crate::lumigraph::Lumigraph;
+use crate::lumigraph::{Lumigraph, SourceView};
 use crate::options::{FieldOptions, Resolution};
 use crate::planted::{Fault, is_planted};
 use crate::sight::within_sight;
@@ -14,6 +14,7 @@ use crate::view_tree::ViewTree;
 use crate::visibility::visible;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
+use std::cmp::Ordering;
 use std::sync::OnceLock;
 
 /// A point of the proxy as the desired view sees it: along `ray` from its centre, at
@@ -131,6 +132,35 @@ fn is_one_place(a: DVec3, b: DVec3) -> bool {
     a.distance(b) <= ONE_PLACE * size
 }
 
+/// No photos in rows, grids or rings are many at one place along it.
+const ASKEW: DVec3 = DVec3::new(0.618_034, 0.324_718, 0.715_999);
+
+/// Where photos were taken; those at one place, or at the viewer's, at the same to the last digit, as
+/// only then ties are ties. Which of them stands for all follows from where they are, not from their
+/// order.
+fn places(sources: &[SourceView], viewer: DVec3) -> Vec<DVec3> {
+    let mut places: Vec<DVec3> = sources.iter().map(|s| s.view.center()).collect();
+    let along = |place: DVec3| place.dot(ASKEW);
+    let key = |i: &usize| (along(places[*i]), places[*i].to_array());
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_unstable_by(|i, j| key(i).partial_cmp(&key(j)).unwrap_or(Ordering::Equal));
+    // What is near is near along any direction, too.
+    let mut last: Vec<DVec3> = Vec::new();
+    for i in order {
+        let place = places[i];
+        last.retain(|other| {
+            let size = other.length().max(place.length());
+            along(place) - along(*other) <= 2.0 * ONE_PLACE * size
+        });
+        let known = std::iter::once(&viewer).chain(&last);
+        match known.copied().find(|other| is_one_place(*other, place)) {
+            Some(same) => places[i] = same,
+            None => last.push(place),
+        }
+    }
+    places
+}
+
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
 #[derive(Debug)]
 pub struct Frame<'a> {
@@ -212,18 +242,13 @@ impl<'a> Frame<'a> {
             .fold(0.0, f64::max);
         let desired_focal = desired.lens.mean_focal().min(longest);
 
-        let here = desired.center();
-        let mut last = here;
         let sources = lumigraph
             .sources
             .iter()
+            .zip(places(&lumigraph.sources, desired.center()))
             .enumerate()
-            .map(|(i, source)| {
+            .map(|(i, (source, center))| {
                 let View { width, height, .. } = source.view;
-                // Ties are ties only where places are the same to the last digit.
-                let center = source.view.center();
-                let same = [here, last].into_iter().find(|c| is_one_place(*c, center));
-                last = same.unwrap_or(center);
                 FrameSource {
                     time_penalty: match gone.contains(&i) {
                         true => f64::INFINITY,
@@ -234,7 +259,7 @@ impl<'a> Frame<'a> {
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
-                    ..FrameSource::at(last, &source.view, &desired)
+                    ..FrameSource::at(center, &source.view, &desired)
                 }
             })
             .collect::<Vec<FrameSource>>();

@@ -5,7 +5,7 @@ use calibrate::{Distortion, Lens, Pixel, Rigid3, View};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Mesh, MeshKind, Plane, Proxy, Solid, SparsePoint};
-use render::{Lumigraph, MAX_CONTRIBUTORS, PhotoStore, SourceView, Visibility};
+use render::{Lumigraph, PhotoStore, SourceView, Visibility};
 use std::sync::Arc;
 
 /// Where a scene lies in the world: new = scale · (rotation · old) + translation.
@@ -53,8 +53,6 @@ pub struct Case {
     /// Whether the smallest change may change what is seen: a viewer on a surface, say. Then
     /// pictures are only drawn, not compared with those of the world moved.
     pub is_on_edge: bool,
-    /// Whether more photos tie than may contribute: the first in order do.
-    pub is_ordered: bool,
 }
 
 /// Pixels of the desired view and of the photos.
@@ -131,7 +129,6 @@ impl Case {
                 CROWDS[crowd], PROXIES[kind], VIEWERS[viewer], LENSES[lens]
             ),
             desired: placement.view(&desired),
-            is_ordered: crowd == 1 && count > MAX_CONTRIBUTORS,
             is_on_edge: matches!(kind, 1 | 2 | 3 | 6 | 7) || crowd == 7 || lens == 2,
             lumigraph: Lumigraph {
                 points: points.collect(),
