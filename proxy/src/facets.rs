@@ -14,8 +14,6 @@ pub struct Facets {
     pub inverse_distances: Vec<f64>,
     /// Corners of each facet, so that det(a, b, c) > 0 but for rounding.
     pub triangles: Vec<[u32; 3]>,
-    /// The facet across the side that lies opposite each corner.
-    pub neighbours: Vec<[u32; 3]>,
     /// q of each facet's plane: a ray v meets it at v / s with s = q · v.
     pub planes: Vec<DVec3>,
 }
@@ -24,9 +22,6 @@ impl Facets {
     /// Facets from corners and triangles, all oriented alike: det(a, b, c) > 0 for all but those
     /// that rounding has turned over. Triangles too thin to carry a plane take that of equal
     /// inverse distance, which is close to the same thing there.
-    ///
-    /// # Panics
-    /// If a side has no triangle beyond it: the sphere must be closed.
     pub fn new(
         directions: Vec<DVec3>,
         inverse_distances: Vec<f64>,
@@ -41,18 +36,49 @@ impl Facets {
                 plane_through([a, b, c], s)
             })
             .collect();
-        let neighbours = neighbours(&triangles);
         Self {
             directions,
             inverse_distances,
             triangles,
-            neighbours,
             planes,
         }
     }
 
-    /// The facet that a ray passes through, found by walking from facet `start` towards it.
-    pub fn locate(&self, ray: DVec3, start: u32) -> u32 {
+    /// For each facet the one across the side that lies opposite each corner.
+    ///
+    /// # Panics
+    /// If a side has no triangle beyond it: the sphere must be closed.
+    pub fn neighbours(&self) -> Vec<[u32; 3]> {
+        // The sides by where they start, each with its end and the facet to its left.
+        let mut first = vec![0; self.directions.len() + 1];
+        for corner in self.triangles.iter().flatten() {
+            first[*corner as usize + 1] += 1;
+        }
+        for i in 1..first.len() {
+            first[i] += first[i - 1];
+        }
+        let mut next = first.clone();
+        let mut sides = vec![(0, 0); 3 * self.triangles.len()];
+        for (facet, corners) in (0..).zip(&self.triangles) {
+            for k in 0..3 {
+                let place = &mut next[corners[k] as usize];
+                sides[*place] = (corners[(k + 1) % 3], facet);
+                *place += 1;
+            }
+        }
+        let across = |from: u32, to: u32| {
+            let from = from as usize;
+            let here = &sides[first[from]..first[from + 1]];
+            let found = here.iter().find(|side| side.0 == to);
+            found.expect("the sphere must be closed").1
+        };
+        let of = |t: &[u32; 3]| [0, 1, 2].map(|k| across(t[(k + 2) % 3], t[(k + 1) % 3]));
+        self.triangles.iter().map(of).collect()
+    }
+
+    /// The facet that a ray passes through, found by walking from facet `start` towards it over
+    /// [`Self::neighbours`].
+    pub fn locate(&self, neighbours: &[[u32; 3]], ray: DVec3, start: u32) -> u32 {
         let mut at = start;
         // A walk over a Delaunay triangulation never comes back (Edelsbrunner 1990); the
         // bound is for rounding.
@@ -63,7 +89,7 @@ impl Facets {
                 let k = (k + step) % 3;
                 let (from, to) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
                 if from.cross(to).dot(ray) < 0.0 {
-                    at = self.neighbours[at as usize][k];
+                    at = neighbours[at as usize][k];
                     continue 'walk;
                 }
             }
@@ -80,15 +106,4 @@ fn plane_through(directions: [DVec3; 3], inverse_distances: [f64; 3]) -> DVec3 {
     let middle = (a + b + c).normalize_or(DVec3::Z);
     let mean = (s.x + s.y + s.z) / 3.0;
     if q.is_finite() { q } else { middle * mean }
-}
-
-fn neighbours(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let mut across = std::collections::HashMap::new();
-    for (i, t) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            across.insert((t[(k + 1) % 3], t[(k + 2) % 3]), i as u32);
-        }
-    }
-    let of = |t: &[u32; 3]| [0, 1, 2].map(|k| across[&(t[(k + 2) % 3], t[(k + 1) % 3])]);
-    triangles.iter().map(of).collect()
 }

@@ -20,6 +20,7 @@ pub mod mesh;
 mod plane;
 mod planes;
 pub mod points;
+mod scan;
 mod shell;
 mod solid;
 pub mod tunnel;
@@ -39,8 +40,9 @@ pub use planes::{
     plane_focused_on,
 };
 pub use points::SparsePoint;
+pub use scan::{Rays, Scan};
 pub use shell::shell;
-pub use solid::{Hit, MeshKind, Scan, Solid};
+pub use solid::{Hit, MeshKind, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 
 /// The approximate surface.

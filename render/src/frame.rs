@@ -14,6 +14,7 @@ use crate::view_tree::ViewTree;
 use crate::visibility::visible;
 use calibrate::{Lens, Pixel, View};
 use glam::{DMat3, DVec3};
+use proxy::Rays;
 use std::cmp::Ordering;
 use std::sync::OnceLock;
 
@@ -264,7 +265,10 @@ impl<'a> Frame<'a> {
             })
             .collect::<Vec<FrameSource>>();
         let surface = match facets {
-            Some(facets) => Surface::Facets(within_sight(facets, &desired, &sources)),
+            Some(facets) => {
+                let rays = Rays::of(&desired.lens, (desired.width, desired.height));
+                Surface::Facets(within_sight(facets, &desired, rays.as_ref(), &sources))
+            }
             None => Surface::of(lumigraph, &desired, &sources),
         };
         let mut frame = Self {

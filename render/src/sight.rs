@@ -2,8 +2,9 @@
 
 use crate::frame::FrameSource;
 use crate::surface::{FacetMap, NO_FACET};
-use calibrate::{Distortion, Pixel, View};
+use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
+use proxy::Rays;
 use rayon::prelude::*;
 
 /// The factor between inverse distances that are tried, and how many on either side.
@@ -75,87 +76,194 @@ impl Seers {
 /// made of, or on a dome. A guess that photos can answer paints what they show there, and
 /// not nothing. (Of house-walk's held-out pixels that are 2 to 4 %, black before.)
 ///
-/// What pixels of a row see of one facet lies on a line, in a photo, too, as long as neither lens
-/// bends. So where a photo has both ends of it well inside it has all of it.
-pub(crate) fn within_sight(mut map: FacetMap, desired: &View, sources: &[FrameSource]) -> FacetMap {
+/// Pixels are asked one by one only where no photo has all that is seen of a facet.
+///
+/// `rays` are the desired view's, where they are known.
+pub(crate) fn within_sight(
+    mut map: FacetMap,
+    desired: &View,
+    rays: Option<&Rays>,
+    sources: &[FrameSource],
+) -> FacetMap {
+    let whole = rays.map_or_else(Vec::new, |rays| seen_whole(&map, rays, sources));
+    let moved = moved(&map, desired, rays, sources, &whole);
+    if moved.iter().any(|row| !row.is_empty()) {
+        map.seers = Seers::new(map.size.map(|side| side as usize));
+    }
+    let width = map.size[0] as usize;
+    for (y, row) in moved.into_iter().enumerate() {
+        for moved in row {
+            map.seers.note((moved.x, y), moved.source_idx);
+            map.facet_of[y * width + moved.x] = map.planes.len() as u32;
+            map.planes.push(moved.plane);
+        }
+    }
+    map
+}
+
+/// A pixel of a row that looks at something else now.
+struct Moved {
+    x: usize,
+    plane: DVec3,
+    /// The first source view that has it.
+    source_idx: u32,
+}
+
+/// What is moved, row by row. Facets that are known to be seen are skipped.
+fn moved(
+    map: &FacetMap,
+    desired: &View,
+    rays: Option<&Rays>,
+    sources: &[FrameSource],
+    whole: &[bool],
+) -> Vec<Vec<Moved>> {
     let [width, height] = map.size.map(|side| side as usize);
-    let is_straight = desired.lens.distortion() == Distortion::None;
-    let moved_in_row = |y: usize| {
-        let facets = &map.facet_of[y * width..(y + 1) * width];
+    let first = |ray, s| sources.iter().position(|source| sees(source, ray, s));
+    let is_straight = rays.is_some_and(Rays::are_straight);
+    let ray = |x: usize, y: usize| match rays {
+        Some(rays) => rays.at(x, y).map(|at| at.extend(1.0)),
+        None => desired.lens.unproject(Pixel::center_of(x as u32, y as u32)),
+    };
+    let of_row = |y: usize| {
+        let row = &map.facet_of[y * width..(y + 1) * width];
         // The pixel's ray and the inverse distance of what it sees.
         let looks = |x: usize| {
-            let center = Pixel::center_of(x as u32, y as u32);
-            let ray = desired.lens.unproject(center)?;
-            Some((ray, map.planes[facets[x] as usize].dot(ray)))
+            let ray = ray(x, y)?;
+            Some((ray, map.planes[row[x] as usize].dot(ray)))
         };
         // The view that saw the last pixel mostly sees the next.
         let mut last = 0;
         let mut moved = Vec::new();
         let mut next = 0;
-        for run in facets.chunk_by(|a, b| a == b) {
+        for run in row.chunk_by(|a, b| a == b) {
             let pixels = next..next + run.len();
             next = pixels.end;
-            if run[0] == NO_FACET {
+            if run[0] == NO_FACET || whole.get(run[0] as usize) == Some(&true) {
                 continue;
             }
-            if is_straight && let Some(source) = sources.get(last) {
-                let ends = [pixels.start, pixels.end - 1].map(looks);
-                let is_inside = |end: Option<(DVec3, f64)>| {
-                    end.is_some_and(|(ray, s)| s >= 0.0 && has_well_inside(source, ray, s))
-                };
-                if ends.into_iter().all(is_inside) {
-                    continue;
-                }
+            // What they see lies on a line.
+            if is_straight
+                && let Some(source) = sources.get(last)
+                && let (Some(a), Some(b)) = (looks(pixels.start), looks(pixels.end - 1))
+                && has_well_inside(source, &[a, b])
+            {
+                continue;
             }
             for x in pixels {
                 let Some((ray, s)) = looks(x) else { continue };
                 let mut seen = |s: f64| {
                     let hint = sources.get(last).filter(|source| sees(source, ray, s));
-                    let found = match hint {
-                        Some(_) => Some(last),
-                        None => sources.iter().position(|source| sees(source, ray, s)),
-                    };
+                    let found = hint.map_or_else(|| first(ray, s), |_| Some(last));
                     last = found.unwrap_or(last);
                     found.is_some()
                 };
                 if !(s >= 0.0) || seen(s) {
                     continue;
                 }
-                if let Some(s) = nearest_seen(s, &mut seen) {
-                    // The last that was found to see anything sees that.
-                    moved.push((x, ray * (s / ray.length_squared()), last as u32));
+                let nearest = nearest_seen(s, &mut seen);
+                if let Some((s, source_idx)) = nearest.and_then(|s| Some((s, first(ray, s)?))) {
+                    moved.push(Moved {
+                        x,
+                        plane: ray * (s / ray.length_squared()),
+                        source_idx: source_idx as u32,
+                    });
                 }
             }
         }
         moved
     };
-    let moved: Vec<Vec<(usize, DVec3, u32)>> =
-        (0..height).into_par_iter().map(moved_in_row).collect();
-    if moved.iter().any(|row| !row.is_empty()) {
-        map.seers = Seers::new([width, height]);
-    }
-    for (y, row) in moved.into_iter().enumerate() {
-        for (x, plane, source_idx) in row {
-            map.seers.note((x, y), source_idx);
-            map.facet_of[y * width + x] = map.planes.len() as u32;
-            map.planes.push(plane);
-        }
-    }
-    map
+    (0..height).into_par_iter().map(of_row).collect()
 }
 
-/// Whether the point at ray / s lies inside a source view's image, beyond doubt of rounding, and
-/// its lens does not bend.
-fn has_well_inside(source: &FrameSource, ray: DVec3, s: f64) -> bool {
-    if !source.takes_part() || source.lens.distortion() != Distortion::None {
+/// For each facet, whether some source view has all that pixels see of it: then it has the part of the
+/// facet's plane before the smallest rectangle around their rays, in the plane z = 1.
+fn seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool> {
+    // 1. The rectangles.
+    let width = map.size[0] as usize;
+    let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let of_row = |(y, row): (usize, &[u32])| {
+        let mut next = 0;
+        let of_run = |run: &[u32]| {
+            let pixels = next..next + run.len();
+            next = pixels.end;
+            let ends = [pixels.start, pixels.end - 1];
+            // A pixel without a ray sees nothing.
+            let at = |x: usize| rays.at(x, y);
+            let grown = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
+            let bounds = if rays.are_straight() {
+                ends.into_iter().filter_map(at).fold(none, grown)
+            } else {
+                pixels.filter_map(at).fold(none, grown)
+            };
+            (run[0], bounds)
+        };
+        row.chunk_by(|a, b| a == b).map(of_run).collect::<Vec<_>>()
+    };
+    let rows = map.facet_of.par_chunks(width.max(1)).enumerate();
+    let runs: Vec<Vec<(u32, (DVec2, DVec2))>> = rows.map(of_row).collect();
+    let mut boxes = vec![none; map.planes.len()];
+    for (facet, (least, most)) in runs.into_iter().flatten() {
+        if facet != NO_FACET {
+            let all = &mut boxes[facet as usize];
+            *all = (all.0.min(least), all.1.max(most));
+        }
+    }
+
+    // 2. Facets beside one another are mostly seen by the same.
+    let mut whole = vec![false; boxes.len()];
+    let facets = boxes.par_chunks(FACETS).zip(map.planes.par_chunks(FACETS));
+    let work = whole.par_chunks_mut(FACETS).zip(facets);
+    work.for_each(|(whole, (boxes, planes))| {
+        let mut last = 0;
+        for ((whole, (least, most)), plane) in whole.iter_mut().zip(boxes).zip(planes) {
+            if !(least.x <= most.x) {
+                continue;
+            }
+            let corners = [
+                *least,
+                DVec2::new(most.x, least.y),
+                *most,
+                DVec2::new(least.x, most.y),
+            ];
+            let corners = corners.map(|at| (at.extend(1.0), plane.dot(at.extend(1.0))));
+            let has_all = |source: &FrameSource| has_well_inside(source, &corners);
+            if sources.get(last).is_some_and(has_all) {
+                *whole = true;
+                continue;
+            }
+            let sees_corner = |source: &FrameSource| sees(source, corners[0].0, corners[0].1);
+            if let Some(found) = sources.iter().position(sees_corner) {
+                last = found;
+                *whole = has_all(&sources[found]);
+            }
+        }
+    });
+    whole
+}
+
+/// Facets that are asked one after the other.
+const FACETS: usize = 256;
+
+/// Whether all points between some, which are in one plane and each at ray / s, lie inside a source
+/// view's image, beyond doubt of rounding.
+fn has_well_inside<const N: usize>(source: &FrameSource, corners: &[(DVec3, f64); N]) -> bool {
+    let points = corners.map(|(ray, s)| source.rotation * ray + source.translation * s);
+    let is_ahead = points.iter().all(|p| p.z > 0.0) && corners.iter().all(|(_, s)| *s >= 0.0);
+    if !source.takes_part() || !is_ahead {
         return false;
     }
-    let point = source.rotation * ray + source.translation * s;
+    let flat = points.map(|p| p.truncate() / p.z);
+    let farthest = flat.iter().map(|p| p.length()).fold(0.0, f64::max);
+    let Some(bend) = source.lens.bend(farthest) else {
+        return false;
+    };
+    let apart = |from: &DVec2| flat.map(|to| to.distance_squared(*from));
+    let squared = flat.iter().flat_map(apart).fold(0.0, f64::max);
+    let margin = MARGIN_PX + 0.5 * bend * squared;
     let [width, height] = source.size;
-    source.lens.project(point).is_some_and(|p| {
-        let inside = p.x.min(width - p.x).min(p.y).min(height - p.y);
-        inside >= MARGIN_PX
-    })
+    let is_inside = |p: Pixel| p.x.min(width - p.x).min(p.y).min(height - p.y) >= margin;
+    let mut pixels = points.into_iter().map(|p| source.lens.project(p));
+    pixels.all(|pixel| pixel.is_some_and(is_inside))
 }
 
 /// The inverse distance nearest to `s`, by its ratio, that is seen; `None` if none tried is.
@@ -181,7 +289,9 @@ fn nearest_seen(s: f64, seen: &mut impl FnMut(f64) -> bool) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::{Lens, Rigid3};
+    use calibrate::{Distortion, Lens, Rigid3};
+    use proptest::prelude::*;
+    use proptest::{array, collection};
 
     /// Looks along z from a place on the x axis, 45° to either side.
     fn view(x: f64) -> View {
@@ -192,6 +302,11 @@ mod tests {
             height: 40,
             camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, DVec3::Y),
         }
+    }
+
+    fn within_sight(map: FacetMap, desired: &View, sources: &[FrameSource]) -> FacetMap {
+        let rays = Rays::of(&desired.lens, (desired.width, desired.height));
+        super::within_sight(map, desired, rays.as_ref(), sources)
     }
 
     /// Every pixel sees the plane at a depth of 2.
@@ -257,5 +372,54 @@ mod tests {
         none.facet_of.fill(NO_FACET);
         let source = FrameSource::of(&view(0.5), &desired);
         assert_eq!(within_sight(none.clone(), &desired, &[source]), none);
+    }
+
+    proptest! {
+        /// Facets that are known to be seen are skipped, and no pixel notices, whatever the lenses.
+        #[test]
+        fn what_is_known_to_be_seen_is(
+            planes in collection::vec((0.05..1.0_f64, array::uniform3(-0.2..0.2)), 30),
+            places in collection::vec((array::uniform3(-1.5..1.5), -0.25..0.25_f64), 1..5),
+            desired_bends in prop_oneof![Just(0.0), -0.2..0.2_f64],
+        ) {
+            let bent = |view: View, k1: f64| View {
+                lens: Lens::new(view.lens.focal, view.lens.principal, Distortion::Rational {
+                    k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0],
+                    p: [0.1 * k1, -0.05 * k1],
+                }),
+                ..view
+            };
+            let desired = bent(view(0.0), desired_bends);
+            let sources: Vec<FrameSource> = places
+                .iter()
+                .map(|(place, k1)| {
+                    let place = DVec3::from_array(*place);
+                    let pose = Rigid3::looking_at(place, 3.0 * DVec3::Z, DVec3::Y);
+                    let source = View { camera_from_world: pose, ..view(0.0) };
+                    FrameSource::of(&bent(source, *k1), &desired)
+                })
+                .collect();
+            let q = |(s, tilt): &(f64, [f64; 3])| (DVec3::Z + DVec3::from_array(*tilt)) * *s;
+            let map = FacetMap {
+                planes: planes.iter().map(q).collect(),
+                // Pieces of 8 × 7 pixels.
+                facet_of: (0..1600).map(|i| i % 40 / 8 + i / 40 / 7 * 5).collect(),
+                moved_from: 30,
+                ..flat()
+            };
+            if let Some(rays) = Rays::of(&desired.lens, (40, 40)) {
+                let all = super::within_sight(map.clone(), &desired, Some(&rays), &sources);
+                let whole = seen_whole(&map, &rays, &sources);
+                let one_by_one = moved(&map, &desired, None, &sources, &[]);
+                for (y, row) in one_by_one.iter().enumerate() {
+                    for at in row {
+                        let facet = map.facet_of[y * 40 + at.x] as usize;
+                        prop_assert!(!whole[facet], "{} {y} of {facet}", at.x);
+                    }
+                }
+                let count: usize = one_by_one.iter().map(Vec::len).sum();
+                prop_assert_eq!(all.planes.len() - 30, count);
+            }
+        }
     }
 }

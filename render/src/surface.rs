@@ -5,8 +5,9 @@ use crate::lumigraph::Lumigraph;
 use crate::sight::{Seers, within_sight};
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
-use proxy::{Facets, Plane, Proxy, Scan, Solid, fit_plane_for_view, points};
+use proxy::{Facets, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
+use std::cell::OnceCell;
 
 /// What each pixel of the desired view looks at: a plane, by its vector q (a ray v meets
 /// it at v / s with s = q · v), in the desired camera's frame.
@@ -47,6 +48,7 @@ impl Surface {
                 Self::Plane(desired.camera_from_world.rotation * q)
             })
         };
+        let rays = || Rays::of(&desired.lens, (desired.width, desired.height));
         match &lumigraph.proxy {
             Proxy::Plane(plane) => of_plane(*plane),
             Proxy::ViewPlane => {
@@ -56,13 +58,15 @@ impl Surface {
             Proxy::Points | Proxy::Dense(_) => {
                 let facets = points::facets(desired, &views(), &lumigraph.points);
                 facets.map_or(Self::Nothing, |facets| {
-                    let map = FacetMap::of_facets(facets, desired);
-                    Self::Facets(within_sight(map, desired, sources))
+                    let rays = rays();
+                    let map = FacetMap::of_facets(facets, desired, rays.as_ref());
+                    Self::Facets(within_sight(map, desired, rays.as_ref(), sources))
                 })
             }
             Proxy::Mesh(solid) => {
-                let map = FacetMap::of_mesh(solid, desired);
-                Self::Facets(within_sight(map, desired, sources))
+                let rays = rays();
+                let map = FacetMap::of_mesh(solid, desired, rays.as_ref());
+                Self::Facets(within_sight(map, desired, rays.as_ref(), sources))
             }
         }
     }
@@ -176,14 +180,36 @@ impl FacetMap {
         if q.is_finite() { q } else { DVec3::ZERO }
     }
 
-    fn of_facets(mut facets: Facets, desired: &View) -> Self {
-        let planes = std::mem::take(&mut facets.planes);
-        Self::new(desired, planes, |ray, last| {
-            facets.locate(ray, if last == NO_FACET { 0 } else { last })
-        })
+    fn of_facets(facets: Facets, desired: &View, rays: Option<&Rays>) -> Self {
+        if let Some(rays) = rays {
+            let mut scan = facets.scan(rays);
+            Self::fill(&facets, &mut scan, desired);
+            return Self::of_pixels(facets.planes, scan.triangle_of, desired);
+        }
+        let neighbours = facets.neighbours();
+        let facet_of = Self::found(desired, |ray, last| {
+            let start = if last == NO_FACET { 0 } else { last };
+            facets.locate(&neighbours, ray, start)
+        });
+        Self::of_pixels(facets.planes, facet_of, desired)
     }
 
-    fn of_mesh(solid: &Solid, desired: &View) -> Self {
+    /// Facets tile all directions: a pixel without one lies where rounding has turned one over.
+    fn fill(facets: &Facets, scan: &mut Scan, desired: &View) {
+        let neighbours = OnceCell::new();
+        for (i, facet) in scan.triangle_of.iter_mut().enumerate() {
+            if *facet != NO_FACET {
+                continue;
+            }
+            let center = Pixel::center_of((i % scan.width) as u32, (i / scan.width) as u32);
+            if let Some(ray) = desired.lens.unproject(center) {
+                let neighbours = neighbours.get_or_init(|| facets.neighbours());
+                *facet = facets.locate(neighbours, ray, 0);
+            }
+        }
+    }
+
+    fn of_mesh(solid: &Solid, desired: &View, rays: Option<&Rays>) -> Self {
         let center = desired.center();
         let rotation = desired.camera_from_world.rotation;
         let mesh = solid.mesh();
@@ -191,18 +217,21 @@ impl FacetMap {
             |i: usize| Self::plane_through(mesh.corners(i).map(|p| rotation * (p - center)));
         let triangles = (0..mesh.triangles.len()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
-        if let Some(scan) = solid.scan(desired, 1) {
+        if let Some(rays) = rays {
+            let scan = solid.scan_along(desired, rays);
             return Self::of_pixels(planes, scan.triangle_of, desired);
         }
         let world_from_camera = rotation.conjugate();
-        Self::new(desired, planes, |ray, _| {
+        let facet_of = Self::found(desired, |ray, _| {
             let hit = solid.first_hit(center, world_from_camera * ray);
             hit.map_or(NO_FACET, |hit| hit.triangle_idx)
-        })
+        });
+        Self::of_pixels(planes, facet_of, desired)
     }
 
-    /// `find` says which facet a ray meets, given what its left neighbour's did.
-    fn new(desired: &View, planes: Vec<DVec3>, find: impl Fn(DVec3, u32) -> u32 + Sync) -> Self {
+    /// The facet at each pixel's centre, row by row: `find` says which a ray meets, given what its
+    /// left neighbour's did.
+    fn found(desired: &View, find: impl Fn(DVec3, u32) -> u32 + Sync) -> Vec<u32> {
         let (width, height) = (desired.width as usize, desired.height as usize);
         let row = |y: usize| {
             let mut last = NO_FACET;
@@ -218,6 +247,6 @@ impl FacetMap {
                 .collect::<Vec<u32>>()
         };
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
-        Self::of_pixels(planes, rows.concat(), desired)
+        rows.concat()
     }
 }

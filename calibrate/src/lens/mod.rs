@@ -81,6 +81,19 @@ impl Lens {
         self.limit
     }
 
+    /// How much the lens bends what is straight: the most that the second derivative of the pixel can
+    /// be, by a place on the plane z = 1 no farther than `radius` from the axis, along any direction.
+    /// So of a convex figure there of diameter d, no pixel is farther than ½·bend·d² from the convex
+    /// hull of its corners' pixels. `None` where no bound is known.
+    pub fn bend(&self, radius: f64) -> Option<f64> {
+        let bend = match self.distortion {
+            Distortion::None => 0.0,
+            Distortion::Rational { k, p } if k[3..] == [0.0; 3] => plane::bend(&k[..3], &p, radius),
+            _ => return None,
+        };
+        Some(bend * self.focal.max_element())
+    }
+
     /// Whether the size of things in the image follows their distance, as a fisheye's,
     /// rather than their depth, as a pinhole's: whichever describes the lens better.
     pub fn is_wide(&self) -> bool {

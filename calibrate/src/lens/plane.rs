@@ -129,6 +129,19 @@ pub(super) fn invert(
     invert_on_disc(distorted, start, limit, |x| rational_prism(x, k, p, s))
 }
 
+/// A bound of the second derivative along any line within a radius, without terms below the bar. Along
+/// a line with the direction u, p·r²ⁱ has 2u·(r²ⁱ)' + p·(r²ⁱ)'', and (r²)' ≤ 2r, (r²)'' = 2; so it is
+/// (2i + 1)·2i·r²ⁱ⁻¹ at most.
+pub(super) fn bend(k: &[f64], p: &[f64; 2], radius: f64) -> f64 {
+    let radial = |(i, k): (i32, &f64)| {
+        let power = 2 * i;
+        f64::from(power * (power + 1)) * k.abs() * radius.powi(power - 1)
+    };
+    // 2xy has 4uₓuᵧ ≤ 2, and r² + 2x² has 2 + 4uₓ² ≤ 6: of both coordinates no more than 8.
+    let tangential = 8.0 * (p[0].abs() + p[1].abs());
+    (1..).zip(k).map(radial).sum::<f64>() + tangential
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::difference;

@@ -1,8 +1,9 @@
 //! Points that spoil a desired view's surface.
 
+use super::Node;
+use super::chart::Chart;
 use super::nearest::Nearest;
-use super::{Node, delaunay};
-use spade::Triangulation;
+use rayon::prelude::*;
 
 /// A point sticks out when its inverse distance is beyond that of all its neighbours by
 /// this factor; it is gone at the second.
@@ -21,59 +22,51 @@ fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// The nodes without those that stick out of all their neighbours in the triangulation.
-pub(super) fn without_spikes(mut nodes: Vec<Node>) -> Vec<Node> {
+/// Takes out those that stick out of all their neighbours in the triangulation.
+pub(super) fn drop_spikes(chart: &mut Chart) {
     for _ in 0..ROUNDS {
-        let Some(triangulation) = delaunay(&nodes) else {
-            break;
+        let of = |(index, node, [least, most]): (usize, Node, [f64; 2])| {
+            let own = node.inverse_distance;
+            let left = 1.0 - smoothstep(SPIKE, (own / most).max(least / own));
+            (index, weighted(node, left))
         };
-        let mut left = vec![1.0; nodes.len()];
-        for vertex in triangulation.vertices() {
-            let around = vertex.out_edges().map(|edge| {
-                let neighbour = edge.to().data().index;
-                nodes[neighbour as usize].inverse_distance
-            });
-            let (least, most) = around.fold((f64::MAX, 0.0), |(least, most): (f64, f64), s| {
-                (least.min(s), most.max(s))
-            });
-            let index = vertex.data().index as usize;
-            let own = nodes[index].inverse_distance;
-            left[index] = 1.0 - smoothstep(SPIKE, (own / most).max(least / own));
-        }
-        nodes = weighted(nodes, &left);
+        let changed: Vec<(usize, Node)> = chart.around().map(of).collect();
+        chart.change(changed);
     }
-    nodes
 }
 
-/// The nodes without those that lie behind what is around them: points of another side of
-/// a building, say, that only views from there observe.
-pub(super) fn without_hidden(nodes: Vec<Node>) -> Vec<Node> {
-    let nearest = Nearest::new(&nodes);
-    let in_the_open = |node: &Node| {
+/// Takes out those that lie behind what is around them: points of another side of a building, say,
+/// that only views from there observe.
+pub(super) fn drop_hidden(chart: &mut Chart) {
+    let left: Vec<Node> = chart.left().collect();
+    let nearest = Nearest::new(&left);
+    let of = |(index, node): (usize, Node)| {
         let (mut nearer, mut all) = (0.0, 0.0);
-        for (share, other) in nearest.around(node, NEIGHBOURS) {
+        for (share, other) in nearest.around(&node, NEIGHBOURS) {
             nearer += share * smoothstep(NEARER, other.inverse_distance / node.inverse_distance);
             all += share;
         }
-        if all > 0.0 {
+        let left = if all > 0.0 {
             1.0 - smoothstep(HIDING, nearer / all)
         } else {
             1.0
-        }
+        };
+        (index, weighted(node, left))
     };
-    let left: Vec<f64> = nodes.iter().map(in_the_open).collect();
-    weighted(nodes, &left)
+    let changed: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
+    chart.change(changed);
 }
 
 /// Brings what is there only in part to where the surface would about be without it.
-pub(super) fn faded(nodes: Vec<Node>) -> Vec<Node> {
-    let nearest = Nearest::new(&nodes);
-    let of = |node: &Node| {
+pub(super) fn fade(chart: &mut Chart) {
+    let left: Vec<Node> = chart.left().collect();
+    let nearest = Nearest::new(&left);
+    let of = |(index, node): (usize, Node)| {
         if node.weight >= 1.0 {
-            return *node;
+            return (index, node);
         }
         let (mut sum, mut all) = (0.0, 0.0);
-        for (share, other) in nearest.around(node, NEIGHBOURS) {
+        for (share, other) in nearest.around(&node, NEIGHBOURS) {
             sum += share * other.inverse_distance;
             all += share;
         }
@@ -82,20 +75,21 @@ pub(super) fn faded(nodes: Vec<Node>) -> Vec<Node> {
         } else {
             node.inverse_distance
         };
-        Node {
-            inverse_distance: without + node.weight * (node.inverse_distance - without),
-            ..*node
-        }
+        let inverse_distance = without + node.weight * (node.inverse_distance - without);
+        let faded = Node {
+            inverse_distance,
+            ..node
+        };
+        (index, faded)
     };
-    nodes.iter().map(of).collect()
+    let changed: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
+    chart.change(changed);
 }
 
-/// The nodes with a part of their weights; those that have none left are gone.
-fn weighted(mut nodes: Vec<Node>, left: &[f64]) -> Vec<Node> {
-    nodes
-        .iter_mut()
-        .zip(left)
-        .for_each(|(node, left)| node.weight *= left);
-    nodes.retain(|node| node.weight > 0.0);
-    nodes
+/// A node with a part of its weight.
+fn weighted(node: Node, left: f64) -> Node {
+    Node {
+        weight: node.weight * left,
+        ..node
+    }
 }

@@ -6,16 +6,16 @@
 //! viewer, make the surface complete. It is the proxy that asks least of a capture: no closed mesh, no agreement
 //! between far views.
 
+mod chart;
 mod clean;
 mod nearest;
 
 use crate::Facets;
 use calibrate::{Pixel, View};
-use clean::{faded, without_hidden, without_spikes};
+use chart::{Chart, distinct};
+use clean::{drop_hidden, drop_spikes, fade};
 use glam::{DVec2, DVec3};
 use nearest::Nearest;
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
-use std::collections::HashSet;
 
 /// A sparse point and who sees it.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,56 +101,44 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         .filter(|node| node.weight > 0.0)
         .collect();
     nodes = distinct(nodes);
-    nodes = without_spikes(nodes);
-    nodes = without_hidden(nodes);
-    nodes = faded(nodes);
-    if nodes.len() < 3 {
+    let mut chart = Chart::new(nodes)?;
+    drop_spikes(&mut chart);
+    drop_hidden(&mut chart);
+    fade(&mut chart);
+    let left: Vec<Node> = chart.left().collect();
+    if left.len() < 3 {
         return None;
     }
 
     // 3. Anchors, at the distance of the points nearest to them.
-    let nearest = Nearest::new(&nodes);
-    let anchors: Vec<Node> = (0..ANCHORS)
-        .map(|k| {
-            let turn = std::f64::consts::TAU * (k as f64 + 0.5) / ANCHORS as f64;
-            let across = DVec2::from_angle(turn) * reach.sin();
-            let mut anchor = Node {
-                direction: across.extend(reach.cos()),
-                inverse_distance: 0.0,
-                weight: 1.0,
-            };
-            anchor.inverse_distance = nearest.inverse_distance(anchor.chart(), ANCHORED_TO);
-            anchor
-        })
-        .collect();
-    nodes.extend(anchors);
-    let mut triangles: Vec<[u32; 3]> = delaunay(&nodes)?
-        .inner_faces()
-        .map(|face| face.vertices().map(|v| v.data().index))
-        .collect();
+    let nearest = Nearest::new(&left);
+    for k in 0..ANCHORS {
+        let turn = std::f64::consts::TAU * (k as f64 + 0.5) / ANCHORS as f64;
+        let across = DVec2::from_angle(turn) * reach.sin();
+        let mut anchor = Node {
+            direction: across.extend(reach.cos()),
+            inverse_distance: 0.0,
+            weight: 1.0,
+        };
+        anchor.inverse_distance = nearest.inverse_distance(anchor.chart(), ANCHORED_TO);
+        chart.insert(anchor)?;
+    }
 
     // 4. Straight behind is the chart's infinity: with it the triangulation closes.
+    let (mut nodes, mut triangles, rim) = chart.into_triangles();
     let behind = Node {
         direction: DVec3::NEG_Z,
         inverse_distance: nodes[nodes.len() - 1].inverse_distance,
         weight: 1.0,
     };
-    let rim = rim(&triangles);
-    triangles.extend(rim.into_iter().map(|[a, b]| [b, a, nodes.len() as u32]));
+    let beyond = |[from, to]: [u32; 2]| [to, from, nodes.len() as u32];
+    triangles.extend(rim.into_iter().map(beyond));
     nodes.push(behind);
     Some(Facets::new(
         nodes.iter().map(|n| n.direction).collect(),
         nodes.iter().map(|n| n.inverse_distance).collect(),
         triangles,
     ))
-}
-
-/// The sides that have no triangle beyond them, each in its triangle's direction.
-fn rim(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-    let all: HashSet<[u32; 2]> = triangles.iter().flat_map(sides).collect();
-    let outer = |side: &[u32; 2]| !all.contains(&[side[1], side[0]]);
-    triangles.iter().flat_map(sides).filter(outer).collect()
 }
 
 /// Which source views are most like one at `center`: those that share many points with it
@@ -198,47 +186,6 @@ fn reach(view: &View) -> f64 {
     });
     let widest = border.filter_map(|(x, y)| angle(x, y)).fold(0.0, f64::max);
     (widest * MARGIN).clamp(0.1, WIDEST)
-}
-
-/// A vertex of the triangulation.
-struct Vertex {
-    at: Point2<f64>,
-    index: u32,
-}
-
-impl HasPosition for Vertex {
-    type Scalar = f64;
-
-    fn position(&self) -> Point2<f64> {
-        self.at
-    }
-}
-
-/// The chart's lattice: whole numbers keep the triangulation's predicates exact and apart.
-const LATTICE: f64 = (1 << 22) as f64;
-
-fn lattice(node: &Node) -> DVec2 {
-    (node.chart() * LATTICE).round()
-}
-
-/// The first node of each place on the lattice.
-fn distinct(mut nodes: Vec<Node>) -> Vec<Node> {
-    let mut taken = HashSet::new();
-    nodes.retain(|node| {
-        let at = lattice(node);
-        taken.insert((at.x as i64, at.y as i64))
-    });
-    nodes
-}
-
-/// `None` where the nodes, which must be distinct, cannot be triangulated.
-fn delaunay(nodes: &[Node]) -> Option<DelaunayTriangulation<Vertex>> {
-    let vertices = nodes.iter().zip(0..).map(|(node, index)| {
-        let at = lattice(node);
-        let at = Point2::new(at.x, at.y);
-        Vertex { at, index }
-    });
-    DelaunayTriangulation::bulk_load_stable(vertices.collect()).ok()
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ fn sources() -> Vec<View> {
 /// The distance of the surface along the ray through a pixel.
 fn depth(facets: &Facets, desired: &View, x: f64, y: f64) -> Option<f64> {
     let ray = desired.lens.unproject(Pixel::new(x, y))?;
-    let facet = facets.locate(ray, 0);
+    let facet = facets.locate(&facets.neighbours(), ray, 0);
     Some(ray.z / facets.planes[facet as usize].dot(ray))
 }
 
@@ -79,13 +79,14 @@ fn every_pixel_of_any_lens_sees_a_facet() {
     };
     for desired in [view(DVec3::new(0.0, 0.3, 0.5)), wide] {
         let facets = facets(&desired, &sources(), &points).unwrap();
+        let neighbours = facets.neighbours();
         let mut last = 0;
         for y in 0..desired.height {
             for x in 0..desired.width {
                 let ray = desired.lens.unproject(Pixel::center_of(x, y)).unwrap();
-                last = facets.locate(ray, last);
+                last = facets.locate(&neighbours, ray, last);
                 let s = facets.planes[last as usize].dot(ray);
-                let from_afar = facets.planes[facets.locate(ray, 0) as usize].dot(ray);
+                let from_afar = facets.planes[facets.locate(&neighbours, ray, 0) as usize].dot(ray);
                 assert!((s - from_afar).abs() < 1e-12, "{x}, {y}: {s}, {from_afar}");
                 assert!(s > 0.0, "{x}, {y}: {s}");
             }
@@ -195,7 +196,7 @@ proptest! {
         let desired = view(DVec3::new(0.0, 0.0, -2.0));
         if let Some(facets) = facets(&desired, &sources(), &points) {
             let ray = desired.lens.unproject(Pixel::new(x, y)).unwrap().normalize();
-            let facet = facets.locate(ray, 0);
+            let facet = facets.locate(&facets.neighbours(), ray, 0);
             let corners = facets.triangles[facet as usize];
             let directions = corners.map(|i| facets.directions[i as usize]);
             for k in 0..3 {

@@ -1,9 +1,5 @@
 //! A mesh as a proxy: its kind, and rays that meet it.
 
-mod scan;
-
-pub use scan::Scan;
-
 use crate::Mesh;
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;

@@ -74,7 +74,8 @@ pub fn check(seed: u64) -> Result<(), String> {
         true => (SHARE_ON_EDGE, STEPS_ON_EDGE),
         false => (SHARE, STEPS),
     };
-    same(&exact, &truth, &tied, rounded).map_err(|what| named(&format!("CPU and reference: {what}")))?;
+    same(&exact, &truth, &tied, rounded)
+        .map_err(|what| named(&format!("CPU and reference: {what}")))?;
 
     // The triangulation refuses views that are too wide; what it draws it draws the same.
     let again = Frame::new(
@@ -105,8 +106,7 @@ pub fn check(seed: u64) -> Result<(), String> {
     }
 
     let other = exact_picture(&Case::reversed(seed)).map_err(drawn)?;
-    same(&other, &exact, &tied, (share, STEPS))
-        .map_err(|what| named(&format!("order: {what}")))?;
+    same(&other, &exact, &tied, (share, STEPS)).map_err(|what| named(&format!("order: {what}")))?;
     if case.is_on_edge {
         return Ok(());
     }

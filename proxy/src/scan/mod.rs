@@ -1,15 +1,22 @@
-//! What a pinhole camera sees of a mesh, all pixels at once: much faster than a ray for each.
+//! What a camera sees of triangles, all pixels at once: much faster than a ray for each.
 //!
 //! Corners are taken to where a pixel's ray is (x, y, 1). There the side from corner A to B is the
 //! plane A × B through the eye, and a triangle's inverse depth is linear, too:
 //! (A × B + B × C + C × A) / A·(B × C). So nothing is divided by a depth, and no triangle need be
 //! cut at the eye (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous
 //! coordinates").
+//!
+//! Of a pinhole's rows a triangle has all pixels from one column to another. Where a lens bends,
+//! its sides are asked at each pixel's ray, but for blocks of pixels whose rays are all beyond one of them.
 
-use super::Solid;
-use calibrate::{Distortion, View};
+mod rays;
+
+use crate::{Facets, Solid};
+use calibrate::{Lens, View};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+pub use rays::Rays;
+use rays::{BLOCK, Bent};
 use std::ops::Range;
 
 /// Which triangle each pixel of a picture sees first.
@@ -42,6 +49,7 @@ struct Prepared {
     slack: [f64; 3],
     /// 1/z: times (x, y, 1).
     inverse_depth: DVec3,
+    columns: Range<usize>,
     rows: Range<usize>,
 }
 
@@ -49,35 +57,73 @@ impl Solid {
     /// What a view sees in a picture reduced so many times: the pixel in column i and row j looks
     /// along the ray of the view's pixel ((i + ½)·reduction, (j + ½)·reduction). The same
     /// triangles as [`Solid::first_hit`]'s, but for ties of rounding: of triangles at one depth
-    /// the first. `None` where the lens is no pinhole.
+    /// the first. `None` where some pixel looks aside or back.
     pub fn scan(&self, view: &View, reduction: u32) -> Option<Scan> {
-        if view.lens.distortion() != Distortion::None {
-            return None;
-        }
-        let step = f64::from(reduction);
-        let [width, height] = [view.width, view.height].map(|side| side.div_ceil(reduction));
-        let [width, height] = [width as usize, height as usize];
-        let (focal, principal) = (view.lens.focal / step, view.lens.principal / step);
-        let pixel_from_camera = DMat3::from_cols(
-            DVec3::new(focal.x, 0.0, 0.0),
-            DVec3::new(0.0, focal.y, 0.0),
-            principal.extend(1.0),
-        );
-        let pixel_from_world =
-            pixel_from_camera * DMat3::from_quat(view.camera_from_world.rotation);
+        let step = f64::from(reduction).recip();
+        let lens = view.lens.scaled(step, step);
+        let size = [view.width, view.height].map(|side| side.div_ceil(reduction));
+        Some(self.scan_along(view, &Rays::of(&lens, size.into())?))
+    }
+
+    /// [`Self::scan`] along rays of the view's camera.
+    pub fn scan_along(&self, view: &View, rays: &Rays) -> Scan {
+        let plane_from_world =
+            rays.from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
-        let front_only = self.kind.has_front_sides_only();
+        let front_only = self.kind().has_front_sides_only();
         let prepare = |i: usize| {
-            let corners = self
-                .mesh
-                .corners(i)
-                .map(|p| pixel_from_world * (p - center));
-            let mut prepared = Prepared::new(corners, front_only, [width, height])?;
-            prepared.triangle_idx = i as u32;
-            Some(prepared)
+            let corners = self.mesh().corners(i);
+            let sides = Sides::new(corners.map(|p| plane_from_world * (p - center)));
+            // 1/z = q·(x, y, 1)
+            let inverse_depth = (sides.of[0] + sides.of[1] + sides.of[2]) / sides.volume;
+            let is_seen = !(front_only && sides.volume >= 0.0);
+            is_seen.then(|| Prepared::new(i as u32, &sides, inverse_depth, rays))?
         };
-        let triangles = (0..self.mesh.triangles.len()).into_par_iter();
-        let triangles: Vec<Prepared> = triangles.with_min_len(256).filter_map(prepare).collect();
+        let triangles = (0..self.mesh().triangles.len()).into_par_iter();
+        let triangles = triangles.with_min_len(256).filter_map(prepare).collect();
+        Scan::of(triangles, rays)
+    }
+}
+
+impl Facets {
+    /// Which facet the viewer sees along rays, and how far. The same as [`Facets::locate`]'s but for
+    /// ties of rounding, and for directions that rounding leaves without any.
+    pub fn scan(&self, rays: &Rays) -> Scan {
+        let plane_from_camera = rays.from_camera();
+        // q·ray, the ray being where it is (x, y, 1).
+        let of_planes = plane_from_camera.inverse().transpose();
+        let prepare = |i: usize| {
+            let corners = self.triangles[i].map(|c| self.directions[c as usize]);
+            let sides = Sides::new(corners.map(|corner| plane_from_camera * corner));
+            Prepared::new(i as u32, &sides, of_planes * self.planes[i], rays)
+        };
+        let facets = (0..self.triangles.len()).into_par_iter();
+        let facets = facets.with_min_len(256).filter_map(prepare).collect();
+        Scan::of(facets, rays)
+    }
+}
+
+impl Rays {
+    /// To where a ray is (x, y, 1): a pinhole's pixels, or the plane z = 1.
+    fn from_camera(&self) -> DMat3 {
+        let Lens {
+            focal, principal, ..
+        } = self.lens;
+        match self.bent {
+            Some(_) => DMat3::IDENTITY,
+            None => DMat3::from_cols(
+                DVec3::new(focal.x, 0.0, 0.0),
+                DVec3::new(0.0, focal.y, 0.0),
+                principal.extend(1.0),
+            ),
+        }
+    }
+}
+
+impl Scan {
+    /// Of triangles in order.
+    fn of(triangles: Vec<Prepared>, rays: &Rays) -> Self {
+        let [width, height] = rays.size;
         // Which triangles reach which bands, in order.
         let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
         for (i, triangle) in triangles.iter().enumerate() {
@@ -86,9 +132,9 @@ impl Solid {
                 .iter_mut()
                 .for_each(|band| band.push(i as u32));
         }
-        let mut scan = Scan {
+        let mut scan = Self {
             width,
-            triangle_of: vec![Scan::NOTHING; width * height],
+            triangle_of: vec![Self::NOTHING; width * height],
             inverse_depth: vec![0.0; width * height],
         };
         let pixels = (BAND * width).max(1);
@@ -103,53 +149,116 @@ impl Solid {
                 for row in triangle.rows.start.max(first)..end {
                     let at = (row - first) * width;
                     let pixels = at..at + width;
-                    triangle.draw(row, &mut ids[pixels.clone()], &mut depths[pixels]);
+                    let (ids, depths) = (&mut ids[pixels.clone()], &mut depths[pixels]);
+                    match &rays.bent {
+                        None => triangle.draw(row, ids, depths),
+                        Some(bent) => triangle.draw_bent(row, bent, ids, depths),
+                    }
                 }
             }
         });
-        Some(scan)
+        scan
+    }
+}
+
+/// A triangle's corners where a pixel's ray is (x, y, 1), and its sides.
+struct Sides {
+    corners: [DVec3; 3],
+    /// Each opposite a corner, positive on that corner's side if the volume is.
+    of: [DVec3; 3],
+    /// Of the corners' directions.
+    volume: f64,
+}
+
+impl Sides {
+    fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let of = [b.cross(c), c.cross(a), a.cross(b)];
+        Self {
+            corners: [a, b, c],
+            volume: a.dot(of[0]),
+            of,
+        }
     }
 }
 
 impl Prepared {
-    /// `None` for one that no pixel sees. Corners are where a pixel's ray is (x, y, 1).
-    fn new([a, b, c]: [DVec3; 3], front_only: bool, [width, height]: [usize; 2]) -> Option<Self> {
-        let sides = [b.cross(c), c.cross(a), a.cross(b)];
-        let volume = a.dot(sides[0]);
-        if front_only && volume >= 0.0 {
-            return None;
-        }
-        let inverse_depth = (sides[0] + sides[1] + sides[2]) / volume;
+    /// `None` for one that no pixel sees. Its 1/z is that times (x, y, 1).
+    fn new(triangle_idx: u32, sides: &Sides, inverse_depth: DVec3, rays: &Rays) -> Option<Self> {
+        let [a, b, c] = sides.corners;
         // Edge on, or not a number: it is seen nowhere.
-        if !inverse_depth.is_finite() || [a, b, c].iter().all(|p| p.z <= 0.0) {
+        let is_flat = sides.volume == 0.0 || !inverse_depth.is_finite();
+        if is_flat || [a, b, c].iter().all(|p| p.z <= 0.0) {
             return None;
         }
-        let rows = if [a, b, c].iter().all(|p| p.z > 0.0) {
-            let inside = |k: usize, side: usize| {
-                let at = [a, b, c].map(|p| p[k] / p.z);
-                let least = at[0].min(at[1]).min(at[2]);
-                let most = at[0].max(at[1]).max(at[2]);
-                // Of pixels whose centres may be between the two.
-                let room = SLACK * (least.abs() + most.abs()) + 1e-6;
-                let within = |at: f64| at.clamp(0.0, side as f64) as usize;
-                within((least - 0.5 - room).ceil())..within((most - 0.5 + room).floor() + 1.0)
-            };
-            if inside(0, width).is_empty() {
-                return None;
-            }
-            inside(1, height)
-        } else {
-            0..height
+        let of = sides.of.map(|side| side * sides.volume.signum());
+        let [width, height] = rays.size;
+        let reach = match &rays.bent {
+            None => DVec3::new(width as f64, height as f64, 1.0),
+            Some(bent) => bent.all.least.abs().max(bent.all.most.abs()).extend(1.0),
         };
-        let sides = sides.map(|side| side * volume.signum());
-        let reach = DVec3::new(width as f64, height as f64, 1.0);
-        (!rows.is_empty()).then_some(Self {
-            triangle_idx: 0,
-            slack: sides.map(|side| SLACK * side.abs().dot(reach)),
-            sides,
+        let slack = of.map(|side| SLACK * side.abs().dot(reach));
+        let (mut columns, mut rows) = (0..width, 0..height);
+        if [a, b, c].iter().all(|p| p.z > 0.0) {
+            let [a, b, c] = [a, b, c].map(|p| p.truncate() / p.z);
+            let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+            let room = SLACK * (least.abs() + most.abs());
+            [columns, rows] = match &rays.bent {
+                None => [0, 1].map(|axis| {
+                    // Of pixels whose centres may be between the two.
+                    let room = room[axis] + 1e-6;
+                    let side = rays.size[axis] as f64;
+                    let within = |at: f64| at.clamp(0.0, side) as usize;
+                    within((least[axis] - 0.5 - room).ceil())
+                        ..within((most[axis] - 0.5 + room).floor() + 1.0)
+                }),
+                Some(bent) => bent.within(least - room - 1e-9, most + room + 1e-9),
+            };
+        } else if let Some(bent) = &rays.bent
+            && (0..3).any(|k| bent.all.most_of(of[k]) < -slack[k])
+        {
+            return None;
+        }
+        (!rows.is_empty() && !columns.is_empty()).then_some(Self {
+            triangle_idx,
+            slack,
+            sides: of,
             inverse_depth,
+            columns,
             rows,
         })
+    }
+
+    /// Draws it over what is farther in a row, ray by ray.
+    fn draw_bent(&self, row: usize, bent: &Bent, ids: &mut [u32], depths: &mut [f64]) {
+        let width = ids.len();
+        let is_beyond = |bounds: &rays::Bounds| {
+            let sides = self.sides.iter().zip(self.slack);
+            sides
+                .map(|(side, slack)| bounds.most_of(*side) < -slack)
+                .any(|b| b)
+        };
+        if is_beyond(&bent.rows[row]) {
+            return;
+        }
+        let [a, b, c] = self.sides;
+        let [least_a, least_b, least_c] = self.slack.map(|slack| -slack);
+        let blocks = width.div_ceil(BLOCK);
+        for block in self.columns.start / BLOCK..self.columns.end.div_ceil(BLOCK) {
+            if is_beyond(&bent.blocks[row * blocks + block]) {
+                continue;
+            }
+            let pixels = block * BLOCK..((block + 1) * BLOCK).min(width);
+            let at = &bent.at[row * width..][pixels.clone()];
+            let drawn = ids[pixels.clone()].iter_mut().zip(&mut depths[pixels]);
+            for ((id, depth), at) in drawn.zip(at) {
+                let of = |side: DVec3| side.x * at.x + side.y * at.y + side.z;
+                let here = of(self.inverse_depth);
+                let is_inside = (of(a) >= least_a) & (of(b) >= least_b) & (of(c) >= least_c);
+                let is_nearer = is_inside & (here > *depth);
+                *depth = if is_nearer { here } else { *depth };
+                *id = if is_nearer { self.triangle_idx } else { *id };
+            }
+        }
     }
 
     /// Draws it over what is farther in a row.
@@ -189,7 +298,7 @@ impl Prepared {
 mod tests {
     use super::*;
     use crate::{Mesh, MeshKind};
-    use calibrate::{Lens, Pixel, Rigid3};
+    use calibrate::{Distortion, Lens, Pixel, Rigid3};
     use glam::{DQuat, DVec2};
     use proptest::prelude::*;
 
@@ -209,13 +318,19 @@ mod tests {
 
     /// Compares a scan with a ray for each pixel. How many pixels see something.
     fn compare(solid: &Solid, view: &View, reduction: u32) -> usize {
-        let scan = solid.scan(view, reduction).unwrap();
+        let Some(scan) = solid.scan(view, reduction) else {
+            assert_ne!(view.lens.distortion(), Distortion::None);
+            return 0;
+        };
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let mut seen = 0;
         for (i, (&id, &s)) in scan.triangle_of.iter().zip(&scan.inverse_depth).enumerate() {
             let at = |i: usize| (i as f64 + 0.5) * f64::from(reduction);
             let pixel = Pixel::new(at(i % scan.width), at(i / scan.width));
-            let ray = view.lens.unproject(pixel).unwrap();
+            let Some(ray) = view.lens.unproject(pixel) else {
+                assert_eq!(id, Scan::NOTHING);
+                continue;
+            };
             let hit = solid.first_hit(view.center(), world_from_camera * (ray / ray.z));
             let place = (i % scan.width, i / scan.width);
             match hit {
@@ -258,6 +373,7 @@ mod tests {
             reduction in 1_u32..4,
             shift in prop_oneof![Just(0.0), Just(1e5)],
             carved: bool,
+            k1 in prop_oneof![Just(0.0), -0.2..0.2],
         ) {
             let shift = DVec3::new(shift, -shift, shift);
             let mut mesh = mesh(&corners);
@@ -265,7 +381,9 @@ mod tests {
             let kind = if carved { MeshKind::Carved } else { MeshKind::Mesh };
             let solid = Solid::new(kind, mesh);
             let turn = DQuat::from_scaled_axis(DVec3::from_array(turn));
-            let view = view(DVec3::from_array(center) + shift, turn, (37, 35), focal);
+            let mut view = view(DVec3::from_array(center) + shift, turn, (37, 35), focal);
+            let bent = Distortion::Rational { k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+            view.lens = Lens::new(view.lens.focal, view.lens.principal, bent);
             compare(&solid, &view, reduction);
         }
     }
@@ -293,6 +411,13 @@ mod tests {
         view.lens = Lens::pinhole(DVec2::splat(64.0), DVec2::splat(48.5));
         assert_eq!(compare(&solid, &view, 1), 96 * 96);
         assert_eq!(compare(&solid, &view, 2), 48 * 48);
+        // As if the lens bent.
+        let bent = Distortion::Rational {
+            k: [1e-30, 0.0, 0.0, 0.0, 0.0, 0.0],
+            p: [0.0; 2],
+        };
+        view.lens = Lens::new(view.lens.focal, view.lens.principal, bent);
+        assert_eq!(compare(&solid, &view, 1), 96 * 96);
     }
 
     #[test]

@@ -1,0 +1,189 @@
+//! Where pixels' rays meet the plane before the camera.
+
+use calibrate::{Distortion, Lens, Pixel};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Pixels of a row whose bounds are kept together.
+pub(super) const BLOCK: usize = 16;
+/// Rays that are nearer than this to the plane z = 0, the z of unit vectors, are not ahead.
+const AHEAD: f64 = 0.1;
+
+/// The rays of all pixels' centres of a picture, where they all look ahead: a pinhole's as they are
+/// needed, any other lens' in a table.
+#[derive(Clone, Debug)]
+pub struct Rays {
+    pub(super) lens: Lens,
+    /// Pixels across and down.
+    pub(super) size: [usize; 2],
+    pub(super) bent: Option<Bent>,
+}
+
+/// Rays of a lens that bends them, each by where it meets the plane z = 1.
+#[derive(Clone, Debug)]
+pub(super) struct Bent {
+    /// Row by row; not a number where the lens has no ray.
+    pub(super) at: Vec<DVec2>,
+    /// Of so many pixels of a row, row by row.
+    pub(super) blocks: Vec<Bounds>,
+    pub(super) rows: Vec<Bounds>,
+    /// The least and the most that any column or one before it, or after it, has.
+    columns_until: Vec<f64>,
+    columns_from: Vec<f64>,
+    rows_until: Vec<f64>,
+    rows_from: Vec<f64>,
+    /// Of all.
+    pub(super) all: Bounds,
+}
+
+/// A rectangle in the plane z = 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) least: DVec2,
+    pub(super) most: DVec2,
+}
+
+impl Bounds {
+    const NONE: Self = Self {
+        least: DVec2::INFINITY,
+        most: DVec2::NEG_INFINITY,
+    };
+
+    fn with(self, other: Self) -> Self {
+        Self {
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
+        }
+    }
+
+    /// Of points; those that are no numbers don't count.
+    fn of(points: &[DVec2]) -> Self {
+        let mut bounds = Self::NONE;
+        for p in points.iter().filter(|p| !p.is_nan()) {
+            bounds = bounds.with(Self {
+                least: *p,
+                most: *p,
+            });
+        }
+        bounds
+    }
+
+    /// The most that side·(x, y, 1) is inside.
+    pub(super) fn most_of(&self, side: DVec3) -> f64 {
+        let x = if side.x > 0.0 {
+            self.most.x
+        } else {
+            self.least.x
+        };
+        let y = if side.y > 0.0 {
+            self.most.y
+        } else {
+            self.least.y
+        };
+        side.x * x + side.y * y + side.z
+    }
+}
+
+impl Rays {
+    /// `None` where some pixel looks aside or back.
+    pub fn of(lens: &Lens, (width, height): (u32, u32)) -> Option<Self> {
+        let size = [width as usize, height as usize];
+        let mut rays = Self {
+            lens: *lens,
+            size,
+            bent: None,
+        };
+        if lens.distortion() != Distortion::None {
+            rays.bent = Some(Bent::of(lens, size)?);
+        }
+        Some(rays)
+    }
+
+    /// Where the ray of a pixel's centre meets the plane z = 1; `None` where the lens has none.
+    pub fn at(&self, column: usize, row: usize) -> Option<DVec2> {
+        match &self.bent {
+            None => {
+                let center = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+                Some((center - self.lens.principal) / self.lens.focal)
+            }
+            Some(bent) => Some(bent.at[row * self.size[0] + column]).filter(|at| !at.is_nan()),
+        }
+    }
+
+    /// Whether what pixels of a row see of a plane lies on a line.
+    pub fn are_straight(&self) -> bool {
+        self.bent.is_none()
+    }
+}
+
+impl Bent {
+    fn of(lens: &Lens, [width, height]: [usize; 2]) -> Option<Self> {
+        let row = |y: usize| -> Option<Vec<DVec2>> {
+            let of_column = |x: usize| {
+                let center = Pixel::center_of(x as u32, y as u32);
+                match lens.unproject(center) {
+                    None => Some(DVec2::NAN),
+                    Some(ray) => (ray.z > AHEAD).then(|| ray.truncate() / ray.z),
+                }
+            };
+            (0..width).map(of_column).collect()
+        };
+        let at: Option<Vec<Vec<DVec2>>> = (0..height).into_par_iter().map(row).collect();
+        let at = at?.concat();
+        let mut blocks = Vec::new();
+        let mut rows = Vec::new();
+        let mut columns = vec![Bounds::NONE; width];
+        for row in at.chunks(width.max(1)) {
+            let first = blocks.len();
+            blocks.extend(row.chunks(BLOCK).map(Bounds::of));
+            let of_row = blocks[first..].iter().copied();
+            rows.push(of_row.fold(Bounds::NONE, Bounds::with));
+            for (column, at) in columns.iter_mut().zip(row) {
+                *column = column.with(Bounds::of(std::slice::from_ref(at)));
+            }
+        }
+        let until = |bounds: &[Bounds], axis: usize| {
+            let mut most = f64::NEG_INFINITY;
+            let next = |b: &Bounds| {
+                most = most.max(b.most[axis]);
+                most
+            };
+            bounds.iter().map(next).collect::<Vec<f64>>()
+        };
+        let from = |bounds: &[Bounds], axis: usize| {
+            let mut least = f64::INFINITY;
+            let next = |b: &Bounds| {
+                least = least.min(b.least[axis]);
+                least
+            };
+            let mut all: Vec<f64> = bounds.iter().rev().map(next).collect();
+            all.reverse();
+            all
+        };
+        Some(Self {
+            all: rows.iter().copied().fold(Bounds::NONE, Bounds::with),
+            columns_until: until(&columns, 0),
+            columns_from: from(&columns, 0),
+            rows_until: until(&rows, 1),
+            rows_from: from(&rows, 1),
+            at,
+            blocks,
+            rows,
+        })
+    }
+
+    /// The columns and rows that may have rays between two places.
+    pub(super) fn within(&self, least: DVec2, most: DVec2) -> [Range<usize>; 2] {
+        let range = |until: &[f64], from: &[f64], least: f64, most: f64| {
+            // Before the first, none so far reaches it; from the last on all are beyond.
+            let first = until.partition_point(|reached| *reached < least);
+            let last = from.partition_point(|begun| *begun <= most);
+            first..last.max(first)
+        };
+        [
+            range(&self.columns_until, &self.columns_from, least.x, most.x),
+            range(&self.rows_until, &self.rows_from, least.y, most.y),
+        ]
+    }
+}
