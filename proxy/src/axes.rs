@@ -1,7 +1,8 @@
 //! The plane where a reconstruction has no sparse points: through what the cameras look at.
 
 use crate::Plane;
-use crate::fit::{FitBasis, FitError, PlaneFit, direction_of_least_spread, mean_forward};
+use crate::condition::thinnest;
+use crate::fit::{FitBasis, FitError, PlaneFit, forward_or};
 use calibrate::Reconstruction;
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -41,19 +42,18 @@ pub fn plane_across_axes(
         })
         .collect();
     let mean_center = rays.iter().map(|(c, _)| *c).sum::<DVec3>() / count;
-    let normal = mean_forward(reconstruction).unwrap_or_else(|| {
-        direction_of_least_spread(rays.iter().map(|(c, _)| *c)).unwrap_or(DVec3::Z)
-    });
-    let at = |distance: f64, point: DVec3, basis: FitBasis| {
+    let (normal, across) = forward_or(reconstruction, || thinnest(rays.iter().map(|(c, _)| *c)));
+    let at = |distance: f64, point: DVec3, basis: FitBasis, condition: f64| {
         Ok(PlaneFit {
             plane: Plane::new(origin + point, normal)?,
             distance,
             basis,
+            condition,
         })
     };
 
     // 1. Where the axes meet.
-    if let Some(point) = nearest_to(&rays) {
+    if let Some((point, along)) = nearest_to(&rays) {
         let depths: Vec<f64> = rays.iter().map(|(c, d)| d.dot(point - *c)).collect();
         if depths.iter().all(|depth| *depth > 0.0) {
             let distance = count / depths.iter().map(|depth| 1.0 / depth).sum::<f64>();
@@ -63,6 +63,7 @@ pub fn plane_across_axes(
                 FitBasis::Axes {
                     cameras: images.len(),
                 },
+                across.max(along),
             );
         }
     }
@@ -85,11 +86,12 @@ pub fn plane_across_axes(
         FitBasis::DepthBounds {
             cameras: bounds.len(),
         },
+        across,
     )
 }
 
-/// The point nearest to all rays; `None` where they are parallel.
-fn nearest_to(rays: &[(DVec3, DVec3)]) -> Option<DVec3> {
+/// The point nearest to all rays, and its condition number; `None` where they are parallel.
+fn nearest_to(rays: &[(DVec3, DVec3)]) -> Option<(DVec3, f64)> {
     let (mut across, mut right_side) = (DMat3::ZERO, DVec3::ZERO);
     for &(center, axis) in rays {
         let projector =
@@ -102,8 +104,9 @@ fn nearest_to(rays: &[(DVec3, DVec3)]) -> Option<DVec3> {
     let mean = across * (1.0 / rays.len() as f64);
     let eigen =
         nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_column_slice(&mean.to_cols_array()));
-    let parallel = eigen.eigenvalues.min() < LEAST_SPREAD * LEAST_SPREAD;
-    (!parallel).then(|| across.inverse() * right_side)
+    let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
+    let parallel = least < LEAST_SPREAD * LEAST_SPREAD;
+    (!parallel).then(|| (across.inverse() * right_side, (most / least).sqrt()))
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 //! camera image planes and placed at the average 1/z distance from the cameras".
 
 use crate::cloud::{isolated_points, median};
+use crate::condition::{Thinnest, thinnest};
 use crate::{Plane, PlaneError};
 use calibrate::Reconstruction;
 use glam::DVec3;
-use nalgebra::{Matrix3, SymmetricEigen};
 use std::fmt;
 
 /// A fitted plane and what it rests on.
@@ -17,6 +17,8 @@ pub struct PlaneFit {
     pub distance: f64,
     /// What it rests on.
     pub basis: FitBasis,
+    /// How many times as large errors of that come out, at most; see [`crate::ILL_CONDITIONED`].
+    pub condition: f64,
 }
 
 /// What decided a plane's distance.
@@ -100,12 +102,12 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
     // 1. Orientation: the mean of the forward axes.
     let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
     let isolated = isolated_points(&positions);
-    let normal = mean_forward(reconstruction).unwrap_or_else(|| {
+    let (normal, condition) = forward_or(reconstruction, || {
         let kept = positions
             .iter()
             .zip(&isolated)
             .filter(|(_, alone)| !**alone);
-        direction_of_least_spread(kept.map(|(p, _)| *p)).unwrap_or(DVec3::Z)
+        thinnest(kept.map(|(p, _)| *p))
     });
 
     // 2. Inverse depths along it, one an observation; and the observing cameras' mean.
@@ -146,33 +148,28 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
             observations: observed.len(),
             outliers: total - observed.len(),
         },
+        condition,
     })
 }
 
-/// The unit vector that the cameras look along on the whole; `None` where they look every
-/// way.
-pub(crate) fn mean_forward(reconstruction: &Reconstruction) -> Option<DVec3> {
+/// A plane's normal and condition: where the cameras look on the whole, or else the direction in
+/// which something is thinnest.
+pub(crate) fn forward_or(
+    reconstruction: &Reconstruction,
+    thinnest: impl FnOnce() -> Option<Thinnest>,
+) -> (DVec3, f64) {
+    let forward = mean_forward(reconstruction).map(|mean| (mean.normalize(), 1.0 / mean.length()));
+    forward
+        .or_else(|| thinnest().map(|t| (t.direction, t.condition)))
+        .unwrap_or((DVec3::Z, f64::INFINITY))
+}
+
+/// The mean of the unit vectors that the cameras look along; `None` where they look every way.
+fn mean_forward(reconstruction: &Reconstruction) -> Option<DVec3> {
     let images = reconstruction.images.values();
     let forward = images.map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z);
     let mean = forward.sum::<DVec3>() / reconstruction.images.len().max(1) as f64;
-    (mean.length() >= COMMON_DIRECTION).then(|| mean.normalize())
-}
-
-/// The direction in which a cloud is thinnest; `None` without a point.
-pub(crate) fn direction_of_least_spread(
-    points: impl Iterator<Item = DVec3> + Clone,
-) -> Option<DVec3> {
-    let first = points.clone().next()?;
-    let count = points.clone().count() as f64;
-    let mean = first + points.clone().map(|p| p - first).sum::<DVec3>() / count;
-    let mut covariance = Matrix3::<f64>::zeros();
-    for point in points {
-        let d = nalgebra::Vector3::from((point - mean).to_array());
-        covariance += d * d.transpose();
-    }
-    let eigen = SymmetricEigen::new(covariance);
-    let thinnest = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    Some(DVec3::new(thinnest[0], thinnest[1], thinnest[2]))
+    (mean.length() >= COMMON_DIRECTION).then_some(mean)
 }
 
 #[cfg(test)]

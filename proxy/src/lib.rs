@@ -8,6 +8,7 @@
 mod axes;
 pub mod carve;
 mod cloud;
+mod condition;
 pub mod dense;
 pub mod depth;
 mod facets;
@@ -29,6 +30,7 @@ use std::sync::Arc;
 
 pub use axes::plane_across_axes;
 pub use cloud::{CloudStatistics, isolated_points, statistics};
+pub use condition::ILL_CONDITIONED;
 pub use dense::DensePoints;
 pub use facets::Facets;
 pub use file::{FileError, parse, read, write};

@@ -8,7 +8,10 @@ use image::RgbaImage;
 use proxy::dense::{DenseOptions, DensePoints, Matching};
 use proxy::depth;
 use proxy::hull::{self, Silhouette};
-use proxy::{FitBasis, FitError, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint, Tunnel};
+use proxy::{
+    FitBasis, FitError, ILL_CONDITIONED, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint,
+    Tunnel,
+};
 use proxy::{carve, tunnel};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -101,14 +104,15 @@ impl Scene {
                     let basis = fit.basis;
                     fitted.note = Some(format!("the proxy is a plane fitted to {basis}"));
                 }
-                Ok(fitted)
+                Ok(fitted.with_condition(fit.condition))
             }
             Kind::DominantPlane => {
                 let (_, points) = sparse()?;
                 let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
                 let found = proxy::dominant_plane(&positions).map_err(unfit)?;
                 let how = format!("{} of {} points lie on it", found.inliers, found.points);
-                Ok(Fitted::new(Proxy::Plane(found.plane), how))
+                let fitted = Fitted::new(Proxy::Plane(found.plane), how);
+                Ok(fitted.with_condition(found.condition))
             }
             Kind::ViewPlane => {
                 self.needs_points(kind)?;
@@ -292,7 +296,23 @@ impl Fitted {
             tunnel.length(),
             100.0 * tunnel.share_on_walls
         );
-        Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how)
+        Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how).with_condition(tunnel.condition)
+    }
+
+    /// Says so where the fit is ill-posed.
+    fn with_condition(mut self, condition: f64) -> Self {
+        if condition > ILL_CONDITIONED {
+            let said = format!(
+                "the surface hardly follows from what it is fitted to (condition number \
+                 {condition:.0}, {ILL_CONDITIONED:.0} is much): look whether it lies where it \
+                 should, or try points"
+            );
+            self.note = Some(match self.note {
+                Some(note) => format!("{note}; {said}"),
+                None => said,
+            });
+        }
+        self
     }
 
     fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {

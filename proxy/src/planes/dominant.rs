@@ -5,7 +5,7 @@
 
 use crate::Plane;
 use crate::cloud::median;
-use crate::fit::direction_of_least_spread;
+use crate::condition::thinnest;
 use glam::DVec3;
 
 /// A plane that holds many of the points.
@@ -19,6 +19,9 @@ pub struct DominantPlane {
     pub points: usize,
     /// Within what distance they lie on it, in world units.
     pub tolerance: f64,
+    /// How many times as large errors of the points, relative to their extent, turn it, at most; see
+    /// [`crate::ILL_CONDITIONED`].
+    pub condition: f64,
 }
 
 /// Why no plane holds the points.
@@ -157,6 +160,7 @@ pub fn dominant_plane(points_in_world: &[DVec3]) -> Result<DominantPlane, Domina
         inliers: inliers.len(),
         points: points.len(),
         tolerance: finer,
+        condition: thinnest(inliers.iter().copied()).map_or(f64::INFINITY, |t| t.condition),
     })
 }
 
@@ -198,13 +202,13 @@ impl Flat {
             if near.len() < 3 || on_a_line(&near) {
                 break;
             }
-            let Some(normal) = direction_of_least_spread(near.iter().copied()) else {
+            let Some(thinnest) = thinnest(near.iter().copied()) else {
                 break;
             };
             let mean = near.iter().sum::<DVec3>() / near.len() as f64;
             flat = Self {
                 point: mean,
-                normal: normal.normalize_or(flat.normal),
+                normal: thinnest.direction.normalize_or(flat.normal),
             };
         }
         flat

@@ -3,7 +3,7 @@
 
 use crate::Plane;
 use crate::cloud::median;
-use crate::fit::direction_of_least_spread;
+use crate::condition::thinnest;
 use calibrate::View;
 use glam::DVec3;
 
@@ -65,7 +65,7 @@ pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<
             .filter(|p| plane.signed_distance(**p).abs() <= thickness);
         let on: Vec<DVec3> = on.copied().collect();
         let middle = on.iter().map(|p| *p - center).sum::<DVec3>() / on.len() as f64;
-        let normal = direction_of_least_spread(on.iter().copied())?;
+        let normal = thinnest(on.iter().copied())?.direction;
         plane = Plane::new(center + middle, upwards(normal, up)).ok()?;
         if !is_wide(&on, center + middle, plane.normal()) {
             return None;

@@ -3,9 +3,10 @@
 
 use super::Tunnel;
 use crate::cloud::median;
+use crate::condition;
 use calibrate::Rigid3;
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Places tried for each wall.
 const PLACES: usize = 40;
@@ -226,6 +227,18 @@ impl<'a> Fitting<'a> {
     /// One step of Gauss and Newton's: a rotation vector in the box's frame, then `min` and
     /// `max`.
     fn step(&self) -> Option<SVector<f64, 9>> {
+        let (mut matrix, right_side) = self.normal_equations();
+        // A little damping holds what no point decides.
+        for k in 0..9 {
+            let own = if k < 3 { 1.0 } else { self.size.powi(-2) };
+            matrix[(k, k)] = matrix[(k, k)] * (1.0 + 1e-6) + 1e-3 * own;
+        }
+        let step = matrix.cholesky()?.solve(&right_side);
+        step.iter().all(|s| s.is_finite()).then_some(step)
+    }
+
+    /// Of a [`Self::step`].
+    fn normal_equations(&self) -> (SMatrix<f64, 9, 9>, SVector<f64, 9>) {
         let (near, far) = self.tolerances();
         let mut matrix = SMatrix::<f64, 9, 9>::zeros();
         let mut right_side = SVector::<f64, 9>::zeros();
@@ -268,13 +281,7 @@ impl<'a> Fitting<'a> {
                 right_side[k] -= weight * slope * residual;
             }
         }
-        // A little damping holds what no point decides.
-        for k in 0..9 {
-            let own = if k < 3 { 1.0 } else { self.size.powi(-2) };
-            matrix[(k, k)] = matrix[(k, k)] * (1.0 + 1e-6) + 1e-3 * own;
-        }
-        let step = matrix.cholesky()?.solve(&right_side);
-        step.iter().all(|s| s.is_finite()).then_some(step)
+        (matrix, right_side)
     }
 
     /// How many points lie near each wall, and how many near any.
@@ -329,6 +336,11 @@ impl<'a> Fitting<'a> {
             points: self.points.len(),
             share_on_walls: on_walls as f64 / self.points.len() as f64,
             walked: high.z - low.z - room,
+            condition: condition::of_normal_equations(&DMatrix::from_column_slice(
+                9,
+                9,
+                self.normal_equations().0.as_slice(),
+            )),
         }
     }
 }

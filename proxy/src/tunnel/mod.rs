@@ -37,6 +37,9 @@ pub struct Tunnel {
     pub share_on_walls: f64,
     /// How far the cameras went along it, in world units.
     pub walked: f64,
+    /// How many times as large errors of the points on its walls come out, at most; see
+    /// [`crate::ILL_CONDITIONED`].
+    pub condition: f64,
 }
 
 /// A point lies on a wall within this share of the mean of the tunnel's width and height.
