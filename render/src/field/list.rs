@@ -5,11 +5,12 @@ use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
 use crate::frame::{Frame, ProxyPoint};
 use crate::near::Near;
+use crate::options::MAX_CONTRIBUTORS;
 use crate::surface::{FacetMap, Surface};
 use crate::view_tree::Ball;
 use calibrate::Pixel;
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
@@ -17,6 +18,17 @@ const CLEARANCE_PX: f64 = 2.0;
 
 /// How much of a view's weight may come or go between a triangle's corners.
 const TURNOVER: f64 = 0.5;
+
+/// How many views see all of a triangle, by their differences at its corners. Of those that differ alike,
+/// as photos from one place do, the first decide: one more than may contribute, as its difference caps the
+/// threshold.
+type Crowds = HashMap<[u64; 3], usize>;
+
+/// With fewer views nobody looks for crowds.
+const MANY: usize = 128;
+
+/// A source view's difference at a triangle's corner, and where its photo has that.
+type AtCorner = (f64, Option<Pixel>);
 
 /// The source views of one triangle.
 pub(super) struct List {
@@ -187,6 +199,7 @@ impl Triangle<'_> {
         let nears = self.corners.map(|corner| &corner.near);
         let mut next = [0; 3];
         let mut listed = Vec::with_capacity(nears.iter().map(|n| n.views.len()).sum());
+        let mut crowds = (listed.capacity() > MANY).then(Crowds::default);
         // The least of all that come next.
         while let Some(&i) = (0..3).filter_map(|c| nears[c].views.get(next[c])).min() {
             let known = [0, 1, 2].map(|c| {
@@ -194,7 +207,19 @@ impl Triangle<'_> {
                 next[c] += usize::from(is_known);
                 is_known.then(|| nears[c].of_views[next[c] - 1])
             });
-            listed.push(self.listed(i as usize, known));
+            let at = self.at_corners(i as usize, known);
+            let Some(crowds) = &mut crowds else {
+                listed.push(self.listed(i as usize, at));
+                continue;
+            };
+            let alike = crowds
+                .entry(at.map(|(diff, _)| diff.to_bits()))
+                .or_insert(0);
+            if *alike <= MAX_CONTRIBUTORS {
+                let view = self.listed(i as usize, at);
+                *alike += usize::from(view.sees == Sees::All);
+                listed.push(view);
+            }
         }
         listed
     }
@@ -205,21 +230,25 @@ impl Triangle<'_> {
         for i in others.into_iter().map(|i| i as usize) {
             let before = listed[..known].binary_search_by_key(&i, |view| view.source_idx);
             if before.is_err() {
-                listed.push(self.listed(i, [None; 3]));
+                listed.push(self.listed(i, self.at_corners(i, [None; 3])));
             }
         }
         listed.sort_unstable_by_key(|view| view.source_idx);
     }
 
-    /// How a source view sees the triangle; with what is known of it at the corners.
-    fn listed(&self, source_idx: usize, known: [Option<(f64, Option<Pixel>)>; 3]) -> Listed {
-        let at = [0, 1, 2].map(|c| {
+    /// A source view's difference and pixel at the corners, where they are not known yet.
+    fn at_corners(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> [AtCorner; 3] {
+        [0, 1, 2].map(|c| {
             let point = &self.points[c];
             known[c].unwrap_or_else(|| {
                 let diff = self.frame.difference(source_idx, point);
                 (diff, self.frame.project(source_idx, point))
             })
-        });
+        })
+    }
+
+    /// How a source view sees the triangle; with what is known of it at the corners.
+    fn listed(&self, source_idx: usize, at: [AtCorner; 3]) -> Listed {
         Listed {
             source_idx,
             sees: self.how_it_is_seen(source_idx, at.map(|a| a.1)),

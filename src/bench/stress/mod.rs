@@ -1,5 +1,6 @@
 //! Scenes that try to break things, and what must hold of every one.
 
+mod layered;
 mod scene;
 
 pub use scene::{Case, Placement};
@@ -46,12 +47,15 @@ const SHARE_OF_POINTS: f64 = 0.1;
 ///   asked;
 /// - the world moved, turned and scaled, and the photos in another order, give the same picture.
 ///
+/// Of a layered depth image, too: see `layered.rs`.
+///
 /// The last, and f32 against f64, is not asked of pixels where more views tie than may contribute, nor
 /// are worlds moved where the smallest change changes what is seen.
 ///
 /// # Errors
 /// What does not hold, with figures.
 pub fn check(seed: u64) -> Result<(), String> {
+    layered::check(seed)?;
     let case = Case::new(seed, &Placement::OWN);
     let named = |what: &str| format!("{}: {what}", case.name);
     let drawn = |error: RenderError| named(&error.to_string());
@@ -85,7 +89,7 @@ pub fn check(seed: u64) -> Result<(), String> {
     );
     match (
         cpu::render(&frame, Method::TRIANGULATED),
-        on_one_thread(&again),
+        on_one_thread(|| cpu::render(&again, Method::TRIANGULATED))?,
     ) {
         (Ok(many), Ok(one)) if many == one => {}
         (Err(RenderError::Triangulation(_)), Err(RenderError::Triangulation(_))) => {}
@@ -149,11 +153,9 @@ fn exact_picture(case: &Case) -> Result<RgbaImage, RenderError> {
     cpu::render(&frame, Method::Exact)
 }
 
-fn on_one_thread(frame: &Frame<'_>) -> Result<RgbaImage, RenderError> {
-    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-        Ok(pool) => pool.install(|| cpu::render(frame, Method::TRIANGULATED)),
-        Err(error) => Err(RenderError::Gpu(error.to_string())),
-    }
+fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    Ok(pool.map_err(|error| error.to_string())?.install(work))
 }
 
 /// Far off, or another size; both together take more digits than there are.
