@@ -408,6 +408,19 @@ impl Columns {
         height_of(top as usize).clamp(2.2, 4.0)
     }
 
+    /// Bits of heights that cameras saw through at a square or beside it along a wall across an axis,
+    /// or a bin higher or lower: lines of sight are samples, with gaps between them.
+    pub(super) fn seen_near(&self, at: usize, along: usize, axis: usize) -> u128 {
+        let Some(seen) = &self.seen else { return 0 };
+        let last = self.size[1 - axis] - 1;
+        let of = |along: usize| match axis {
+            0 => seen[along * self.size[0] + at],
+            _ => seen[at * self.size[0] + along],
+        };
+        let all = of(along) | of(along.saturating_sub(1)) | of((along + 1).min(last));
+        all | all << 1 | all >> 1
+    }
+
     /// Whether who stands there sees past a column.
     pub(super) fn is_open_at_eye(&self, taken: u128) -> bool {
         (taken & band(EYE_BAND)).count_ones() < 3
