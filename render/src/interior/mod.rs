@@ -7,6 +7,7 @@
 
 mod captured;
 mod fill;
+mod floor_map;
 mod geometry;
 mod library;
 mod painter;
