@@ -164,6 +164,18 @@ impl Columns {
         all.into_iter().flatten()
     }
 
+    /// The squares on the straight way from one to another.
+    pub(super) fn between(&self, from: usize, to: usize) -> impl Iterator<Item = usize> + use<> {
+        let width = self.size[0];
+        let place = |i: usize| DVec2::new((i % width) as f64, (i / width) as f64);
+        let (from, to) = (place(from), place(to));
+        let count = (to - from).abs().max_element() as usize;
+        (1..count).map(move |k| {
+            let at = from.lerp(to, k as f64 / count as f64).round();
+            at.y as usize * width + at.x as usize
+        })
+    }
+
     /// Metres as squares.
     pub(super) fn squares(&self, metres: f64) -> f64 {
         metres / self.step_m

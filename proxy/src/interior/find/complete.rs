@@ -2,9 +2,11 @@
 
 use super::columns::Columns;
 
-/// Gaps in walls narrower than twice this do not let a room through, and parts of rooms narrower
-/// than twice this neither extend a room nor are added to it; metres.
+/// Gaps in walls narrower than twice this do not let a room through, and parts that are narrower than
+/// twice this are not added to it; metres.
 const NARROW: f64 = 0.3;
+/// Parts of rooms narrower than twice this do not extend a room: a glance through a gap; metres.
+const GLANCE: f64 = 0.15;
 
 /// Gives squares of which nothing is known to the room that one meets both along the one axis and
 /// along the other, with no wall in between: the room's missing corners. A capture's lines of sight
@@ -12,7 +14,7 @@ const NARROW: f64 = 0.3;
 /// was seen, and what is beyond all that was seen, stays unknown.
 pub(super) fn complete(columns: &Columns, labels: &mut [u32]) {
     let stops = columns.closed(NARROW, |i| columns.is_wall(i) || columns.is_lintel(i));
-    let broad = opened(columns, |i| labels[i] != 0);
+    let broad = opened(columns, GLANCE, |i| labels[i] != 0);
     // 1. What one meets in each direction: how far it is, and which room.
     let [width, height] = columns.size;
     let mut met_at = vec![[[None::<(u32, u32)>; 2]; 2]; labels.len()];
@@ -49,7 +51,7 @@ pub(super) fn complete(columns: &Columns, labels: &mut [u32]) {
         same.min().map_or(0, |(_, label)| label)
     };
     let rooms: Vec<u32> = (0..labels.len()).map(room).collect();
-    let broad = opened(columns, |i| rooms[i] != 0 || stops[i]);
+    let broad = opened(columns, NARROW, |i| rooms[i] != 0 || stops[i]);
     for (i, label) in labels.iter_mut().enumerate() {
         if *label == 0 && broad[i] {
             *label = rooms[i];
@@ -57,16 +59,16 @@ pub(super) fn complete(columns: &Columns, labels: &mut [u32]) {
     }
 }
 
-/// A set without its parts that are narrower than twice [`NARROW`] along an axis; corners stay.
-fn opened(columns: &Columns, is_in: impl Fn(usize) -> bool) -> Vec<bool> {
+/// A set without its parts that are narrower than twice a radius along an axis; corners stay.
+fn opened(columns: &Columns, radius: f64, is_in: impl Fn(usize) -> bool) -> Vec<bool> {
     let out: Vec<bool> = (0..columns.count()).map(|i| !is_in(i)).collect();
-    let inside = widened(columns, out).into_iter().map(|is| !is);
-    widened(columns, inside.collect())
+    let inside = widened(columns, radius, out).into_iter().map(|is| !is);
+    widened(columns, radius, inside.collect())
 }
 
-/// A set with all that is within [`NARROW`] of it along each axis.
-fn widened(columns: &Columns, mut set: Vec<bool>) -> Vec<bool> {
-    let reach = columns.squares(NARROW).round() as usize;
+/// A set with all that is within a radius of it along each axis.
+fn widened(columns: &Columns, radius: f64, mut set: Vec<bool>) -> Vec<bool> {
+    let reach = columns.squares(radius).round() as usize;
     let [width, height] = columns.size;
     for (step, length, lines, first) in [(1, width, height, width), (width, height, width, 1)] {
         for line in 0..lines {

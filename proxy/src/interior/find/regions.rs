@@ -181,10 +181,14 @@ pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
     // 1. Furniture that is open above: what is free above it is of the room.
     let top = columns.lintel_band();
     let depth = columns.squares(FURNITURE).powi(2);
+    let is_tall = |i: usize| top.is_some_and(|top| columns.taken[i] & top != 0);
     let is_room = |i: usize| {
-        let is_thing = top.is_some_and(|top| {
-            squared[i] <= depth && columns.is_wall(i) && columns.taken[i] & top == 0
-        });
+        let is_thing = top.is_some()
+            && squared[i] <= depth
+            && columns.is_wall(i)
+            && !is_tall(i)
+            // Not the other face of a wall.
+            && !columns.between(i, nearest[i] as usize).any(is_tall);
         known[i] != 0 || is_thing
     };
     // 2. Walls between rooms: gaps in all of them together. Other walls: a little of them.
