@@ -17,7 +17,8 @@ use lumigraph::scene::{Truth, TruthScore, picture_files};
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, tour,
+    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, left_out,
+    tour,
 };
 use render::score::mean_of;
 use render::{DeviceChoice, path};
@@ -320,6 +321,12 @@ fn frames(
                 FPS,
             )
             .with_context(|| args.interior.display().to_string())?;
+            let left_out = left_out(interior, contents).into_iter();
+            let names: Vec<&str> = left_out.map(|id| &*interior.cell(id).name).collect();
+            if !names.is_empty() {
+                let names = names.join(", ");
+                say!("note: no opening leads to {names}; the tour leaves them out");
+            }
             let file = args.output.join("path.json");
             make_parent(&file)?;
             path::write(&file, &planned)?;

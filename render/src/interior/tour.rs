@@ -89,6 +89,25 @@ pub fn tour(
     Ok(CameraPath::new(fps, frames)?)
 }
 
+/// Rooms that a tour does not come to, as no opening leads to them from where it begins.
+pub fn left_out(interior: &Interior, contents: &Contents) -> Vec<CellId> {
+    let ids = (0..interior.cells.len() as u32).map(CellId);
+    let places: Vec<Option<DVec3>> = ids.map(|id| place(interior, contents, id)).collect();
+    let mut is_seen = vec![false; places.len()];
+    if let Some(first) = places.iter().position(Option::is_some) {
+        is_seen[first] = true;
+        let mut at = CellId(first as u32);
+        while let Some(route) = route(interior, contents, &places, &is_seen, at) {
+            for (_, into) in route {
+                is_seen[into.0 as usize] = true;
+                at = into;
+            }
+        }
+    }
+    let rest = is_seen.iter().enumerate().filter(|(_, is_seen)| !**is_seen);
+    rest.map(|(i, _)| CellId(i as u32)).collect()
+}
+
 /// Points to pass in one room, in order.
 struct Leg {
     cell: CellId,
