@@ -119,7 +119,15 @@ fn tours(args: &Args) {
         start.elapsed().as_secs_f64()
     );
     let camera = Camera::of(&lens(), SIZE[0], SIZE[1]);
-    let path = tour(&house.interior, &contents, &camera, args.frames, 15.0).expect("a tour");
+    let path = tour(
+        &house.interior,
+        &contents,
+        &house.model,
+        &camera,
+        args.frames,
+        15.0,
+    )
+    .expect("a tour");
     println!(
         "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
         "portals",

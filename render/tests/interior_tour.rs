@@ -1,9 +1,14 @@
 //! Tours: through doors rather than windows, whatever says where the rooms are.
 
+mod house;
+
 use calibrate::{Camera, Lens};
 use glam::{DVec2, DVec3};
+use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{Contents, Interior, interior_from_nodes, parse_rooms};
+use proxy::mesh::read_model;
 use proxy::mesh::{Mesh, Model, ModelNode, Part};
+use proxy::{MeshKind, Solid};
 use render::interior::tour;
 use std::path::Path;
 
@@ -101,7 +106,7 @@ fn tours_go_through_doors_and_not_through_windows() {
     );
     for interior in [by_boxes(), by_nodes] {
         let (contents, _) = Contents::new(&interior, &model).unwrap();
-        let path = tour(&interior, &contents, &camera, 200, 15.0).unwrap();
+        let path = tour(&interior, &contents, &model, &camera, 200, 15.0).unwrap();
         let eyes: Vec<DVec3> = path.frames.iter().map(|f| f.view.center()).collect();
         // At eye height over the floor everywhere.
         assert!(eyes.iter().all(|eye| (eye.y - 1.6).abs() < 1e-9));
@@ -119,4 +124,51 @@ fn tours_go_through_doors_and_not_through_windows() {
             assert!(eyes.iter().any(is_there), "{cell}");
         }
     }
+}
+
+/// Steps of a tour that pass a triangle, and how many cells it comes to.
+fn crossings(interior: &Interior, model: &Model) -> (usize, usize) {
+    let (contents, _) = Contents::new(interior, model).unwrap();
+    let camera = Camera::of(
+        &Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0)),
+        64,
+        64,
+    );
+    let path = tour(interior, &contents, model, &camera, 1500, 15.0).unwrap();
+    let solid = Solid::new(MeshKind::Mesh, model.mesh.clone());
+    let eyes: Vec<DVec3> = path.frames.iter().map(|f| f.view.center()).collect();
+    let passes = |e: &[DVec3]| {
+        let hit = solid.first_hit(e[0], e[1] - e[0]);
+        hit.is_some_and(|hit| hit.along <= 1.0)
+    };
+    let mut cells: Vec<_> = eyes
+        .iter()
+        .filter_map(|e| contents.locate(interior, *e))
+        .collect();
+    cells.sort_unstable();
+    cells.dedup();
+    (eyes.windows(2).filter(|e| passes(e)).count(), cells.len())
+}
+
+#[test]
+fn tours_go_around_walls_and_furniture() {
+    for (rooms, seed) in [(3, 2), (9, 6), (19, 1)] {
+        let (house, _) = house::small_house(rooms, seed);
+        let found = crossings(&house.interior, &house.model);
+        assert_eq!(found, (0, rooms), "{rooms} rooms");
+    }
+    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/captures");
+    let file = captures.join("interior-house/house.glb");
+    if !file.exists() {
+        eprintln!("SKIPPED: {} is absent", file.display());
+        return;
+    }
+    let (model, _) = read_model(&file).unwrap();
+    let evidence = Evidence {
+        mesh: &model.mesh,
+        cameras: &[],
+        sights: &[],
+    };
+    let found = find_interior(&evidence, "house.glb", &FindOptions::default()).unwrap();
+    assert_eq!(crossings(&found.interior, &model), (0, 3));
 }

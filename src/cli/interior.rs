@@ -11,8 +11,8 @@ use image::ImageFormat;
 use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, Interior, InteriorError, InteriorWarning, interior_from_nodes, read_interior,
-    read_rooms, write_interior,
+    Contents, Interior, InteriorError, InteriorWarning, compare, interior_from_nodes,
+    read_interior, read_rooms, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::io::Cursor;
@@ -31,6 +31,7 @@ use std::time::Instant;
 ///     lumigraph interior house.glb -o house
 ///     lumigraph interior my-rgbd-walk -o office
 ///     lumigraph interior house.glb --rooms rooms.json -o house
+///     lumigraph interior my-rgbd-walk --compare rooms.json -o office
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -58,11 +59,17 @@ pub(super) struct Args {
         conflicts_with = "rooms"
     )]
     meter: f64,
+    /// Print how what was found compares with rooms and openings that are known, as --rooms has them;
+    /// portals count within 0.3 m
+    #[arg(long, value_name = "FILE", conflicts_with = "rooms")]
+    compare: Option<PathBuf>,
     /// The interior's folder: interior.json, and the model beside it
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
+/// Portals that are nearer than this to one another are the same; metres.
+const SAME_PORTAL: f64 = 0.3;
 /// What a capture's model is called.
 const MODEL: &str = "model.glb";
 
@@ -198,6 +205,11 @@ fn finish(
     pictures: &Pictures,
 ) -> anyhow::Result<()> {
     let named = || args.model.display().to_string();
+    let known = args.compare.as_ref().map(|rooms| read_rooms(rooms, file));
+    let compared = known.transpose()?.map(|(known, _)| {
+        let tolerance = SAME_PORTAL * args.meter;
+        compare(&known, &interior, tolerance).to_string()
+    });
     let (contents, more) = Contents::new(&interior, model).with_context(named)?;
     for warning in warnings.into_iter().chain(more) {
         say!("warning: {warning}");
@@ -207,6 +219,7 @@ fn finish(
     for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
         table += &format!("{:>9} triangles  {}\n", triangles.len(), cell.name);
     }
+    table += &compared.unwrap_or_default();
     print(&format!(
         "{table}{}: {} cells, {} portals, {} triangles\n",
         args.output.display(),

@@ -17,7 +17,8 @@ use lumigraph::scene::{Truth, TruthScore, picture_files};
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, tour,
+    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, left_out,
+    tour,
 };
 use render::score::mean_of;
 use render::{DeviceChoice, path};
@@ -162,7 +163,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let frames = match args.held_out {
         true => held_out(photos.as_ref(), args.size).with_context(named)?,
-        false => frames(args, &interior, &contents)?,
+        false => frames(args, &interior, &contents, &model)?,
     };
     // 3. The walks: one walker, so that images are made once for all kinds.
     let painter = match photos.as_ref().filter(|_| !args.no_photos) {
@@ -298,7 +299,12 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
     Ok(named)
 }
 
-fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Result<Vec<Named>> {
+fn frames(
+    args: &Args,
+    interior: &Interior,
+    contents: &Contents,
+    model: &Model,
+) -> anyhow::Result<Vec<Named>> {
     let path = match &args.path {
         Some(file) => path::read(file)?,
         None => {
@@ -306,8 +312,21 @@ fn frames(args: &Args, interior: &Interior, contents: &Contents) -> anyhow::Resu
             let size = DVec2::new(f64::from(width), f64::from(height));
             let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
             let camera = Camera::of(&lens, width, height);
-            let planned = tour(interior, contents, &camera, args.frames as usize, FPS)
-                .with_context(|| args.interior.display().to_string())?;
+            let planned = tour(
+                interior,
+                contents,
+                model,
+                &camera,
+                args.frames as usize,
+                FPS,
+            )
+            .with_context(|| args.interior.display().to_string())?;
+            let left_out = left_out(interior, contents).into_iter();
+            let names: Vec<&str> = left_out.map(|id| &*interior.cell(id).name).collect();
+            if !names.is_empty() {
+                let names = names.join(", ");
+                say!("note: no opening leads to {names}; the tour leaves them out");
+            }
             let file = args.output.join("path.json");
             make_parent(&file)?;
             path::write(&file, &planned)?;

@@ -143,7 +143,14 @@ impl Space {
         };
         // The first room as the tour enters it.
         let camera = Camera::of(&lens, width, height);
-        let toured = tour(&house.interior, &house.contents, &camera, 64, 15.0);
+        let toured = tour(
+            &house.interior,
+            &house.contents,
+            &house.model,
+            &camera,
+            64,
+            15.0,
+        );
         let first = toured
             .ok()
             .map(|path| path.frames[0].view.camera_from_world);

@@ -6,6 +6,7 @@
 //! the cell's content ends it.
 
 mod check;
+mod compare;
 mod contents;
 mod error;
 mod file;
@@ -17,6 +18,7 @@ mod rooms;
 mod semicircle;
 mod visibility;
 
+pub use compare::{ComparedCell, ComparedPortal, Comparison, compare};
 pub use contents::Contents;
 pub use error::{InteriorError, InteriorFileError, InteriorWarning};
 pub use file::{parse_interior, read_interior, write_interior};

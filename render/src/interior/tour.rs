@@ -1,9 +1,11 @@
 //! A tour through all rooms of an interior.
 
+use super::floor_map::FloorMap;
 use crate::path::{CameraPath, PathError, PathFrame};
 use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
 use proxy::interior::{CellId, Contents, Interior, Portal, PortalId, RoomBox};
+use proxy::mesh::Model;
 use std::collections::VecDeque;
 
 /// Why there is no tour.
@@ -22,6 +24,8 @@ const BEFORE_DOOR: f64 = 0.3;
 const SMOOTH: f64 = 0.22;
 const LOOK_AHEAD: f64 = 0.8;
 const TURN: f64 = 0.6;
+/// Room enough on both sides of who goes through an opening.
+const ENOUGH: f64 = 0.16;
 /// How high a threshold one steps over, likewise.
 const STEP: f64 = 0.25;
 
@@ -30,20 +34,24 @@ const STEP: f64 = 0.25;
 /// so many frames. Rooms to which no opening leads that one could walk through are entered by
 /// other openings; those with none at all are left out. A single room is looked around in.
 ///
-/// Furniture is walked through.
+/// What stands at eye height, walls and furniture, is walked around where there is a way.
 ///
 /// # Errors
 /// No room's place is known; the camera is unusable; no frames.
 pub fn tour(
     interior: &Interior,
     contents: &Contents,
+    model: &Model,
     camera: &Camera,
     frames: usize,
     fps: f64,
 ) -> Result<CameraPath, TourError> {
     let up = interior.up;
-    let way = Way::new(stops(interior, contents).ok_or(TourError::NoPlace)?);
     let unit = interior.eye_height.abs().max(1e-9);
+    let mut rooms = Rooms::new(interior, contents, model);
+    let legs = rooms.legs().ok_or(TourError::NoPlace)?;
+    let reach = rooms.smoothness(&legs, SMOOTH * unit);
+    let way = Way::new(legs.into_iter().flat_map(|leg| leg.stops).collect());
     let length = way.length();
     let count = frames.max(1);
     let level = up.any_orthonormal_vector();
@@ -51,7 +59,7 @@ pub fn tour(
     let frame = |i: usize| {
         let share = i as f64 / (count.max(2) - 1) as f64;
         let along = share * length;
-        let center = way.smoothed(along, SMOOTH * unit);
+        let center = way.smoothed(along, reach);
         if length > 0.0 {
             // The mean of where one will look a little before and after.
             let ahead = |s: f64| {
@@ -81,35 +89,195 @@ pub fn tour(
     Ok(CameraPath::new(fps, frames)?)
 }
 
-/// Points to pass, in order.
-fn stops(interior: &Interior, contents: &Contents) -> Option<Vec<DVec3>> {
-    let places: Vec<Option<DVec3>> = (0..interior.cells.len() as u32)
-        .map(|i| place(interior, contents, CellId(i)))
-        .collect();
-    let first = places.iter().position(Option::is_some)?;
-    let mut at = CellId(first as u32);
-    let mut stops = vec![places[first]?];
+/// Rooms that a tour does not come to, as no opening leads to them from where it begins.
+pub fn left_out(interior: &Interior, contents: &Contents) -> Vec<CellId> {
+    let ids = (0..interior.cells.len() as u32).map(CellId);
+    let places: Vec<Option<DVec3>> = ids.map(|id| place(interior, contents, id)).collect();
     let mut is_seen = vec![false; places.len()];
-    is_seen[first] = true;
-    let unit = interior.eye_height;
-    while let Some(route) = route(interior, contents, &places, &is_seen, at) {
-        for (id, into) in route {
-            let portal = interior.portal(id);
-            let up = interior.up;
-            let center = portal.polygon.center();
-            let height = floor(interior, contents, at, portal) + unit;
-            let center = center + up * (height - center.dot(up));
-            // Straight through.
-            let normal = portal.normal_into(Some(at));
-            let level = (normal - up * normal.dot(up)).normalize_or_zero();
-            let off = BEFORE_DOOR * unit * level;
-            stops.extend([center + off, center, center - off]);
-            is_seen[into.0 as usize] = true;
-            at = into;
+    if let Some(first) = places.iter().position(Option::is_some) {
+        is_seen[first] = true;
+        let mut at = CellId(first as u32);
+        while let Some(route) = route(interior, contents, &places, &is_seen, at) {
+            for (_, into) in route {
+                is_seen[into.0 as usize] = true;
+                at = into;
+            }
         }
-        stops.extend(places[at.0 as usize]);
     }
-    Some(stops)
+    let rest = is_seen.iter().enumerate().filter(|(_, is_seen)| !**is_seen);
+    rest.map(|(i, _)| CellId(i as u32)).collect()
+}
+
+/// Points to pass in one room, in order.
+struct Leg {
+    cell: CellId,
+    stops: Vec<DVec3>,
+}
+
+/// Rooms and what stands in them.
+struct Rooms<'a> {
+    interior: &'a Interior,
+    contents: &'a Contents,
+    model: &'a Model,
+    /// By cell, when it is first walked through.
+    maps: Vec<Option<FloorMap>>,
+}
+
+/// Places along an opening that are tried, for one where nothing is in the way.
+const TRIED: usize = 21;
+
+impl<'a> Rooms<'a> {
+    fn new(interior: &'a Interior, contents: &'a Contents, model: &'a Model) -> Self {
+        Self {
+            interior,
+            contents,
+            model,
+            maps: interior.cells.iter().map(|_| None).collect(),
+        }
+    }
+
+    fn unit(&self) -> f64 {
+        self.interior.eye_height.abs().max(1e-9)
+    }
+
+    /// A room's map at the height of a point; nothing for a room without bounds.
+    fn map(&mut self, id: CellId, eye: DVec3) -> Option<&FloorMap> {
+        let i = id.0 as usize;
+        let room = bounds(self.contents, id)?;
+        let (model, up, unit) = (self.model, self.interior.up, self.unit());
+        let triangles = self.contents.triangles.get(i)?;
+        Some(
+            self.maps[i]
+                .get_or_insert_with(|| FloorMap::new(model, triangles, room, up, eye, unit)),
+        )
+    }
+
+    /// The tour, room by room.
+    fn legs(&mut self) -> Option<Vec<Leg>> {
+        let (interior, contents) = (self.interior, self.contents);
+        let mut places: Vec<Option<DVec3>> = (0..interior.cells.len() as u32)
+            .map(|i| place(interior, contents, CellId(i)))
+            .collect();
+        for (i, place) in places.iter_mut().enumerate() {
+            if let Some(at) = *place {
+                let map = self.map(CellId(i as u32), at);
+                *place = Some(map.map_or(at, |map| map.roomy(at)));
+            }
+        }
+        let first = places.iter().position(Option::is_some)?;
+        let mut at = CellId(first as u32);
+        let mut here = places[first]?;
+        let mut legs = vec![Leg {
+            cell: at,
+            stops: vec![here],
+        }];
+        let mut is_seen = vec![false; places.len()];
+        is_seen[first] = true;
+        while let Some(route) = route(interior, contents, &places, &is_seen, at) {
+            for (id, into) in route {
+                let [before, middle, after] = self.through(id, at, into);
+                let mut leg = Leg {
+                    cell: at,
+                    stops: Vec::new(),
+                };
+                self.walk(&mut leg, here, before);
+                leg.stops.push(middle);
+                legs.push(leg);
+                legs.push(Leg {
+                    cell: into,
+                    stops: vec![after],
+                });
+                here = after;
+                is_seen[into.0 as usize] = true;
+                at = into;
+            }
+            if let Some(place) = places[at.0 as usize] {
+                let mut leg = Leg {
+                    cell: at,
+                    stops: Vec::new(),
+                };
+                self.walk(&mut leg, here, place);
+                legs.push(leg);
+                here = place;
+            }
+        }
+        Some(legs)
+    }
+
+    /// Goes on in a room to a point, around what stands there.
+    fn walk(&mut self, leg: &mut Leg, from: DVec3, to: DVec3) {
+        if let Some(map) = self.map(leg.cell, from) {
+            leg.stops.extend(map.way(from, to));
+        }
+        leg.stops.push(to);
+    }
+
+    /// Straight through an opening: before it, in it, and after it; where most is free around.
+    fn through(&mut self, id: PortalId, from: CellId, into: CellId) -> [DVec3; 3] {
+        let (interior, contents, unit) = (self.interior, self.contents, self.unit());
+        let portal = interior.portal(id);
+        let up = interior.up;
+        let center = portal.polygon.center();
+        let height = floor(interior, contents, from, portal) + unit;
+        let center = center + up * (height - center.dot(up));
+        let normal = portal.normal_into(Some(from));
+        let level = (normal - up * normal.dot(up)).normalize_or_zero();
+        let off = BEFORE_DOOR * unit * level;
+        let aside = up.cross(level) * 0.5 * portal.width(up);
+        let mut best: Option<(f64, [DVec3; 3])> = None;
+        // The middle first, then farther and farther aside.
+        for k in 0..TRIED {
+            let share = k.div_ceil(2) as f64 / (TRIED / 2 + 1) as f64;
+            let middle = center + aside * if k % 2 == 0 { share } else { -share };
+            if !portal
+                .polygon
+                .covers(middle - normal * portal.polygon.height(middle), 0.0)
+                && k > 0
+            {
+                continue;
+            }
+            let points = [middle + off, middle, middle - off];
+            let mut room = f64::INFINITY;
+            for cell in [from, into] {
+                if let Some(map) = self.map(cell, middle) {
+                    let along = (0..=8).map(|i| points[0].lerp(points[2], f64::from(i) / 8.0));
+                    room = along.map(|p| map.clearance(p)).fold(room, f64::min);
+                }
+            }
+            // What is enough is enough.
+            let room = room.min(ENOUGH * unit);
+            if best.as_ref().is_none_or(|(most, _)| room > *most) {
+                best = Some((room, points));
+            }
+        }
+        best.map_or([center + off, center, center - off], |(_, points)| points)
+    }
+
+    /// Over how far the way may be smoothed without coming nearer to what stands than it must: the
+    /// asked reach, or less.
+    fn smoothness(&mut self, legs: &[Leg], asked: f64) -> f64 {
+        let way = Way::new(legs.iter().flat_map(|leg| leg.stops.clone()).collect());
+        let used: Vec<&FloorMap> = self.maps.iter().flatten().collect();
+        let count = (way.length() / (0.02 * self.interior.eye_height.abs()).max(1e-9)).min(2e4);
+        let is_free = |reach: f64| {
+            (0..=count as usize).all(|i| {
+                let along = way.length() * i as f64 / count.max(1.0);
+                let [rough, smooth] = [way.at(along), way.smoothed(along, reach)];
+                let least = |p: DVec3| {
+                    used.iter()
+                        .map(|m| m.clearance(p))
+                        .fold(f64::INFINITY, f64::min)
+                };
+                least(smooth) > 0.0 || least(rough) == 0.0
+            })
+        };
+        let tried = [1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.08];
+        let found = tried
+            .into_iter()
+            .map(|s| s * asked)
+            .find(|reach| is_free(*reach));
+        found.unwrap_or(0.0)
+    }
 }
 
 /// The middle of a room, at eye height.

@@ -164,6 +164,18 @@ impl Columns {
         all.into_iter().flatten()
     }
 
+    /// The squares on the straight way from one to another.
+    pub(super) fn between(&self, from: usize, to: usize) -> impl Iterator<Item = usize> + use<> {
+        let width = self.size[0];
+        let place = |i: usize| DVec2::new((i % width) as f64, (i / width) as f64);
+        let (from, to) = (place(from), place(to));
+        let count = (to - from).abs().max_element() as usize;
+        (1..count).map(move |k| {
+            let at = from.lerp(to, k as f64 / count as f64).round();
+            at.y as usize * width + at.x as usize
+        })
+    }
+
     /// Metres as squares.
     pub(super) fn squares(&self, metres: f64) -> f64 {
         metres / self.step_m
@@ -406,6 +418,19 @@ impl Columns {
         tops.sort_unstable();
         let top = tops.get(tops.len() * 19 / 20).copied().unwrap_or(0);
         height_of(top as usize).clamp(2.2, 4.0)
+    }
+
+    /// Bits of heights that cameras saw through at a square or beside it along a wall across an axis,
+    /// or a bin higher or lower: lines of sight are samples, with gaps between them.
+    pub(super) fn seen_near(&self, at: usize, along: usize, axis: usize) -> u128 {
+        let Some(seen) = &self.seen else { return 0 };
+        let last = self.size[1 - axis] - 1;
+        let of = |along: usize| match axis {
+            0 => seen[along * self.size[0] + at],
+            _ => seen[at * self.size[0] + along],
+        };
+        let all = of(along) | of(along.saturating_sub(1)) | of((along + 1).min(last));
+        all | all << 1 | all >> 1
     }
 
     /// Whether who stands there sees past a column.

@@ -9,6 +9,8 @@
 //! open (`openings`). Rooms reach to the middle of their walls, and every hole there is a portal.
 
 mod columns;
+mod complete;
+mod corridors;
 mod distance;
 mod level;
 mod openings;
@@ -175,8 +177,10 @@ pub fn find_interior(
             None => {
                 let small = regions::drop_small(&columns, &mut labels, &grown, options);
                 if !small {
-                    let openings = found.into_iter().flat_map(|side| side.openings).collect();
-                    break (grown, openings);
+                    let all = found.into_iter().flat_map(|side| side.openings);
+                    let mut all: Vec<Opening> = all.collect();
+                    openings::meet(&columns, &mut all);
+                    break (grown, all);
                 }
             }
         }

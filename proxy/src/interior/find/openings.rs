@@ -59,6 +59,8 @@ pub(super) struct Side {
 const SAME_PLANE: f64 = 0.2;
 /// Walls are looked for on both sides of where rooms meet; metres.
 const REACH: f64 = 0.35;
+/// Openings that end within this of each other, and of a wall between the rooms beyond, end there; metres.
+const SAME_END: f64 = 0.35;
 /// Openings' least width, height and area; metres.
 const LEAST: f64 = 0.35;
 const LEAST_AREA: f64 = 0.15;
@@ -126,6 +128,41 @@ pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
     sides
 }
 
+/// Where openings of one room into two others meet, the wall between those two begins: both end at its
+/// plane. (Around the end of a wall rooms do not meet in a straight line.)
+pub(super) fn meet(columns: &Columns, openings: &mut [Opening]) {
+    let near = SAME_END * columns.meter;
+    for i in 0..openings.len() {
+        for j in 0..openings.len() {
+            let (a, b) = (openings[i], openings[j]);
+            let is_one_side = a.axis == b.axis && (a.at - b.at).abs() <= near;
+            if i == j || !is_one_side || (a.to - b.from).abs() > near {
+                continue;
+            }
+            let ends: Vec<u32> = a
+                .rooms
+                .into_iter()
+                .filter(|r| !b.rooms.contains(r))
+                .collect();
+            let others: Vec<u32> = b
+                .rooms
+                .into_iter()
+                .filter(|r| !a.rooms.contains(r))
+                .collect();
+            let is_between = |c: &&Opening| {
+                let pair = [ends.first(), others.first()].map(Option::<&u32>::copied);
+                c.axis != a.axis
+                    && pair.iter().all(|r| r.is_some_and(|r| c.rooms.contains(&r)))
+                    && (c.at - a.to).abs() <= near
+            };
+            if let Some(at) = openings.iter().find(is_between).map(|c| c.at) {
+                openings[i].to = at;
+                openings[j].from = at;
+            }
+        }
+    }
+}
+
 /// Two rooms that nothing but a beam parts, or nothing at all.
 pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)> {
     let mut pairs: BTreeMap<(u32, u32), [usize; 4]> = BTreeMap::new();
@@ -164,23 +201,33 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Si
     // 1. How thick the wall is, and where its middle is.
     let reach = columns.squares(REACH).round() as usize;
     let around = middle.saturating_sub(reach)..(middle + reach).min(most);
+    let is_wall = |at: usize, along: usize| {
+        let i = index(at, along);
+        columns.is_wall(i) || columns.is_lintel(i)
+    };
     let mut walls: Vec<(usize, usize)> = Vec::new();
     for along in &alongs {
-        let is_wall = |at: &usize| {
-            let i = index(*at, *along);
-            columns.is_wall(i) || columns.is_lintel(i)
-        };
-        let mut of = around.clone().filter(is_wall);
+        let mut of = around.clone().filter(|at| is_wall(*at, *along));
         if let Some(first) = of.next() {
             walls.push((first, of.next_back().unwrap_or(first) + 1));
         }
     }
-    let median = |pick: fn(&(usize, usize)) -> usize| {
-        let mut all: Vec<usize> = walls.iter().map(pick).collect();
-        all.sort_unstable();
-        all.get(all.len() / 2).copied().unwrap_or(middle)
+    let (low, high) = if columns.seen.is_some() {
+        // Of a wall often one face was seen, and leaves of doors beside the other: all that is as
+        // long as the narrowest opening is of it.
+        let length = |at: usize| alongs.iter().filter(|a| is_wall(at, **a)).count() as f64;
+        let mut faces = around.filter(|at| length(*at) >= columns.squares(LEAST));
+        let first = faces.next();
+        let last = faces.next_back().or(first).map(|at| at + 1);
+        (first.unwrap_or(middle), last.unwrap_or(middle))
+    } else {
+        let median = |pick: fn(&(usize, usize)) -> usize| {
+            let mut all: Vec<usize> = walls.iter().map(pick).collect();
+            all.sort_unstable();
+            all.get(all.len() / 2).copied().unwrap_or(middle)
+        };
+        (median(|w| w.0), median(|w| w.1))
     };
-    let (low, high) = (median(|w| w.0), median(|w| w.1));
     let at = 0.5 * (low + high) as f64;
     let across = low.saturating_sub(1)..(high + 1).min(most);
     // 2. What is open, square by square along it.
@@ -195,8 +242,11 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Si
         let taken = all.clone().fold(0, |t, i| t | columns.taken[i]);
         let mut free = !taken & range;
         let mut is_open = columns.is_open_at_eye(taken);
-        if let Some(seen) = &columns.seen {
-            free &= all.fold(0, |s, i| s | seen[i]);
+        if columns.seen.is_some() {
+            // Someone saw through all of its thickness.
+            let inner = low..high.max(low + 1);
+            free &= inner.fold(!0, |s, at| s & columns.seen_near(at, *along, axis));
+            free = reaching(free, !taken & range);
             is_open &= !columns.is_open_at_eye(free);
         }
         open[along - first] = free;
@@ -237,6 +287,19 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Si
         lintel: lintel_count,
         walled: walls.len(),
         openings: holes.into_iter().map(opening).collect(),
+    }
+}
+
+/// All of a column's free bins that join what was seen to be open: an opening ends where there is
+/// surface, not where lines of sight did.
+fn reaching(seen: u128, free: u128) -> u128 {
+    let mut all = seen & free;
+    loop {
+        let more = (all | all << 1 | all >> 1) & free;
+        if more == all {
+            return all;
+        }
+        all = more;
     }
 }
 

@@ -2,6 +2,8 @@
 
 use super::FindOptions;
 use super::columns::Columns;
+use super::complete::complete;
+use super::corridors;
 use super::distance::squared_distances;
 use std::collections::BTreeMap;
 
@@ -86,6 +88,8 @@ pub(super) fn regions(columns: &Columns, options: &FindOptions) -> Labels {
         drop_outside(columns, &mut found);
     }
     renumber(&mut found);
+    corridors::split(columns, &mut found, options);
+    renumber(&mut found);
     found
 }
 
@@ -169,15 +173,23 @@ pub(super) fn join(found: &mut Labels, a: u32, b: u32) {
 
 /// Rooms with what stands in them and half of their walls.
 pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
-    let (squared, nearest) = squared_distances(columns.size, |i| found.labels[i] != 0);
+    let mut known = found.labels.clone();
+    if columns.seen.is_some() {
+        complete(columns, &mut known);
+    }
+    let (squared, nearest) = squared_distances(columns.size, |i| known[i] != 0);
     // 1. Furniture that is open above: what is free above it is of the room.
     let top = columns.lintel_band();
     let depth = columns.squares(FURNITURE).powi(2);
+    let is_tall = |i: usize| top.is_some_and(|top| columns.taken[i] & top != 0);
     let is_room = |i: usize| {
-        let is_thing = top.is_some_and(|top| {
-            squared[i] <= depth && columns.is_wall(i) && columns.taken[i] & top == 0
-        });
-        found.labels[i] != 0 || is_thing
+        let is_thing = top.is_some()
+            && squared[i] <= depth
+            && columns.is_wall(i)
+            && !is_tall(i)
+            // Not the other face of a wall.
+            && !columns.between(i, nearest[i] as usize).any(is_tall);
+        known[i] != 0 || is_thing
     };
     // 2. Walls between rooms: gaps in all of them together. Other walls: a little of them.
     let mut is_in = columns.closed(HALF_WALL, is_room);
@@ -186,7 +198,7 @@ pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
         is_in[i] |= squared[i] <= skin;
     }
     let label = |i: usize| match is_in[i] && nearest[i] != u32::MAX {
-        true => found.labels[nearest[i] as usize],
+        true => known[nearest[i] as usize],
         false => 0,
     };
     Grown {

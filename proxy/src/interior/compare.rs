@@ -1,0 +1,233 @@
+//! How a found interior compares with a known one.
+
+use super::{CellId, Interior};
+use glam::DVec3;
+use std::fmt;
+
+/// A cell of the known interior, and the found one that shares most with it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparedCell {
+    /// The known one's name.
+    pub name: String,
+    /// The found one's; each is matched once.
+    pub found: Option<String>,
+    /// Floor area that both have, over floor area that either has.
+    pub iou: f64,
+}
+
+/// A portal of the known interior, and the found one where it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparedPortal {
+    /// The known one's name.
+    pub name: String,
+    /// The nearest found one that none nearer has, its middle's greatest distance along an axis of the
+    /// world, and by how much it is wider; in world units.
+    pub nearest: Option<(String, f64, f64)>,
+    /// Whether that is within the tolerance, and twice the tolerance in width.
+    pub is_found: bool,
+}
+
+/// How a found interior compares with a known one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// By cell of the known one that has a box.
+    pub cells: Vec<ComparedCell>,
+    /// Found cells that are matched with none.
+    pub extra_cells: Vec<String>,
+    /// By portal of the known one.
+    pub portals: Vec<ComparedPortal>,
+    /// Found portals that are none of them.
+    pub extra_portals: Vec<String>,
+}
+
+/// The side of squares of floor that are compared, in tolerances; and how many there are at most along
+/// a side of the storey.
+const STEP: f64 = 0.25;
+const MOST: f64 = 2000.0;
+
+/// Compares cells with boxes by the floor that they share, and portals by where their middles are.
+/// `tolerance` is in world units; of interiors without any box there is nothing to compare but portals.
+pub fn compare(known: &Interior, found: &Interior, tolerance: f64) -> Comparison {
+    let shared = shared_floor(known, found, tolerance);
+    let (n, m) = (known.cells.len(), found.cells.len());
+    let iou = |t: usize, f: usize| {
+        let both = shared.both[t * m + f];
+        both as f64 / (shared.known[t] + shared.found[f] - both).max(1) as f64
+    };
+    // 1. Cells, those that share most first.
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
+    pairs.retain(|(t, f)| iou(*t, *f) > 0.0);
+    pairs.sort_by(|a, b| iou(b.0, b.1).total_cmp(&iou(a.0, a.1)));
+    let (mut of_known, mut is_matched) = (vec![None; n], vec![false; m]);
+    for (t, f) in pairs {
+        if of_known[t].is_none() && !is_matched[f] {
+            of_known[t] = Some(f);
+            is_matched[f] = true;
+        }
+    }
+    let name = |f: usize| found.cells[f].name.clone();
+    let cells = (0..n).map(|t| ComparedCell {
+        name: known.cells[t].name.clone(),
+        found: of_known[t].map(name),
+        iou: of_known[t].map_or(0.0, |f| iou(t, f)),
+    });
+    let cells = cells.collect();
+    let extra_cells = (0..m).filter(|f| !is_matched[*f]).map(name).collect();
+    // 2. Portals, the nearest first.
+    let off = |t: usize, f: usize| {
+        let [a, b] = [&known.portals[t], &found.portals[f]];
+        let apart = b.polygon.center() - a.polygon.center();
+        let wider = b.width(found.up) - a.width(known.up);
+        (apart.abs().max_element(), wider)
+    };
+    let (n, m) = (known.portals.len(), found.portals.len());
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
+    pairs.sort_by(|a, b| off(a.0, a.1).0.total_cmp(&off(b.0, b.1).0));
+    let (mut of_known, mut is_matched) = (vec![None; n], vec![false; m]);
+    for (t, f) in pairs {
+        if of_known[t].is_none() && !is_matched[f] {
+            of_known[t] = Some(f);
+            is_matched[f] = true;
+        }
+    }
+    let mut is_extra = vec![true; m];
+    let mut portals = Vec::new();
+    for t in 0..n {
+        let nearest = of_known[t].map(|f| (f, off(t, f)));
+        let is_near = |(_, (apart, wider)): &(usize, (f64, f64))| {
+            *apart <= tolerance && wider.abs() <= 2.0 * tolerance
+        };
+        if let Some((f, _)) = nearest.filter(is_near) {
+            is_extra[f] = false;
+        }
+        portals.push(ComparedPortal {
+            name: known.portals[t].name.clone(),
+            is_found: nearest.is_some_and(|n| is_near(&n)),
+            nearest: nearest
+                .map(|(f, (apart, wider))| (found.portals[f].name.clone(), apart, wider)),
+        });
+    }
+    let extra = (0..m).filter(|f| is_extra[*f]);
+    Comparison {
+        cells,
+        extra_cells,
+        portals,
+        extra_portals: extra.map(|f| found.portals[f].name.clone()).collect(),
+    }
+}
+
+/// Squares of floor, by cell.
+struct Shared {
+    known: Vec<usize>,
+    found: Vec<usize>,
+    /// By known cell, then by found cell.
+    both: Vec<usize>,
+}
+
+fn shared_floor(known: &Interior, found: &Interior, tolerance: f64) -> Shared {
+    let m = found.cells.len();
+    let mut shared = Shared {
+        known: vec![0; known.cells.len()],
+        found: vec![0; m],
+        both: vec![0; known.cells.len() * m],
+    };
+    let up = known.up;
+    let along = up.any_orthonormal_vector();
+    let axes = [along, up.cross(along)];
+    // 1. What all boxes span.
+    let boxes = known.cells.iter().chain(&found.cells);
+    let corners = boxes.filter_map(|c| c.content.room()).flat_map(|b| {
+        (0..8).map(move |i| {
+            DVec3::select(
+                glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0),
+                b.max,
+                b.min,
+            )
+        })
+    });
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for p in corners {
+        for k in 0..2 {
+            low[k] = low[k].min(p.dot(axes[k]));
+            high[k] = high[k].max(p.dot(axes[k]));
+        }
+    }
+    let longest = (high[0] - low[0]).max(high[1] - low[1]);
+    if !(longest.is_finite() && longest > 0.0) {
+        return shared;
+    }
+    // 2. Which squares are whose.
+    let step = (STEP * tolerance).max(longest / MOST);
+    let counts = [0, 1].map(|k| ((high[k] - low[k]) / step) as usize + 1);
+    for i in 0..counts[0] * counts[1] {
+        let place = [i % counts[0], i / counts[0]];
+        let at = [0, 1].map(|k| low[k] + (place[k] as f64 + 0.5) * step);
+        let p = at[0] * axes[0] + at[1] * axes[1];
+        let over = |interior: &Interior| -> Vec<usize> {
+            let ids = 0..interior.cells.len();
+            ids.filter(|i| is_over(interior, CellId(*i as u32), p, up))
+                .collect()
+        };
+        let (a, b) = (over(known), over(found));
+        a.iter().for_each(|t| shared.known[*t] += 1);
+        b.iter().for_each(|f| shared.found[*f] += 1);
+        for t in &a {
+            b.iter().for_each(|f| shared.both[t * m + f] += 1);
+        }
+    }
+    shared
+}
+
+/// Whether a cell's box and outline have the vertical through a point.
+fn is_over(interior: &Interior, id: CellId, p: DVec3, up: DVec3) -> bool {
+    let cell = interior.cell(id);
+    let Some(room) = cell.content.room() else {
+        return false;
+    };
+    let middle = room.min.midpoint(room.max);
+    let in_box = p + up * (middle.dot(up) - p.dot(up));
+    let on_floor = |floor: &super::Polygon| {
+        let along = up.dot(floor.normal());
+        let foot = p - up * (floor.height(p) / along);
+        along.abs() > 1e-6 && floor.covers(foot, 0.0)
+    };
+    room.contains(in_box) && cell.floor.as_ref().is_none_or(on_floor)
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for ComparedCell { name, found, iou } in &self.cells {
+            match found {
+                Some(found) => writeln!(f, "{name}: {found}, IoU {iou:.3}")?,
+                None => writeln!(f, "{name}: not found")?,
+            }
+        }
+        for name in &self.extra_cells {
+            writeln!(f, "{name}: no such room")?;
+        }
+        for portal in &self.portals {
+            let said = if portal.is_found {
+                "found"
+            } else {
+                "not found"
+            };
+            write!(f, "{}: {said}", portal.name)?;
+            match &portal.nearest {
+                Some((name, apart, wider)) => {
+                    writeln!(f, "; {name} is {apart:.2} off and {wider:+.2} wide")?;
+                }
+                None => writeln!(f)?,
+            }
+        }
+        for name in &self.extra_portals {
+            writeln!(f, "{name}: no such portal")?;
+        }
+        let (cells, portals) = (self.cells.len(), self.portals.len());
+        let found = self.cells.iter().filter(|c| c.found.is_some()).count();
+        let seen = self.portals.iter().filter(|p| p.is_found).count();
+        writeln!(
+            f,
+            "{found} of {cells} rooms, {seen} of {portals} portals found"
+        )
+    }
+}
