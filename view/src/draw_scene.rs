@@ -2,6 +2,7 @@
 
 use crate::compose::{depth_picture, nearest_stop, over_background, photo_picture, shaded_picture};
 use crate::content::Space;
+use crate::overlay::mesh_of;
 use crate::picture::{DepthGrid, Hover, Layer, Lines, Request, Shown, Support};
 use calibrate::{Pixel, View};
 use egui::ColorImage;
@@ -87,6 +88,7 @@ impl<'a> SceneDrawer<'a> {
             image: Arc::new(image?),
             photo: None,
             lines: Lines::default(),
+            mesh: Arc::default(),
             depths: DepthGrid::default(),
             support: None,
             hover: None,
@@ -192,7 +194,7 @@ impl<'a> SceneDrawer<'a> {
         // 3. What goes with it.
         let mut lines = Lines::default();
         let scale = f64::from(asked.width) / f64::from(width);
-        timed(&mut stages, "overlays", || {
+        let mesh = timed(&mut stages, "overlays", || {
             if let Some(field) = prepared.field() {
                 if look.triangulation {
                     lines.triangulation = edges_of_field(field, scale);
@@ -203,6 +205,7 @@ impl<'a> SceneDrawer<'a> {
             if look.wireframe {
                 lines.wireframe = edges_of_proxy(self.lumigraph, asked, self.space.depth);
             }
+            mesh_of(&lines, asked)
         });
         let photo = look
             .photo
@@ -224,6 +227,7 @@ impl<'a> SceneDrawer<'a> {
             image: Arc::new(image),
             photo: photo.flatten().map(|(i, photo)| (i, Arc::new(photo))),
             lines,
+            mesh: Arc::new(mesh),
             depths,
             support: Some(support),
             hover,

@@ -11,6 +11,7 @@ mod draw_house;
 mod draw_scene;
 mod keyframes;
 mod keys;
+mod lines;
 mod loader;
 mod overlay;
 mod panel;

@@ -1,5 +1,6 @@
 //! What is asked of the thread that draws, and what comes back.
 
+use crate::lines::LineMesh;
 use calibrate::{Pixel, View};
 use egui::ColorImage;
 use glam::{DVec2, DVec3};
@@ -111,6 +112,8 @@ pub struct Shown {
     pub photo: Option<(usize, Arc<ColorImage>)>,
     /// Lines over it, in pixels of the view.
     pub lines: Lines,
+    /// Those that are many, as they are painted.
+    pub(crate) mesh: Arc<LineMesh>,
     /// How far away things are.
     pub depths: DepthGrid,
     /// How well the photos support it; none of interiors.
