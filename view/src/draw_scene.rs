@@ -11,8 +11,8 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, RenderError, TriangulatedField,
-    picture,
+    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Prepared, RenderError,
+    TriangulatedField, picture,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -40,6 +40,7 @@ struct Ready<'a> {
     view: View,
     options: FieldOptions,
     method: Method,
+    moment: Option<Moment>,
     frame: Frame<'a>,
     prepared: Prepared,
 }
@@ -138,12 +139,20 @@ impl<'a> SceneDrawer<'a> {
             ),
         };
         // 1. The surface and the field, if they are others than before.
-        let is_same =
-            |r: &Ready<'_>| r.view == view && r.options == look.options && r.method == look.method;
+        let is_same = |r: &Ready<'_>| {
+            r.view == view
+                && r.options == look.options
+                && r.method == look.method
+                && r.moment == look.moment
+        };
         if !self.ready.as_ref().is_some_and(is_same) {
             self.ready = None;
             let frame = timed(&mut stages, "surface", || {
                 let frame = Frame::without(self.lumigraph, view.clone(), look.options, self.gone);
+                let frame = match &look.moment {
+                    Some(moment) => frame.at(moment),
+                    None => frame,
+                };
                 if self.no_skip {
                     frame.without_skipping()
                 } else {
@@ -155,6 +164,7 @@ impl<'a> SceneDrawer<'a> {
                 view,
                 options: look.options,
                 method: look.method,
+                moment: look.moment,
                 frame,
                 prepared,
             });

@@ -92,15 +92,15 @@ impl<'a> Overlay<'a> {
     }
 
     /// The photos' cameras, `nearest` in a colour of its own.
-    pub(crate) fn frusta(&mut self, space: &Space, nearest: Option<usize>) {
-        for i in nearest_few(&space.stops, self.view) {
+    pub(crate) fn frusta(&mut self, stops: &[Stop], depth: f64, nearest: Option<usize>) {
+        for i in nearest_few(stops, self.view) {
             let color = if Some(i) == nearest {
                 CAMERA_NEAR
             } else {
                 CAMERA
             };
-            let length = FRUSTUM * space.depth;
-            self.frustum(&space.stops[i].view, length, Stroke::new(1.0, color));
+            let length = FRUSTUM * depth;
+            self.frustum(&stops[i].view, length, Stroke::new(1.0, color));
         }
     }
 
@@ -256,7 +256,9 @@ mod tests {
             speed: 1.0,
             depth: 5.0,
             stops: vec![stop(-1.0), stop(0.0), stop(1.0)],
+            cameras: Vec::new(),
             is_interior: false,
+            times: None,
         };
         let mut view = stop(0.0).view;
         view.camera_from_world = Rigid3::looking_at(-4.0 * DVec3::Z, DVec3::Z, DVec3::NEG_Y);

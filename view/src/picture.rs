@@ -5,7 +5,7 @@ use calibrate::{Pixel, View};
 use egui::ColorImage;
 use glam::{DVec2, DVec3};
 use render::interior::PortalFill;
-use render::{FieldOptions, Method};
+use render::{FieldOptions, Method, Moment};
 use std::sync::Arc;
 
 /// What pixels show.
@@ -57,6 +57,8 @@ pub struct Look {
     pub method: Method,
     /// What is seen through the portals of an interior.
     pub portals: PortalFill,
+    /// When, of a scene that moves.
+    pub moment: Option<Moment>,
     /// Whether the field's triangulation is wanted.
     pub triangulation: bool,
     /// Whether the proxy's edges are wanted.
@@ -74,6 +76,7 @@ impl Default for Look {
             options: FieldOptions::default(),
             method: Method::TRIANGULATED,
             portals: PortalFill::Geometry,
+            moment: None,
             triangulation: false,
             wireframe: false,
             photo: false,

@@ -18,7 +18,7 @@ use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
 use pane::{Opened, Pane};
 use panels::Panels;
-use render::path::KeyframeFile;
+use render::path::{KeyframeFile, NerfstudioFrame};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -41,6 +41,8 @@ pub struct ViewOptions {
     pub worker: WorkerOptions,
     /// Keyframes to begin with.
     pub keyframes: Option<KeyframeFile>,
+    /// Where paths lie that are saved for nerfstudio.
+    pub nerfstudio: NerfstudioFrame,
     /// A file that gets a line of JSON for each frame.
     pub trace: Option<PathBuf>,
 }
@@ -437,6 +439,7 @@ mod tests {
                 output: PathBuf::new(),
             },
             keyframes: None,
+            nerfstudio: NerfstudioFrame::default(),
             trace: None,
         };
         let mut app = App::new(options, Arc::new(|_| {}), None);

@@ -6,7 +6,9 @@ use crate::overlay::clicked;
 use crate::panel::Command;
 use crate::state::{Action, Button};
 use calibrate::Pixel;
-use render::path::{KeyframeFile, write_keyframes};
+use render::path::{
+    CameraPath, KeyframeFile, NerfstudioFrame, PathFileError, write_keyframes, write_nerfstudio,
+};
 use std::path::Path;
 use std::sync::Arc;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
@@ -100,7 +102,8 @@ impl App {
         };
         let folder = self.options.worker.output.clone();
         let tell = Arc::clone(&self.tell);
-        std::thread::spawn(move || tell(Event::Said(write_path(&folder, &file))));
+        let frame = self.options.nerfstudio;
+        std::thread::spawn(move || tell(Event::Said(write_path(&folder, &file, &frame))));
     }
 
     fn width(&self) -> f64 {
@@ -220,14 +223,19 @@ impl App {
     }
 }
 
-/// Writes a path to a folder; what people should know of it.
-fn write_path(folder: &Path, file: &KeyframeFile) -> String {
-    let path = folder.join("path.json");
-    let written = std::fs::create_dir_all(folder)
-        .map_err(|error| format!("{}: {error}", folder.display()))
-        .and_then(|()| write_keyframes(&path, file).map_err(|error| error.to_string()));
+/// Writes a path to a folder, and for nerfstudio beside it; what people should know of it.
+fn write_path(folder: &Path, file: &KeyframeFile, frame: &NerfstudioFrame) -> String {
+    let (own, other) = (folder.join("path.json"), folder.join("camera_path.json"));
+    if let Err(error) = std::fs::create_dir_all(folder) {
+        return format!("{}: {error}", folder.display());
+    }
+    let written = write_keyframes(&own, file).and_then(|()| {
+        let sampled = CameraPath::from_keyframes(&file.keyframes, file.interpolation, file.fps);
+        let sampled = sampled.map_err(|error| PathFileError::Path(own.clone(), error))?;
+        write_nerfstudio(&other, &sampled, Some(file), frame)
+    });
     match written {
-        Ok(()) => format!("saved {}", path.display()),
-        Err(error) => error,
+        Ok(()) => format!("saved {}; camera_path.json is nerfstudio's", own.display()),
+        Err(error) => error.to_string(),
     }
 }

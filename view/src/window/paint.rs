@@ -45,8 +45,10 @@ pub(super) fn paint(
         overlay.epipoles(&shown.lines.epipoles);
     }
     if let Some(space) = state.space() {
-        if shows.frusta && !space.is_interior {
-            overlay.frusta(space, state.nearest());
+        match (shows.frusta, space.is_interior) {
+            (true, false) => overlay.frusta(&space.stops, space.depth, state.nearest()),
+            (true, true) => overlay.frusta(&space.cameras, space.depth, None),
+            (false, _) => {}
         }
         if !state.is_playing() {
             let keyframes = &state.keyframes;
