@@ -8,6 +8,7 @@ use image::{Rgba, RgbaImage};
 use lumigraph::scene::{Photo, Scene};
 use render::score::on_black;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -98,7 +99,7 @@ pub(super) struct FilmArgs {
     /// Go on where an interrupted run with --resume stopped: frames that are there stay. The command
     /// line, the photos and the path must be those of before
     #[arg(long)]
-    pub(super) resume: bool,
+    resume: bool,
 }
 
 /// What is behind the picture.
@@ -187,10 +188,13 @@ const NAMED: usize = 3;
 
 /// What became of files, for people; empty of files as they were.
 fn changes(before: &[Stamp], now: &[Stamp]) -> String {
-    let find = |all: &[Stamp], file: &Path| all.iter().find(|s| s.file == file).cloned();
-    let gone = before.iter().filter(|s| find(now, &s.file).is_none());
+    let by_file = |all: &[Stamp]| -> BTreeMap<PathBuf, Stamp> {
+        all.iter().map(|s| (s.file.clone(), s.clone())).collect()
+    };
+    let (was, is) = (by_file(before), by_file(now));
+    let gone = before.iter().filter(|s| !is.contains_key(&s.file));
     let gone = gone.map(|s| format!("{} is gone", s.file.display()));
-    let other = now.iter().filter_map(|s| match find(before, &s.file) {
+    let other = now.iter().filter_map(|s| match was.get(&s.file) {
         None => Some(format!("{} is new", s.file.display())),
         Some(was) if was.bytes != s.bytes => Some(format!(
             "{} has {} bytes, not {}",
@@ -198,7 +202,7 @@ fn changes(before: &[Stamp], now: &[Stamp]) -> String {
             s.bytes,
             was.bytes
         )),
-        Some(was) if was != *s => Some(format!("{} was written since", s.file.display())),
+        Some(was) if was != s => Some(format!("{} was written since", s.file.display())),
         Some(_) => None,
     });
     let all: Vec<String> = gone.chain(other).collect();
