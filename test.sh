@@ -49,6 +49,7 @@ install_missing() {
     command -v ffmpeg >/dev/null || missing+=(ffmpeg)
     command -v Xvfb >/dev/null || missing+=(xvfb)
     command -v xdotool >/dev/null || missing+=(xdotool)
+    command -v xprop >/dev/null || missing+=(x11-utils)
     has_x11 || missing+=(libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon0 libxkbcommon-x11-0)
     if [ ${#missing[@]} -eq 0 ]; then return; fi
     step "installing ${missing[*]}"

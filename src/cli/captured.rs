@@ -1,6 +1,7 @@
 //! The photos that show an interior's cells.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
+use super::film::files_of;
 use super::options::print_warnings;
 use super::output::say;
 use anyhow::{Context, bail};
@@ -12,7 +13,7 @@ use render::interior::{Captured, Painter};
 use render::{DeviceChoice, Engine, FieldOptions, Method};
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The scene whose photos show an interior's cells.
@@ -63,6 +64,11 @@ impl Photos {
             without,
             exposure,
         }))
+    }
+
+    /// The scene's files; see [`files_of`].
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        files_of(&self.scene)
     }
 
     /// Adds what is seen where the model has no surface; see [`Scene::add_backdrop`].

@@ -14,6 +14,7 @@ use glam::{DVec2, DVec3};
 use image::RgbaImage;
 use render::blend::Contributor;
 use render::field::FieldTriangle;
+use render::path::NerfstudioFrame;
 use render::picture::{contributors_exact, field_picture, palette};
 use render::triangulation::{Triangulation, to_svg};
 use render::{Frame, Method, TriangulatedField};
@@ -85,7 +86,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         None => (scene.view(&args.view)?, scene.time_s(&args.view)),
         Some(path) => {
             let points = || points(&scene, &without);
-            frame_of(of_path(path, args.frames, &lumigraph, points)?, &args.view)?
+            let frame = NerfstudioFrame::default();
+            let (views, _) = of_path(path, args.frames, &lumigraph, points, &frame)?;
+            frame_of(views, &args.view)?
         }
     };
     let view = resized(view, args.size);

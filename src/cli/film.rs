@@ -5,22 +5,23 @@ use super::options::positive;
 use super::output::write_file;
 use anyhow::{Context, bail};
 use image::{Rgba, RgbaImage};
+use lumigraph::scene::{Photo, Scene};
 use render::score::on_black;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
 
 /// Which frames: so many of a derived path, or a part of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FrameChoice {
-    /// Of a derived path.
-    pub(super) count: u32,
+    /// Of a derived path, where it is said.
+    count: Option<u32>,
     /// Those that are drawn; `None` for all.
     range: Option<Range<usize>>,
 }
 
-/// Frames of a derived path where nobody says.
-const COUNT: u32 = 30;
 const MOST: u32 = 100_000;
 
 /// `60`, `120..240` or `120..240/300`.
@@ -28,13 +29,16 @@ pub(super) fn frame_choice(text: &str) -> Result<FrameChoice, String> {
     let parse = || {
         let count = |text: &str| text.parse().ok().filter(|n| (1..=MOST).contains(n));
         let Some((first, rest)) = text.split_once("..") else {
-            let count = count(text)?;
+            let count = Some(count(text)?);
             return Some(FrameChoice { count, range: None });
         };
         let (last, all) = rest
             .split_once('/')
             .map_or((rest, None), |(l, n)| (l, Some(n)));
-        let count = all.map_or(Some(COUNT), count)?;
+        let count = match all {
+            Some(all) => Some(count(all)?),
+            None => None,
+        };
         let range: Range<usize> = first.parse().ok()?..last.parse().ok()?;
         (!range.is_empty()).then_some(FrameChoice {
             count,
@@ -50,6 +54,16 @@ pub(super) fn frame_choice(text: &str) -> Result<FrameChoice, String> {
 }
 
 impl FrameChoice {
+    /// How many frames a derived path has.
+    pub(super) fn count(&self, otherwise: u32) -> u32 {
+        self.count.unwrap_or(otherwise)
+    }
+
+    /// Whether only a part of a path is drawn.
+    pub(super) fn is_part(&self) -> bool {
+        self.range.is_some()
+    }
+
     /// Keeps the frames that are to be drawn.
     pub(super) fn of<T>(&self, mut frames: Vec<T>) -> anyhow::Result<Vec<T>> {
         let Some(range) = &self.range else {
@@ -75,14 +89,15 @@ pub(super) struct FilmArgs {
     /// Also make a film of the frames, with ffmpeg: .mp4, .webm, .mkv, …
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
-    /// Its frames a second [default: 30]
+    /// Its frames a second [default: the path's own, else 30]
     #[arg(long, value_name = "N", value_parser = positive, requires = "video")]
     fps: Option<f64>,
-    /// What is seen where no photo shows anything: #RRGGBB, or transparent; in a film transparent
+    /// What is behind where nothing is shown: #RRGGBB, or transparent; in a film transparent
     /// is black
     #[arg(long, value_name = "COLOR", default_value = "transparent", value_parser = background)]
     background: Background,
-    /// Go on where an interrupted run with --resume stopped: frames that are there stay
+    /// Go on where an interrupted run with --resume stopped: frames that are there stay. The command
+    /// line, the photos and the path must be those of before
     #[arg(long)]
     resume: bool,
 }
@@ -121,10 +136,86 @@ impl Background {
 }
 
 /// What the frames of a folder were made with.
-#[derive(PartialEq, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 struct Plan {
     version: String,
     arguments: Vec<String>,
+    /// None of earlier versions.
+    #[serde(default)]
+    inputs: Vec<Stamp>,
+}
+
+/// A file as it was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Stamp {
+    file: PathBuf,
+    bytes: u64,
+    /// Nanoseconds after 1970 at which it was last written.
+    modified_ns: u64,
+}
+
+impl Stamp {
+    /// `None` of what is no file, as the name of a derived path.
+    fn of(file: &Path) -> Option<Self> {
+        let found = std::fs::metadata(file).ok().filter(|m| m.is_file())?;
+        let modified = found.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+        Some(Self {
+            file: file.to_owned(),
+            bytes: found.len(),
+            modified_ns: u64::try_from(modified.as_nanos()).ok()?,
+        })
+    }
+}
+
+/// The files of a scene that decide what its pictures are.
+pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
+    let of_photo = |p: &Photo| {
+        let beside = [&p.ignore_mask, &p.object_matte, &p.silhouette, &p.depth_map];
+        let beside = beside.into_iter().flatten().cloned();
+        std::iter::once(p.path.clone())
+            .chain(beside)
+            .collect::<Vec<_>>()
+    };
+    let own = scene.folder.iter().flat_map(|folder| {
+        let proxy = scene.proxy.iter().map(|p| folder.join(&p.file));
+        proxy.chain([folder.join("scene.json")])
+    });
+    own.chain(scene.photos.iter().flat_map(of_photo)).collect()
+}
+
+/// More files than these are not named.
+const NAMED: usize = 3;
+
+/// What became of files, for people; empty of files as they were.
+fn changes(before: &[Stamp], now: &[Stamp]) -> String {
+    let by_file = |all: &[Stamp]| -> BTreeMap<PathBuf, Stamp> {
+        all.iter().map(|s| (s.file.clone(), s.clone())).collect()
+    };
+    let (was, is) = (by_file(before), by_file(now));
+    let gone = before.iter().filter(|s| !is.contains_key(&s.file));
+    let gone = gone.map(|s| format!("{} is gone", s.file.display()));
+    let other = now.iter().filter_map(|s| match was.get(&s.file) {
+        None => Some(format!("{} is new", s.file.display())),
+        Some(was) if was.bytes != s.bytes => Some(format!(
+            "{} has {} bytes, not {}",
+            s.file.display(),
+            s.bytes,
+            was.bytes
+        )),
+        Some(was) if was != s => Some(format!("{} was written since", s.file.display())),
+        Some(_) => None,
+    });
+    let all: Vec<String> = gone.chain(other).collect();
+    let named = all
+        .iter()
+        .take(NAMED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
+    match all.len().saturating_sub(NAMED) {
+        0 => named,
+        more => format!("{named}, and {more} more"),
+    }
 }
 
 /// Where a run with `--resume` says what it makes.
@@ -132,7 +223,7 @@ const PLAN: &str = "resume.json";
 
 impl Plan {
     /// This run's, without what decides no pixel.
-    fn own() -> Self {
+    fn own(inputs: &[PathBuf]) -> Self {
         const ALONE: [&str; 2] = ["--resume", "--json"];
         const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
         let mut arguments = Vec::new();
@@ -155,16 +246,25 @@ impl Plan {
                 arguments.push(argument);
             }
         }
+        let mut stamps: Vec<Stamp> = inputs.iter().filter_map(|file| Stamp::of(file)).collect();
+        stamps.sort_by(|a, b| a.file.cmp(&b.file));
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             arguments,
+            inputs: stamps,
         }
     }
 }
 
 impl FilmArgs {
-    /// Fails early where a film cannot be made, and says which frames are there already.
-    pub(super) fn begin(&self, folder: &Path, files: &[PathBuf]) -> anyhow::Result<Vec<bool>> {
+    /// Fails early where a film cannot be made, and says which frames are there already. `inputs` are
+    /// the files that frames are made of.
+    pub(super) fn begin(
+        &self,
+        folder: &Path,
+        files: &[PathBuf],
+        inputs: &[PathBuf],
+    ) -> anyhow::Result<Vec<bool>> {
         if self.video.is_some() {
             capture::video::ffmpeg().text(&["-version"])?;
         }
@@ -172,13 +272,22 @@ impl FilmArgs {
             return Ok(vec![false; files.len()]);
         }
         let file = folder.join(PLAN);
-        let own = Plan::own();
+        let own = Plan::own(inputs);
         match std::fs::read(&file) {
             Ok(bytes) => {
                 let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
-                if plan.as_ref() != Some(&own) {
+                let is_same = |p: &Plan| p.version == own.version && p.arguments == own.arguments;
+                let Some(plan) = plan.filter(is_same) else {
                     bail!(
                         "{}: the frames in this folder were made by another command line; choose \
+                         another folder, or remove this one",
+                        file.display()
+                    );
+                };
+                let changes = changes(&plan.inputs, &own.inputs);
+                if !(plan.inputs.is_empty() || changes.is_empty()) {
+                    bail!(
+                        "{}: the frames in this folder were made of other files: {changes}; choose \
                          another folder, or remove this one",
                         file.display()
                     );
@@ -202,7 +311,7 @@ impl FilmArgs {
     }
 
     /// Makes the film of written frames, if one is asked for.
-    pub(super) fn finish(&self, files: &[PathBuf]) -> anyhow::Result<()> {
+    pub(super) fn finish(&self, files: &[PathBuf], fps: f64) -> anyhow::Result<()> {
         let (Some(video), Some(first)) = (&self.video, files.first()) else {
             return Ok(());
         };
@@ -224,7 +333,7 @@ impl FilmArgs {
             Ok(on_black(&picture).into_iter().flatten().collect())
         });
         super::output::make_parent(video)?;
-        capture::video::encode(video, size, self.fps.unwrap_or(30.0), frames)
+        capture::video::encode(video, size, self.fps.unwrap_or(fps), frames)
             .with_context(|| video.display().to_string())
     }
 
@@ -240,7 +349,10 @@ mod tests {
 
     #[test]
     fn frames_are_counted_or_chosen() {
-        let all = |count| FrameChoice { count, range: None };
+        let all = |count| FrameChoice {
+            count: Some(count),
+            range: None,
+        };
         assert_eq!(frame_choice("60"), Ok(all(60)));
         let part = frame_choice("2..4").unwrap();
         assert_eq!(part.of(vec![0, 1, 2, 3, 4]).unwrap(), [2, 3]);
@@ -248,12 +360,31 @@ mod tests {
             part.of(vec![0, 1, 2]).unwrap_err().to_string(),
             "--frames 2..4: the path has 3 frames"
         );
-        assert_eq!(frame_choice("1..2/7").unwrap().count, 7);
+        assert_eq!(part.count(30), 30);
+        assert_eq!(frame_choice("1..2/7").unwrap().count(30), 7);
         for bad in [
             "", "0", "4..4", "5..2", "-1..3", "1..", "100001", "1..2/0", "a..b",
         ] {
             assert!(frame_choice(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn what_became_of_files_is_said() {
+        let stamp = |name: &str, bytes: u64, modified_ns: u64| Stamp {
+            file: PathBuf::from(name),
+            bytes,
+            modified_ns,
+        };
+        let before = ["a", "b", "c", "d"].map(|name| stamp(name, 5, 7));
+        assert_eq!(changes(&before, &before), "");
+        let now = [stamp("b", 5, 8), stamp("c", 6, 9), stamp("d", 5, 7)];
+        let expected = "a is gone, b was written since, c has 6 bytes, not 5";
+        assert_eq!(changes(&before, &now), expected);
+        assert_eq!(
+            changes(&[], &before),
+            "a is new, b is new, c is new, and 1 more"
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ use calibrate::{View, colmap};
 use glam::DVec3;
 use lumigraph::scene::SceneError;
 use render::Lumigraph;
-use render::path::{self, CameraPath, PathFrame};
+use render::path::{self, CameraPath, NerfstudioFrame, PathFrame};
 use render::trajectory::{self, Trajectory};
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 pub(super) struct ViewArgs {
     /// The views of a COLMAP model, of a path file, or of a screenshot of `view`
     #[arg(long, value_name = "MODEL|FILE")]
-    views: Option<PathBuf>,
+    pub(super) views: Option<PathBuf>,
     /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
-    /// file
+    /// file, nerfstudio's too
     #[arg(long, value_name = "KIND|FILE")]
-    path: Option<String>,
+    pub(super) path: Option<String>,
 }
 
 /// A view to render and what to call it.
@@ -30,7 +30,8 @@ pub(super) struct NamedView {
     pub(super) time_s: Option<f64>,
 }
 
-/// The views asked for. `points_in_world` are the sparse points, for derived paths.
+/// The views asked for, and how many a second a film shows. `points_in_world` are the sparse points,
+/// for derived paths; `frame` is where nerfstudio's paths lie.
 ///
 /// # Errors
 /// They cannot be read or derived.
@@ -39,18 +40,19 @@ pub(super) fn frames(
     count: u32,
     lumigraph: &Lumigraph,
     points_in_world: impl FnOnce() -> Vec<DVec3>,
-) -> anyhow::Result<Vec<NamedView>> {
+    frame: &NerfstudioFrame,
+) -> anyhow::Result<(Vec<NamedView>, f64)> {
     match (&args.views, &args.path) {
-        (Some(views), _) if views.is_dir() => of_model(views),
-        (Some(views), _) => of_file(views),
+        (Some(views), _) if views.is_dir() => Ok((of_model(views)?, FPS)),
+        (Some(views), _) => of_file(views, frame),
         (None, path) => {
             let asked = path.as_deref().unwrap_or_default();
-            of_path(asked, count, lumigraph, points_in_world)
+            of_path(asked, count, lumigraph, points_in_world, frame)
         }
     }
 }
 
-/// The frames of a path: a kind of derived path, or a file.
+/// The frames of a path, and how many of them a second: a kind of derived path, or a file.
 ///
 /// # Errors
 /// It cannot be read or derived.
@@ -59,7 +61,8 @@ pub(super) fn of_path(
     count: u32,
     lumigraph: &Lumigraph,
     points_in_world: impl FnOnce() -> Vec<DVec3>,
-) -> anyhow::Result<Vec<NamedView>> {
+    frame: &NerfstudioFrame,
+) -> anyhow::Result<(Vec<NamedView>, f64)> {
     let kind = match asked {
         "orbit" => Trajectory::Orbit,
         "dolly" => Trajectory::Dolly,
@@ -71,7 +74,7 @@ pub(super) fn of_path(
                     format!("--path {asked}: expected orbit, dolly, sweep or a path file");
                 return Err(Usage(message).into());
             }
-            return of_file(file);
+            return of_file(file, frame);
         }
     };
     let points = points_in_world();
@@ -86,7 +89,7 @@ pub(super) fn of_path(
     )?))
 }
 
-/// Frames a second of derived paths. Only a film made of the frames would show it.
+/// Frames a second where no path says. Only a film made of the frames would show it.
 const FPS: f64 = 30.0;
 
 /// The images of a COLMAP model, by name.
@@ -115,21 +118,22 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
 }
 
 /// The frames of a path file, or the one that a screenshot was taken of.
-fn of_file(file: &Path) -> anyhow::Result<Vec<NamedView>> {
+fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<(Vec<NamedView>, f64)> {
     let is_shot = file
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
     Ok(named(match is_shot {
         true => path::read_shot(file)?,
-        false => path::read(file)?,
+        false => path::read_in(file, frame)?,
     }))
 }
 
-fn named(path: CameraPath) -> Vec<NamedView> {
+fn named(path: CameraPath) -> (Vec<NamedView>, f64) {
+    let fps = path.fps;
     let named = |frame: PathFrame| NamedView {
         name: frame.name,
         view: frame.view,
         time_s: frame.time_s,
     };
-    path.frames.into_iter().map(named).collect()
+    (path.frames.into_iter().map(named).collect(), fps)
 }

@@ -19,6 +19,7 @@ mod ledger;
 mod npz;
 mod options;
 mod output;
+mod path;
 mod plan;
 mod plot;
 mod proxy;
@@ -61,6 +62,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Bench(bench::Args),
     Export(export::Args),
+    Path(path::Args),
     Interior(interior::Args),
     Plan(plan::Args),
     Walk(walk::Args),
@@ -110,6 +112,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Path(args) => path::run(&args),
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Walk(args) => walk::run(&args),

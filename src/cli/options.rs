@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Which photo set.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct SceneArgs {
     /// A scene written by `import`, or a capture: photos with a calibration
     pub(super) scene: PathBuf,
@@ -67,7 +67,7 @@ pub(super) fn tie_text(group: &WeakGroup) -> String {
 }
 
 /// Which of an OpenCV calibration's matrices to use.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct KeyArgs {
     /// What an OpenCV calibration calls the camera matrix [default: a name known here]
     #[arg(long, value_name = "KEY")]
@@ -106,7 +106,7 @@ pub(super) fn print_warnings(warnings: &[Warning]) {
 }
 
 /// Which photos to leave out of everything.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct HoldOutArgs {
     /// Leave out the photos named in this file: {"test": ["a.jpg", …]}
     #[arg(long, value_name = "SPLIT.json")]

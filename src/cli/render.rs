@@ -1,11 +1,12 @@
 //! `lumigraph render`
 
 use super::exposure::ExposureArgs;
-use super::film::{FilmArgs, FrameChoice, frame_choice};
+use super::film::{FilmArgs, FrameChoice, files_of, frame_choice};
 use super::frames::{NamedView, ViewArgs, frames};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
+use super::path::NerfstudioArgs;
 use super::report::{Report, Start};
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
@@ -30,6 +31,8 @@ pub(super) struct Args {
     /// runs share a film: 120..240, or 120..240/300 of a derived path
     #[arg(long, value_name = "N|A..B", default_value = "30", value_parser = frame_choice)]
     frames: FrameChoice,
+    #[command(flatten)]
+    nerfstudio: NerfstudioArgs,
     #[command(flatten)]
     hold_out: HoldOutArgs,
     #[command(flatten)]
@@ -60,6 +63,9 @@ pub(super) struct Args {
     output: PathBuf,
 }
 
+/// Frames of a derived path where nobody says.
+const FRAMES: u32 = 30;
+
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
     let mut session = Session::open(
@@ -74,11 +80,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     session.max_error = args.max_error;
     let points = || session.points();
-    let frames = frames(&args.views, args.frames.count, session.lumigraph(), points)?;
+    let count = args.frames.count(FRAMES);
+    let world = args.nerfstudio.frame()?;
+    let (frames, fps) = frames(&args.views, count, session.lumigraph(), points, &world)?;
     let frames = args.frames.of(frames)?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
-    let is_there = args.film.begin(&args.output, &files)?;
+    let given = [
+        &args.views.path.as_ref().map(PathBuf::from),
+        &args.views.views,
+    ];
+    let inputs = given.into_iter().flatten().cloned();
+    let inputs: Vec<PathBuf> = inputs.chain(files_of(&session.scene)).collect();
+    let is_there = args.film.begin(&args.output, &files, &inputs)?;
     session.prepare()?;
 
     let missing: Vec<usize> = (0..files.len()).filter(|i| !is_there[*i]).collect();
@@ -97,7 +111,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Ok(())
     })?;
     bar.finish_and_clear();
-    args.film.finish(&files)?;
+    args.film.finish(&files, fps)?;
 
     let report = Report::new(&session, &start);
     if args.json {

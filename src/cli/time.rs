@@ -9,7 +9,7 @@ use render::{Lumigraph, Moment};
 use serde_json::{Value, json};
 
 /// For scenes that move. With either option photos count by their times, too.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct TimeArgs {
     /// Everything repeats after so many seconds; auto finds the period in the photos
     #[arg(long, value_name = "SECONDS|auto", value_parser = period, allow_negative_numbers = true)]
@@ -21,7 +21,7 @@ pub(super) struct TimeArgs {
 }
 
 /// One moment for all views.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct AtArgs {
     /// Show the scene as it was at this time, in seconds [default: each frame's time_s, if
     /// there is a period or a time window]

@@ -4,17 +4,19 @@ use super::Usage;
 use super::captured::Photos;
 use super::exposure::ExposureArgs;
 use super::interior::open;
-use super::options::{DrawArgs, FieldArgs, SceneArgs};
+use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
+use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text};
+use super::time::{AtArgs, Clock, TimeArgs};
 use super::walk::model_of;
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
 use proxy::interior::Contents;
+use render::DeviceChoice;
 use render::interior::{PortalFill, WalkOptions};
 use render::path::read_keyframes;
-use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use view::{Content, House, Look, Progress, Teller, ViewOptions, WorkerOptions};
 
 /// Look around in a window
@@ -30,6 +32,8 @@ pub(super) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
+    hold_out: HoldOutArgs,
+    #[command(flatten)]
     proxy: ProxyArgs,
     #[command(flatten)]
     exposure: ExposureArgs,
@@ -37,13 +41,20 @@ pub(super) struct Args {
     field: FieldArgs,
     #[command(flatten)]
     draw: DrawArgs,
+    #[command(flatten)]
+    time: TimeArgs,
+    #[command(flatten)]
+    at: AtArgs,
     /// What the portals of an interior show: geometry, texture, warp1, warp2 or ldi
     #[arg(long, value_name = "KIND", default_value = "geometry")]
     portals: String,
-    /// Begin with the keyframes of a path that was saved before
+    /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
-    /// The folder for screenshots (shot_0001.png, …) and the path (path.json)
+    #[command(flatten)]
+    nerfstudio: NerfstudioArgs,
+    /// The folder for screenshots (shot_0001.png, …) and the path (path.json; for nerfstudio
+    /// camera_path.json)
     #[arg(short, long, value_name = "DIR", default_value = "lumigraph-view")]
     output: PathBuf,
     /// Write a line of JSON for each frame on the screen: where one is, and what took how long
@@ -60,9 +71,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--portals: unknown {:?}; expected {known}", args.portals);
         return Err(Usage(text).into());
     };
+    let nerfstudio = args.nerfstudio.frame()?;
     let keyframes = match &args.path {
         Some(path) => {
-            let file = read_keyframes(path)?;
+            let file = read_keyframes(path, &nerfstudio)?;
             let none = || format!("{}: it has frames, not keyframes", path.display());
             Some(file.with_context(none)?)
         }
@@ -88,106 +100,145 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             output: args.output.clone(),
         },
         keyframes,
+        nerfstudio,
         trace: args.trace.clone(),
     };
-    // What cannot be opened is said where it was asked for, not in a window.
-    let load = loader(args)?;
+    // A slip of the pen is said where it was made; what else is wrong is said in the window, too.
+    if !given.exists() {
+        args.scene.open()?;
+    }
+    let load = Load::of(args);
     // Threads of its own: pictures must not wait until a piece of the fitting is done.
     let threads = rayon::current_num_threads();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()?;
+    let failed = Arc::new(Mutex::new(None));
+    let of_loading = Arc::clone(&failed);
     view::run(options, move |teller| {
-        teller.say(match pool.install(|| load(teller)) {
+        teller.say(match pool.install(|| load.run(teller)) {
             Ok(()) => Progress::Done,
-            Err(error) => Progress::Failed(super::one_line(&error)),
+            Err(error) => {
+                let text = super::one_line(&error);
+                *of_loading.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                Progress::Failed(text)
+            }
         });
     })?;
-    Ok(())
+    let failed = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
+    failed.map_or(Ok(()), Err)
 }
 
-type Load = Box<dyn FnOnce(&Teller) -> anyhow::Result<()> + Send>;
-
-fn loader(args: &Args) -> anyhow::Result<Load> {
-    let given = args.scene.scene.clone();
-    let is_interior = given.join("interior.json").is_file()
-        || given
-            .file_name()
-            .is_some_and(|name| name == "interior.json");
-    if is_interior {
-        let (path, interior) = open(&given)?;
-        let (device, budget) = (args.draw.device(), args.draw.cpu_memory);
-        let exposure = args.exposure.clone();
-        return Ok(Box::new(move |teller| {
-            teller.doing("reading the model");
-            let model = model_of(&path, &interior)?;
-            let named = || given.display().to_string();
-            let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
-            if let Some(warning) = warnings.first() {
-                teller.say(Progress::Note(warning.to_string()));
-            }
-            let photos = Photos::open(&path, &interior, &exposure)?;
-            let mut house = House::new(interior, contents, model);
-            if let Some(photos) = photos {
-                teller.doing("measuring what photos see");
-                house = house.with_photos(|interior, contents, model| {
-                    let backdrop = photos.add_backdrop(model, contents)?;
-                    photos.painter(device, budget, interior, contents, model, backdrop)
-                })?;
-            }
-            teller.show(Content::Interior(Arc::new(house)));
-            Ok(())
-        }));
-    }
-    let scene = args.scene.open()?;
-    let (proxy, exposure) = (args.proxy.clone(), args.exposure.clone());
-    let budget = args.draw.cpu_memory;
-    Ok(Box::new(move |teller| {
-        load_scene(scene, &proxy, &exposure, budget, teller)
-    }))
-}
-
-/// Shows a scene as soon as may be with a proxy that is quickly had, and then as `render` would
-/// draw it.
-fn load_scene(
-    mut scene: Scene,
-    proxy: &ProxyArgs,
-    exposure: &ExposureArgs,
+/// What is loaded behind the window.
+struct Load {
+    scene: SceneArgs,
+    hold_out: HoldOutArgs,
+    proxy: ProxyArgs,
+    exposure: ExposureArgs,
+    time: TimeArgs,
+    at: AtArgs,
+    device: DeviceChoice,
     budget: Option<u64>,
-    teller: &Teller,
-) -> anyhow::Result<()> {
-    let without = BTreeSet::new();
-    let show = |scene: &Scene, proxy: proxy::Proxy| -> anyhow::Result<()> {
-        let mut lumigraph = scene.lumigraph(&without, proxy)?;
-        lumigraph.photos.set_budget(budget);
-        teller.show(Content::Scene(Arc::new(lumigraph)));
-        Ok(())
-    };
-    // 1. At once.
-    let is_ready = proxy.is_default() && scene.proxy.is_some();
-    let quick = match &scene.proxy {
-        Some(own) if is_ready => Some(own.proxy.clone()),
-        _ => {
-            let quick = scene.fit(Kind::Points, &without);
-            let quick = quick.or_else(|_| scene.fit(Kind::Plane, &without));
-            quick.ok().map(|fitted| fitted.proxy)
+}
+
+impl Load {
+    fn of(args: &Args) -> Self {
+        Self {
+            scene: args.scene.clone(),
+            hold_out: args.hold_out.clone(),
+            proxy: args.proxy.clone(),
+            exposure: args.exposure.clone(),
+            time: args.time.clone(),
+            at: args.at.clone(),
+            device: args.draw.device(),
+            budget: args.draw.cpu_memory,
         }
-    };
-    if let Some(quick) = quick {
-        show(&scene, quick)?;
     }
-    // 2. Behind.
-    teller.doing("matching exposures");
-    exposure.choose(&mut scene, &without);
-    let has_gains = scene.photos.iter().any(|photo| photo.gain.is_some());
-    if !is_ready {
-        teller.doing("choosing the proxy that shows best what photos show: this may take a while");
-        let chosen = proxy.choose(&scene, &without)?;
-        let text = proxy_text(&chosen.proxy);
-        show(&scene, chosen.proxy)?;
-        teller.say(Progress::Note(format!("proxy: {text}")));
-    } else if let (true, Some(own)) = (has_gains, &scene.proxy) {
-        show(&scene, own.proxy.clone())?;
+
+    fn run(&self, teller: &Teller) -> anyhow::Result<()> {
+        let given = &self.scene.scene;
+        let is_interior = given.join("interior.json").is_file()
+            || given
+                .file_name()
+                .is_some_and(|name| name == "interior.json");
+        match is_interior {
+            true => self.load_house(teller),
+            false => self.load_scene(teller),
+        }
     }
-    Ok(())
+
+    fn load_house(&self, teller: &Teller) -> anyhow::Result<()> {
+        let given = &self.scene.scene;
+        let (path, interior) = open(given)?;
+        teller.doing("reading the model");
+        let model = model_of(&path, &interior)?;
+        let named = || given.display().to_string();
+        let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
+        if let Some(warning) = warnings.first() {
+            teller.say(Progress::Note(warning.to_string()));
+        }
+        let photos = Photos::open(&path, &interior, &self.exposure)?;
+        let mut house = House::new(interior, contents, model);
+        if let Some(photos) = photos {
+            teller.doing("measuring what photos see");
+            house = house.with_photos(|interior, contents, model| {
+                let backdrop = photos.add_backdrop(model, contents)?;
+                let (device, budget) = (self.device, self.budget);
+                photos.painter(device, budget, interior, contents, model, backdrop)
+            })?;
+        }
+        teller.show(Content::Interior(Arc::new(house)));
+        Ok(())
+    }
+
+    /// Shows a scene as soon as may be with a proxy that is quickly had, and then as `render` would
+    /// draw it.
+    fn load_scene(&self, teller: &Teller) -> anyhow::Result<()> {
+        let (proxy, exposure) = (&self.proxy, &self.exposure);
+        let mut scene = self.scene.open()?;
+        let without = self.hold_out.names(&scene)?;
+        let mut clock = None;
+        let mut show = |scene: &Scene, proxy: proxy::Proxy| -> anyhow::Result<()> {
+            let mut lumigraph = scene.lumigraph(&without, proxy)?;
+            lumigraph.photos.set_budget(self.budget);
+            // Looking for a period takes a while.
+            let clock = match &clock {
+                Some(clock) => *clock,
+                None => *clock.insert(Clock::of(&self.time, self.at.time, &lumigraph)?),
+            };
+            let first_s = lumigraph.sources.iter().filter_map(|s| s.time_s);
+            let first_s = first_s.min_by(f64::total_cmp);
+            let moment = clock.map(|clock| clock.moment("the scene", first_s));
+            teller.show_at(Content::Scene(Arc::new(lumigraph)), moment.transpose()?);
+            Ok(())
+        };
+        // 1. At once.
+        let is_ready = proxy.is_default() && scene.proxy.is_some() && without.is_empty();
+        let quick = match &scene.proxy {
+            Some(own) if is_ready => Some(own.proxy.clone()),
+            _ => {
+                let quick = scene.fit(Kind::Points, &without);
+                let quick = quick.or_else(|_| scene.fit(Kind::Plane, &without));
+                quick.ok().map(|fitted| fitted.proxy)
+            }
+        };
+        if let Some(quick) = quick {
+            show(&scene, quick)?;
+        }
+        // 2. Behind.
+        teller.doing("matching exposures");
+        exposure.choose(&mut scene, &without);
+        let has_gains = scene.photos.iter().any(|photo| photo.gain.is_some());
+        if !is_ready {
+            let text = "choosing the proxy that shows best what photos show: this may take a while";
+            teller.doing(text);
+            let chosen = proxy.choose(&scene, &without)?;
+            let text = proxy_text(&chosen.proxy);
+            show(&scene, chosen.proxy)?;
+            teller.say(Progress::Note(format!("proxy: {text}")));
+        } else if let (true, Some(own)) = (has_gains, &scene.proxy) {
+            show(&scene, own.proxy.clone())?;
+        }
+        Ok(())
+    }
 }

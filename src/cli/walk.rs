@@ -1,11 +1,15 @@
 //! `lumigraph walk`
 
+mod report;
+
 use super::Usage;
 use super::captured::Photos;
 use super::exposure::ExposureArgs;
+use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::interior::open;
 use super::options::{bytes, resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
+use super::path::NerfstudioArgs;
 use super::plot::{Line, plot};
 use super::session::progress;
 use anyhow::{Context, bail};
@@ -13,16 +17,14 @@ use calibrate::{Camera, Lens, View};
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::DVec2;
-use lumigraph::scene::{Truth, TruthScore, picture_files};
+use lumigraph::scene::{Truth, picture_files};
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, left_out,
-    tour,
+    CAPTURED_REFERENCE_SIZE, Painter, PortalFill, Splat, Walk, WalkOptions, left_out, tour,
 };
-use render::score::mean_of;
 use render::{DeviceChoice, path};
-use serde::Serialize;
+use report::{Drawn, Scored, Walked, ms};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -35,25 +37,28 @@ use std::path::{Path, PathBuf};
 /// when the interior was made, and scores them as `evaluate` does.
 ///
 ///     lumigraph walk house --portals all -o walk
+///     lumigraph walk house --path film/path.json -o frames --video film.mp4
 ///     lumigraph walk office --held-out --portals all,whole -o scored
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     /// The interior: a folder with interior.json, or that file
     interior: PathBuf,
-    /// A path file
+    /// A path file, nerfstudio's too
     #[arg(long, value_name = "FILE", conflicts_with = "tour")]
     path: Option<PathBuf>,
+    #[command(flatten)]
+    nerfstudio: NerfstudioArgs,
     /// Walk through all rooms [default, where there is no --path]
     #[arg(long)]
     tour: bool,
     /// Draw and score the photos that were held out when the interior was made
-    #[arg(long, conflicts_with_all = ["tour", "path"])]
+    #[arg(long, conflicts_with_all = ["tour", "path", "frames", "video", "resume"])]
     held_out: bool,
-    /// Frames of a tour
-    #[arg(long, value_name = "N", default_value_t = 520, conflicts_with_all = ["path", "held_out"],
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
+    /// Frames of a tour; or which of a path's are drawn, counted from 0, so that several runs share
+    /// a film: 120..240, or 120..240/300 of a tour
+    #[arg(long, value_name = "N|A..B", default_value = "520", value_parser = frame_choice)]
+    frames: FrameChoice,
     /// What portals show: geometry, texture, warp1, warp2, ldi, several of them, or all; of several,
     /// each has a folder of its own. whole draws everything as if there were no cells
     #[arg(
@@ -80,7 +85,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "RADII", default_value_t = 1.0)]
     near: f64,
     /// Keep the last frame's colours where no image shows anything
-    #[arg(long)]
+    #[arg(long, conflicts_with = "resume")]
     persist: bool,
     /// Draw the model's own colours, not the photos of a capture's rooms
     #[arg(long)]
@@ -94,6 +99,8 @@ pub(super) struct Args {
     /// too; those not used for longest are made again when they are needed [default: no limit]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     cpu_memory: Option<u64>,
+    #[command(flatten)]
+    film: FilmArgs,
     /// Print times, and what was drawn and skipped, as JSON
     #[arg(long)]
     json: bool,
@@ -112,6 +119,7 @@ enum Device {
 /// The tour's own size, that of Rafferty et al. 1998.
 const SIZE: (u32, u32) = (640, 512);
 const FPS: f64 = 15.0;
+const FRAMES: u32 = 520;
 /// Of a tour's camera, over the picture's width.
 const FOCAL: f64 = 0.7;
 
@@ -126,6 +134,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if !(args.near >= 0.0 && args.near.is_finite()) {
         let text = format!("--near is {}; expected 0 or more", args.near);
         return Err(Usage(text).into());
+    }
+    if args.persist && args.frames.is_part() {
+        let text = "--persist: what a frame keeps is of the one before; draw all of the path";
+        return Err(Usage(text.to_owned()).into());
+    }
+    if args.film.video().is_some() && fills.len() > 1 {
+        let text = "--video makes a film of one kind of --portals";
+        return Err(Usage(text.to_owned()).into());
     }
     if args.reference_size.is_some_and(|(w, h)| w.max(h) > 4096) {
         let text = "--reference-size: expected sides of up to 4096".to_owned();
@@ -161,10 +177,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         (None, Some(_)) if !args.no_photos => CAPTURED_REFERENCE_SIZE,
         _ => options.library.size,
     };
-    let frames = match args.held_out {
-        true => held_out(photos.as_ref(), args.size).with_context(named)?,
+    let (frames, fps) = match args.held_out {
+        true => (
+            held_out(photos.as_ref(), args.size).with_context(named)?,
+            FPS,
+        ),
         false => frames(args, &interior, &contents, &model)?,
     };
+    let mut inputs: Vec<PathBuf> = photos.iter().flat_map(Photos::files).collect();
+    inputs.extend(args.path.clone());
+    inputs.extend(model_file(&path, &interior));
+    inputs.push(path);
     // 3. The walks: one walker, so that images are made once for all kinds.
     let painter = match photos.as_ref().filter(|_| !args.no_photos) {
         Some(photos) => {
@@ -183,7 +206,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             _ => args.output.join(fill.name()),
         };
         walk.begin();
-        walks.push(draw(&mut walk, *fill, &frames, &folder)?);
+        walks.push(draw(
+            &mut walk, *fill, &frames, &folder, &args.film, &inputs,
+        )?);
+    }
+    if let [walked] = &walks[..] {
+        args.film.finish(&walked.files, fps)?;
     }
     for note in walk.painter().notes() {
         say!("note: {note}");
@@ -216,6 +244,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "references_peak_bytes": references.peak,
             "photos_peak_bytes": decoded.map(|d| d.peak),
             "photos_decoded": decoded.map(|d| d.loads),
+            "video": args.film.video(),
             "walks": walks,
         }));
     }
@@ -231,10 +260,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for walk in &walks {
         text += &walk.line();
     }
+    let drawn = walks.iter().map(|w| w.frames.len()).max();
+    let before = frames.len() - drawn.unwrap_or(0);
     print(&format!(
-        "{text}{}: {} frames, drawn by {device}\n",
+        "{text}{}: {} frames{}, drawn by {device}\n",
         args.output.display(),
-        frames.len()
+        frames.len(),
+        match before {
+            0 => String::new(),
+            _ => format!(", {before} of them from before"),
+        }
     ))
 }
 
@@ -260,14 +295,19 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
     Ok(once)
 }
 
+/// The model of an interior whose file is `path`.
+fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
+    let name = interior.model.as_ref()?;
+    Some(path.parent().unwrap_or(Path::new("")).join(name))
+}
+
 pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model> {
-    let Some(name) = &interior.model else {
+    let Some(file) = model_file(path, interior) else {
         bail!(
             "{}: it has no model; cells that are scenes are not drawn yet",
             path.display()
         );
     };
-    let file = path.parent().unwrap_or(Path::new("")).join(name);
     let (model, warnings) = read_model(&file)?;
     for warning in warnings {
         say!("warning: {}: {warning}", file.display());
@@ -299,28 +339,23 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
     Ok(named)
 }
 
+/// The frames to draw, and how many a second a film of them shows.
 fn frames(
     args: &Args,
     interior: &Interior,
     contents: &Contents,
     model: &Model,
-) -> anyhow::Result<Vec<Named>> {
+) -> anyhow::Result<(Vec<Named>, f64)> {
     let path = match &args.path {
-        Some(file) => path::read(file)?,
+        Some(file) => path::read_in(file, &args.nerfstudio.frame()?)?,
         None => {
             let (width, height) = args.size.unwrap_or(SIZE);
             let size = DVec2::new(f64::from(width), f64::from(height));
             let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
             let camera = Camera::of(&lens, width, height);
-            let planned = tour(
-                interior,
-                contents,
-                model,
-                &camera,
-                args.frames as usize,
-                FPS,
-            )
-            .with_context(|| args.interior.display().to_string())?;
+            let count = args.frames.count(FRAMES) as usize;
+            let planned = tour(interior, contents, model, &camera, count, FPS)
+                .with_context(|| args.interior.display().to_string())?;
             let left_out = left_out(interior, contents).into_iter();
             let names: Vec<&str> = left_out.map(|id| &*interior.cell(id).name).collect();
             if !names.is_empty() {
@@ -338,30 +373,8 @@ fn frames(
         view: resized(frame.view, args.size),
         truth: None,
     };
-    Ok(path.frames.into_iter().map(named).collect())
-}
-
-/// A walk with one kind of portals.
-struct Walked {
-    fill: PortalFill,
-    frames: Vec<Drawn>,
-    /// How many reference images it used.
-    references: usize,
-}
-
-/// A frame of a walk.
-struct Drawn {
-    name: String,
-    file: PathBuf,
-    cost: FrameCost,
-    scored: Option<Scored>,
-}
-
-/// What a held-out photo's picture scores.
-struct Scored {
-    score: TruthScore,
-    /// Processor time for the picture, with all photos and images in memory.
-    cpu_ms: f64,
+    let frames = args.frames.of(path.frames)?;
+    Ok((frames.into_iter().map(named).collect(), path.fps))
 }
 
 fn draw(
@@ -369,12 +382,19 @@ fn draw(
     fill: PortalFill,
     frames: &[Named],
     folder: &Path,
+    film: &FilmArgs,
+    inputs: &[PathBuf],
 ) -> anyhow::Result<Walked> {
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("frame", names, folder)?;
-    let bar = progress(frames.len(), fill.name());
+    let is_there = film.begin(folder, &files, inputs)?;
+    let missing = is_there.iter().filter(|is_there| !**is_there).count();
+    let bar = progress(missing, fill.name());
     let mut drawn = Vec::new();
-    for (frame, file) in frames.iter().zip(files) {
+    for ((frame, file), is_there) in frames.iter().zip(&files).zip(is_there) {
+        if is_there {
+            continue;
+        }
         let named = || format!("frame {}", frame.name);
         let mut cost = walk.draw(&frame.view, fill).with_context(named)?;
         let mut scored = None;
@@ -388,10 +408,10 @@ fn draw(
             let score = truth.score(&walk.picture().picture())?;
             scored = Some(Scored { score, cpu_ms });
         }
-        capture::write_png(&file, &walk.picture().picture())?;
+        film.write(file, walk.picture().picture())?;
         drawn.push(Drawn {
             name: frame.name.clone(),
-            file,
+            file: file.clone(),
             cost,
             scored,
         });
@@ -401,143 +421,7 @@ fn draw(
     Ok(Walked {
         fill,
         frames: drawn,
+        files,
         references: walk.references_used(),
     })
-}
-
-#[derive(Serialize)]
-struct FrameReport<'a> {
-    name: &'a str,
-    file: &'a Path,
-    cell: Option<&'a str>,
-    ms: f64,
-    visibility_ms: f64,
-    geometry_ms: f64,
-    fill_ms: f64,
-    shade_ms: f64,
-    references_ms: f64,
-    references_made: usize,
-    visible_cells: usize,
-    portals: usize,
-    filled: usize,
-    /// Of the cells drawn as geometry.
-    triangles_in_cells: usize,
-    /// Passed over in whole runs.
-    triangles_skipped: usize,
-    /// That touch a pixel's centre; none where a graphics device drew them.
-    triangles_met: Option<usize>,
-    samples: usize,
-    /// Of LDIs, in columns out of sight.
-    samples_clipped: usize,
-    holes: usize,
-    #[serde(flatten)]
-    scored: Option<ScoreReport>,
-}
-
-/// Of a held-out photo.
-#[derive(Serialize)]
-struct ScoreReport {
-    #[serde(flatten)]
-    score: TruthScore,
-    cpu_ms: f64,
-}
-
-fn ms(time: std::time::Duration) -> f64 {
-    1e3 * time.as_secs_f64()
-}
-
-impl Walked {
-    fn times_ms(&self) -> Vec<f64> {
-        self.frames.iter().map(|f| ms(f.cost.time())).collect()
-    }
-
-    /// The median, what 95 % stay below, and the worst.
-    fn spread(&self) -> [f64; 3] {
-        let mut times = self.times_ms();
-        times.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let i = (share * times.len() as f64).ceil() as usize;
-            times.get(i.saturating_sub(1)).copied().unwrap_or(0.0)
-        };
-        [at(0.5), at(0.95), at(1.0)]
-    }
-
-    fn mean(&self, of: impl Fn(&FrameCost) -> usize) -> f64 {
-        let sum: usize = self.frames.iter().map(|f| of(&f.cost)).sum();
-        sum as f64 / self.frames.len().max(1) as f64
-    }
-
-    /// The means over the photos that were held out: their scores, and the processor's time.
-    fn scored(&self) -> Option<ScoreReport> {
-        let scored: Vec<&Scored> = self
-            .frames
-            .iter()
-            .filter_map(|f| f.scored.as_ref())
-            .collect();
-        let scores: Vec<TruthScore> = scored.iter().map(|s| s.score).collect();
-        let times: Vec<f64> = scored.iter().map(|s| s.cpu_ms).collect();
-        Some(ScoreReport {
-            score: TruthScore::mean(&scores)?,
-            cpu_ms: mean_of(&times)?,
-        })
-    }
-
-    fn line(&self) -> String {
-        let scored = self.scored().map_or_else(String::new, |s| {
-            let ScoreReport { score, cpu_ms } = s;
-            let score = score.score;
-            let (psnr, ssim, coverage) = (score.psnr, score.ssim, score.coverage);
-            format!(" {psnr:>8.2} {ssim:>8.4} {coverage:>8.4} {cpu_ms:>8.1}")
-        });
-        let [median, most, worst] = self.spread();
-        format!(
-            "{:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7}{scored}\n",
-            self.fill.name(),
-            self.mean(|c| c.triangles_tried),
-            self.mean(|c| c.samples),
-            self.mean(|c| c.holes),
-            self.references
-        )
-    }
-
-    fn json<'a>(&'a self, interior: &'a Interior) -> Value {
-        let [median, most, worst] = self.spread();
-        let report = |f: &'a Drawn, c: &'a FrameCost| FrameReport {
-            name: &f.name,
-            file: &f.file,
-            scored: f.scored.as_ref().map(|s| ScoreReport {
-                score: s.score,
-                cpu_ms: s.cpu_ms,
-            }),
-            cell: c.cell.map(|id| interior.cell(id).name.as_str()),
-            ms: ms(c.time()),
-            visibility_ms: ms(c.visibility),
-            geometry_ms: ms(c.geometry),
-            fill_ms: ms(c.fill),
-            shade_ms: ms(c.shade),
-            references_ms: ms(c.references),
-            references_made: c.references_made,
-            visible_cells: c.visible_cells,
-            portals: c.portals,
-            filled: c.filled,
-            triangles_in_cells: c.triangles_in_cells,
-            triangles_skipped: c.triangles_in_cells - c.triangles_tried,
-            triangles_met: c.triangles_met,
-            samples: c.samples,
-            samples_clipped: c.samples_clipped,
-            holes: c.holes,
-        };
-        let frames = self.frames.iter().map(|f| report(f, &f.cost));
-        let frames: Vec<FrameReport<'_>> = frames.collect();
-        json!({
-            "portals": self.fill.name(),
-            "median_ms": median,
-            "percentile_95_ms": most,
-            "worst_ms": worst,
-            "references_used": self.references,
-            "references_made": self.frames.iter().map(|f| f.cost.references_made).sum::<usize>(),
-            "mean": self.scored(),
-            "frames": frames,
-        })
-    }
 }

@@ -238,6 +238,57 @@ const HALVES: &str = r#"{"version": 1, "rooms": [
         "polygon": [[-1, 0, -2], [1, 0, -2], [1, 2.4, -2], [-1, 2.4, -2]]}]}"#;
 
 #[test]
+fn a_walk_becomes_a_film() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --size 47x36 --background #204060";
+    let whole = format!("{walk} --frames 6 -o whole --video films/tour.mp4");
+    lumigraph(here, &whole).ok();
+    assert_eq!(names(&here.join("films")), ["tour.mp4"]);
+    let frame = |folder: &str, i: usize| {
+        let file = here.join(folder).join(format!("frame_{i:04}.png"));
+        std::fs::read(&file).unwrap()
+    };
+    let picture = image::load_from_memory(&frame("whole", 0)).unwrap();
+    assert!(picture.to_rgba8().pixels().all(|p| p.0[3] == 255));
+    // In parts, and after an interruption, the bytes are the same.
+    for part in ["0..2/6", "2..6/6"] {
+        lumigraph(here, &format!("{walk} --frames {part} -o parts --resume")).ok();
+    }
+    std::fs::remove_file(here.join("parts/frame_0003.png")).unwrap();
+    let again = format!("{walk} --frames 6 -o parts --resume");
+    let said = lumigraph(here, &again).ok().stdout;
+    assert!(said.contains("6 frames, 5 of them from before"), "{said}");
+    for i in 0..6 {
+        assert!(frame("whole", i) == frame("parts", i), "frame {i}");
+    }
+    // Frames of something else are not mixed in.
+    let house = here.join("house/interior.json");
+    let mut text = std::fs::read_to_string(&house).unwrap();
+    text.push('\n');
+    std::fs::write(&house, text).unwrap();
+    let error = lumigraph(here, &again).error(1);
+    assert!(
+        error.contains("made of other files: house/interior.json has"),
+        "{error}"
+    );
+    for (more, said) in [
+        ("--video f.mp4 --portals geometry,ldi", "one kind"),
+        ("--persist --frames 1..2", "--persist"),
+        ("--persist --resume", "cannot be used with"),
+        ("--frames 1..9/6", "the path has 6 frames"),
+        ("--fps 3", "--video"),
+    ] {
+        let ran = lumigraph(here, &format!("{walk} -o x {more}"));
+        assert!(
+            ran.code == 2 && ran.stderr.contains(said),
+            "{more}: {}",
+            ran.stderr
+        );
+    }
+}
+
+#[test]
 fn a_captures_rooms_are_drawn_from_its_photos() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

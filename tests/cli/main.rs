@@ -17,6 +17,7 @@ mod interior;
 mod masks;
 mod memory;
 mod opencv;
+mod path;
 mod render;
 mod repeat;
 mod report;

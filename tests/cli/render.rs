@@ -242,6 +242,14 @@ fn a_film_is_shared_resumed_and_made() {
     let other = format!("{render} --frames 6 --k 2 -o parts --resume");
     let error = lumigraph(folder.path(), &other).error(1);
     assert!(error.contains("another command line"), "{error}");
+    let photo = folder.path().join("wall/images/0000.png");
+    let bytes = std::fs::read(&photo).unwrap();
+    std::fs::write(&photo, bytes).unwrap();
+    let error = lumigraph(folder.path(), &line).error(1);
+    assert!(
+        error.contains("made of other files: wall/images/0000.png was written since"),
+        "{error}"
+    );
     let error = lumigraph(
         folder.path(),
         &format!("{render} --frames 6 -o whole --resume"),

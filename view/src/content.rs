@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 use proxy::Proxy;
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
-use render::Lumigraph;
 use render::interior::{Painter, tour};
+use render::{Lumigraph, Moment, SourceView};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the window shows.
@@ -30,6 +30,8 @@ pub struct House {
     pub model: Model,
     /// What stops who walks.
     pub obstacles: Obstacles,
+    /// Cameras of the photos that show it, if any do.
+    cameras: Vec<Stop>,
     /// What draws it from photos, where some show it; taken by the first that draws.
     photos: Mutex<Option<Painter>>,
 }
@@ -43,6 +45,7 @@ impl House {
             contents,
             model,
             obstacles,
+            cameras: Vec::new(),
             photos: Mutex::new(None),
         }
     }
@@ -57,6 +60,10 @@ impl House {
         make: impl FnOnce(&Interior, &mut Contents, &mut Model) -> Result<Painter, E>,
     ) -> Result<Self, E> {
         let painter = make(&self.interior, &mut self.contents, &mut self.model)?;
+        if let Some(captured) = painter.captured() {
+            let sources = captured.lumigraph().sources.iter();
+            self.cameras = sources.map(Stop::of).collect();
+        }
         self.photos = Mutex::new(Some(painter));
         Ok(self)
     }
@@ -77,6 +84,36 @@ pub struct Stop {
     pub view: View,
 }
 
+impl Stop {
+    fn of(source: &SourceView) -> Self {
+        Self {
+            name: source.name.clone(),
+            view: source.view.clone(),
+        }
+    }
+}
+
+/// The times of a scene that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Times {
+    /// At which it is shown first.
+    pub moment: Moment,
+    /// From the first photo to the last, in seconds.
+    pub range_s: [f64; 2],
+}
+
+impl Times {
+    /// A scene's, shown first at `moment`; `None` where no photo has a time.
+    pub fn of(lumigraph: &Lumigraph, moment: Moment) -> Option<Self> {
+        let times = lumigraph.sources.iter().filter_map(|s| s.time_s);
+        let range = times.fold(None, |range: Option<[f64; 2]>, t| {
+            let [first, last] = range.unwrap_or([t, t]);
+            Some([first.min(t), last.max(t)])
+        });
+        range.map(|range_s| Self { moment, range_s })
+    }
+}
+
 /// What moving about needs to know of a content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
@@ -88,8 +125,12 @@ pub struct Space {
     pub depth: f64,
     /// Photos' cameras, or rooms.
     pub stops: Vec<Stop>,
+    /// Cameras of photos that are no stops: those that show an interior.
+    pub cameras: Vec<Stop>,
     /// Whether one walks in it.
     pub is_interior: bool,
+    /// Where time plays a part.
+    pub times: Option<Times>,
 }
 
 /// The tour's own camera; see `lumigraph walk`.
@@ -115,18 +156,16 @@ impl Space {
         let extent = views.iter().map(reach).fold(0.0, f64::max);
         let depth =
             typical_depth(lumigraph).unwrap_or(if extent > 0.0 { 2.0 * extent } else { 1.0 });
-        let stop = |s: &render::SourceView| Stop {
-            name: s.name.clone(),
-            view: s.view.clone(),
-        };
         Self {
             up: ups.try_normalize().unwrap_or(DVec3::NEG_Y),
             // What is looked at should be reached in some five seconds, the cameras' region
             // crossed in ten.
             speed: 0.2 * depth.min((2.0 * extent).max(0.2 * depth)),
             depth,
-            stops: lumigraph.sources.iter().map(stop).collect(),
+            stops: lumigraph.sources.iter().map(Stop::of).collect(),
+            cameras: Vec::new(),
             is_interior: false,
+            times: None,
         }
     }
 
@@ -196,7 +235,9 @@ impl Space {
             speed: eye_height,
             depth: 1.5 * eye_height,
             stops,
+            cameras: house.cameras.clone(),
             is_interior: true,
+            times: None,
         }
     }
 }

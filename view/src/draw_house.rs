@@ -70,6 +70,7 @@ pub(crate) fn draw_house(
         image: Arc::new(image),
         photo: None,
         lines: Lines::default(),
+        mesh: Arc::default(),
         depths,
         support: None,
         hover: None,

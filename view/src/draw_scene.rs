@@ -2,6 +2,7 @@
 
 use crate::compose::{depth_picture, nearest_stop, over_background, photo_picture, shaded_picture};
 use crate::content::Space;
+use crate::overlay::mesh_of;
 use crate::picture::{DepthGrid, Hover, Layer, Lines, Request, Shown, Support};
 use calibrate::{Pixel, View};
 use egui::ColorImage;
@@ -10,8 +11,8 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, RenderError, TriangulatedField,
-    picture,
+    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Prepared, RenderError,
+    TriangulatedField, picture,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -39,6 +40,7 @@ struct Ready<'a> {
     view: View,
     options: FieldOptions,
     method: Method,
+    moment: Option<Moment>,
     frame: Frame<'a>,
     prepared: Prepared,
 }
@@ -87,6 +89,7 @@ impl<'a> SceneDrawer<'a> {
             image: Arc::new(image?),
             photo: None,
             lines: Lines::default(),
+            mesh: Arc::default(),
             depths: DepthGrid::default(),
             support: None,
             hover: None,
@@ -136,12 +139,20 @@ impl<'a> SceneDrawer<'a> {
             ),
         };
         // 1. The surface and the field, if they are others than before.
-        let is_same =
-            |r: &Ready<'_>| r.view == view && r.options == look.options && r.method == look.method;
+        let is_same = |r: &Ready<'_>| {
+            r.view == view
+                && r.options == look.options
+                && r.method == look.method
+                && r.moment == look.moment
+        };
         if !self.ready.as_ref().is_some_and(is_same) {
             self.ready = None;
             let frame = timed(&mut stages, "surface", || {
                 let frame = Frame::without(self.lumigraph, view.clone(), look.options, self.gone);
+                let frame = match &look.moment {
+                    Some(moment) => frame.at(moment),
+                    None => frame,
+                };
                 if self.no_skip {
                     frame.without_skipping()
                 } else {
@@ -153,6 +164,7 @@ impl<'a> SceneDrawer<'a> {
                 view,
                 options: look.options,
                 method: look.method,
+                moment: look.moment,
                 frame,
                 prepared,
             });
@@ -192,7 +204,7 @@ impl<'a> SceneDrawer<'a> {
         // 3. What goes with it.
         let mut lines = Lines::default();
         let scale = f64::from(asked.width) / f64::from(width);
-        timed(&mut stages, "overlays", || {
+        let mesh = timed(&mut stages, "overlays", || {
             if let Some(field) = prepared.field() {
                 if look.triangulation {
                     lines.triangulation = edges_of_field(field, scale);
@@ -203,6 +215,7 @@ impl<'a> SceneDrawer<'a> {
             if look.wireframe {
                 lines.wireframe = edges_of_proxy(self.lumigraph, asked, self.space.depth);
             }
+            mesh_of(&lines, asked)
         });
         let photo = look
             .photo
@@ -224,6 +237,7 @@ impl<'a> SceneDrawer<'a> {
             image: Arc::new(image),
             photo: photo.flatten().map(|(i, photo)| (i, Arc::new(photo))),
             lines,
+            mesh: Arc::new(mesh),
             depths,
             support: Some(support),
             hover,

@@ -11,6 +11,7 @@ mod draw_house;
 mod draw_scene;
 mod keyframes;
 mod keys;
+mod lines;
 mod loader;
 mod overlay;
 mod panel;
@@ -23,7 +24,7 @@ mod walker;
 mod window;
 mod worker;
 
-pub use content::{Content, House, Space, Stop};
+pub use content::{Content, House, Space, Stop, Times};
 pub use keyframes::Keyframes;
 pub use loader::{Progress, Teller};
 pub use picture::{DepthGrid, Hover, Layer, Lines, Look, Request, Shown, Support};

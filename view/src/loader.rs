@@ -1,6 +1,7 @@
 //! Loading goes on behind the window, and tells it how far it is.
 
-use crate::content::{Content, Space};
+use crate::content::{Content, Space, Times};
+use render::Moment;
 use std::sync::Arc;
 
 /// What loading has to say.
@@ -40,8 +41,16 @@ impl Teller {
     /// Shows something, in place of what was there before. What moving about in it needs to know is
     /// found here, not on the window's thread.
     pub fn show(&self, content: Content) {
-        let space = Arc::new(Space::of(&content));
-        self.say(Progress::Show(content, space));
+        self.show_at(content, None);
+    }
+
+    /// As [`Self::show`], a scene that moves at a moment.
+    pub fn show_at(&self, content: Content, moment: Option<Moment>) {
+        let mut space = Space::of(&content);
+        if let (Content::Scene(lumigraph), Some(moment)) = (&content, moment) {
+            space.times = Times::of(lumigraph, moment);
+        }
+        self.say(Progress::Show(content, Arc::new(space)));
     }
 
     /// Says something else.

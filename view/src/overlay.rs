@@ -1,6 +1,7 @@
 //! Lines over the picture: cameras, epipoles, the triangulation, the proxy's edges, the wipe.
 
 use crate::content::{Space, Stop};
+use crate::lines::LineMesh;
 use crate::picture::Lines;
 use calibrate::{Pixel, View};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
@@ -18,71 +19,94 @@ const CAMERA_NEAR: Color32 = Color32::from_rgb(90, 220, 255);
 const EPIPOLE: Color32 = Color32::from_rgb(255, 90, 90);
 const KEYFRAME: Color32 = Color32::from_rgb(150, 255, 120);
 
+/// The lines that go with a picture, as large as its view is, in pixels.
+pub(crate) fn mesh_of(lines: &Lines, view: &View) -> LineMesh {
+    let whole = Rect::from_min_size(Pos2::ZERO, vec2(view.width as f32, view.height as f32));
+    let mut mesh = LineMesh::default();
+    let triangulation = Stroke::new(0.6, Color32::from_rgba_unmultiplied(255, 255, 255, 130));
+    let wireframe = Stroke::new(0.7, Color32::from_rgba_unmultiplied(110, 235, 160, 150));
+    for (edges, stroke) in [
+        (&lines.triangulation, triangulation),
+        (&lines.wireframe, wireframe),
+    ] {
+        for ends in edges {
+            let ends = ends.map(|p| pos2(p.x as f32, p.y as f32));
+            mesh.add(ends, stroke, whole, 1.0);
+        }
+    }
+    mesh
+}
+
 /// Draws over a picture of a view.
 pub(crate) struct Overlay<'a> {
     /// Clipped to the picture.
-    pub(crate) painter: &'a Painter,
-    /// Physical pixels a point of the painter.
-    pub(crate) pixels_per_point: f32,
+    painter: &'a Painter,
+    /// Pixels of the view a point of the painter.
+    pixels_per_point: f32,
     /// Of the picture.
-    pub(crate) view: &'a View,
+    view: &'a View,
+    lines: LineMesh,
 }
 
-impl Overlay<'_> {
+impl<'a> Overlay<'a> {
+    /// Draws over a picture of `view`, which fills what `painter` is clipped to.
+    pub(crate) fn new(painter: &'a Painter, view: &'a View) -> Self {
+        Self {
+            painter,
+            pixels_per_point: view.width as f32 / painter.clip_rect().width().max(1.0),
+            view,
+            lines: LineMesh::default(),
+        }
+    }
+
+    /// Paints the lines that were drawn.
+    pub(crate) fn finish(self) {
+        self.lines.paint(self.painter);
+    }
+
     fn at(&self, pixel: DVec2) -> Pos2 {
         let place = |v: f64| v as f32 / self.pixels_per_point;
         pos2(place(pixel.x), place(pixel.y))
     }
 
-    fn line(&self, [a, b]: [DVec2; 2], stroke: Stroke) {
-        let (a, b) = (self.at(a), self.at(b));
-        // What is far outside only costs time; so do numbers that are none.
-        let clip = self.painter.clip_rect().expand(2.0);
-        if clip.intersects(Rect::from_two_pos(a, b)) {
-            self.painter.line_segment([a, b], stroke);
-        }
+    fn line(&mut self, ends: [DVec2; 2], stroke: Stroke) {
+        let ends = ends.map(|end| self.at(end));
+        let feather = 1.0 / self.painter.pixels_per_point();
+        let clip = self.painter.clip_rect();
+        self.lines.add(ends, stroke, clip, feather);
     }
 
-    /// Edges of the triangulation and of the proxy, and epipoles.
-    pub(crate) fn lines(&self, lines: &Lines, has_epipoles: bool) {
-        for edge in &lines.triangulation {
-            self.line(
-                *edge,
-                Stroke::new(0.6, Color32::from_rgba_unmultiplied(255, 255, 255, 130)),
-            );
-        }
-        for edge in &lines.wireframe {
-            self.line(
-                *edge,
-                Stroke::new(0.7, Color32::from_rgba_unmultiplied(110, 235, 160, 150)),
-            );
-        }
-        if has_epipoles {
-            for (_, at) in &lines.epipoles {
-                let at = self.at(*at);
-                self.painter
-                    .circle_stroke(at, 4.0, Stroke::new(1.5, EPIPOLE));
-                self.painter.circle_filled(at, 1.2, EPIPOLE);
-            }
+    /// Edges of the triangulation and of the proxy.
+    pub(crate) fn edges(&self, mesh: &LineMesh) {
+        mesh.scaled(1.0 / self.pixels_per_point).paint(self.painter);
+    }
+
+    /// Where other cameras' centres are seen.
+    pub(crate) fn epipoles(&self, epipoles: &[(usize, DVec2)]) {
+        for (_, at) in epipoles {
+            let at = self.at(*at);
+            self.painter
+                .circle_stroke(at, 4.0, Stroke::new(1.5, EPIPOLE));
+            self.painter.circle_filled(at, 1.2, EPIPOLE);
         }
     }
 
     /// The photos' cameras, `nearest` in a colour of its own.
-    pub(crate) fn frusta(&self, space: &Space, nearest: Option<usize>) {
-        for i in nearest_few(&space.stops, self.view) {
+    pub(crate) fn frusta(&mut self, stops: &[Stop], depth: f64, nearest: Option<usize>) {
+        for i in nearest_few(stops, self.view) {
             let color = if Some(i) == nearest {
                 CAMERA_NEAR
             } else {
                 CAMERA
             };
-            let length = FRUSTUM * space.depth;
-            self.frustum(&space.stops[i].view, length, Stroke::new(1.0, color));
+            let length = FRUSTUM * depth;
+            self.frustum(&stops[i].view, length, Stroke::new(1.0, color));
         }
     }
 
     /// The keyframes of the path in the making, and the way between them.
     pub(crate) fn keyframes(
-        &self,
+        &mut self,
         poses: &[calibrate::Rigid3],
         chosen: Option<usize>,
         length: f64,
@@ -106,7 +130,7 @@ impl Overlay<'_> {
         seen(self.view, point, length)
     }
 
-    fn frustum(&self, camera: &View, length: f64, stroke: Stroke) {
+    fn frustum(&mut self, camera: &View, length: f64, stroke: Stroke) {
         let center = camera.center();
         let world_from_camera = camera.camera_from_world.inverse();
         let (w, h) = (f64::from(camera.width), f64::from(camera.height));
@@ -127,7 +151,7 @@ impl Overlay<'_> {
     }
 
     /// Outlines of portals.
-    pub(crate) fn portals(&self, interior: &proxy::interior::Interior, length: f64) {
+    pub(crate) fn portals(&mut self, interior: &proxy::interior::Interior, length: f64) {
         for portal in &interior.portals {
             let corners = portal.polygon.corners();
             for (i, a) in corners.iter().enumerate() {
@@ -232,7 +256,9 @@ mod tests {
             speed: 1.0,
             depth: 5.0,
             stops: vec![stop(-1.0), stop(0.0), stop(1.0)],
+            cameras: Vec::new(),
             is_interior: false,
+            times: None,
         };
         let mut view = stop(0.0).view;
         view.camera_from_world = Rigid3::looking_at(-4.0 * DVec3::Z, DVec3::Z, DVec3::NEG_Y);

@@ -160,6 +160,11 @@ fn contents(
         ui.separator();
         field_sliders(ui, state);
     }
+    let times = state.space().and_then(|space| space.times);
+    if let (Some(times), Some(moment)) = (times, &mut state.look.moment) {
+        let [first, last] = times.range_s;
+        ui.add(Slider::new(&mut moment.time_s, first..=last).text("time, s"));
+    }
     let exposure = &mut state.look.exposure_stops;
     ui.add(
         Slider::new(exposure, -3.0..=3.0)

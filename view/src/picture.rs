@@ -1,10 +1,11 @@
 //! What is asked of the thread that draws, and what comes back.
 
+use crate::lines::LineMesh;
 use calibrate::{Pixel, View};
 use egui::ColorImage;
 use glam::{DVec2, DVec3};
 use render::interior::PortalFill;
-use render::{FieldOptions, Method};
+use render::{FieldOptions, Method, Moment};
 use std::sync::Arc;
 
 /// What pixels show.
@@ -56,6 +57,8 @@ pub struct Look {
     pub method: Method,
     /// What is seen through the portals of an interior.
     pub portals: PortalFill,
+    /// When, of a scene that moves.
+    pub moment: Option<Moment>,
     /// Whether the field's triangulation is wanted.
     pub triangulation: bool,
     /// Whether the proxy's edges are wanted.
@@ -73,6 +76,7 @@ impl Default for Look {
             options: FieldOptions::default(),
             method: Method::TRIANGULATED,
             portals: PortalFill::Geometry,
+            moment: None,
             triangulation: false,
             wireframe: false,
             photo: false,
@@ -111,6 +115,8 @@ pub struct Shown {
     pub photo: Option<(usize, Arc<ColorImage>)>,
     /// Lines over it, in pixels of the view.
     pub lines: Lines,
+    /// Those that are many, as they are painted.
+    pub(crate) mesh: Arc<LineMesh>,
     /// How far away things are.
     pub depths: DepthGrid,
     /// How well the photos support it; none of interiors.

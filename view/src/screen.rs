@@ -16,6 +16,8 @@ pub(crate) struct Screen {
     configuration: wgpu::SurfaceConfiguration,
     renderer: Renderer,
     is_lost: Arc<AtomicBool>,
+    /// The processor draws.
+    is_software: bool,
     /// The surface must be configured anew before the next frame.
     is_stale: bool,
 }
@@ -91,6 +93,7 @@ impl Screen {
             configuration,
             renderer,
             is_lost,
+            is_software: adapter.get_info().device_type == wgpu::DeviceType::Cpu,
             is_stale: true,
         })
     }
@@ -209,6 +212,10 @@ impl Screen {
         commands.push(encoder.finish());
         self.queue.submit(commands);
         self.queue.present(frame);
+        if self.is_software {
+            // Its threads would take the cores from the next frame's steps.
+            let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+        }
         Presented::Yes
     }
 }

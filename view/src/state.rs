@@ -197,6 +197,7 @@ impl State {
                 self.mode = Mode::Walk;
             }
         }
+        self.look.moment = self.look.moment.or(space.times.map(|times| times.moment));
         self.space = Some(space);
         // Its pictures differ.
         self.asked = None;

@@ -1,33 +1,30 @@
 //! The window: events in, frames out. All that takes long is done on other threads; what is done
 //! on this one is timed.
 
+mod frame;
 mod hands;
 mod paint;
 mod pane;
+mod panels;
 
 use crate::content::Content;
 use crate::loader::{Progress, Teller};
-use crate::panel::{self, Shows, Status};
+use crate::panel::{Shows, Status};
 use crate::picture::{Look, Shown};
 use crate::plan::Plan;
-use crate::screen::Presented;
 use crate::state::State;
-use crate::trace::Trace;
+use crate::trace::{Took, Trace, Watch};
 use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
-use cpu_time::ThreadTime;
-use egui::TextureHandle;
-use paint::paint;
-use pane::{Pane, Warm, warm_context};
-use render::path::KeyframeFile;
-use serde_json::json;
+use pane::{Opened, Pane};
+use panels::Panels;
+use render::path::{KeyframeFile, NerfstudioFrame};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::event::WindowEvent;
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::ModifiersState;
 use winit::window::{Window, WindowId};
 
@@ -44,6 +41,8 @@ pub struct ViewOptions {
     pub worker: WorkerOptions,
     /// Keyframes to begin with.
     pub keyframes: Option<KeyframeFile>,
+    /// Where paths lie that are saved for nerfstudio.
+    pub nerfstudio: NerfstudioFrame,
     /// A file that gets a line of JSON for each frame.
     pub trace: Option<PathBuf>,
 }
@@ -72,7 +71,16 @@ pub enum ViewError {
 enum Event {
     Progress(Progress),
     News(News),
+    /// There is something to draw with, or there is not.
+    Opened(Result<Box<Opened>, ViewError>),
+    /// Panels with letters for another scale.
+    Panels(Box<Panels>),
+    /// Something people should know.
+    Said(String),
 }
+
+/// By which other threads tell it.
+type Tell = Arc<dyn Fn(Event) + Send + Sync>;
 
 /// A frame is drawn so often at most, while things move.
 const FRAME: Duration = Duration::from_millis(8);
@@ -80,6 +88,7 @@ const FRAME: Duration = Duration::from_millis(8);
 const PATIENCE: Duration = Duration::from_millis(150);
 /// A device that is lost more often is not opened again.
 const MOST_LOSSES: u32 = 5;
+
 /// Opens a window and shows in it what `load`, on a thread of its own, has to show. Returns when
 /// the window is closed; threads may still be at work then.
 ///
@@ -99,12 +108,17 @@ pub fn run(
     let event_loop = EventLoop::<Event>::with_user_event()
         .build()
         .map_err(no_display)?;
-    let proxy = event_loop.create_proxy();
-    let teller = Teller::new(teller_of(proxy.clone(), Event::Progress));
-    let tell_news = teller_of(proxy, Event::News);
-    let worker = Worker::start(options.worker.clone(), tell_news);
+    // Proxies may be used by one thread at a time.
+    let proxy = Mutex::new(event_loop.create_proxy());
+    let tell: Tell = Arc::new(move |event| {
+        let proxy = proxy.lock().unwrap_or_else(PoisonError::into_inner);
+        // A window that is closed does not listen.
+        let _ = proxy.send_event(event);
+    });
+    let of_loading = Arc::clone(&tell);
+    let teller = Teller::new(move |progress| of_loading(Event::Progress(progress)));
     std::thread::spawn(move || load(&teller));
-    let mut app = App::new(options, worker, trace);
+    let mut app = App::new(options, tell, trace);
     event_loop.run_app(&mut app).map_err(no_display)?;
     match app.error {
         Some(error) => Err(error),
@@ -123,27 +137,19 @@ fn without_place(text: &str) -> String {
         .to_owned()
 }
 
-/// Proxies may be used by one thread at a time.
-fn teller_of<T: 'static>(
-    proxy: EventLoopProxy<Event>,
-    wrap: fn(T) -> Event,
-) -> impl Fn(T) + Send + Sync + 'static {
-    let proxy = Mutex::new(proxy);
-    move |said| {
-        let proxy = proxy.lock().unwrap_or_else(PoisonError::into_inner);
-        // A window that is closed does not listen.
-        let _ = proxy.send_event(wrap(said));
-    }
-}
-
 struct App {
     options: ViewOptions,
     state: State,
     shows: Option<Shows>,
     status: Status,
     worker: Worker,
+    tell: Tell,
     trace: Option<Trace>,
+    window: Option<Arc<Window>>,
+    /// What draws in it, once that is opened.
     pane: Option<Pane>,
+    /// Pixels a point that are wanted.
+    scale: f32,
     plan: Option<Plan>,
     shown: Option<Shown>,
     revision: u64,
@@ -152,25 +158,26 @@ struct App {
     holds_wipe: bool,
     start: Instant,
     last_frame: Instant,
-    /// The longest that an event took since the last frame.
-    event_ms: f64,
+    /// What all that happened since the last frame took.
+    events: Took,
     frames: u64,
     losses: u32,
     /// When the panels want another frame.
     wake: Option<Instant>,
     error: Option<ViewError>,
-    /// Fonts being read.
-    warm: Option<JoinHandle<Warm>>,
 }
 
 impl App {
-    fn new(options: ViewOptions, worker: Worker, trace: Option<Trace>) -> Self {
+    fn new(options: ViewOptions, tell: Tell, trace: Option<Trace>) -> Self {
         let mut state = State::new(options.look.clone());
         if let Some(file) = &options.keyframes {
             state
                 .keyframes
                 .load(&file.keyframes, file.interpolation, file.fps);
         }
+        let of_worker = Arc::clone(&tell);
+        let tell_news = move |news| of_worker(Event::News(news));
+        let worker = Worker::start(options.worker.clone(), tell_news);
         Self {
             options,
             state,
@@ -180,8 +187,11 @@ impl App {
                 ..Status::default()
             },
             worker,
+            tell,
             trace,
+            window: None,
             pane: None,
+            scale: 1.0,
             plan: None,
             shown: None,
             revision: 0,
@@ -190,64 +200,118 @@ impl App {
             holds_wipe: false,
             start: Instant::now(),
             last_frame: Instant::now(),
-            event_ms: 0.0,
+            events: Took::default(),
             frames: 0,
             losses: 0,
             wake: None,
             error: None,
-            warm: Some(std::thread::spawn(warm_context)),
         }
     }
 
     fn redraw(&self) {
-        if let Some(pane) = &self.pane {
-            pane.window.request_redraw();
+        if let (Some(window), Some(_)) = (&self.window, &self.pane) {
+            window.request_redraw();
         }
     }
 
-    fn open_pane(
-        &mut self,
-        event_loop: &ActiveEventLoop,
-        window: Arc<Window>,
-    ) -> Result<(), ViewError> {
-        let pane = Pane::open(event_loop, window, self.warm.take())?;
+    /// Begins to open what draws in the window.
+    fn open(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(window) = self.window.clone() else {
+            return;
+        };
+        let display = event_loop.owned_display_handle();
+        let open = move || Event::Opened(Opened::of(&window, display).map(Box::new));
+        if cfg!(target_os = "macos") {
+            // There surfaces are made on the window's thread only.
+            self.hear(event_loop, open());
+        } else {
+            let tell = Arc::clone(&self.tell);
+            std::thread::spawn(move || tell(open()));
+        }
+    }
+
+    fn opened(&mut self, opened: Opened) {
+        let Some(window) = self.window.clone() else {
+            return;
+        };
+        let pane = Pane::new(window, opened);
         let (width, height) = pane.size();
-        self.state.resize(width, height);
-        let points = width as f32 / pane.window.scale_factor() as f32;
+        let points = width as f32 / pane.panels.scale();
         self.shows.get_or_insert_with(|| Shows::fitting(points));
         self.pane = Some(pane);
+        if self.losses > 0 {
+            self.status.said = Some("the graphics device was lost and opened anew".to_owned());
+        }
+        // Both may have changed meanwhile.
+        self.resize(width, height);
+        self.rescale(self.scale);
         self.show_picture();
-        self.redraw();
-        Ok(())
+    }
+
+    /// Opens another device in place of one that was lost.
+    fn reopen(&mut self, event_loop: &ActiveEventLoop) {
+        self.losses += 1;
+        self.pane = None;
+        match self.losses {
+            0..=MOST_LOSSES => self.open(event_loop),
+            _ => {
+                let text = "it was lost again and again".to_owned();
+                self.fail(event_loop, ViewError::NoDevice(text));
+            }
+        }
+    }
+
+    fn fail(&mut self, event_loop: &ActiveEventLoop, error: ViewError) {
+        self.error = Some(error);
+        self.close(event_loop);
     }
 
     /// Brings the picture to the screen's textures.
     fn show_picture(&mut self) {
         if let (Some(pane), Some(shown)) = (&mut self.pane, &self.shown) {
-            pane.show(shown);
+            pane.panels.show(shown);
         }
     }
 
-    fn hear(&mut self, event: Event) {
+    /// Another size of the window, in pixels; none while it is minimised.
+    fn resize(&mut self, width: u32, height: u32) {
+        let mut size = (width, height);
+        if let Some(pane) = &mut self.pane {
+            pane.screen.resize(width, height);
+            let most = pane.texture_side() as u32;
+            size = (width.min(most), height.min(most));
+        }
+        self.state.resize(size.0, size.1);
+    }
+
+    /// Another scale, as of another monitor: its letters are drawn on another thread.
+    fn rescale(&mut self, scale: f32) {
+        self.scale = scale;
+        let Some(pane) = &self.pane else {
+            return;
+        };
+        if pane.panels.scale() != scale {
+            let (size, side) = (pane.size(), pane.texture_side());
+            let tell = Arc::clone(&self.tell);
+            std::thread::spawn(move || {
+                tell(Event::Panels(Box::new(Panels::warm(scale, size, side))));
+            });
+        }
+    }
+
+    fn hear(&mut self, event_loop: &ActiveEventLoop, event: Event) {
         match event {
-            Event::Progress(Progress::Doing(text)) => self.status.doing = Some(text),
-            Event::Progress(Progress::Note(text)) => self.status.said = Some(text),
-            Event::Progress(Progress::Done) => self.status.doing = None,
-            Event::Progress(Progress::Failed(text)) => {
-                self.status.doing = None;
-                self.status.failed = Some(text);
+            Event::Opened(Ok(opened)) => self.opened(*opened),
+            Event::Opened(Err(error)) => self.fail(event_loop, error),
+            Event::Panels(panels) => {
+                // Others may be wanted by now.
+                if let (Some(pane), true) = (&mut self.pane, panels.scale() == self.scale) {
+                    pane.replace(*panels);
+                    self.show_picture();
+                }
             }
-            Event::Progress(Progress::Show(content, space)) => {
-                self.revision += 1;
-                self.plan = match &content {
-                    Content::Interior(house) => Some(Plan::new(house)),
-                    Content::Scene(_) => None,
-                };
-                let before = self.state.show(content.clone(), Arc::clone(&space));
-                // Gigabytes of photos may go with it.
-                std::thread::spawn(move || drop(before));
-                self.worker.show(content, space, self.revision);
-            }
+            Event::Said(text) => self.status.said = Some(text),
+            Event::Progress(progress) => self.progress(progress),
             Event::News(News::Shown(shown)) => {
                 self.state.shown(&shown);
                 self.shown = Some(*shown);
@@ -263,168 +327,32 @@ impl App {
         self.redraw();
     }
 
-    /// One frame.
-    fn draw(&mut self, event_loop: &ActiveEventLoop) {
-        // 1. Time passes.
-        let (now, cpu) = (Instant::now(), ThreadTime::now());
-        let seconds = (now - self.last_frame).as_secs_f64();
-        self.last_frame = now;
-        self.state.step(seconds);
-        if let Some(request) = self.state.wanted() {
-            self.worker.ask(request);
-        }
-        let step_ms = ms_since(now);
-        // 2. What is to be painted.
-        let start = Instant::now();
-        let (Some(pane), Some(shows)) = (&mut self.pane, &mut self.shows) else {
-            return;
-        };
-        let input = pane.input.take_egui_input(&pane.window);
-        let mut commands = Vec::new();
-        let textures = [&pane.picture, &pane.photo].map(|t| t.as_ref().map(TextureHandle::id));
-        let (state, status, shown) = (&mut self.state, &self.status, self.shown.as_ref());
-        let plan = self.plan.as_ref();
-        let mut output = pane.context.run_pass(input, |context| {
-            paint(context, state, shows, shown, plan, textures);
-            panel::texts(context, state, shows, status, shown);
-            if shows.panel {
-                commands.extend(panel::panel(context, state, shows, shown));
+    fn progress(&mut self, progress: Progress) {
+        match progress {
+            Progress::Doing(text) => self.status.doing = Some(text),
+            Progress::Note(text) => self.status.said = Some(text),
+            Progress::Done => self.status.doing = None,
+            Progress::Failed(text) => {
+                self.status.doing = None;
+                self.status.failed = Some(text);
             }
-            panel::help(context, shows);
-        });
-        pane.input
-            .handle_platform_output(&pane.window, output.platform_output);
-        let delay = output
-            .viewport_output
-            .get(&egui::ViewportId::ROOT)
-            .map(|v| v.repaint_delay);
-        // Far away is never.
-        let delay = delay.filter(|delay| *delay < Duration::from_secs(60));
-        self.wake = delay.map(|delay| now + delay.max(FRAME));
-        let ui_ms = ms_since(start);
-        let start = Instant::now();
-        let pixels_per_point = output.pixels_per_point;
-        let primitives = pane.context.tessellate(output.shapes, pixels_per_point);
-        let tessellate_ms = ms_since(start);
-        // Without what other threads had of this core meanwhile.
-        let cpu_ms = 1e3 * cpu.elapsed().as_secs_f64();
-        // 3. It is painted.
-        let start = Instant::now();
-        let mut textures = std::mem::take(&mut pane.textures);
-        textures.append(std::mem::take(&mut output.textures_delta));
-        pane.screen.upload(&textures);
-        let upload_ms = ms_since(start);
-        let start = Instant::now();
-        let presented = pane.screen.present(&primitives, pixels_per_point);
-        pane.screen.free(&textures);
-        textures.clear();
-        let draw_ms = ms_since(start);
-        self.frames += 1;
-        let steps = [
-            ("events", self.event_ms),
-            ("step", step_ms),
-            ("panels", ui_ms),
-            ("tessellate", tessellate_ms),
-        ];
-        self.event_ms = 0.0;
-        self.status.step_ms = steps.iter().map(|s| s.1).fold(0.0, f64::max);
-        self.status.draw_ms = upload_ms + draw_ms;
-        if presented == Presented::Yes {
-            self.trace_frame(&steps, cpu_ms, [upload_ms, draw_ms]);
-        }
-        let start = Instant::now();
-        for command in commands {
-            self.do_command(command);
-            self.redraw();
-        }
-        self.event_ms = ms_since(start);
-        match presented {
-            Presented::Yes | Presented::NotNow => {}
-            Presented::Again => self.redraw(),
-            Presented::Lost => self.reopen(event_loop),
-        }
-    }
-
-    /// Opens another device in place of one that was lost.
-    fn reopen(&mut self, event_loop: &ActiveEventLoop) {
-        self.losses += 1;
-        let Some(pane) = self.pane.take() else {
-            return;
-        };
-        let window = Arc::clone(&pane.window);
-        drop(pane);
-        let opened = match self.losses {
-            0..=MOST_LOSSES => self.open_pane(event_loop, window),
-            _ => Err(ViewError::NoDevice(
-                "it was lost again and again".to_owned(),
-            )),
-        };
-        match opened {
-            Ok(()) => {
-                self.status.said = Some("the graphics device was lost and opened anew".to_owned());
-            }
-            Err(error) => {
-                self.error = Some(error);
-                self.close(event_loop);
+            Progress::Show(content, space) => {
+                self.revision += 1;
+                self.plan = match &content {
+                    Content::Interior(house) => Some(Plan::new(house)),
+                    Content::Scene(_) => None,
+                };
+                let before = self.state.show(content.clone(), Arc::clone(&space));
+                // Gigabytes of photos may go with it.
+                std::thread::spawn(move || drop(before));
+                self.worker.show(content, space, self.revision);
             }
         }
-    }
-
-    fn trace_frame(&self, steps: &[(&str, f64)], cpu_ms: f64, [upload_ms, draw_ms]: [f64; 2]) {
-        let Some(trace) = &self.trace else {
-            return;
-        };
-        let state = &self.state;
-        let pose = state.pose();
-        let forward = pose.rotation.conjugate() * glam::DVec3::Z;
-        let size = self.pane.as_ref().map(|p| p.window.inner_size());
-        let steps: serde_json::Map<_, _> = steps
-            .iter()
-            .map(|(name, ms)| ((*name).to_owned(), json!(ms)))
-            .collect();
-        let picture = self.shown.as_ref().map(|s| {
-            json!({
-                "id": s.id,
-                "revision": s.revision,
-                "reduction": s.reduction,
-                "ms": s.time_ms(),
-                "center": s.view.center().to_array(),
-                "layer": state.look.layer.name(),
-                "is_settled": state.is_settled(s),
-                "photo": s.photo.as_ref().map(|p| p.0),
-            })
-        });
-        let cell = match (state.content(), state.cell()) {
-            (Some(Content::Interior(house)), Some(id)) => Some(&house.interior.cell(id).name),
-            _ => None,
-        };
-        trace.add(json!({
-            "frame": self.frames,
-            "t_ms": ms_since(self.start),
-            "center": pose.center().to_array(),
-            "forward": forward.to_array(),
-            "mode": state.mode.name(),
-            "cell": cell,
-            "stop": state.stop(),
-            "support": state.support,
-            "size": size.map(|s| [s.width, s.height]),
-            "picture": picture,
-            "wipe": state.wipe,
-            "keyframes": state.keyframes.len(),
-            "is_playing": state.is_playing(),
-            "doing": self.status.doing,
-            "said": self.status.said,
-            "losses": self.losses,
-            "steps_ms": steps,
-            "cpu_ms": cpu_ms,
-            "upload_ms": upload_ms,
-            "draw_ms": draw_ms,
-        }));
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
-        if let Some(pane) = &self.pane {
-            pane.window.set_visible(false);
+        if let Some(window) = &self.window {
+            window.set_visible(false);
         }
         self.trace = None;
         self.worker.end(PATIENCE);
@@ -432,33 +360,29 @@ impl App {
     }
 }
 
-fn ms_since(start: Instant) -> f64 {
-    1e3 * start.elapsed().as_secs_f64()
-}
-
 impl ApplicationHandler<Event> for App {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        if self.pane.is_some() {
+        if self.window.is_some() {
             return;
         }
         let (width, height) = self.options.size;
         let attributes = Window::default_attributes()
             .with_title(self.options.title.clone())
             .with_inner_size(winit::dpi::LogicalSize::new(width, height));
-        let opened = match event_loop.create_window(attributes) {
-            Ok(window) => self.open_pane(event_loop, Arc::new(window)),
-            Err(error) => Err(ViewError::NoDisplay(error.to_string())),
-        };
-        if let Err(error) = opened {
-            self.error = Some(error);
-            self.close(event_loop);
+        match event_loop.create_window(attributes) {
+            Ok(window) => {
+                self.scale = window.scale_factor() as f32;
+                self.window = Some(Arc::new(window));
+                self.open(event_loop);
+            }
+            Err(error) => self.fail(event_loop, ViewError::NoDisplay(error.to_string())),
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, event: Event) {
-        let start = Instant::now();
-        self.hear(event);
-        self.event_ms = self.event_ms.max(ms_since(start));
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, event: Event) {
+        let watch = Watch::start();
+        self.hear(event_loop, event);
+        self.events += watch.took();
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -466,9 +390,9 @@ impl ApplicationHandler<Event> for App {
             self.draw(event_loop);
             return;
         }
-        let start = Instant::now();
+        let watch = Watch::start();
         self.on_event(event_loop, event);
-        self.event_ms = self.event_ms.max(ms_since(start));
+        self.events += watch.took();
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
@@ -488,6 +412,9 @@ impl ApplicationHandler<Event> for App {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calibrate::Rigid3;
+    use render::DeviceChoice;
+    use render::interior::WalkOptions;
 
     #[test]
     fn errors_say_what_to_do() {
@@ -496,5 +423,36 @@ mod tests {
         assert!(!text.contains('\n'));
         let text = without_place("os error at /a/b.rs:7: neither is set.");
         assert_eq!(text, "neither is set");
+    }
+
+    #[test]
+    fn what_comes_before_there_is_a_device_is_kept() {
+        let options = ViewOptions {
+            title: String::new(),
+            size: (320, 240),
+            look: Look::default(),
+            worker: WorkerOptions {
+                device: DeviceChoice::Cpu,
+                gpu_memory: None,
+                no_skip: false,
+                walk: WalkOptions::default(),
+                output: PathBuf::new(),
+            },
+            keyframes: None,
+            nerfstudio: NerfstudioFrame::default(),
+            trace: None,
+        };
+        let mut app = App::new(options, Arc::new(|_| {}), None);
+        for (width, height) in [(0, 0), (1, 0), (0, 1), (u32::MAX, 1), (320, 240)] {
+            app.resize(width, height);
+            app.rescale(1.5);
+            app.redraw();
+            assert!(app.state.view().is_none() && app.state.wanted().is_none());
+        }
+        assert_eq!(app.scale, 1.5);
+        app.progress(Progress::Failed("no such scene".to_owned()));
+        assert_eq!(app.status.failed.as_deref(), Some("no such scene"));
+        assert_eq!(*app.state.pose(), Rigid3::IDENTITY);
+        app.worker.end(Duration::from_secs(10));
     }
 }

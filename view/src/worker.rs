@@ -384,6 +384,7 @@ fn is_alike(a: &Request, b: &Request) -> bool {
         && a.look.options == b.look.options
         && a.look.method == b.look.method
         && a.look.portals == b.look.portals
+        && a.look.moment == b.look.moment
 }
 
 #[cfg(test)]

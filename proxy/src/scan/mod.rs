@@ -68,7 +68,7 @@ impl Solid {
     /// [`Self::scan`] along rays of the view's camera.
     pub fn scan_along(&self, view: &View, rays: &Rays) -> Scan {
         let plane_from_world =
-            rays.from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
+            rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
         let front_only = self.kind().has_front_sides_only();
         let prepare = |i: usize| {
@@ -89,7 +89,7 @@ impl Facets {
     /// Which facet the viewer sees along rays, and how far. The same as [`Facets::locate`]'s but for
     /// ties of rounding, and for directions that rounding leaves without any.
     pub fn scan(&self, rays: &Rays) -> Scan {
-        let plane_from_camera = rays.from_camera();
+        let plane_from_camera = rays.plane_from_camera();
         // q·ray, the ray being where it is (x, y, 1).
         let of_planes = plane_from_camera.inverse().transpose();
         let prepare = |i: usize| {
@@ -105,7 +105,7 @@ impl Facets {
 
 impl Rays {
     /// To where a ray is (x, y, 1): a pinhole's pixels, or the plane z = 1.
-    fn from_camera(&self) -> DMat3 {
+    fn plane_from_camera(&self) -> DMat3 {
         let Lens {
             focal, principal, ..
         } = self.lens;
@@ -232,10 +232,8 @@ impl Prepared {
     fn draw_bent(&self, row: usize, bent: &Bent, ids: &mut [u32], depths: &mut [f64]) {
         let width = ids.len();
         let is_beyond = |bounds: &rays::Bounds| {
-            let sides = self.sides.iter().zip(self.slack);
-            sides
-                .map(|(side, slack)| bounds.most_of(*side) < -slack)
-                .any(|b| b)
+            let mut sides = self.sides.iter().zip(self.slack);
+            sides.any(|(side, slack)| bounds.most_of(*side) < -slack)
         };
         if is_beyond(&bent.rows[row]) {
             return;

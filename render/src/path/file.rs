@@ -1,5 +1,7 @@
-//! Path files, version 1: JSON with either frames or keyframes.
+//! Path files, version 1: JSON with either frames or keyframes. Those of nerfstudio are told by their
+//! content.
 
+use super::nerfstudio::{self, NerfstudioFrame};
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
 use calibrate::{Camera, ModelKind, Rigid3};
 use glam::{DMat3, DVec3};
@@ -25,6 +27,9 @@ pub enum PathFileError {
     /// Its frames do not make a path.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Path(PathBuf, PathError),
+    /// A path of nerfstudio's, or where its world lies, cannot be read.
+    #[error("{path}: nerfstudio's: {reason}", path = .0.display(), reason = .1)]
+    Nerfstudio(PathBuf, String),
 }
 
 /// What the file says.
@@ -69,7 +74,8 @@ struct StoredFrame {
 /// How far RᵀR of a pose may be from the identity: what six printed digits leave.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
-/// Reads a path; keyframes are sampled at its frame rate.
+/// Reads a path; keyframes are sampled at its frame rate. Of nerfstudio's, which are told by their
+/// content, the frames are read, as if its world were ours.
 ///
 /// Keys that this version does not know are kept in `extra`, except those of keyframes,
 /// which end with the sampling.
@@ -77,8 +83,19 @@ const ROTATION_TOLERANCE: f64 = 1e-6;
 /// # Errors
 /// The file, the frame by its index, and what is wrong with it.
 pub fn read(path: &Path) -> Result<CameraPath, PathFileError> {
-    let bytes = std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))?;
-    parse(path, &bytes)
+    read_in(path, &NerfstudioFrame::default())
+}
+
+/// As [`read`], where nerfstudio's world lies as `frame` says; of other paths that says nothing.
+///
+/// # Errors
+/// As for [`read`].
+pub fn read_in(path: &Path, frame: &NerfstudioFrame) -> Result<CameraPath, PathFileError> {
+    parse_in(path, &bytes_of(path)?, frame)
+}
+
+fn bytes_of(path: &Path) -> Result<Vec<u8>, PathFileError> {
+    std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))
 }
 
 /// Reads the content of a file; `path` is only named in errors.
@@ -86,6 +103,25 @@ pub fn read(path: &Path) -> Result<CameraPath, PathFileError> {
 /// # Errors
 /// As for [`read`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
+    parse_in(path, bytes, &NerfstudioFrame::default())
+}
+
+fn parse_in(
+    path: &Path,
+    bytes: &[u8],
+    frame: &NerfstudioFrame,
+) -> Result<CameraPath, PathFileError> {
+    match nerfstudio::is_nerfstudio(bytes) {
+        true => nerfstudio::frames(path, bytes, frame),
+        false => Ok(parse_own(path, bytes)?.0),
+    }
+}
+
+/// A path, and its keyframes as they are, where it has some.
+fn parse_own(
+    path: &Path,
+    bytes: &[u8],
+) -> Result<(CameraPath, Option<KeyframeFile>), PathFileError> {
     let json = |e| PathFileError::Json(path.to_owned(), e);
     // The version first: a later one may have other keys.
     #[derive(Deserialize)]
@@ -100,18 +136,24 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
     debug_assert_eq!(stored.version, version);
 
     let camera_path = match (stored.frames, stored.keyframes) {
-        (Some(frames), None) => read_frames(stored.fps, frames),
-        (None, Some(keyframes)) => {
+        (Some(frames), None) => read_frames(stored.fps, frames).map(|path| (path, None)),
+        (None, Some(keyframes)) => keyframes_of(keyframes).and_then(|keyframes| {
             let interpolation = interpolation_of(stored.interpolation);
-            keyframes_of(keyframes)
-                .and_then(|k| CameraPath::from_keyframes(&k, interpolation, stored.fps))
-        }
+            let path = CameraPath::from_keyframes(&keyframes, interpolation, stored.fps)?;
+            let file = KeyframeFile {
+                fps: stored.fps,
+                keyframes,
+                interpolation,
+            };
+            Ok((path, Some(file)))
+        }),
         (None, None) => return Err(PathFileError::Content(path.to_owned(), "neither")),
         (Some(_), Some(_)) => return Err(PathFileError::Content(path.to_owned(), "both")),
     };
-    let mut camera_path = camera_path.map_err(|e| PathFileError::Path(path.to_owned(), e))?;
+    let (mut camera_path, keyframes) =
+        camera_path.map_err(|e| PathFileError::Path(path.to_owned(), e))?;
     camera_path.extra = stored.extra;
-    Ok(camera_path)
+    Ok((camera_path, keyframes))
 }
 
 /// Writes a path as frames, one a line. What [`read`] makes of it is equal, bit for bit,
@@ -171,24 +213,19 @@ pub struct KeyframeFile {
 }
 
 /// Reads a path's keyframes as they are, not sampled; `None` of a path that has frames instead.
+/// `frame` is for nerfstudio's paths.
 ///
 /// # Errors
 /// As for [`read`].
-pub fn read_keyframes(path: &Path) -> Result<Option<KeyframeFile>, PathFileError> {
-    let bytes = std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))?;
-    // All that `read` finds wrong is wrong here.
-    let sampled = parse(path, &bytes)?;
-    let json = |e| PathFileError::Json(path.to_owned(), e);
-    let stored: Stored = serde_json::from_slice(&bytes).map_err(json)?;
-    let Some(keyframes) = stored.keyframes else {
-        return Ok(None);
-    };
-    let keyframes = keyframes_of(keyframes).map_err(|e| PathFileError::Path(path.to_owned(), e))?;
-    Ok(Some(KeyframeFile {
-        fps: sampled.fps,
-        keyframes,
-        interpolation: interpolation_of(stored.interpolation),
-    }))
+pub fn read_keyframes(
+    path: &Path,
+    frame: &NerfstudioFrame,
+) -> Result<Option<KeyframeFile>, PathFileError> {
+    let bytes = bytes_of(path)?;
+    match nerfstudio::is_nerfstudio(&bytes) {
+        true => nerfstudio::keyframes(path, &bytes, frame),
+        false => Ok(parse_own(path, &bytes)?.1),
+    }
 }
 
 /// Writes keyframes, one a line, in the way of [`write()`]. What [`read`] makes of them is what
@@ -229,7 +266,7 @@ pub fn write_keyframes(path: &Path, file: &KeyframeFile) -> Result<(), PathFileE
     write_whole(path, &text)
 }
 
-fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> {
+pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> {
     let io = |e| PathFileError::Io(path.to_owned(), e);
     let mut temporary = path.as_os_str().to_owned();
     temporary.push(".tmp");
@@ -365,22 +402,31 @@ impl StoredFrame {
         let row = |r: usize| DVec3::new(m[4 * r], m[4 * r + 1], m[4 * r + 2]);
         let rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
         let translation = DVec3::new(m[3], m[7], m[11]);
-        let Some(pose) = Rigid3::from_matrix(rotation, translation, ROTATION_TOLERANCE) else {
-            return Err(malformed(
+        pose_of_matrix(rotation, translation, ROTATION_TOLERANCE).ok_or_else(|| {
+            malformed(
                 "camera_from_world does not begin with a rotation: its rows must be of length \
                  1, at right angles and right-handed"
                     .to_owned(),
-            ));
-        };
-        // A matrix that [`write`] wrote gives back the very quaternion.
-        let written = Rigid3 {
-            rotation: settled(pose.rotation),
-            translation,
-        };
-        Ok(if written.matrix() == rotation {
-            written
-        } else {
-            pose
+            )
         })
     }
+}
+
+/// A pose of a rotation matrix, as [`Rigid3::from_matrix`] makes it; a matrix that we wrote gives back
+/// the very quaternion.
+pub(super) fn pose_of_matrix(
+    rotation: DMat3,
+    translation: DVec3,
+    tolerance: f64,
+) -> Option<Rigid3> {
+    let pose = Rigid3::from_matrix(rotation, translation, tolerance)?;
+    let written = Rigid3 {
+        rotation: settled(pose.rotation),
+        translation,
+    };
+    Some(if written.matrix() == rotation {
+        written
+    } else {
+        pose
+    })
 }

@@ -1,12 +1,14 @@
 //! Camera paths: the desired views of a film or a list of pictures, frame by frame.
 
 mod file;
+mod nerfstudio;
 mod shot;
 mod spline;
 
 pub use file::{
-    KeyframeFile, PathFileError, parse, read, read_keyframes, text, write, write_keyframes,
+    KeyframeFile, PathFileError, parse, read, read_in, read_keyframes, text, write, write_keyframes,
 };
+pub use nerfstudio::{NerfstudioFrame, write_nerfstudio};
 pub use shot::{SHOT_KEYWORD, ShotError, read_shot, write_shot};
 pub(crate) use spline::{Curve, mean_rotation};
 

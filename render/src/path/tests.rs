@@ -160,13 +160,19 @@ fn keyframes_come_back_as_they_were_written() {
             interpolation,
         };
         write_keyframes(&path, &file).unwrap();
-        assert_eq!(read_keyframes(&path).unwrap(), Some(file));
+        assert_eq!(
+            read_keyframes(&path, &NerfstudioFrame::default()).unwrap(),
+            Some(file)
+        );
         let sampled = CameraPath::from_keyframes(&keyframes, interpolation, 24.0).unwrap();
         assert_eq!(read(&path).unwrap(), sampled);
     }
     // A path of frames has none, and none make no file.
     write(&path, &read_text(&frames(&good_frame("")))).unwrap();
-    assert_eq!(read_keyframes(&path).unwrap(), None);
+    assert_eq!(
+        read_keyframes(&path, &NerfstudioFrame::default()).unwrap(),
+        None
+    );
     let none = KeyframeFile {
         fps: 24.0,
         keyframes: Vec::new(),

@@ -150,6 +150,7 @@ fn with_depths(state: &mut State) {
         image: Arc::new(ColorImage::default()),
         photo: None,
         lines: Lines::default(),
+        mesh: Arc::default(),
         support: Some(Support {
             covered: 0.0,
             difference: 0.0,

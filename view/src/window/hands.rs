@@ -1,12 +1,16 @@
 //! What keys, buttons and the wheel do to the window and its state.
 
-use super::App;
+use super::{App, Event};
 use crate::keys::{self, Key};
 use crate::overlay::clicked;
 use crate::panel::Command;
 use crate::state::{Action, Button};
 use calibrate::Pixel;
-use render::path::{KeyframeFile, write_keyframes};
+use render::path::{
+    CameraPath, KeyframeFile, NerfstudioFrame, PathFileError, write_keyframes, write_nerfstudio,
+};
+use std::path::Path;
+use std::sync::Arc;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{ModifiersState, PhysicalKey};
@@ -80,40 +84,38 @@ impl App {
                 }
                 self.worker.shoot();
             }
-            Command::SavePath => self.status.said = Some(self.save_path()),
+            Command::SavePath => self.save_path(),
         }
     }
 
-    fn save_path(&self) -> String {
+    /// On another thread: disks may be slow.
+    fn save_path(&mut self) {
         let Some(view) = self.state.view() else {
-            return "there is no view to save a path for".to_owned();
+            self.status.said = Some("there is no view to save a path for".to_owned());
+            return;
         };
         let keyframes = &self.state.keyframes;
-        let folder = &self.options.worker.output;
-        let path = folder.join("path.json");
         let file = KeyframeFile {
             fps: keyframes.fps,
             keyframes: keyframes.stored(&view),
             interpolation: keyframes.interpolation,
         };
-        let written = std::fs::create_dir_all(folder)
-            .map_err(|error| format!("{}: {error}", folder.display()))
-            .and_then(|()| write_keyframes(&path, &file).map_err(|error| error.to_string()));
-        match written {
-            Ok(()) => format!("saved {}", path.display()),
-            Err(error) => error,
-        }
+        let folder = self.options.worker.output.clone();
+        let tell = Arc::clone(&self.tell);
+        let frame = self.options.nerfstudio;
+        std::thread::spawn(move || tell(Event::Said(write_path(&folder, &file, &frame))));
+    }
+
+    fn width(&self) -> f64 {
+        let size = self.window.as_ref().map(|window| window.inner_size());
+        size.map_or(1.0, |size| f64::from(size.width.max(1)))
     }
 
     fn on_pointer(&mut self, at: Option<Pixel>) {
         self.pointer = at;
-        let width = self
-            .pane
-            .as_ref()
-            .map_or(1, |p| p.window.inner_size().width.max(1));
         match at {
             Some(at) if self.holds_wipe => {
-                self.state.wipe = Some((at.x / f64::from(width)).clamp(0.0, 1.0));
+                self.state.wipe = Some((at.x / self.width()).clamp(0.0, 1.0));
             }
             _ => self.state.point(at),
         }
@@ -123,10 +125,6 @@ impl App {
         let Some(at) = self.pointer else {
             return;
         };
-        let width = self
-            .pane
-            .as_ref()
-            .map_or(0, |p| p.window.inner_size().width);
         let button = match button {
             MouseButton::Left => Button::Left,
             _ => Button::Other,
@@ -147,7 +145,7 @@ impl App {
             }
             return;
         }
-        let wipe = self.state.wipe.map(|share| share * f64::from(width));
+        let wipe = self.state.wipe.map(|share| share * self.width());
         if wipe.is_some_and(|x| (x - at.x).abs() < WIPE_PX) && button == Button::Left {
             self.holds_wipe = true;
         } else {
@@ -157,9 +155,6 @@ impl App {
 
     /// Whatever else happens to a window than that it is to be drawn.
     pub(super) fn on_event(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) {
-        let Some(pane) = &mut self.pane else {
-            return;
-        };
         let key = match &event {
             // With the focus come keys that were pressed elsewhere.
             WindowEvent::KeyboardInput {
@@ -179,13 +174,15 @@ impl App {
         };
         // egui would move its focus by it.
         let is_ours = key == Some(Key::Panel);
-        let consumed = !is_ours && pane.input.on_window_event(&pane.window, &event).consumed;
+        let consumed = match &mut self.pane {
+            Some(pane) if !is_ours => pane.input.on_window_event(&pane.window, &event).consumed,
+            _ => false,
+        };
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
-            WindowEvent::Resized(size) => {
-                pane.screen.resize(size.width, size.height);
-                let (width, height) = pane.size();
-                self.state.resize(width, height);
+            WindowEvent::Resized(size) => self.resize(size.width, size.height),
+            WindowEvent::ScaleFactorChanged { scale_factor, .. } => {
+                self.rescale(scale_factor as f32);
             }
             WindowEvent::Focused(false) => self.state.let_go(),
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
@@ -223,5 +220,22 @@ impl App {
             _ => {}
         }
         self.redraw();
+    }
+}
+
+/// Writes a path to a folder, and for nerfstudio beside it; what people should know of it.
+fn write_path(folder: &Path, file: &KeyframeFile, frame: &NerfstudioFrame) -> String {
+    let (own, other) = (folder.join("path.json"), folder.join("camera_path.json"));
+    if let Err(error) = std::fs::create_dir_all(folder) {
+        return format!("{}: {error}", folder.display());
+    }
+    let written = write_keyframes(&own, file).and_then(|()| {
+        let sampled = CameraPath::from_keyframes(&file.keyframes, file.interpolation, file.fps);
+        let sampled = sampled.map_err(|error| PathFileError::Path(own.clone(), error))?;
+        write_nerfstudio(&other, &sampled, Some(file), frame)
+    });
+    match written {
+        Ok(()) => format!("saved {}; camera_path.json is nerfstudio's", own.display()),
+        Err(error) => error.to_string(),
     }
 }

@@ -39,15 +39,16 @@ pub(super) fn paint(
         painter.rect_filled(rect, 0.0, Color32::from_black_alpha(share as u8));
     }
     // A picture of another size is stretched until there is one of this.
-    let overlay = Overlay {
-        painter: &painter,
-        pixels_per_point: shown.view.width as f32 / rect.width().max(1.0),
-        view: &shown.view,
-    };
-    overlay.lines(&shown.lines, shows.epipoles);
+    let mut overlay = Overlay::new(&painter, &shown.view);
+    overlay.edges(&shown.mesh);
+    if shows.epipoles {
+        overlay.epipoles(&shown.lines.epipoles);
+    }
     if let Some(space) = state.space() {
-        if shows.frusta && !space.is_interior {
-            overlay.frusta(space, state.nearest());
+        match (shows.frusta, space.is_interior) {
+            (true, false) => overlay.frusta(&space.stops, space.depth, state.nearest()),
+            (true, true) => overlay.frusta(&space.cameras, space.depth, None),
+            (false, _) => {}
         }
         if !state.is_playing() {
             let keyframes = &state.keyframes;
@@ -58,12 +59,11 @@ pub(super) fn paint(
             overlay.wipe(share, name);
         }
     }
-    if let (Some(Content::Interior(house)), Some(plan)) = (state.content(), plan) {
-        if shows.frusta {
-            overlay.portals(&house.interior, 0.05);
-        }
-        if shows.plan {
-            plan.paint(&painter, plan::place(rect), state.pose(), state.cell());
-        }
+    if let (Some(Content::Interior(house)), true) = (state.content(), shows.frusta) {
+        overlay.portals(&house.interior, 0.05);
+    }
+    overlay.finish();
+    if let (Some(plan), true) = (plan, shows.plan) {
+        plan.paint(&painter, plan::place(rect), state.pose(), state.cell());
     }
 }

@@ -1,0 +1,72 @@
+//! `lumigraph path`, and paths of nerfstudio.
+
+use crate::run::{lumigraph, with_wall};
+use image::RgbaImage;
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn pixels(path: &Path) -> RgbaImage {
+    image::open(path).unwrap().into_rgba8()
+}
+
+fn most_apart(a: &RgbaImage, b: &RgbaImage) -> u8 {
+    let pairs = a.as_raw().iter().zip(b.as_raw());
+    pairs.map(|(a, b)| a.abs_diff(*b)).max().unwrap()
+}
+
+/// A path of two keyframes before the wall.
+fn keyframes() -> Value {
+    let keyframe = |t_s: f64, x: f64| {
+        json!({"t_s": t_s, "camera_from_world": [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+            "width": 64, "height": 48, "model": "PINHOLE", "params": [60, 60, 32, 24]})
+    };
+    json!({"version": 1, "fps": 2, "keyframes": [keyframe(0.0, 0.0), keyframe(1.0, 0.1)]})
+}
+
+#[test]
+fn paths_go_to_nerfstudio_and_back() {
+    let folder = with_wall();
+    let here = folder.path();
+    std::fs::write(here.join("own.json"), keyframes().to_string()).unwrap();
+    // Its world is turned, moved and scaled.
+    let transform = json!({"transform": [[0, -1, 0, 3], [1, 0, 0, 4], [0, 0, 1, 5]], "scale": 0.2});
+    std::fs::write(here.join("dp.json"), transform.to_string()).unwrap();
+    let there = "--dataparser-transforms dp.json";
+    let line = format!("path own.json --format nerfstudio {there} -o theirs/path.json");
+    let said = lumigraph(here, &line).ok().stdout;
+    assert_eq!(said, "theirs/path.json: 3 frames, 2 a second\n");
+    let text = std::fs::read(here.join("theirs/path.json")).unwrap();
+    let theirs: Value = serde_json::from_slice(&text).unwrap();
+    let fov = theirs["camera_path"][0]["fov"].as_f64().unwrap();
+    assert!((fov - 2.0 * (24.0_f64 / 60.0).atan().to_degrees()).abs() < 1e-9);
+    assert_eq!(theirs["keyframes"].as_array().unwrap().len(), 2);
+    // The same pictures, by either, and by what comes back.
+    let back = format!("path theirs/path.json --format lumigraph {there} -o back.json");
+    lumigraph(here, &back).ok();
+    let render = "render wall --proxy plane --path";
+    lumigraph(here, &format!("{render} own.json -o own")).ok();
+    lumigraph(here, &format!("{render} theirs/path.json {there} -o b")).ok();
+    lumigraph(here, &format!("{render} back.json -o c")).ok();
+    for name in ["frame_0000.png", "frame_0001.png", "frame_0002.png"] {
+        let own = pixels(&here.join("own").join(name));
+        for other in ["b", "c"] {
+            let other = pixels(&here.join(other).join(name));
+            assert!(most_apart(&own, &other) <= 1, "{name}");
+        }
+    }
+    // Elsewhere it is seen from elsewhere.
+    lumigraph(here, &format!("{render} theirs/path.json -o d")).ok();
+    let [a, d] = ["own", "d"].map(|folder| pixels(&here.join(folder).join("frame_0001.png")));
+    assert!(most_apart(&a, &d) > 50);
+
+    let mut fisheye = theirs;
+    fisheye["camera_type"] = json!("fisheye");
+    std::fs::write(here.join("fisheye.json"), fisheye.to_string()).unwrap();
+    let error = lumigraph(here, &format!("{render} fisheye.json -o x")).error(1);
+    assert!(error.contains("only \"perspective\" is read"), "{error}");
+    let error = lumigraph(
+        here,
+        &format!("{render} own.json --dataparser-transforms own.json -o x"),
+    );
+    assert!(error.error(1).contains("dataparser_transforms.json"));
+}
