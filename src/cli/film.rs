@@ -104,9 +104,9 @@ pub(super) struct FilmArgs {
 
 /// What is behind the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Background(Option<[u8; 3]>);
+pub(super) struct Background(pub(super) Option<[u8; 3]>);
 
-fn background(text: &str) -> Result<Background, String> {
+pub(super) fn background(text: &str) -> Result<Background, String> {
     if text == "transparent" {
         return Ok(Background(None));
     }

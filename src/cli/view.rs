@@ -3,6 +3,7 @@
 use super::Usage;
 use super::captured::Photos;
 use super::exposure::ExposureArgs;
+use super::film::{Background, background};
 use super::interior::open;
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::path::NerfstudioArgs;
@@ -48,6 +49,9 @@ pub(super) struct Args {
     /// What the portals of an interior show: geometry, texture, warp1, warp2 or ldi
     #[arg(long, value_name = "KIND", default_value = "geometry")]
     portals: String,
+    /// What is behind where nothing is shown: #RRGGBB, or transparent, shown as squares
+    #[arg(long, value_name = "COLOR", default_value = "#1c1c20", value_parser = background)]
+    background: Background,
     /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
@@ -90,6 +94,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             options: args.field.options(),
             method: args.field.method(),
             portals,
+            background: args.background.0,
             ..Look::default()
         },
         worker: WorkerOptions {

@@ -2,7 +2,7 @@
 
 use crate::camera::angle_between;
 use crate::content::Stop;
-use crate::picture::Layer;
+use crate::picture::{Layer, Look};
 use calibrate::{Pixel, View};
 use egui::{Color32, ColorImage};
 use glam::DVec3;
@@ -10,27 +10,33 @@ use image::RgbaImage;
 use rayon::prelude::*;
 use render::{Pyramid, reference};
 
-/// What is behind what no photo covers.
+/// What is behind what no photo covers, unless something else is chosen.
 pub(crate) const BEHIND: [u8; 3] = [28, 28, 32];
 /// What marks it where one asks for it.
 const UNCOVERED: [u8; 3] = [214, 40, 160];
 
-/// A picture with straight alpha over what is behind it.
-pub(crate) fn over_background(
-    picture: &RgbaImage,
-    layer: Layer,
-    exposure_stops: f64,
-) -> ColorImage {
-    let behind = match layer {
-        Layer::Coverage => UNCOVERED,
-        _ => BEHIND,
+/// The two greys of the squares that stand for transparency, and the squares' side in pixels.
+const SQUARES: [[u8; 3]; 2] = [[96; 3], [128; 3]];
+const SQUARE: usize = 8;
+
+/// A picture with straight alpha over the look's background.
+pub(crate) fn over_background(picture: &RgbaImage, look: &Look) -> ColorImage {
+    let (width, height) = picture.dimensions();
+    let behind = |i: usize| match (look.layer, look.background) {
+        (Layer::Coverage, _) => UNCOVERED,
+        (_, Some(color)) => color,
+        (_, None) => {
+            let (x, y) = (i % width as usize, i / width as usize);
+            SQUARES[(x / SQUARE + y / SQUARE) % 2]
+        }
     };
+    let exposure_stops = look.exposure_stops;
     let factor = 2f64.powf(exposure_stops);
     let lighter: Vec<u8> = (0..=255)
         .map(|v| (f64::from(v) * factor).round().clamp(0.0, 255.0) as u8)
         .collect();
-    let (width, height) = picture.dimensions();
-    let mix = |rgba: &[u8]| {
+    let mix = |(i, rgba): (usize, &[u8])| {
+        let behind = behind(i);
         let alpha = u32::from(rgba[3]);
         let channel = |c: usize| {
             let own = u32::from(lighter[usize::from(rgba[c])]);
@@ -41,6 +47,7 @@ pub(crate) fn over_background(
     let pixels = picture
         .as_raw()
         .par_chunks_exact(4)
+        .enumerate()
         .with_min_len(4096)
         .map(mix);
     ColorImage::new([width as usize, height as usize], pixels.collect())
@@ -181,11 +188,24 @@ mod tests {
     #[test]
     fn what_is_behind_shows_through() {
         let picture = RgbaImage::from_raw(2, 1, vec![200, 0, 0, 0, 100, 50, 0, 255]).unwrap();
-        let shown = over_background(&picture, Layer::Picture, 1.0);
+        let mut look = Look {
+            exposure_stops: 1.0,
+            ..Look::default()
+        };
+        let shown = over_background(&picture, &look);
         let [r, g, b] = BEHIND;
         let expected = [Color32::from_rgb(r, g, b), Color32::from_rgb(200, 100, 0)];
         assert_eq!(shown.pixels, expected);
-        let marked = over_background(&picture, Layer::Coverage, 0.0);
+        look.background = Some([1, 2, 3]);
+        let shown = over_background(&picture, &look);
+        assert_eq!(shown.pixels[0], Color32::from_rgb(1, 2, 3));
+        look.background = None;
+        let clear = RgbaImage::new(20, 10);
+        let squares = over_background(&clear, &look).pixels;
+        let grey = |x: usize, y: usize| squares[20 * y + x].r();
+        assert_eq!([grey(0, 0), grey(8, 0), grey(8, 8)], [96, 128, 96]);
+        look.layer = Layer::Coverage;
+        let marked = over_background(&picture, &look);
         assert_eq!(marked.pixels[0], Color32::from_rgb(214, 40, 160));
     }
 

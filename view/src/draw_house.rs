@@ -52,9 +52,7 @@ pub(crate) fn draw_house(
             .get(y * width + x.min(width - 1))
             .map(|s| f64::from(*s))
     });
-    let image = timed(&mut stages, "compose", || {
-        over_background(&picture, look.layer, look.exposure_stops)
-    });
+    let image = timed(&mut stages, "compose", || over_background(&picture, look));
     let skipped = format!(
         "{} of {} cells visible, {} of their {} triangles tried, {} samples clipped",
         cost.visible_cells,

@@ -225,9 +225,7 @@ impl<'a> SceneDrawer<'a> {
             (depths, support(frame, &picture))
         });
         let hover = request.hover.map(|pixel| hover(frame, asked, pixel));
-        let image = timed(&mut stages, "compose", || {
-            over_background(&picture, look.layer, look.exposure_stops)
-        });
+        let image = timed(&mut stages, "compose", || over_background(&picture, look));
         let store = &self.lumigraph.photos;
         let scored = frame.scored();
         let shown = Shown {

@@ -1,5 +1,6 @@
 //! The panel, the lines of text, and the help.
 
+use crate::compose::BEHIND;
 use crate::picture::{Layer, Shown};
 use crate::state::{Action, Mode, State};
 use egui::{Align2, Color32, ComboBox, Context, Frame, Id, RichText, Slider, Ui};
@@ -171,6 +172,16 @@ fn contents(
             .text("exposure")
             .step_by(0.1),
     );
+    ui.horizontal(|ui| {
+        let background = &mut state.look.background;
+        let mut is_clear = background.is_none();
+        if ui.checkbox(&mut is_clear, "transparent").changed() {
+            *background = (!is_clear).then_some(BEHIND);
+        }
+        if let Some(color) = background {
+            ui.color_edit_button_srgb(color).on_hover_text("behind");
+        }
+    });
     if let Some(shown) = shown {
         ui.label(format!("frame: {:.1} ms", shown.time_ms()));
     }

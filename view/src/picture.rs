@@ -1,5 +1,6 @@
 //! What is asked of the thread that draws, and what comes back.
 
+use crate::compose::BEHIND;
 use crate::lines::LineMesh;
 use calibrate::{Pixel, View};
 use egui::ColorImage;
@@ -67,6 +68,8 @@ pub struct Look {
     pub photo: bool,
     /// Stops by which the picture is shown lighter or darker.
     pub exposure_stops: f64,
+    /// What is behind what no photo covers; `None` for squares, as it is transparent.
+    pub background: Option<[u8; 3]>,
 }
 
 impl Default for Look {
@@ -81,6 +84,7 @@ impl Default for Look {
             wireframe: false,
             photo: false,
             exposure_stops: 0.0,
+            background: Some(BEHIND),
         }
     }
 }
