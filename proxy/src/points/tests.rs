@@ -35,8 +35,18 @@ fn sources() -> Vec<View> {
 
 /// The distance of the surface along the ray through a pixel.
 fn depth(facets: &Facets, desired: &View, x: f64, y: f64) -> Option<f64> {
+    depth_at(facets, &facets.neighbours(), desired, x, y)
+}
+
+fn depth_at(
+    facets: &Facets,
+    neighbours: &[[u32; 3]],
+    desired: &View,
+    x: f64,
+    y: f64,
+) -> Option<f64> {
     let ray = desired.lens.unproject(Pixel::new(x, y))?;
-    let facet = facets.locate(&facets.neighbours(), ray, 0);
+    let facet = facets.locate(neighbours, ray, 0);
     Some(ray.z / facets.planes[facet as usize].dot(ray))
 }
 
@@ -212,12 +222,13 @@ proptest! {
 /// The mean relative change of depth over the image from one desired view to another.
 fn change(a: &View, b: &View, sources: &[View], points: &[SparsePoint]) -> f64 {
     let [first, second] = [a, b].map(|view| facets(view, sources, points).unwrap());
+    let [beside_first, beside_second] = [&first, &second].map(Facets::neighbours);
     let places = (0..16)
         .flat_map(|i| (0..12).map(move |j| (10.0 * f64::from(i) + 5.0, 10.0 * f64::from(j) + 5.0)));
     let changes = places.map(|(x, y)| {
         let (p, q) = (
-            depth(&first, a, x, y).unwrap(),
-            depth(&second, b, x, y).unwrap(),
+            depth_at(&first, &beside_first, a, x, y).unwrap(),
+            depth_at(&second, &beside_second, b, x, y).unwrap(),
         );
         (p / q).ln().abs()
     });
