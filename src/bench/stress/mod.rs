@@ -8,6 +8,7 @@ pub use scene::{Case, Placement};
 use super::Random;
 use glam::DVec3;
 use image::RgbaImage;
+use render::blend::SAME_RAY;
 use render::score::on_black;
 use render::{FieldOptions, Frame, MAX_CONTRIBUTORS, Method, RenderError, cpu, reference};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -193,7 +194,7 @@ fn tied(frame: &Frame<'_>) -> Vec<bool> {
         let mut diffs: Vec<f64> = seeing.map(|i| frame.difference(i, &point)).collect();
         diffs.sort_by(f64::total_cmp);
         let beyond = *diffs.get(MAX_CONTRIBUTORS)?;
-        (beyond <= diffs[0] * (1.0 + TIED)).then_some(())
+        (beyond <= SAME_RAY.max(diffs[0] * (1.0 + TIED))).then_some(())
     };
     places.map(|place| is_tied_at(place).is_some()).collect()
 }
