@@ -14,11 +14,10 @@ use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::DVec2;
 use lumigraph::scene::{Truth, TruthScore, picture_files};
-use proxy::interior::{Contents, Interior};
+use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions, left_out,
-    tour,
+    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Tour, Walk, WalkOptions,
 };
 use render::score::mean_of;
 use render::{DeviceChoice, path};
@@ -312,7 +311,7 @@ fn frames(
             let size = DVec2::new(f64::from(width), f64::from(height));
             let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
             let camera = Camera::of(&lens, width, height);
-            let planned = tour(
+            let planned = Tour::new(
                 interior,
                 contents,
                 model,
@@ -321,16 +320,13 @@ fn frames(
                 FPS,
             )
             .with_context(|| args.interior.display().to_string())?;
-            let left_out = left_out(interior, contents).into_iter();
-            let names: Vec<&str> = left_out.map(|id| &*interior.cell(id).name).collect();
-            if !names.is_empty() {
-                let names = names.join(", ");
-                say!("note: no opening leads to {names}; the tour leaves them out");
+            for note in notes_of(&planned, interior) {
+                say!("note: {note}");
             }
             let file = args.output.join("path.json");
             make_parent(&file)?;
-            path::write(&file, &planned)?;
-            planned
+            path::write(&file, &planned.path)?;
+            planned.path
         }
     };
     let named = |frame: path::PathFrame| Named {
@@ -339,6 +335,28 @@ fn frames(
         truth: None,
     };
     Ok(path.frames.into_iter().map(named).collect())
+}
+
+/// What is not as one would walk, a line each.
+fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
+    let cells =
+        |ids: &[CellId]| -> Vec<&str> { ids.iter().map(|id| &*interior.cell(*id).name).collect() };
+    let mut notes = Vec::new();
+    if !tour.left_out.is_empty() {
+        let names = cells(&tour.left_out).join(", ");
+        notes.push(format!(
+            "no opening leads to {names}; the tour leaves them out"
+        ));
+    }
+    let portals = tour.shut.iter().map(|id| &*interior.portal(*id).name);
+    let names: Vec<&str> = cells(&tour.blocked).into_iter().chain(portals).collect();
+    if !names.is_empty() {
+        let names = names.join(", ");
+        notes.push(format!(
+            "something at eye height is in the way in {names}; the tour goes straight through it"
+        ));
+    }
+    notes
 }
 
 /// A walk with one kind of portals.

@@ -31,7 +31,7 @@ pub use raster::{Beyond, Raster};
 pub use reference::{CAPTURED_REFERENCE_SIZE, REFERENCE_SIZE, Reference};
 pub use target::Target;
 pub use texture::texture;
-pub use tour::{TourError, left_out, tour};
+pub use tour::{Tour, TourError, tour};
 pub use walk::{FrameCost, Walk, WalkError, WalkOptions};
 pub use warp::{Splat, Warp, Warped, warp};
 pub use window::Window;
