@@ -17,7 +17,8 @@ use lumigraph::scene::{Truth, TruthScore, picture_files};
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Tour, Walk, WalkOptions,
+    CAPTURED_REFERENCE_SIZE, FrameCost, LdiSource, Painter, PortalFill, Splat, Tour, Walk,
+    WalkOptions,
 };
 use render::score::mean_of;
 use render::{DeviceChoice, path};
@@ -71,6 +72,10 @@ pub(super) struct Args {
     /// Reference images before each side of a portal: an odd number
     #[arg(long, value_name = "N", default_value_t = 13)]
     reference_views: usize,
+    /// What LDIs of a capture's rooms are made of: its photos with depth maps themselves, wherever they
+    /// were taken (views where none sees the portal), or views that photos are blended into
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
+    ldi_from: LdiFrom,
     /// Draw samples as squares of so many pixels, not as large as their footprints
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
@@ -99,6 +104,12 @@ pub(super) struct Args {
     /// The folder for the frames
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LdiFrom {
+    Views,
+    Photos,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -138,6 +149,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     options.library.semicircles.views = args.reference_views;
     options.library.budget = args.cpu_memory;
+    options.library.ldi_of = match args.ldi_from {
+        LdiFrom::Views => LdiSource::Views,
+        LdiFrom::Photos => LdiSource::Photos,
+    };
     let device = match args.device {
         Device::Auto => DeviceChoice::Auto,
         Device::Gpu => DeviceChoice::Gpu,
