@@ -9,6 +9,7 @@ use crate::RenderError;
 use calibrate::{Distortion, Lens, View};
 use capture::DepthMap;
 use glam::{DVec2, DVec3};
+use image::GrayImage;
 use proxy::depth::{self, DepthError, DepthNoise};
 use proxy::interior::{Interior, Portal, Region, SemicircleView, clip};
 use rayon::prelude::*;
@@ -37,11 +38,24 @@ impl DepthMaps {
         }
     }
 
-    /// How noisy they are; nothing where they say nothing, or one cannot be decoded.
+    /// How noisy those are that can be decoded; nothing where they say nothing.
     fn noise(&self, view: impl Fn(usize) -> View) -> Option<DepthNoise> {
         *self.noise.get_or_init(|| {
             let with: Vec<usize> = (0..self.has.len()).filter(|i| self.has[*i]).collect();
-            let frame = |k: usize| Ok::<_, String>((view(with[k]), (self.load)(with[k])?));
+            let frame = |k: usize| {
+                let view = view(with[k]);
+                let (width, height) = (view.width, view.height);
+                let count = width as usize * height as usize;
+                let fits =
+                    |m: &DepthMap| (m.width, m.height, m.depths.len()) == (width, height, count);
+                let map = (self.load)(with[k]).ok().filter(fits);
+                let nothing = || DepthMap {
+                    width,
+                    height,
+                    depths: vec![0.0; count],
+                };
+                Ok::<_, String>((view, map.unwrap_or_else(nothing)))
+            };
             depth::noise(with.len(), frame).ok()
         })
     }
@@ -304,7 +318,9 @@ fn image(
         };
         let (x, y) = ((at % width) as u32, (at / width) as u32);
         let color = texels.get_pixel(x, y).0;
-        let is_used = mask.is_none_or(|mask| mask.get_pixel(x, y).0[0] == u8::MAX);
+        // One that cannot be decoded has a single pixel, which says no.
+        let use_of = |mask: &GrayImage| mask.get_pixel_checked(x, y).map_or(0, |p| p.0[0]);
+        let is_used = mask.is_none_or(|mask| use_of(mask) == u8::MAX);
         if color[3] == u8::MAX && is_used {
             seen.color[i] = color;
             seen.inverse_depth[i] = depths[i];
