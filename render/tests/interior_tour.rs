@@ -5,11 +5,13 @@ mod house;
 use calibrate::{Camera, Lens};
 use glam::{DVec2, DVec3};
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
-use proxy::interior::{Contents, Interior, interior_from_nodes, parse_rooms};
+use proxy::interior::{
+    CellId, Contents, Interior, Polygon, PortalId, interior_from_nodes, parse_rooms,
+};
 use proxy::mesh::read_model;
 use proxy::mesh::{Mesh, Model, ModelNode, Part};
 use proxy::{MeshKind, Solid};
-use render::interior::tour;
+use render::interior::{Tour, tour};
 use std::path::Path;
 
 /// Rooms a, b and c in a row of squares around a corner: between a and b a window, from a to c
@@ -171,4 +173,104 @@ fn tours_go_around_walls_and_furniture() {
     };
     let found = find_interior(&evidence, "house.glb", &FindOptions::default()).unwrap();
     assert_eq!(crossings(&found.interior, &model), (0, 3));
+}
+
+/// Walls from the floor to 3 m, along corners.
+fn walls(model: &mut Model, corners: &[[f64; 2]]) {
+    let mut mesh = Mesh::default();
+    for pair in corners.windows(2) {
+        let first = mesh.positions.len() as u32;
+        let foot = pair.iter().map(|[x, z]| DVec3::new(*x, 0.0, *z));
+        mesh.positions.extend(foot.clone());
+        mesh.positions.extend(foot.map(|p| p.with_y(3.0)));
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| first + k);
+        mesh.triangles.extend([[a, b, d], [a, d, c]]);
+    }
+    model.append(&mesh, "walls");
+}
+
+/// An L-shaped room, the middle of whose box is beyond its walls, and a square one behind a door.
+fn around_a_corner(with_outline: bool, in_the_way: &[[[f64; 2]; 2]]) -> (Interior, Model) {
+    let mut model = Model::default();
+    let l = [
+        [8.0, 1.0],
+        [8.0, 0.0],
+        [0.0, 0.0],
+        [0.0, 8.0],
+        [3.0, 8.0],
+        [3.0, 3.0],
+        [8.0, 3.0],
+    ];
+    walls(&mut model, &[&l[..], &[[8.0, 2.0]]].concat());
+    walls(
+        &mut model,
+        &[
+            [8.0, 1.0],
+            [8.0, 0.0],
+            [12.0, 0.0],
+            [12.0, 4.0],
+            [8.0, 4.0],
+            [8.0, 2.0],
+        ],
+    );
+    in_the_way.iter().for_each(|ends| walls(&mut model, ends));
+    let text = r#"{"version": 1, "rooms": [
+        {"name": "bend", "min": [0, 0, 0], "max": [8, 3, 8]},
+        {"name": "end", "min": [8, 0, 0], "max": [12, 3, 4]}],
+        "openings": [{"name": "door", "between": ["bend", "end"],
+            "polygon": [[8, 0, 1], [8, 0, 2], [8, 2.2, 2], [8, 2.2, 1]]}]}"#;
+    let read = parse_rooms(Path::new("r.json"), text.as_bytes(), "m.glb");
+    let (mut interior, _) = read.unwrap();
+    if with_outline {
+        let l = [
+            [8.0, 0.0],
+            [0.0, 0.0],
+            [0.0, 8.0],
+            [3.0, 8.0],
+            [3.0, 3.0],
+            [8.0, 3.0],
+        ];
+        let corners = l.map(|[x, z]| DVec3::new(x, 0.0, z));
+        interior.cells[0].floor = Some(Polygon::new(corners.to_vec()).unwrap());
+    }
+    (interior, model)
+}
+
+#[test]
+fn tours_stay_within_rooms_that_go_around_a_corner() {
+    for with_outline in [false, true] {
+        let (interior, model) = around_a_corner(with_outline, &[]);
+        assert_eq!(crossings(&interior, &model), (0, 2), "{with_outline}");
+    }
+}
+
+/// What a tour leaves out, goes straight through, and which openings it finds shut.
+fn amiss(interior: &Interior, model: &Model) -> (Vec<CellId>, Vec<CellId>, Vec<PortalId>) {
+    let (contents, _) = Contents::new(interior, model).unwrap();
+    let lens = Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0));
+    let camera = Camera::of(&lens, 64, 64);
+    let tour = Tour::new(interior, &contents, model, &camera, 50, 15.0).unwrap();
+    assert_eq!(tour.path.frames.len(), 50);
+    (tour.left_out, tour.blocked, tour.shut)
+}
+
+#[test]
+fn tours_say_where_something_is_in_the_way() {
+    let (interior, model) = around_a_corner(false, &[]);
+    assert_eq!(amiss(&interior, &model), (vec![], vec![], vec![]));
+    // A closed door.
+    let (interior, model) = around_a_corner(false, &[[[8.0, 1.0], [8.0, 2.0]]]);
+    assert_eq!(amiss(&interior, &model).2, [PortalId(0)]);
+    // A wall between the doors of the middle of three rooms.
+    let text = r#"{"version": 1, "rooms": [
+        {"name": "a", "min": [0, 0, 0], "max": [4, 3, 4]},
+        {"name": "b", "min": [4, 0, 0], "max": [8, 3, 4]},
+        {"name": "c", "min": [8, 0, 0], "max": [12, 3, 4]}],
+        "openings": [
+        {"name": "a|b", "between": ["a", "b"], "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]]},
+        {"name": "b|c", "between": ["b", "c"], "polygon": [[8, 0, 1], [8, 0, 2], [8, 2, 2], [8, 2, 1]]}]}"#;
+    let (interior, _) = parse_rooms(Path::new("r.json"), text.as_bytes(), "m.glb").unwrap();
+    let mut model = Model::default();
+    walls(&mut model, &[[6.0, -0.5], [6.0, 4.5]]);
+    assert_eq!(amiss(&interior, &model), (vec![], vec![CellId(1)], vec![]));
 }

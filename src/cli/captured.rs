@@ -106,7 +106,8 @@ impl Photos {
             backdrop,
         );
         captured.prepare();
-        Ok(Painter::of_photos(captured))
+        let depth_maps = self.scene.depth_maps(&self.without);
+        Ok(Painter::of_photos(captured.with_depth_maps(depth_maps?)))
     }
 
     /// The photos that were held out, to compare pictures with. Those that are corrupt are left

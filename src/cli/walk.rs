@@ -18,10 +18,10 @@ use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::DVec2;
 use lumigraph::scene::{Truth, picture_files};
-use proxy::interior::{Contents, Interior};
+use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::{Model, read_model};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, Painter, PortalFill, Splat, Walk, WalkOptions, left_out, tour,
+    CAPTURED_REFERENCE_SIZE, LdiSource, Painter, PortalFill, Splat, Tour, Walk, WalkOptions,
 };
 use render::{DeviceChoice, path};
 use report::{Drawn, Scored, Walked, ms};
@@ -77,6 +77,10 @@ pub(super) struct Args {
     /// Reference images before each side of a portal: an odd number
     #[arg(long, value_name = "N", default_value_t = 13)]
     reference_views: usize,
+    /// What LDIs of a capture's rooms are made of: its photos with depth maps themselves, wherever they
+    /// were taken (views where none sees the portal), or views that photos are blended into
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
+    ldi_from: LdiFrom,
     /// Draw samples as squares of so many pixels, not as large as their footprints
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
@@ -107,6 +111,12 @@ pub(super) struct Args {
     /// The folder for the frames
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LdiFrom {
+    Views,
+    Photos,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -155,6 +165,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     options.library.semicircles.views = args.reference_views;
     options.library.budget = args.cpu_memory;
+    options.library.ldi_of = match args.ldi_from {
+        LdiFrom::Views => LdiSource::Views,
+        LdiFrom::Photos => LdiSource::Photos,
+    };
     let device = match args.device {
         Device::Auto => DeviceChoice::Auto,
         Device::Gpu => DeviceChoice::Gpu,
@@ -354,18 +368,15 @@ fn frames(
             let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
             let camera = Camera::of(&lens, width, height);
             let count = args.frames.count(FRAMES) as usize;
-            let planned = tour(interior, contents, model, &camera, count, FPS)
+            let planned = Tour::new(interior, contents, model, &camera, count, FPS)
                 .with_context(|| args.interior.display().to_string())?;
-            let left_out = left_out(interior, contents).into_iter();
-            let names: Vec<&str> = left_out.map(|id| &*interior.cell(id).name).collect();
-            if !names.is_empty() {
-                let names = names.join(", ");
-                say!("note: no opening leads to {names}; the tour leaves them out");
+            for note in notes_of(&planned, interior) {
+                say!("note: {note}");
             }
             let file = args.output.join("path.json");
             make_parent(&file)?;
-            path::write(&file, &planned)?;
-            planned
+            path::write(&file, &planned.path)?;
+            planned.path
         }
     };
     let named = |frame: path::PathFrame| Named {
@@ -375,6 +386,28 @@ fn frames(
     };
     let frames = args.frames.of(path.frames)?;
     Ok((frames.into_iter().map(named).collect(), path.fps))
+}
+
+/// What is not as one would walk, a line each.
+fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
+    let cells =
+        |ids: &[CellId]| -> Vec<&str> { ids.iter().map(|id| &*interior.cell(*id).name).collect() };
+    let mut notes = Vec::new();
+    if !tour.left_out.is_empty() {
+        let names = cells(&tour.left_out).join(", ");
+        notes.push(format!(
+            "no opening leads to {names}; the tour leaves them out"
+        ));
+    }
+    let portals = tour.shut.iter().map(|id| &*interior.portal(*id).name);
+    let names: Vec<&str> = cells(&tour.blocked).into_iter().chain(portals).collect();
+    if !names.is_empty() {
+        let names = names.join(", ");
+        notes.push(format!(
+            "something at eye height is in the way in {names}; the tour goes straight through it"
+        ));
+    }
+    notes
 }
 
 fn draw(

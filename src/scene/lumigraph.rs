@@ -3,6 +3,7 @@
 use super::{Photo, Scene, SceneError};
 use calibrate::{Image, ImageId, View};
 use proxy::{DensePoints, Proxy, SparsePoint};
+use render::interior::DepthMaps;
 use render::{Lumigraph, PhotoStore, SourceView, Visibility};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -122,6 +123,24 @@ impl Scene {
             points,
             visibility,
         })
+    }
+
+    /// The depth maps of the photos of [`Self::lumigraph`], decoded when they are asked for.
+    ///
+    /// # Errors
+    /// A camera has no lens.
+    pub fn depth_maps(&self, without: &BTreeSet<String>) -> Result<DepthMaps, SceneError> {
+        let sources = self.sources(without)?.into_iter();
+        let files: Vec<(Photo, (u32, u32))> = sources
+            .map(|(photo, view)| (photo.clone(), (view.width, view.height)))
+            .collect();
+        let has = files.iter().map(|(p, _)| p.depth_map.is_some()).collect();
+        Ok(DepthMaps::new(has, move |source_idx| {
+            let (photo, size) = &files[source_idx];
+            let map = photo.decode_depth(*size);
+            let map = map.map_err(|error| error.to_string())?;
+            map.ok_or_else(|| format!("{}: no depth map", photo.name))
+        }))
     }
 
     /// The photos but those of the given names, with their cameras, in the order of their

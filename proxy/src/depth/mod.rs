@@ -8,10 +8,13 @@
 //! for free space are counted apart, so that they remove what has gone but never move what
 //! stays; and where the distance jumps, which no distance does, there is no surface.
 
+mod believed;
 mod blocks;
 mod frame;
 mod nets;
 mod volume;
+
+pub use believed::{DepthNoise, believed, noise};
 
 use crate::Mesh;
 use blocks::Grid;

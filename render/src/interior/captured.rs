@@ -5,7 +5,7 @@
 //! portals and images before them compose as they do with models, and images before portals are made of
 //! photos, too.
 
-use super::{Pinhole, Raster, Target};
+use super::{DepthMaps, Pinhole, Raster, Target};
 use crate::engine::Engine;
 use crate::frame::Frame;
 use crate::lumigraph::Lumigraph;
@@ -32,6 +32,7 @@ pub struct Captured {
     /// Photos that cannot be decoded.
     gone: Vec<usize>,
     notes: Vec<String>,
+    depth_maps: Option<DepthMaps>,
     /// By triangle: its facet in the frame that is drawn; all [`NO_FACET`] between frames.
     facet_of_triangle: Vec<u32>,
 }
@@ -75,7 +76,19 @@ impl Captured {
             backdrop,
             gone: Vec::new(),
             notes: Vec::new(),
+            depth_maps: None,
         }
+    }
+
+    /// With the photos' depth maps, so that LDIs can be made of the photos themselves.
+    pub fn with_depth_maps(mut self, depth_maps: DepthMaps) -> Self {
+        self.depth_maps = Some(depth_maps);
+        self
+    }
+
+    /// The photos' depth maps, if they were given.
+    pub(super) fn depth_maps(&self) -> Option<&DepthMaps> {
+        self.depth_maps.as_ref()
     }
 
     /// What is drawn from.
@@ -188,8 +201,15 @@ impl Captured {
         Ok(())
     }
 
+    /// Says something to people, once.
+    pub(super) fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
     /// Goes on without a photo; with the last one it is an error.
-    fn leave_out(&mut self, error: PhotoError) -> Result<(), RenderError> {
+    pub(super) fn leave_out(&mut self, error: PhotoError) -> Result<(), RenderError> {
         let sources = &self.lumigraph.sources;
         if self.gone.contains(&error.source_idx) || self.gone.len() + 1 >= sources.len() {
             return Err(RenderError::Photo(error));

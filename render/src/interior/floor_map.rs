@@ -1,7 +1,7 @@
 //! Where one can walk in a room: what stands at eye height, on a grid.
 
 use glam::{DVec2, DVec3};
-use proxy::interior::RoomBox;
+use proxy::interior::{CellId, Contents, Interior, RoomBox};
 use proxy::mesh::Model;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,6 +14,9 @@ const MOST: f64 = 1024.0;
 /// How far from walls one walks, in eye heights: the first of these that leads there.
 const CLEAR: [f64; 4] = [0.16, 0.1, 0.05, 0.0];
 
+/// How far inside of a room's openings one is surely in it, in eye heights.
+const INSIDE: [f64; 3] = [0.1, 0.2, 0.3];
+
 /// A room's floor with what stands at eye height over it.
 pub(super) struct FloorMap {
     axes: [DVec3; 2],
@@ -22,20 +25,26 @@ pub(super) struct FloorMap {
     size: [usize; 2],
     /// Squares to the nearest that is taken, by city blocks and diagonals alike; 0 is taken.
     free: Vec<u32>,
+    /// Squares of the room itself: not all that is in its box need be.
+    is_inside: Vec<bool>,
     unit: f64,
 }
 
 impl FloorMap {
-    /// What of some triangles is about as high as `eye`, in a room's box. `unit` is the eyes' height
-    /// over the floor.
+    /// What of a room's triangles is about as high as `eye`, in the room's box; nothing for a room
+    /// without one. `unit` is the eyes' height over the floor.
     pub(super) fn new(
+        interior: &Interior,
+        contents: &Contents,
         model: &Model,
-        triangles: &[u32],
-        room: RoomBox,
-        up: DVec3,
+        id: CellId,
         eye: DVec3,
         unit: f64,
-    ) -> Self {
+    ) -> Option<Self> {
+        let i = id.0 as usize;
+        let room = contents.bounds.get(i).copied().flatten()?;
+        let triangles = contents.triangles.get(i)?;
+        let up = interior.up;
         let along = up.any_orthonormal_vector();
         let axes = [along, up.cross(along)];
         let flat = |p: DVec3| DVec2::new(p.dot(axes[0]), p.dot(axes[1]));
@@ -43,14 +52,15 @@ impl FloorMap {
         let middle = flat(room.min.midpoint(room.max));
         let reach = DVec2::new(half.dot(axes[0].abs()), half.dot(axes[1].abs()));
         let step = (STEP * unit).max(2.0 * reach.max_element() / MOST);
-        let room = reach + 2.0 * step;
-        let size = (2.0 * room / step).ceil();
+        let around = reach + 2.0 * step;
+        let size = (2.0 * around / step).ceil();
         let mut map = Self {
             axes,
-            origin: middle - room,
+            origin: middle - around,
             step,
             size: [size.x.max(1.0) as usize, size.y.max(1.0) as usize],
             free: Vec::new(),
+            is_inside: Vec::new(),
             unit,
         };
         map.free = vec![u32::MAX; map.size[0] * map.size[1]];
@@ -66,7 +76,61 @@ impl FloorMap {
             }
         }
         map.spread();
-        map
+        map.is_inside = map.inside(interior, id, room, eye);
+        Some(map)
+    }
+
+    /// The squares that one comes to from the room's openings without passing what stands, an
+    /// opening, or the box; and within the room's outline, where that is known. All of the outline,
+    /// or of the box, where that leaves nothing.
+    fn inside(&self, interior: &Interior, id: CellId, room: RoomBox, eye: DVec3) -> Vec<bool> {
+        let count = self.free.len();
+        let outline = interior.cell(id).floor.as_ref();
+        let within: Vec<bool> = (0..count)
+            .map(|i| {
+                let at = self.lifted(self.place(i), eye);
+                let is_near = room.distance(at) <= 0.5 * self.step;
+                is_near && outline.is_none_or(|floor| floor.covers(at, 0.0))
+            })
+            .collect();
+        // 1. Openings are shut, and what is just inside of them is where to begin.
+        let mut is_shut = vec![false; count];
+        let mut queue = Vec::new();
+        for (_, portal) in interior.portals_of(Some(id)) {
+            let corners = portal.polygon.corners();
+            for (k, from) in corners.iter().enumerate() {
+                let to = corners[(k + 1) % corners.len()];
+                let steps = (2.0 * from.distance(to) / self.step).ceil().clamp(1.0, 1e4);
+                for j in 0..=steps as usize {
+                    let at = from.lerp(to, j as f64 / steps);
+                    if let Some(i) = self.square(self.flat(at)) {
+                        is_shut[i] = true;
+                    }
+                }
+            }
+            let inwards = portal.normal_into(Some(id));
+            let off = |share: &f64| portal.polygon.center() + share * self.unit * inwards;
+            queue.extend(INSIDE.iter().filter_map(|s| self.square(self.flat(off(s)))));
+        }
+        // 2. From there on, side by side: diagonals pass between a wall's squares.
+        let [width, height] = self.size;
+        let mut is_inside = vec![false; count];
+        while let Some(i) = queue.pop() {
+            if is_inside[i] || is_shut[i] || !within[i] || self.free[i] == 0 {
+                continue;
+            }
+            is_inside[i] = true;
+            let (x, y) = (i % width, i / width);
+            queue.extend((x > 0).then(|| i - 1));
+            queue.extend((x + 1 < width).then_some(i + 1));
+            queue.extend((y > 0).then(|| i - width));
+            queue.extend((y + 1 < height).then_some(i + width));
+        }
+        match (is_inside.contains(&true), within.contains(&true)) {
+            (true, _) => is_inside,
+            (false, true) => within,
+            (false, false) => vec![true; count],
+        }
     }
 
     /// Takes the squares under a triangle's part in the band, by samples half a square apart.
@@ -142,37 +206,38 @@ impl FloorMap {
         (0..=count).all(|k| self.clearance(at(k)) > clear)
     }
 
-    /// The corners of a short way around what stands between two points, without them; nothing where
-    /// the straight way is free, or none is.
-    pub(super) fn way(&self, from: DVec3, to: DVec3) -> Vec<DVec3> {
-        for clear in CLEAR.map(|c| c * self.unit) {
-            // Who starts beside a wall may.
-            let ends = self.clearance(from).min(self.clearance(to));
-            let clear = clear.min(0.5 * ends);
-            if self.is_clear(from, to, clear) {
-                return Vec::new();
+    /// The corners of a short way around what stands between two points, without them: none where
+    /// the straight way is free. Nothing where no way is.
+    pub(super) fn way(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
+        // Who starts beside a wall may.
+        let ends = self.clearance(from).min(self.clearance(to));
+        CLEAR.iter().find_map(|clear| {
+            let clear = (clear * self.unit).min(0.5 * ends);
+            match self.is_clear(from, to, clear) {
+                true => Some(Vec::new()),
+                false => self.found(from, to, clear),
             }
-            if let Some(way) = self.found(from, to, clear) {
-                return way;
-            }
-        }
-        Vec::new()
+        })
     }
 
-    /// The point nearest to one that has room around it; itself where it has, or none has.
+    /// The place of the room nearest to a point that has room around it, as much as there is; the
+    /// point where it has, or no place is free.
     pub(super) fn roomy(&self, near: DVec3) -> DVec3 {
-        let clear = CLEAR[0] * self.unit;
-        if self.clearance(near) > clear {
-            return near;
-        }
         let at = self.flat(near);
-        let free = (0..self.free.len()).filter(|i| f64::from(self.free[*i]) * self.step > clear);
-        let place = |i: usize| self.place(i);
-        let best = free.min_by(|a, b| {
-            let off = |i: &usize| place(*i).distance_squared(at);
-            off(a).total_cmp(&off(b)).then(a.cmp(b))
+        let found = CLEAR.iter().find_map(|clear| {
+            let is_free = |i: &usize| {
+                self.is_inside[*i] && f64::from(self.free[*i]) * self.step > clear * self.unit
+            };
+            if self.square(at).is_some_and(|i| is_free(&i)) {
+                return Some(near);
+            }
+            let off = |i: &usize| self.place(*i).distance_squared(at);
+            let best = (0..self.free.len())
+                .filter(is_free)
+                .min_by(|a, b| off(a).total_cmp(&off(b)).then(a.cmp(b)));
+            best.map(|i| self.lifted(self.place(i), near))
         });
-        best.map_or(near, |i| self.lifted(place(i), near))
+        found.unwrap_or(near)
     }
 
     fn place(&self, i: usize) -> DVec2 {

@@ -1,8 +1,9 @@
 //! The reference images of an interior and the LDIs of them, made when they are first asked for.
 
+use super::photographed::photographed;
 use super::{Captured, CellGeometry, REFERENCE_SIZE, Reference};
 use crate::RenderError;
-use crate::ldi::{ClipTree, ConstructOptions, Layered, construct};
+use crate::ldi::{ClipTree, ConstructOptions, Layered, construct, construct_of_photos};
 use crate::residency::Residency;
 use glam::DVec3;
 use proxy::interior::{
@@ -12,6 +13,17 @@ use proxy::mesh::Model;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// What LDIs are made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LdiSource {
+    /// Images drawn at the places of semicircles.
+    Views,
+    /// Photos with depth maps, wherever they were taken; images where none sees the portal, or there
+    /// are no photos.
+    #[default]
+    Photos,
+}
+
 /// How reference images are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LibraryOptions {
@@ -19,6 +31,8 @@ pub struct LibraryOptions {
     pub size: [u32; 2],
     /// Where they are made.
     pub semicircles: SemicircleOptions,
+    /// What LDIs are made of.
+    pub ldi_of: LdiSource,
     /// How an LDI is made of them.
     pub ldi: ConstructOptions,
     /// The most bytes that they may take between frames; `None` for no limit. A frame has all
@@ -31,6 +45,7 @@ impl Default for LibraryOptions {
         Self {
             size: REFERENCE_SIZE,
             semicircles: SemicircleOptions::default(),
+            ldi_of: LdiSource::default(),
             ldi: ConstructOptions::default(),
             budget: None,
         }
@@ -204,24 +219,18 @@ impl Library {
         self.turn += 1;
         let mut made = 0;
         for side in touch(&mut self.ldis, sides, self.turn) {
-            // Its images are of no more use once it is made.
-            let range = self.sides[side].clone();
-            let images: Vec<Arc<Reference>> = range
-                .map(|place| match &self.images[place] {
-                    Some(kept) => Ok(kept.what.clone()),
-                    None => {
-                        made += 1;
-                        let captured = captured.as_deref_mut();
-                        let image = self.make(place, interior, model, geometry, captured)?;
-                        Ok(Arc::new(image))
-                    }
-                })
-                .collect::<Result<_, RenderError>>()?;
-            let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
-            let constructed = construct(&images, &self.options.ldi).ok();
-            let ldi = constructed.map(|made| PortalLdi {
-                tree: ClipTree::new(&made.ldi),
-                ldi: made.ldi,
+            let of_photos = match (self.options.ldi_of, captured.as_deref_mut()) {
+                (LdiSource::Photos, Some(photos)) => self.of_photos(side, interior, photos)?,
+                _ => None,
+            };
+            let (layered, images) = match of_photos {
+                Some((layered, images)) => (Some(layered), images),
+                None => self.of_views(side, interior, model, geometry, captured.as_deref_mut())?,
+            };
+            made += images;
+            let ldi = layered.map(|ldi| PortalLdi {
+                tree: ClipTree::new(&ldi),
+                ldi,
             });
             let bytes = ldi.as_ref().map_or(0, |l| l.ldi.bytes() + l.tree.bytes());
             self.make_room(bytes);
@@ -234,6 +243,52 @@ impl Library {
         }
         self.residency.loads += made as u64;
         Ok((found(&self.ldis, sides), made))
+    }
+
+    /// The LDI of a side's images, and how many were made for it: they are of no more use once it
+    /// is made.
+    fn of_views(
+        &self,
+        side: usize,
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        mut captured: Option<&mut Captured>,
+    ) -> Result<(Option<Layered>, usize), RenderError> {
+        let mut made = 0;
+        let images: Vec<Arc<Reference>> = self.sides[side]
+            .clone()
+            .map(|place| match &self.images[place] {
+                Some(kept) => Ok(kept.what.clone()),
+                None => {
+                    made += 1;
+                    let captured = captured.as_deref_mut();
+                    let image = self.make(place, interior, model, geometry, captured)?;
+                    Ok(Arc::new(image))
+                }
+            })
+            .collect::<Result<_, RenderError>>()?;
+        let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
+        let constructed = construct(&images, &self.options.ldi);
+        Ok((constructed.ok().map(|made| made.ldi), made))
+    }
+
+    /// The LDI of the photos that see through a side's portal, and how many they are; nothing where
+    /// none does.
+    fn of_photos(
+        &self,
+        side: usize,
+        interior: &Interior,
+        captured: &mut Captured,
+    ) -> Result<Option<(Layered, usize)>, RenderError> {
+        let places = &self.places[self.sides[side].clone()];
+        let Some(photos) = photographed(interior, places, self.options.size, captured)? else {
+            return Ok(None);
+        };
+        let images: Vec<&Reference> = photos.images.iter().collect();
+        let (place, options) = (&places[places.len() / 2], &self.options.ldi);
+        let made = construct_of_photos(place, &photos.camera, &images, photos.noise, options);
+        Ok(made.ok().map(|made| (made.ldi, images.len())))
     }
 
     fn make(

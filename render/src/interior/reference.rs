@@ -142,7 +142,7 @@ impl Reference {
 }
 
 /// A lens whose image the portal's outline just fills.
-fn lens(portal: &Portal, place: &SemicircleView, [width, height]: [u32; 2]) -> Lens {
+pub(super) fn lens(portal: &Portal, place: &SemicircleView, [width, height]: [u32; 2]) -> Lens {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for corner in portal.polygon.corners() {
         let p = place.camera_from_world * *corner;

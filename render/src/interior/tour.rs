@@ -6,7 +6,7 @@ use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
 use proxy::interior::{CellId, Contents, Interior, Portal, PortalId, RoomBox};
 use proxy::mesh::Model;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Why there is no tour.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,15 +29,23 @@ const ENOUGH: f64 = 0.16;
 /// How high a threshold one steps over, likewise.
 const STEP: f64 = 0.25;
 
-/// A walk at eye height through the middles of all rooms and of the openings between them, from
-/// the first room to the nearest that was not seen yet, and so on, looking ahead; at even speed, in
-/// so many frames. Rooms to which no opening leads that one could walk through are entered by
-/// other openings; those with none at all are left out. A single room is looked around in.
-///
-/// What stands at eye height, walls and furniture, is walked around where there is a way.
+/// A walk through an interior, and what is not as one would walk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tour {
+    /// The walk.
+    pub path: CameraPath,
+    /// Rooms that it does not come to, as no opening leads to them from where it begins.
+    pub left_out: Vec<CellId>,
+    /// Rooms in which no way around what stands there was found: it goes straight through that.
+    pub blocked: Vec<CellId>,
+    /// Openings with something in them wherever one might pass, which it does all the same.
+    pub shut: Vec<PortalId>,
+}
+
+/// The path of [`Tour::new`].
 ///
 /// # Errors
-/// No room's place is known; the camera is unusable; no frames.
+/// As there.
 pub fn tour(
     interior: &Interior,
     contents: &Contents,
@@ -46,10 +54,50 @@ pub fn tour(
     frames: usize,
     fps: f64,
 ) -> Result<CameraPath, TourError> {
-    let up = interior.up;
-    let unit = interior.eye_height.abs().max(1e-9);
-    let mut rooms = Rooms::new(interior, contents, model);
-    let legs = rooms.legs().ok_or(TourError::NoPlace)?;
+    Ok(Tour::new(interior, contents, model, camera, frames, fps)?.path)
+}
+
+impl Tour {
+    /// A walk at eye height through the middles of all rooms and of the openings between them, from
+    /// the first room to the nearest that was not seen yet, and so on, looking ahead; at even speed,
+    /// in so many frames. Rooms to which no opening leads that one could walk through are entered by
+    /// other openings; those with none at all are left out. A single room is looked around in.
+    ///
+    /// What stands at eye height, walls and furniture, is walked around where there is a way.
+    ///
+    /// # Errors
+    /// No room's place is known; the camera is unusable; no frames.
+    pub fn new(
+        interior: &Interior,
+        contents: &Contents,
+        model: &Model,
+        camera: &Camera,
+        frames: usize,
+        fps: f64,
+    ) -> Result<Self, TourError> {
+        let mut rooms = Rooms::new(interior, contents, model);
+        let legs = rooms.legs().ok_or(TourError::NoPlace)?;
+        let ids = (0..interior.cells.len() as u32).map(CellId);
+        Ok(Self {
+            left_out: ids
+                .filter(|id| !legs.iter().any(|leg| leg.cell == *id))
+                .collect(),
+            path: path(&mut rooms, legs, camera, frames, fps)?,
+            blocked: rooms.blocked.into_iter().collect(),
+            shut: rooms.shut.into_iter().collect(),
+        })
+    }
+}
+
+/// Frames along a tour.
+fn path(
+    rooms: &mut Rooms<'_>,
+    legs: Vec<Leg>,
+    camera: &Camera,
+    frames: usize,
+    fps: f64,
+) -> Result<CameraPath, TourError> {
+    let (up, unit) = (rooms.interior.up, rooms.unit());
     let reach = rooms.smoothness(&legs, SMOOTH * unit);
     let way = Way::new(legs.into_iter().flat_map(|leg| leg.stops).collect());
     let length = way.length();
@@ -89,25 +137,6 @@ pub fn tour(
     Ok(CameraPath::new(fps, frames)?)
 }
 
-/// Rooms that a tour does not come to, as no opening leads to them from where it begins.
-pub fn left_out(interior: &Interior, contents: &Contents) -> Vec<CellId> {
-    let ids = (0..interior.cells.len() as u32).map(CellId);
-    let places: Vec<Option<DVec3>> = ids.map(|id| place(interior, contents, id)).collect();
-    let mut is_seen = vec![false; places.len()];
-    if let Some(first) = places.iter().position(Option::is_some) {
-        is_seen[first] = true;
-        let mut at = CellId(first as u32);
-        while let Some(route) = route(interior, contents, &places, &is_seen, at) {
-            for (_, into) in route {
-                is_seen[into.0 as usize] = true;
-                at = into;
-            }
-        }
-    }
-    let rest = is_seen.iter().enumerate().filter(|(_, is_seen)| !**is_seen);
-    rest.map(|(i, _)| CellId(i as u32)).collect()
-}
-
 /// Points to pass in one room, in order.
 struct Leg {
     cell: CellId,
@@ -121,6 +150,10 @@ struct Rooms<'a> {
     model: &'a Model,
     /// By cell, when it is first walked through.
     maps: Vec<Option<FloorMap>>,
+    /// See [`Tour::blocked`].
+    blocked: BTreeSet<CellId>,
+    /// See [`Tour::shut`].
+    shut: BTreeSet<PortalId>,
 }
 
 /// Places along an opening that are tried, for one where nothing is in the way.
@@ -133,6 +166,8 @@ impl<'a> Rooms<'a> {
             contents,
             model,
             maps: interior.cells.iter().map(|_| None).collect(),
+            blocked: BTreeSet::new(),
+            shut: BTreeSet::new(),
         }
     }
 
@@ -142,14 +177,12 @@ impl<'a> Rooms<'a> {
 
     /// A room's map at the height of a point; nothing for a room without bounds.
     fn map(&mut self, id: CellId, eye: DVec3) -> Option<&FloorMap> {
-        let i = id.0 as usize;
-        let room = bounds(self.contents, id)?;
-        let (model, up, unit) = (self.model, self.interior.up, self.unit());
-        let triangles = self.contents.triangles.get(i)?;
-        Some(
-            self.maps[i]
-                .get_or_insert_with(|| FloorMap::new(model, triangles, room, up, eye, unit)),
-        )
+        let unit = self.unit();
+        let map = &mut self.maps[id.0 as usize];
+        if map.is_none() {
+            *map = FloorMap::new(self.interior, self.contents, self.model, id, eye, unit);
+        }
+        map.as_ref()
     }
 
     /// The tour, room by room.
@@ -206,8 +239,12 @@ impl<'a> Rooms<'a> {
 
     /// Goes on in a room to a point, around what stands there.
     fn walk(&mut self, leg: &mut Leg, from: DVec3, to: DVec3) {
-        if let Some(map) = self.map(leg.cell, from) {
-            leg.stops.extend(map.way(from, to));
+        let map = self.map(leg.cell, from);
+        match map.map_or(Some(Vec::new()), |map| map.way(from, to)) {
+            Some(way) => leg.stops.extend(way),
+            None => {
+                self.blocked.insert(leg.cell);
+            }
         }
         leg.stops.push(to);
     }
@@ -249,6 +286,9 @@ impl<'a> Rooms<'a> {
             if best.as_ref().is_none_or(|(most, _)| room > *most) {
                 best = Some((room, points));
             }
+        }
+        if matches!(best, Some((room, _)) if room <= 0.0) {
+            self.shut.insert(id);
         }
         best.map_or([center + off, center, center - off], |(_, points)| points)
     }

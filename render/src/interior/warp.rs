@@ -188,15 +188,26 @@ fn ceil(x: f64) -> i32 {
     whole + i32::from(f64::from(whole) < x)
 }
 
+/// The normal of what a pixel shows, away from its camera and in its frame; 0 where it shows nothing.
+///
+/// On a plane n·X = d the inverse depth is n·q / d, q the ray with z = 1: its slopes are the normal.
+pub(crate) fn normal_at(camera: &Pinhole, inverse_depth: &[f32], i: usize) -> DVec3 {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let (x, y) = (i % width, i / width);
+    let s = f64::from(inverse_depth[i]);
+    if !(s > 0.0) {
+        return DVec3::ZERO;
+    }
+    let ray = camera.ray(x as u32, y as u32);
+    let slope_x = slope(inverse_depth, i, 1, [x > 0, x + 1 < width]) * camera.focal.x;
+    let slope_y = slope(inverse_depth, i, width, [y > 0, y + 1 < height]) * camera.focal.y;
+    DVec3::new(slope_x, slope_y, s - slope_x * ray.x - slope_y * ray.y)
+}
+
 /// How inverse depth changes from a pixel to the next: the smaller of the changes on its two
 /// sides, zero where they disagree. It is exact on a plane, and at the border of a surface that
 /// surface's own.
-pub(crate) fn slope(
-    inverse_depth: &[f32],
-    i: usize,
-    step: usize,
-    [before, after]: [bool; 2],
-) -> f64 {
+fn slope(inverse_depth: &[f32], i: usize, step: usize, [before, after]: [bool; 2]) -> f64 {
     let s = f64::from(inverse_depth[i]);
     let other = |has: bool, j: usize| {
         let other = if has {

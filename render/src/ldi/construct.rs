@@ -1,9 +1,10 @@
-//! An LDI of the images that a portal's semicircle has.
+//! An LDI of the images that a portal's semicircle has, or of photos that see through the portal.
 
 use super::layered::pinhole_view;
 use super::{Layered, LdiError, Look, Sample};
-use crate::interior::{Pinhole, Reference, Warp, slope};
+use crate::interior::{Pinhole, Reference, Warp, normal_at};
 use glam::{DVec2, DVec3};
+use proxy::interior::SemicircleView;
 
 /// When two samples count as one surface, and what becomes of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,12 +74,17 @@ struct Node {
     image: u32,
     /// How many samples it is the mean of.
     of: u32,
+    /// Standard deviation of its depth, in world units.
+    deviation: f64,
     next: u32,
 }
 
 const NONE: u32 = u32::MAX;
 /// The least cosine that a patch's area is divided by.
 const GRAZING: f64 = 1e-3;
+/// Measured depths that differ by up to so many standard deviations of their difference may be of
+/// one surface.
+const SAME_SURFACE: f64 = 3.0;
 
 /// An LDI of a portal's images, from left to right: the middle one's camera is the LDI's, and its
 /// samples come first and stay. Then come the others', those made near the middle first.
@@ -93,8 +99,41 @@ pub fn construct(
     let central = *images.get(center).ok_or(LdiError::NoImages)?;
     let mut order: Vec<usize> = (0..images.len()).collect();
     order.sort_by_key(|i| (i.abs_diff(center), *i));
+    let images: Vec<&Reference> = order.into_iter().map(|i| images[i]).collect();
+    made(&central.place, &central.camera, &images, 0, 0.0, options)
+}
+
+/// An LDI of photos with measured depths, the most trusted first, as a camera at a place sees what
+/// they show. There is no central image: all samples are alike, in depth order.
+///
+/// `noise` is the standard deviation of the photos' inverse depths: samples are one surface within
+/// the range that the options say, or within what two such depths differ by.
+///
+/// # Errors
+/// No images; a camera that is none.
+pub fn construct_of_photos(
+    place: &SemicircleView,
+    camera: &Pinhole,
+    photos: &[&Reference],
+    noise: f64,
+    options: &ConstructOptions,
+) -> Result<Constructed, LdiError> {
+    if photos.is_empty() {
+        return Err(LdiError::NoImages);
+    }
+    made(place, camera, photos, 1, noise.max(0.0), options)
+}
+
+/// Images in order, the first of which is so-manieth: the central one is 0.
+fn made(
+    place: &SemicircleView,
+    camera: &Pinhole,
+    images: &[&Reference],
+    first: u32,
+    noise: f64,
+    options: &ConstructOptions,
+) -> Result<Constructed, LdiError> {
     // 1. How much the LDI shows: what the samples need.
-    let camera = &central.camera;
     let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
     let room = if options.margin > 0.0 {
         options.margin.min(16.0)
@@ -102,9 +141,9 @@ pub fn construct(
         0.0
     };
     let (mut low, mut high) = (DVec2::ZERO, size);
-    for i in &order[1..] {
-        let warp = Warp::new(&images[*i].camera, camera);
-        for (pixel, s) in pixels(images[*i]) {
+    for image in &images[usize::from(first == 0)..] {
+        let warp = Warp::new(&image.camera, camera);
+        for (pixel, s) in pixels(image) {
             if let Some(at) = warp.at(pixel, s) {
                 (low, high) = (low.min(at.pixel), high.max(at.pixel));
             }
@@ -114,7 +153,7 @@ pub fn construct(
     let low = low.floor().max(-most);
     let size = (high.ceil().min(size + most) - low).max(DVec2::ONE);
     let view = pinhole_view(
-        central.place.camera_from_world,
+        place.camera_from_world,
         camera.focal,
         camera.principal - low,
         [size.x as u32, size.y as u32],
@@ -129,8 +168,7 @@ pub fn construct(
     let ldi_camera = Pinhole::new(&view)?;
     // 2. Samples, image by image.
     let (mut offered, mut outside) = (0, 0);
-    for (rank, i) in order.iter().enumerate() {
-        let image = images[*i];
+    for (rank, &image) in (first..).zip(images) {
         let warp = Warp::new(&image.camera, &ldi_camera);
         let turn = ldi_camera.rotation * image.camera.rotation.transpose();
         for (pixel, s) in pixels(image) {
@@ -147,7 +185,7 @@ pub fn construct(
                 continue;
             }
             let (normal, area) = patch(image, pixel, s);
-            let place = corner.y as usize * width + corner.x as usize;
+            let at_pixel = corner.y as usize * width + corner.x as usize;
             let offset = (256.0 * (at.pixel - corner - 0.5)).floor();
             let sample = Sample {
                 color: image.seen.color[index(image, pixel)],
@@ -155,7 +193,19 @@ pub fn construct(
                 offset: [offset.x as i8, offset.y as i8],
                 look: Look::new(turn * normal, area.sqrt() * at.inverse_depth),
             };
-            made.add(place, sample, area, rank as u32);
+            // Depth here is there / s plus what no depth changes.
+            let change = warp.pixel_from_pixel.row(2).dot(pixel.extend(1.0)).abs() / (s * s);
+            made.add(
+                Node {
+                    sample,
+                    area,
+                    image: rank,
+                    of: 1,
+                    deviation: noise * change,
+                    next: made.heads[at_pixel],
+                },
+                at_pixel,
+            );
         }
     }
     // 3. Back to front.
@@ -194,7 +244,7 @@ pub fn construct(
         counts.push(most as u8);
         samples.extend(pixel[from..].iter().map(|node| node.sample));
     }
-    let ldi = Layered::new(view, central.place.portal.0, &counts, samples.into_iter())?;
+    let ldi = Layered::new(view, place.portal.0, &counts, samples.into_iter())?;
     Ok(Constructed {
         ldi,
         offered,
@@ -225,19 +275,11 @@ fn index(image: &Reference, pixel: DVec2) -> usize {
 /// The normal of what a pixel shows, in its camera's frame, and the area of what of it the pixel
 /// sees.
 ///
-/// On a plane n·X = d the inverse depth is n·q / d, q the ray with z = 1: linear, so its slopes
-/// are the normal. A pixel's solid angle is |q|⁻³ / (fx·fy), what it sees Z²·|q|² times that over
-/// the cosine |n·q| / (|n|·|q|): Z² / (fx·fy·|n·q|) with |n| = 1.
+/// A pixel's solid angle is |q|⁻³ / (fx·fy), q its ray with z = 1; what it sees is Z²·|q|² times
+/// that over the cosine |n·q| / (|n|·|q|): Z² / (fx·fy·|n·q|) with |n| = 1.
 fn patch(image: &Reference, pixel: DVec2, s: f64) -> (DVec3, f64) {
-    let (camera, seen) = (&image.camera, &image.seen);
-    let i = index(image, pixel);
-    let (x, y) = (pixel.x as u32, pixel.y as u32);
-    let width = seen.width as usize;
-    let depths = &seen.inverse_depth;
-    let slope_x = slope(depths, i, 1, [x > 0, x + 1 < seen.width]) * camera.focal.x;
-    let slope_y = slope(depths, i, width, [y > 0, y + 1 < seen.height]) * camera.focal.y;
-    let q = (pixel - camera.principal) / camera.focal;
-    let normal = DVec3::new(slope_x, slope_y, s - slope_x * q.x - slope_y * q.y);
+    let camera = &image.camera;
+    let normal = normal_at(camera, &image.seen.inverse_depth, index(image, pixel));
     let cosine = (s / normal.length()).clamp(GRAZING, 1e3);
     let area = 1.0 / (s * s * camera.focal.x * camera.focal.y * cosine);
     (normal, area)
@@ -252,36 +294,33 @@ struct Making {
 }
 
 impl Making {
-    fn add(&mut self, pixel: usize, sample: Sample, area: f64, image: u32) {
-        let s = f64::from(sample.inverse_depth);
-        // The nearest in depth of those it is in conflict with.
+    /// Puts a sample into a pixel's list, or merges it with the one nearest in depth of those that it
+    /// is in conflict with.
+    fn add(&mut self, new: Node, pixel: usize) {
+        let (sample, s) = (new.sample, f64::from(new.sample.inverse_depth));
         let mut found: Option<(usize, f64)> = None;
         let mut at = self.heads[pixel];
         while let Some(node) = self.nodes.get(at as usize) {
             let other = f64::from(node.sample.inverse_depth);
             // Of the depths' difference the share of the greater: 1 - s₁/s₂.
             let apart = 1.0 - s.min(other) / s.max(other);
+            let noise = SAME_SURFACE * new.deviation.hypot(node.deviation) * s.min(other);
             let is_other = match self.options.conflict {
-                Conflict::SmallerPatch => node.image != image,
+                Conflict::SmallerPatch => node.image != new.image,
                 Conflict::RangeThenColor { same_color } => {
                     let [a, b] = [node.sample.color, sample.color];
                     (0..3).all(|k| a[k].abs_diff(b[k]) <= same_color)
                 }
                 Conflict::Average => true,
             };
-            if is_other && apart <= self.options.range && found.is_none_or(|(_, d)| apart < d) {
+            let is_near = apart <= self.options.range.max(noise);
+            if is_other && is_near && found.is_none_or(|(_, d)| apart < d) {
                 found = Some((at as usize, apart));
             }
             at = node.next;
         }
         let Some((i, _)) = found else {
-            self.nodes.push(Node {
-                sample,
-                area,
-                image,
-                of: 1,
-                next: self.heads[pixel],
-            });
+            self.nodes.push(new);
             self.heads[pixel] = self.nodes.len() as u32 - 1;
             return;
         };
@@ -289,8 +328,11 @@ impl Making {
         let node = &mut self.nodes[i];
         match self.options.conflict {
             Conflict::SmallerPatch => {
-                if node.image != 0 && area < node.area {
-                    (node.sample, node.area, node.image) = (sample, area, image);
+                if node.image != 0 && new.area < node.area {
+                    *node = Node {
+                        next: node.next,
+                        ..new
+                    };
                 }
             }
             Conflict::RangeThenColor { .. } => {}
