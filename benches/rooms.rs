@@ -10,7 +10,7 @@ use proxy::interior::Contents;
 use proxy::interior::find::FindOptions;
 use proxy::mesh::{model_to_glb, parse_model};
 use proxy::{MeshKind, Proxy, Solid};
-use render::interior::{Captured, Painter, PortalFill, Walk, WalkOptions, tour};
+use render::interior::{Captured, Painter, PortalFill, Tour, Walk, WalkOptions};
 use render::{DeviceChoice, Engine, FieldOptions, Method};
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -121,7 +121,7 @@ fn measure(capture: &Path, given: &Path) -> Result<(), Box<dyn Error>> {
         640,
         512,
     );
-    let path = tour(&interior, &contents, &model, &camera, 200, 15.0)?;
+    let path = Tour::new(&interior, &contents, &model, &camera, 200, 15.0)?.path;
     let painter = stage("photos made ready", || {
         let backdrop = scene.add_backdrop(&none, &mut model, &mut contents)?;
         let solid = Solid::new(MeshKind::Depth, model.mesh.clone());

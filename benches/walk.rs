@@ -16,7 +16,7 @@ use proxy::interior::{Contents, Interior, SemicircleOptions, SemicircleView, rea
 use proxy::mesh::{Model, read_model};
 use render::DeviceChoice;
 use render::interior::{
-    FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Walk, WalkOptions, Window, tour,
+    FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Tour, Walk, WalkOptions, Window,
 };
 use std::path::PathBuf;
 use std::time::Instant;
@@ -119,7 +119,7 @@ fn tours(args: &Args) {
         start.elapsed().as_secs_f64()
     );
     let camera = Camera::of(&lens(), SIZE[0], SIZE[1]);
-    let path = tour(
+    let path = Tour::new(
         &house.interior,
         &contents,
         &house.model,
@@ -127,7 +127,8 @@ fn tours(args: &Args) {
         args.frames,
         15.0,
     )
-    .expect("a tour");
+    .expect("a tour")
+    .path;
     println!(
         "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
         "portals",

@@ -4,8 +4,7 @@ use glam::DVec3;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
 
 /// Beyond this condition number a fit is ill-posed: relative errors of what it rests on come out
-/// that many times as large, so that of a thousandth, usual for points of photos, some per cent
-/// are left.
+/// that many times as large, a thousandth as three per cent.
 pub const ILL_CONDITIONED: f64 = 30.0;
 
 /// The direction in which a cloud is thinnest.

@@ -142,12 +142,15 @@ const ASKEW: DVec3 = DVec3::new(0.618_034, 0.324_718, 0.715_999);
 fn places(sources: &[SourceView], viewer: DVec3) -> Vec<DVec3> {
     let mut places: Vec<DVec3> = sources.iter().map(|s| s.view.center()).collect();
     let along = |place: DVec3| place.dot(ASKEW);
-    let key = |i: &usize| (along(places[*i]), places[*i].to_array());
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    order.sort_unstable_by(|i, j| key(i).partial_cmp(&key(j)).unwrap_or(Ordering::Equal));
+    // Worked out once, not at each comparison.
+    let keys = places.iter().enumerate();
+    let mut order: Vec<(f64, [f64; 3], usize)> = keys
+        .map(|(i, place)| (along(*place), place.to_array(), i))
+        .collect();
+    order.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
     // What is near is near along any direction, too.
     let mut last: Vec<DVec3> = Vec::new();
-    for i in order {
+    for (_, _, i) in order {
         let place = places[i];
         last.retain(|other| {
             let size = other.length().max(place.length());

@@ -11,7 +11,7 @@ use proxy::interior::{
 use proxy::mesh::read_model;
 use proxy::mesh::{Mesh, Model, ModelNode, Part};
 use proxy::{MeshKind, Solid};
-use render::interior::{Tour, tour};
+use render::interior::Tour;
 use std::path::Path;
 
 /// Rooms a, b and c in a row of squares around a corner: between a and b a window, from a to c
@@ -108,7 +108,9 @@ fn tours_go_through_doors_and_not_through_windows() {
     );
     for interior in [by_boxes(), by_nodes] {
         let (contents, _) = Contents::new(&interior, &model).unwrap();
-        let path = tour(&interior, &contents, &model, &camera, 200, 15.0).unwrap();
+        let path = Tour::new(&interior, &contents, &model, &camera, 200, 15.0)
+            .unwrap()
+            .path;
         let eyes: Vec<DVec3> = path.frames.iter().map(|f| f.view.center()).collect();
         // At eye height over the floor everywhere.
         assert!(eyes.iter().all(|eye| (eye.y - 1.6).abs() < 1e-9));
@@ -136,7 +138,9 @@ fn crossings(interior: &Interior, model: &Model) -> (usize, usize) {
         64,
         64,
     );
-    let path = tour(interior, &contents, model, &camera, 1500, 15.0).unwrap();
+    let path = Tour::new(interior, &contents, model, &camera, 1500, 15.0)
+        .unwrap()
+        .path;
     let solid = Solid::new(MeshKind::Mesh, model.mesh.clone());
     let eyes: Vec<DVec3> = path.frames.iter().map(|f| f.view.center()).collect();
     let passes = |e: &[DVec3]| {

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use proxy::Proxy;
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
-use render::interior::{Painter, tour};
+use render::interior::{Painter, Tour};
 use render::{Lumigraph, Moment, SourceView};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -182,7 +182,7 @@ impl Space {
         };
         // The first room as the tour enters it.
         let camera = Camera::of(&lens, width, height);
-        let toured = tour(
+        let toured = Tour::new(
             &house.interior,
             &house.contents,
             &house.model,
@@ -192,7 +192,7 @@ impl Space {
         );
         let first = toured
             .ok()
-            .map(|path| path.frames[0].view.camera_from_world);
+            .map(|tour| tour.path.frames[0].view.camera_from_world);
         let first_cell = first.and_then(|pose| {
             let eye = pose.center();
             house.contents.locate(&house.interior, eye)

@@ -33,7 +33,7 @@ pub use raster::{Beyond, Raster};
 pub use reference::{CAPTURED_REFERENCE_SIZE, REFERENCE_SIZE, Reference};
 pub use target::Target;
 pub use texture::texture;
-pub use tour::{Tour, TourError, tour};
+pub use tour::{Tour, TourError};
 pub use walk::{FrameCost, Walk, WalkError, WalkOptions};
 pub use warp::{Splat, Warp, Warped, warp};
 pub use window::Window;

@@ -42,21 +42,6 @@ pub struct Tour {
     pub shut: Vec<PortalId>,
 }
 
-/// The path of [`Tour::new`].
-///
-/// # Errors
-/// As there.
-pub fn tour(
-    interior: &Interior,
-    contents: &Contents,
-    model: &Model,
-    camera: &Camera,
-    frames: usize,
-    fps: f64,
-) -> Result<CameraPath, TourError> {
-    Ok(Tour::new(interior, contents, model, camera, frames, fps)?.path)
-}
-
 impl Tour {
     /// A walk at eye height through the middles of all rooms and of the openings between them, from
     /// the first room to the nearest that was not seen yet, and so on, looking ahead; at even speed,
