@@ -31,9 +31,9 @@ pub enum FileError {
     /// Its mesh cannot be read or written.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// Its dense points contradict themselves.
-    #[error("{path}: {reason}; find the points anew with `lumigraph proxy … dense`", path = .0.display(), reason = .1)]
-    Dense(PathBuf, String),
+    /// Its points, of a kind, contradict themselves.
+    #[error("{path}: {reason}; find the points anew with `lumigraph proxy … {kind}`", path = .0.display(), kind = .1, reason = .2)]
+    Points(PathBuf, &'static str, String),
     /// JSON is no place for a mesh.
     #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
     NoMesh(PathBuf),
@@ -73,11 +73,16 @@ enum StoredSurface {
     },
     #[serde(rename = "view-plane")]
     ViewPlane,
-    Points,
+    Points {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        within: Option<StoredMesh>,
+    },
     Dense {
         views: Vec<String>,
         points: Vec<[f64; 3]>,
         seen_by: Vec<Vec<u32>>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        within: Option<StoredMesh>,
     },
     // Of a GLB, whose geometry says the rest.
     Tunnel,
@@ -85,6 +90,38 @@ enum StoredSurface {
     Carved,
     Depth,
     Mesh,
+}
+
+/// A closed mesh that bounds what is made of points.
+#[derive(Serialize, Deserialize)]
+struct StoredMesh {
+    positions: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl StoredMesh {
+    fn of(solid: &Arc<Solid>) -> Self {
+        let mesh = solid.mesh();
+        Self {
+            positions: mesh.positions.iter().map(|p| p.to_array()).collect(),
+            triangles: mesh.triangles.clone(),
+        }
+    }
+
+    fn solid(self) -> Result<Arc<Solid>, String> {
+        let count = self.positions.len();
+        let missing = |t: &&[u32; 3]| t.iter().any(|&i| i as usize >= count);
+        if let Some(triangle) = self.triangles.iter().find(missing) {
+            return Err(format!(
+                "the hull around its points has {count} corners, and a triangle {triangle:?}"
+            ));
+        }
+        let mesh = mesh::Mesh {
+            positions: self.positions.into_iter().map(DVec3::from_array).collect(),
+            triangles: self.triangles,
+        };
+        Ok(Arc::new(Solid::new(MeshKind::Hull, mesh)))
+    }
 }
 
 impl Stored {
@@ -95,13 +132,16 @@ impl Stored {
                 normal: plane.normal().to_array(),
             },
             Proxy::ViewPlane => StoredSurface::ViewPlane,
-            Proxy::Points => StoredSurface::Points,
+            Proxy::Points { within } => StoredSurface::Points {
+                within: within.as_ref().map(StoredMesh::of),
+            },
             Proxy::Dense(dense) => {
                 let points = dense.points.iter();
                 StoredSurface::Dense {
                     views: dense.names.clone(),
                     points: points.clone().map(|p| p.position.to_array()).collect(),
                     seen_by: points.map(|p| p.seen_by.clone()).collect(),
+                    within: dense.within.as_ref().map(StoredMesh::of),
                 }
             }
             Proxy::Mesh(solid) => match solid.kind() {
@@ -136,14 +176,19 @@ impl Stored {
                     .map_err(|e| FileError::Plane(path.to_owned(), e));
             }
             StoredSurface::ViewPlane => return Ok(Proxy::ViewPlane),
-            StoredSurface::Points => return Ok(Proxy::Points),
+            StoredSurface::Points { within } => {
+                let within = within.map(StoredMesh::solid).transpose();
+                let within = within.map_err(|e| FileError::Points(path.to_owned(), "points", e))?;
+                return Ok(Proxy::Points { within });
+            }
             StoredSurface::Dense {
                 views,
                 points,
                 seen_by,
+                within,
             } => {
-                return dense(views, &points, seen_by)
-                    .map_err(|reason| FileError::Dense(path.to_owned(), reason));
+                return dense(views, &points, seen_by, within)
+                    .map_err(|reason| FileError::Points(path.to_owned(), "dense", reason));
             }
             StoredSurface::Tunnel => MeshKind::Tunnel,
             StoredSurface::Hull => MeshKind::Hull,
@@ -168,7 +213,12 @@ fn hides_nothing(solid: &Solid) -> bool {
     solid.kind().can_occlude_itself() && !solid.occludes()
 }
 
-fn dense(names: Vec<String>, points: &[[f64; 3]], seen_by: Vec<Vec<u32>>) -> Result<Proxy, String> {
+fn dense(
+    names: Vec<String>,
+    points: &[[f64; 3]],
+    seen_by: Vec<Vec<u32>>,
+    within: Option<StoredMesh>,
+) -> Result<Proxy, String> {
     if points.len() != seen_by.len() {
         let (points, seen) = (points.len(), seen_by.len());
         return Err(format!("{points} points, and who sees {seen} of them"));
@@ -183,7 +233,11 @@ fn dense(names: Vec<String>, points: &[[f64; 3]], seen_by: Vec<Vec<u32>>) -> Res
     };
     let points = points.iter().zip(seen_by).enumerate().map(point);
     let points = points.collect::<Result<_, String>>()?;
-    Ok(Proxy::Dense(Arc::new(DensePoints { names, points })))
+    Ok(Proxy::Dense(Arc::new(DensePoints {
+        names,
+        points,
+        within: within.map(StoredMesh::solid).transpose()?,
+    })))
 }
 
 /// Reads a proxy that [`write()`] wrote, or a mesh from elsewhere: .glb, .gltf, .ply or .obj.
@@ -266,7 +320,9 @@ pub fn write(
     let no_surface = || FileError::NoSurface(path.to_owned(), proxy.kind());
     let bytes = match (extension(path).as_str(), proxy) {
         ("json", Proxy::Mesh(_)) => return Err(FileError::NoMesh(path.to_owned())),
-        ("json", Proxy::Dense(_)) => serde_json::to_vec(&Stored::of(proxy)).map_err(json)?,
+        ("json", Proxy::Dense(_) | Proxy::Points { within: Some(_) }) => {
+            serde_json::to_vec(&Stored::of(proxy)).map_err(json)?
+        }
         ("json", _) => {
             let text = serde_json::to_string_pretty(&Stored::of(proxy)).map_err(json)?;
             (text + "\n").into_bytes()
@@ -398,11 +454,19 @@ mod tests {
                 position: corner(1.0, 2.0),
                 seen_by: vec![0, 1],
             }],
+            within: None,
+        };
+        let within = Some(Arc::new(Solid::new(MeshKind::Hull, mesh.clone())));
+        let bounded = DensePoints {
+            within: within.clone(),
+            ..dense.clone()
         };
         let mut proxies = vec![
             ("json", Proxy::ViewPlane),
-            ("json", Proxy::Points),
+            ("json", Proxy::Points { within: None }),
+            ("json", Proxy::Points { within }),
             ("json", Proxy::Dense(Arc::new(dense))),
+            ("json", Proxy::Dense(Arc::new(bounded))),
         ];
         for kind in MeshKind::ALL {
             let solid = Proxy::Mesh(Arc::new(Solid::new(kind, mesh.clone())));
@@ -431,7 +495,7 @@ mod tests {
         let error = write(&path, &solid, &[], &[]).unwrap_err().to_string();
         assert!(error.contains(".ply"), "{error}");
         let path = folder.path().join("p.ply");
-        assert!(write(&path, &Proxy::Points, &[], &[]).is_err());
+        assert!(write(&path, &Proxy::Points { within: None }, &[], &[]).is_err());
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub use planes::{
     plane_focused_on,
 };
 pub use points::SparsePoint;
-pub use scan::{Rays, Scan};
+pub use scan::{Kept, Rays, Scan};
 pub use shell::shell;
 pub use solid::{Hit, MeshKind, Solid};
 pub use tunnel::{Tunnel, TunnelError};
@@ -56,7 +56,10 @@ pub enum Proxy {
     /// nearer to the scene than one plane for all, but equal rays no longer meet equal points.
     ViewPlane,
     /// The sparse points that views like the desired one observe; see [`points`].
-    Points,
+    Points {
+        /// The hull of the object that photos are cut out to: it bounds what is made of points.
+        within: Option<Arc<Solid>>,
+    },
     /// As [`Self::Points`], with more points than the capture's own; see [`dense`].
     Dense(Arc<DensePoints>),
     /// Triangles.
@@ -68,7 +71,16 @@ impl Proxy {
     pub fn plane(&self) -> Option<Plane> {
         match self {
             Self::Plane(plane) => Some(*plane),
-            Self::ViewPlane | Self::Points | Self::Dense(_) | Self::Mesh(_) => None,
+            Self::ViewPlane | Self::Points { .. } | Self::Dense(_) | Self::Mesh(_) => None,
+        }
+    }
+
+    /// The closed mesh that bounds what is made of points, if there is one.
+    pub fn within(&self) -> Option<&Solid> {
+        match self {
+            Self::Points { within } => within.as_deref(),
+            Self::Dense(dense) => dense.within.as_deref(),
+            Self::Plane(_) | Self::ViewPlane | Self::Mesh(_) => None,
         }
     }
 
@@ -77,7 +89,7 @@ impl Proxy {
         match self {
             Self::Plane(_) => "plane",
             Self::ViewPlane => "view-plane",
-            Self::Points => "points",
+            Self::Points { .. } => "points",
             Self::Dense(_) => "dense",
             Self::Mesh(solid) => solid.kind().name(),
         }

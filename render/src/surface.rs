@@ -5,7 +5,7 @@ use crate::lumigraph::Lumigraph;
 use crate::sight::{Seers, within_sight};
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
-use proxy::{Facets, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
+use proxy::{Facets, Kept, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
 use std::cell::OnceCell;
 
@@ -55,11 +55,11 @@ impl Surface {
                 let plane = fit_plane_for_view(desired, &views(), &lumigraph.points);
                 plane.map_or(Self::Nothing, of_plane)
             }
-            Proxy::Points | Proxy::Dense(_) => {
+            proxy @ (Proxy::Points { .. } | Proxy::Dense(_)) => {
                 let facets = points::facets(desired, &views(), &lumigraph.points);
                 facets.map_or(Self::Nothing, |facets| {
                     let rays = rays();
-                    let map = FacetMap::of_facets(facets, desired, rays.as_ref());
+                    let map = FacetMap::of_facets(facets, desired, rays.as_ref(), proxy.within());
                     Self::Facets(within_sight(map, desired, rays.as_ref(), sources))
                 })
             }
@@ -180,18 +180,71 @@ impl FacetMap {
         if q.is_finite() { q } else { DVec3::ZERO }
     }
 
-    fn of_facets(facets: Facets, desired: &View, rays: Option<&Rays>) -> Self {
+    fn of_facets(
+        facets: Facets,
+        desired: &View,
+        rays: Option<&Rays>,
+        within: Option<&Solid>,
+    ) -> Self {
         if let Some(rays) = rays {
             let mut scan = facets.scan(rays);
             Self::fill(&facets, &mut scan, desired);
-            return Self::of_pixels(facets.planes, scan.triangle_of, desired);
+            let map = Self::of_pixels(facets.planes, scan.triangle_of, desired);
+            return match within {
+                None => map,
+                Some(hull) => {
+                    let kept = hull.keep(desired, rays, &scan.inverse_depth);
+                    map.kept(&kept, hull, desired)
+                }
+            };
         }
         let neighbours = facets.neighbours();
         let facet_of = Self::found(desired, |ray, last| {
             let start = if last == NO_FACET { 0 } else { last };
             facets.locate(&neighbours, ray, start)
         });
-        Self::of_pixels(facets.planes, facet_of, desired)
+        let map = Self::of_pixels(facets.planes, facet_of, desired);
+        let Some(hull) = within else {
+            return map;
+        };
+        let world_from_camera = desired.camera_from_world.rotation.conjugate();
+        let keep = |i: usize| {
+            let (x, y) = (i as u32 % desired.width, i as u32 / desired.width);
+            let ray = desired.lens.unproject(Pixel::center_of(x, y));
+            let seen = ray.zip(map.plane_of(map.facet_of[i]));
+            seen.map_or(Kept::Nowhere, |(ray, plane)| {
+                let along = plane.dot(ray).recip();
+                hull.keep_on_ray(desired.center(), world_from_camera * ray, along)
+            })
+        };
+        let pixels = (0..map.facet_of.len()).into_par_iter();
+        let kept: Vec<Kept> = pixels.map(keep).collect();
+        map.kept(&kept, hull, desired)
+    }
+
+    /// What pixels see, kept within a hull as was found.
+    fn kept(mut self, kept: &[Kept], hull: &Solid, desired: &View) -> Self {
+        let center = desired.center();
+        let rotation = desired.camera_from_world.rotation;
+        // The facets of the hull's triangles that are seen.
+        let mut facet_of = vec![NO_FACET; hull.mesh().triangles.len()];
+        for (facet, kept) in self.facet_of.iter_mut().zip(kept) {
+            match *kept {
+                Kept::AsItIs => {}
+                Kept::Nowhere => *facet = NO_FACET,
+                Kept::On(triangle_idx) => {
+                    let own = &mut facet_of[triangle_idx as usize];
+                    if *own == NO_FACET {
+                        *own = self.planes.len() as u32;
+                        let corners = hull.mesh().corners(triangle_idx as usize);
+                        let corners = corners.map(|p| rotation * (p - center));
+                        self.planes.push(Self::plane_through(corners));
+                    }
+                    *facet = *own;
+                }
+            }
+        }
+        Self::of_pixels(self.planes, self.facet_of, desired)
     }
 
     /// Facets tile all directions: a pixel without one lies where rounding has turned one over.
@@ -205,6 +258,9 @@ impl FacetMap {
             if let Some(ray) = desired.lens.unproject(center) {
                 let neighbours = neighbours.get_or_init(|| facets.neighbours());
                 *facet = facets.locate(neighbours, ray, 0);
+                if let Some(plane) = facets.planes.get(*facet as usize) {
+                    scan.inverse_depth[i] = plane.dot(ray) / ray.z;
+                }
             }
         }
     }

@@ -249,7 +249,7 @@ fn a_flat_mesh_is_a_plane() {
 fn surfaces_that_cannot_hide_themselves_ask_for_no_distances() {
     let convex = lumigraph(wall(), MeshKind::Tunnel);
     assert!(convex.visibility.is_none());
-    assert!(Visibility::of(&Proxy::Points, &convex.sources).is_none());
+    assert!(Visibility::of(&Proxy::Points { within: None }, &convex.sources).is_none());
 }
 
 #[test]

@@ -6,9 +6,10 @@ use calibrate::{ImageId, View};
 use common::{Shot, assert_close, gpu, psnr, psnr_covered, unmoved};
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
-use proxy::{Proxy, SparsePoint};
+use proxy::{Mesh, MeshKind, Proxy, Solid, SparsePoint};
 use render::{FieldOptions, Frame, Lumigraph, Method, PhotoStore, Surface, cpu, reference};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 const METHODS: [Method; 2] = [Method::Exact, Method::TRIANGULATED];
 
@@ -35,7 +36,7 @@ fn points(shot: &Shot) -> Vec<SparsePoint> {
 
 fn lumigraph(shot: &Shot) -> Lumigraph {
     Lumigraph {
-        proxy: Proxy::Points,
+        proxy: Proxy::Points { within: None },
         points: points(shot),
         ..shot.lumigraph()
     }
@@ -92,6 +93,111 @@ fn every_engine_draws_the_same_picture() {
             println!("{name}, {engine}, triangulated against exact: {db:.1} dB");
             assert!(db >= 50.0, "{name}, {engine}: {db} dB");
         }
+    }
+}
+
+/// A box as a hull: what rays meet of it is held against the box itself.
+#[test]
+fn what_is_made_of_points_stays_within_the_hull() {
+    let shot = Shot::of("shelf", 9, None);
+    let free = lumigraph(&shot);
+    let (_, between) = desired_views(&shot).swap_remove(0);
+    let seen: Vec<DVec3> = {
+        let frame = Frame::new(&free, between.clone(), FieldOptions::default());
+        let pixels = (30..130).map(|x| calibrate::Pixel::center_of(x, 60));
+        let point = |pixel| Some(in_world(&frame, &frame.proxy_point(pixel)?));
+        pixels.filter_map(point).collect()
+    };
+    // Around some of what is in the middle, so that much is before it, behind it and beside it.
+    let middle = seen.iter().sum::<DVec3>() / seen.len() as f64;
+    let half = 0.2 * middle.distance(between.center()) * DVec3::new(1.0, 1.0, 0.3);
+    let hull = Arc::new(Solid::new(MeshKind::Hull, box_around(middle, half)));
+    let lumigraph = Lumigraph {
+        proxy: Proxy::Points { within: Some(hull) },
+        ..lumigraph(&shot)
+    };
+    for (name, desired) in desired_views(&shot) {
+        let frame = Frame::new(&lumigraph, desired.clone(), FieldOptions::default());
+        let unbounded = Frame::new(&free, desired.clone(), FieldOptions::default());
+        let world_from_camera = desired.camera_from_world.rotation.conjugate();
+        let Surface::Facets(map) = &frame.surface else {
+            panic!("{name}");
+        };
+        let moved: Vec<bool> = map.moved().collect();
+        // By whether the box was missed, the point was within, or was brought to its side.
+        let mut counts = [0; 3];
+        for i in 0..160 * 120 {
+            let pixel = calibrate::Pixel::center_of(i % 160, i / 160);
+            if moved[i as usize] {
+                continue;
+            }
+            let ray = world_from_camera * desired.lens.unproject(pixel).unwrap();
+            let range = through_box(desired.center() - middle, ray, half);
+            let Some(point) = frame.proxy_point(pixel) else {
+                assert!(
+                    range.is_none_or(|[from, to]| to - from < 1e-6),
+                    "{name} {pixel:?}"
+                );
+                counts[0] += 1;
+                continue;
+            };
+            let [from, to] = range.unwrap_or_else(|| panic!("{name}: {pixel:?} misses the box"));
+            let along = point.inverse_distance.recip();
+            assert!(along > from - 1e-6 && along < to + 1e-6, "{name} {pixel:?}");
+            let own = unbounded
+                .proxy_point(pixel)
+                .unwrap()
+                .inverse_distance
+                .recip();
+            let expected = own.clamp(from, to);
+            assert!(
+                (along - expected).abs() < 1e-6 * to,
+                "{name} {pixel:?}: {along} {expected}"
+            );
+            counts[1 + usize::from(along != own)] += 1;
+        }
+        assert!(
+            counts.iter().all(|&count| count > 200),
+            "{name}: {counts:?}"
+        );
+        let truth = reference::render_exact(&frame).unwrap();
+        for (engine, picture) in pictures(&frame, Method::Exact) {
+            assert_close(&picture, &truth, &format!("{name}, {engine}"));
+        }
+    }
+}
+
+fn in_world(frame: &Frame<'_>, point: &render::ProxyPoint) -> DVec3 {
+    let rotation = frame.desired.camera_from_world.rotation.conjugate();
+    frame.desired.center() + rotation * point.ray / point.inverse_distance
+}
+
+/// From where to where a ray is in a box around the origin.
+fn through_box(from: DVec3, ray: DVec3, half: DVec3) -> Option<[f64; 2]> {
+    let (a, b) = ((-half - from) / ray, (half - from) / ray);
+    let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+    (near < far && far > 0.0).then_some([near, far])
+}
+
+fn box_around(middle: DVec3, half: DVec3) -> Mesh {
+    let corner = |i: u32| {
+        let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        middle + half * DVec3::new(side(0), side(1), side(2))
+    };
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    Mesh {
+        positions: (0..8).map(corner).collect(),
+        triangles: faces
+            .into_iter()
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
     }
 }
 

@@ -157,16 +157,27 @@ pub(super) fn proxy_json(proxy: &Proxy) -> Value {
     value
 }
 
+/// What bounds a proxy of points, if anything.
+fn within_text(proxy: &Proxy) -> String {
+    proxy.within().map_or_else(String::new, |hull| {
+        let count = hull.mesh().triangles.len();
+        format!(", within the hull of their silhouettes ({count} triangles)")
+    })
+}
+
 pub(super) fn proxy_text(proxy: &Proxy) -> String {
     let plane = match proxy {
         Proxy::Plane(plane) => plane,
         Proxy::ViewPlane => return "a plane for every view".to_owned(),
-        Proxy::Points => {
-            return "the sparse points that views like the desired one observe".to_owned();
+        Proxy::Points { .. } => {
+            let points = "the sparse points that views like the desired one observe";
+            return format!("{points}{}", within_text(proxy));
         }
         Proxy::Dense(dense) => {
-            let count = dense.points.len();
-            return format!("those of {count} dense points that views like the desired one see");
+            let (count, within) = (dense.points.len(), within_text(proxy));
+            return format!(
+                "those of {count} dense points that views like the desired one see{within}"
+            );
         }
         Proxy::Mesh(solid) => {
             let count = solid.mesh().triangles.len();

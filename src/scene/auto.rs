@@ -94,6 +94,7 @@ impl Scene {
         let (kind, occludes) = best.unwrap_or((Kind::Plane, true));
         let mut fitted = match kind {
             Kind::Dense => bench.dense()?,
+            Kind::Points => bench.points()?,
             _ => self.fit(kind, without)?,
         };
         if let (false, Proxy::Mesh(solid)) = (occludes, &mut fitted.proxy)

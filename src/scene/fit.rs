@@ -120,7 +120,8 @@ impl Scene {
             }
             Kind::Points => {
                 self.needs_points(kind)?;
-                Ok(Fitted::new(Proxy::Points, "made for every view"))
+                let cutout = self.cutout(without, None)?;
+                Ok(Fitted::points(cutout.map(|cutout| cutout.hull)))
             }
             Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
             Kind::Carved => {
@@ -250,7 +251,13 @@ impl Scene {
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
         let (_, sparse) = self.sparse(without)?;
         let points = self.matching(without)?.points(&sparse, None);
-        Ok(Fitted::dense(names, points, sparse.len()))
+        let within = self.cutout(without, None)?.map(|cutout| cutout.hull);
+        let dense = DensePoints {
+            names,
+            points,
+            within,
+        };
+        Ok(Fitted::dense(dense, sparse.len()))
     }
 
     /// The photos but those of the given names, ready to be compared.
@@ -277,14 +284,18 @@ impl Fitted {
         }
     }
 
-    /// Of points, the first of which are the sparse ones.
-    pub(super) fn dense(names: Vec<String>, points: Vec<SparsePoint>, sparse: usize) -> Self {
+    /// The sparse points, within a hull if there is one.
+    pub(super) fn points(within: Option<Arc<Solid>>) -> Self {
+        Self::new(Proxy::Points { within }, "made for every view")
+    }
+
+    /// Of points, so many of which are the sparse ones.
+    pub(super) fn dense(dense: DensePoints, sparse: usize) -> Self {
         let how = format!(
             "{} points, {} of them found between the sparse ones",
-            points.len(),
-            points.len() - sparse
+            dense.points.len(),
+            dense.points.len() - sparse
         );
-        let dense = DensePoints { names, points };
         Self::new(Proxy::Dense(Arc::new(dense)), how)
     }
 

@@ -112,7 +112,9 @@ impl Scene {
         });
         let points = match &proxy {
             Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),
-            Proxy::ViewPlane | Proxy::Points => self.sparse_points(without, &names_of(&sources)),
+            Proxy::ViewPlane | Proxy::Points { .. } => {
+                self.sparse_points(without, &names_of(&sources))
+            }
             Proxy::Dense(dense) => renamed(dense, &names_of(&sources)),
         };
         let visibility = Visibility::of(&proxy, &sources);

@@ -9,6 +9,7 @@
 mod auto;
 mod beside;
 mod calibration;
+mod cutout;
 mod error;
 mod exposure;
 pub mod file;

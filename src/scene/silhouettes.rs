@@ -17,7 +17,12 @@ impl Photo {
     /// Whether something says what of it is the object: a matte, a silhouette among its masks,
     /// or an alpha channel. Asks only the header of its file.
     pub fn has_silhouette(&self) -> bool {
-        self.object_matte.is_some() || self.silhouette.is_some() || has_alpha(&self.path)
+        self.is_cut_out() || self.silhouette.is_some()
+    }
+
+    /// Whether it shows nothing but an object: it has a matte, or an alpha channel.
+    pub(super) fn is_cut_out(&self) -> bool {
+        self.object_matte.is_some() || has_alpha(&self.path)
     }
 
     /// What of it is the object, by its matte, else by its alpha if that is not opaque, else by

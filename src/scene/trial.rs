@@ -1,13 +1,14 @@
 //! Photos that judge proxies: each is drawn small from all the others and compared.
 
+use super::cutout::Cutout;
 use super::fit::{Fitted, Kind, unfit};
 use super::{Scene, SceneError};
 use calibrate::View;
 use image::RgbaImage;
-use proxy::Proxy;
-use proxy::dense::Matching;
+use proxy::dense::{DensePoints, Matching};
+use proxy::{Proxy, Solid};
 use render::{FieldOptions, Frame, Lumigraph, Method, Visibility, cpu, score};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Pixels along the longer side of the pictures that decide.
@@ -38,6 +39,10 @@ pub(super) struct Trials<'a> {
     /// Whose proxy changes with what is on trial.
     lumigraph: Lumigraph,
     matching: Option<Matching>,
+    /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
+    cutout: Option<Option<Cutout>>,
+    /// And without the judges of each fold.
+    bounds: BTreeMap<usize, Option<Arc<Solid>>>,
 }
 
 /// How a proxy did: PSNR in dB for each judge; `None` for those that were not asked.
@@ -79,7 +84,8 @@ impl<'a> Trials<'a> {
         without: &'a BTreeSet<String>,
         count: usize,
     ) -> Result<Self, SceneError> {
-        let lumigraph = scene.reduced_lumigraph(without, Proxy::Points, PHOTO_SIDE)?;
+        let lumigraph =
+            scene.reduced_lumigraph(without, Proxy::Points { within: None }, PHOTO_SIDE)?;
         let names: Vec<String> = lumigraph.sources.iter().map(|s| s.name.clone()).collect();
         let spread = (0..count).map(|i| (2 * i + 1) * names.len() / (2 * count));
         let judge = |source_idx: usize| {
@@ -106,6 +112,8 @@ impl<'a> Trials<'a> {
             judges,
             lumigraph,
             matching: None,
+            cutout: None,
+            bounds: BTreeMap::new(),
         })
     }
 
@@ -122,11 +130,7 @@ impl<'a> Trials<'a> {
     ) -> Result<(Scores, Option<Scores>), SceneError> {
         let count = self.judges.len();
         let of_points = matches!(kind, Kind::Points | Kind::ViewPlane | Kind::Dense);
-        let folds = if of_points {
-            count
-        } else {
-            count.div_ceil((self.names.len() / FOLD).max(1))
-        };
+        let folds = if of_points { count } else { self.folds() };
         let mut plain = Scores(vec![None; count]);
         let mut occluding = plain.clone();
         for fold in 0..folds {
@@ -161,22 +165,75 @@ impl<'a> Trials<'a> {
     pub(super) fn dense(&mut self) -> Result<Fitted, SceneError> {
         let sparse = self.scene.sparse_points(self.without, &self.names);
         let points = self.matching()?.points(&sparse, None);
-        Ok(Fitted::dense(self.names.clone(), points, sparse.len()))
+        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        let dense = DensePoints {
+            names: self.names.clone(),
+            points,
+            within,
+        };
+        Ok(Fitted::dense(dense, sparse.len()))
+    }
+
+    /// The sparse points of all photos.
+    pub(super) fn points(&mut self) -> Result<Fitted, SceneError> {
+        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        Ok(Fitted::points(within))
+    }
+
+    /// How many times what is fitted to photos is fitted, each time without a few judges.
+    fn folds(&self) -> usize {
+        let at_once = (self.names.len() / FOLD).max(1);
+        self.judges.len().div_ceil(at_once)
+    }
+
+    fn cutout(&mut self) -> Result<&Option<Cutout>, SceneError> {
+        let found = match self.cutout.take() {
+            Some(found) => found,
+            None => self.scene.cutout(self.without, None)?,
+        };
+        Ok(self.cutout.insert(found))
+    }
+
+    /// What bounds points where a judge is drawn: carved without it, and with it a few others.
+    fn bound(&mut self, judge: usize) -> Result<Option<Arc<Solid>>, SceneError> {
+        let Some(like) = self.cutout()?.clone() else {
+            return Ok(None);
+        };
+        let folds = self.folds();
+        let fold = judge % folds;
+        if let Some(bound) = self.bounds.get(&fold) {
+            return Ok(bound.clone());
+        }
+        let members = (fold..self.judges.len()).step_by(folds);
+        let mut fewer = self.without.clone();
+        fewer.extend(members.map(|j| self.judges[j].name.clone()));
+        let carved = self.scene.cutout(&fewer, Some(&like))?;
+        let bound = carved.map(|carved| carved.hull);
+        self.bounds.insert(fold, bound.clone());
+        Ok(bound)
     }
 
     /// Makes the lumigraph's proxy without some of the judges.
     fn prepare(&mut self, kind: Kind, judges: &[usize]) -> Result<(), SceneError> {
         let mut fewer = self.without.clone();
         fewer.extend(judges.iter().map(|&j| self.judges[j].name.clone()));
+        let within = match kind {
+            Kind::Points | Kind::Dense => self.bound(judges[0])?,
+            _ => None,
+        };
         let sparse = || self.scene.sparse_points(&fewer, &self.names);
         let (proxy, points) = match kind {
-            Kind::Points => (Proxy::Points, sparse()),
+            Kind::Points => (Proxy::Points { within }, sparse()),
             Kind::ViewPlane => (Proxy::ViewPlane, sparse()),
             Kind::Dense => {
                 let gone = self.judges[judges[0]].source_idx;
                 let sparse = sparse();
                 let points = self.matching()?.points(&sparse, Some(gone));
-                (Proxy::Dense(Arc::default()), points)
+                let dense = DensePoints {
+                    within,
+                    ..DensePoints::default()
+                };
+                (Proxy::Dense(Arc::new(dense)), points)
             }
             // A box may happen to suit a few photos of anything.
             Kind::Tunnel => (self.scene.fit_hallway(&fewer)?.proxy, Vec::new()),

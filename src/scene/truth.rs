@@ -23,7 +23,8 @@ pub struct Truth {
     pub matte: Option<GrayImage>,
     /// What to use of it (255) and what to ignore (0), where a mask says so.
     pub used: Option<GrayImage>,
-    /// Where it shows sparse points that two or more source photos see, too.
+    /// Where it shows sparse points that two or more source photos see, too; of its object only,
+    /// if it has a matte.
     pub points: Vec<Pixel>,
 }
 
@@ -44,7 +45,7 @@ pub struct TruthScore {
 }
 
 impl Truth {
-    fn new(pixels: RgbaImage, used: Option<GrayImage>, points: Vec<Pixel>) -> Self {
+    fn new(pixels: RgbaImage, used: Option<GrayImage>, mut points: Vec<Pixel>) -> Self {
         let (width, height) = pixels.dimensions();
         let alpha = |x, y| pixels.get_pixel(x, y).0[3];
         let opaque = pixels.pixels().all(|p| p.0[3] == 255);
@@ -56,6 +57,7 @@ impl Truth {
         });
         let matte =
             (!opaque).then(|| GrayImage::from_fn(width, height, |x, y| Luma([alpha(x, y)])));
+        points.retain(|&place| coverage_points(&pixels, [place]) != Some(0.0));
         Self {
             pixels,
             inside,
@@ -190,7 +192,11 @@ mod tests {
             Rgba([200, 100, 50, if x < 24 { 255 } else { 0 }])
         });
         let used = GrayImage::from_fn(48, 24, |_, y| Luma([if y < 12 { 255 } else { 0 }]));
-        let truth = Truth::new(pixels, Some(used), vec![Pixel::new(12.0, 6.0)]);
+        let truth = Truth::new(
+            pixels,
+            Some(used),
+            vec![Pixel::new(12.0, 6.0), Pixel::new(40.0, 6.0)],
+        );
         let small = truth.resized(24, 12);
         assert_eq!(small.points, [Pixel::new(6.0, 3.0)]);
         for (x, y, inside, matte) in [(3, 3, 255, 255), (20, 3, 0, 0), (3, 9, 0, 255)] {

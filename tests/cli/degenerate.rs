@@ -95,7 +95,7 @@ fn is_finite(file: &Path) -> bool {
         Proxy::Plane(plane) => plane.point().is_finite() && plane.normal().is_finite(),
         Proxy::Mesh(solid) => solid.mesh().positions.iter().all(|v| v.is_finite()),
         Proxy::Dense(dense) => dense.points.iter().all(|p| p.position.is_finite()),
-        Proxy::ViewPlane | Proxy::Points => true,
+        Proxy::ViewPlane | Proxy::Points { .. } => true,
     }
 }
 

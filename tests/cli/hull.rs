@@ -81,6 +81,30 @@ fn silhouettes_in_masks_carve_without_being_asked_for() {
     assert_eq!(info["silhouettes"], PHOTOS);
     lumigraph(here, "import car --mattes masks -o mattes").ok();
     assert_eq!(coverage(&hull(here, "mattes").ok()), found);
+    // Where photos are cut out, the hull bounds what is made of points.
+    let scores = |line: &str| lumigraph(here, line).ok().json()["mean"].clone();
+    lumigraph(here, "proxy mattes points -o points.json").ok();
+    let bounded = fs::read_to_string(here.join("points.json")).unwrap();
+    fs::write(
+        here.join("free.json"),
+        r#"{"version": 1, "kind": "points"}"#,
+    )
+    .unwrap();
+    let within = scores("evaluate mattes --every 4 --proxy points --json");
+    let free = scores("evaluate mattes --every 4 --proxy free.json --json");
+    let share = |scores: &serde_json::Value, key: &str| scores[key].as_f64().unwrap();
+    let gain = |key: &str| share(&within, key) - share(&free, key);
+    assert!(gain("psnr") > 0.5 && gain("ssim") > 0.1, "{within}, {free}");
+    assert!(gain("coverage_background") < 0.0, "{within}, {free}");
+    assert!(gain("coverage_matte") > -0.005, "{within}, {free}");
+    // A file's hull has to be one.
+    let broken = bounded.replacen("\"triangles\":[[", "\"triangles\":[[999999,0,1],[", 1);
+    fs::write(here.join("broken.json"), broken).unwrap();
+    let error = lumigraph(here, "evaluate mattes --proxy broken.json").error(1);
+    assert!(
+        error.contains("broken.json: the hull around its points has"),
+        "{error}"
+    );
     // Pictures stay whole.
     let of = |scene: &str| {
         let line = format!("evaluate {scene} --every 4 --proxy plane --json");

@@ -405,7 +405,7 @@ fn edges_of_proxy(lumigraph: &Lumigraph, view: &View, depth: f64) -> Vec<[DVec2;
             let lines = lines.filter_map(|(a, b, c, d)| line(place(a, b), place(c, d)));
             lines.collect()
         }
-        Proxy::Points | Proxy::Dense(_) | Proxy::ViewPlane => {
+        Proxy::Points { .. } | Proxy::Dense(_) | Proxy::ViewPlane => {
             let step = lumigraph.points.len().div_ceil(MOST_POINTS).max(1);
             let seen = lumigraph.points.iter().step_by(step);
             let seen = seen.filter_map(|p| project(p.position));

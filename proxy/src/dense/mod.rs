@@ -14,14 +14,14 @@ mod small;
 mod smooth;
 mod sweep;
 
-use crate::SparsePoint;
+use crate::{Solid, SparsePoint};
 use calibrate::View;
 use image::RgbaImage;
 use neighbours::Affinity;
 use rayon::prelude::*;
 use small::SmallPhoto;
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Points, and the names of the views that their `seen_by` counts.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,6 +30,8 @@ pub struct DensePoints {
     pub names: Vec<String>,
     /// The points.
     pub points: Vec<SparsePoint>,
+    /// As that of [`crate::Proxy::Points`].
+    pub within: Option<Arc<Solid>>,
 }
 
 /// How carefully to look.

@@ -9,11 +9,13 @@
 //! Of a pinhole's rows a triangle has all pixels from one column to another. Where a lens bends,
 //! its sides are asked at each pixel's ray, but for blocks of pixels whose rays are all beyond one of them.
 
+mod kept;
 mod rays;
 
 use crate::{Facets, Solid};
 use calibrate::{Lens, View};
 use glam::{DMat3, DVec3};
+pub use kept::Kept;
 use rayon::prelude::*;
 pub use rays::Rays;
 use rays::{BLOCK, Bent};
@@ -124,14 +126,7 @@ impl Scan {
     /// Of triangles in order.
     fn of(triangles: Vec<Prepared>, rays: &Rays) -> Self {
         let [width, height] = rays.size;
-        // Which triangles reach which bands, in order.
-        let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
-        for (i, triangle) in triangles.iter().enumerate() {
-            let last = (triangle.rows.end - 1) / BAND;
-            bands[triangle.rows.start / BAND..=last]
-                .iter_mut()
-                .for_each(|band| band.push(i as u32));
-        }
+        let bands = by_bands(triangles.iter().map(|triangle| &triangle.rows), height);
         let mut scan = Self {
             width,
             triangle_of: vec![Self::NOTHING; width * height],
@@ -159,6 +154,18 @@ impl Scan {
         });
         scan
     }
+}
+
+/// Which triangles, given by the rows they reach, reach which bands: their indices, in order.
+fn by_bands<'a>(rows: impl Iterator<Item = &'a Range<usize>>, height: usize) -> Vec<Vec<u32>> {
+    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
+    for (i, rows) in rows.enumerate() {
+        let last = (rows.end - 1) / BAND;
+        bands[rows.start / BAND..=last]
+            .iter_mut()
+            .for_each(|band| band.push(i as u32));
+    }
+    bands
 }
 
 /// A triangle's corners where a pixel's ray is (x, y, 1), and its sides.
@@ -259,11 +266,10 @@ impl Prepared {
         }
     }
 
-    /// Draws it over what is farther in a row.
-    fn draw(&self, row: usize, ids: &mut [u32], depths: &mut [f64]) {
+    /// The columns of a pinhole's row whose centres are inside of all sides.
+    fn columns_in(&self, row: usize, width: usize) -> Range<usize> {
         let y = row as f64 + 0.5;
-        // The columns whose centres are inside of all sides.
-        let (mut least, mut most) = (0.0_f64, ids.len() as f64);
+        let (mut least, mut most) = (0.0_f64, width as f64);
         for (side, slack) in self.sides.iter().zip(self.slack) {
             // side.x · x + rest ≥ 0
             let rest = side.y * y + side.z + slack;
@@ -273,10 +279,40 @@ impl Prepared {
             } else if side.x < 0.0 {
                 most = most.min(at.floor() + 1.0);
             } else if rest < 0.0 {
-                return;
+                return 0..0;
             }
         }
-        let (start, end) = (least as usize, most.max(0.0) as usize);
+        least as usize..most.max(0.0) as usize
+    }
+
+    /// Calls `put(column, 1/z)` for all pixels of a row that look at it or, where the viewer is
+    /// between its corners, away from it.
+    fn each_pixel(&self, row: usize, rays: &Rays, mut put: impl FnMut(usize, f64)) {
+        let [width, _] = rays.size;
+        match &rays.bent {
+            None => {
+                let at = DVec3::new(0.0, row as f64 + 0.5, 1.0);
+                let rest = self.inverse_depth.dot(at);
+                for column in self.columns_in(row, width) {
+                    put(column, self.inverse_depth.x * (column as f64 + 0.5) + rest);
+                }
+            }
+            Some(bent) => {
+                for column in self.columns.clone() {
+                    let at = bent.at[row * width + column].extend(1.0);
+                    let mut sides = self.sides.iter().zip(self.slack);
+                    if sides.all(|(side, slack)| side.dot(at) >= -slack) {
+                        put(column, self.inverse_depth.dot(at));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Draws it over what is farther in a row.
+    fn draw(&self, row: usize, ids: &mut [u32], depths: &mut [f64]) {
+        let y = row as f64 + 0.5;
+        let Range { start, end } = self.columns_in(row, ids.len());
         if start >= end {
             return;
         }

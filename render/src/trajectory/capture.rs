@@ -89,7 +89,7 @@ impl Capture {
         let hit = match proxy {
             Proxy::Plane(plane) => plane.intersect(origin_in_world, forward),
             // Made of points, it lies where they do.
-            Proxy::ViewPlane | Proxy::Points | Proxy::Dense(_) => None,
+            Proxy::ViewPlane | Proxy::Points { .. } | Proxy::Dense(_) => None,
             Proxy::Mesh(solid) => {
                 let hit = solid.first_hit(origin_in_world, forward);
                 hit.map(|hit| origin_in_world + forward * hit.along)

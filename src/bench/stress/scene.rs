@@ -298,7 +298,7 @@ fn proxy_of(
         5 => mesh(ball(DVec3::ZERO, 40.0)),
         6 => mesh(ball(desired.center() + DVec3::Z, 1.0)),
         7 => mesh(slivers(random)),
-        _ => Proxy::Points,
+        _ => Proxy::Points { within: None },
     };
     let points = if kind == 8 {
         let count = random.below(120);
