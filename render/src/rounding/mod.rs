@@ -1,7 +1,7 @@
 //! How far the fast engines may be from the reference by rounding: a bound for each pixel of the
 //! exact field, derived by running their own formulas in intervals.
 //!
-//! The formulas of `cpu/source.rs` are written for any [`Scalar`]: once for f32, once for intervals
+//! The formulas of `cpu/source.rs` are written for any `Scalar`: once for f32, once for intervals
 //! that hold what they give exactly and in f32. What f32's polynomials leave is added where they
 //! stand for angles and logarithms. Blends follow from what they are made of (`weights.rs`), photos
 //! are sampled over all places that are possible (`sample.rs`).
