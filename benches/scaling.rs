@@ -28,7 +28,7 @@ struct Args {
     /// How many photos
     #[arg(long, value_delimiter = ',', default_values_t = [10, 100, 1_000, 10_000, 100_000])]
     photos: Vec<usize>,
-    /// What they show: plane, tunnel, hull
+    /// What they show: plane, tunnel, hull; crowd, a hull from one place
     #[arg(long, value_delimiter = ',', default_values_t = ["plane", "tunnel", "hull"].map(String::from))]
     proxies: Vec<String>,
     /// Only one stage, over and over, for profiles
@@ -64,12 +64,14 @@ fn main() {
         Surroundings::Plane,
         Surroundings::Tunnel,
         Surroundings::BALL,
+        Surroundings::Crowd,
     ];
     let is_asked = |kind: &Surroundings| args.proxies.iter().any(|name| name == kind.name());
     for kind in all.into_iter().filter(is_asked) {
         for size in [(960, 720), (1920, 1080)] {
             for &count in &args.photos {
-                if kind == Surroundings::BALL && count > MOST_OCCLUDED {
+                let occluded = matches!(kind, Surroundings::Ball { .. } | Surroundings::Crowd);
+                if occluded && count > MOST_OCCLUDED {
                     continue;
                 }
                 let lumigraph = lumigraph(kind, count, PHOTO);

@@ -1,8 +1,12 @@
 //! The command line.
 
 mod cli;
+mod memory;
 
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: memory::OrSay = memory::OrSay;
 
 fn main() -> ExitCode {
     silence_device_select();

@@ -4,7 +4,7 @@
 pub(crate) mod every_lens;
 
 use crate::lumigraph::{Lumigraph, SourceView};
-use crate::options::{FieldOptions, Resolution};
+use crate::options::{FieldOptions, Resolution, Skips};
 use crate::planted::{Fault, is_planted};
 use crate::sight::within_sight;
 use crate::surface::{FacetMap, Surface};
@@ -180,8 +180,8 @@ pub struct Frame<'a> {
     pub surface: Surface,
     /// Source views that take no part.
     gone: Vec<usize>,
-    /// Asks every source view about every ray.
-    no_skip: bool,
+    /// What is left out.
+    pub(crate) skips: Skips,
     /// Made when first asked for.
     view_tree: OnceLock<ViewTree>,
     /// Which views were scored.
@@ -281,7 +281,7 @@ impl<'a> Frame<'a> {
             sources,
             surface,
             gone,
-            no_skip: false,
+            skips: Skips::ALL,
             view_tree: OnceLock::new(),
             tally: Tally::new(lumigraph.sources.len()),
         };
@@ -320,18 +320,17 @@ impl<'a> Frame<'a> {
         self
     }
 
-    /// The same view, with every source view asked whether it counts for a ray, one by one: the
-    /// same pictures, later.
+    /// The same view, leaving out these things alone: the same pictures, sooner or later.
     #[must_use]
-    pub fn without_skipping(mut self) -> Self {
-        self.no_skip = true;
+    pub fn skipping(mut self, skips: Skips) -> Self {
+        self.skips = skips;
         self.view_tree = OnceLock::new();
         self
     }
 
     pub(crate) fn view_tree(&self) -> &ViewTree {
         self.view_tree
-            .get_or_init(|| ViewTree::new(&self.sources, !self.no_skip))
+            .get_or_init(|| ViewTree::new(&self.sources, self.skips.views))
     }
 
     /// The source views that take part: all but those outside the time window, in order.

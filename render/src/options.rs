@@ -82,6 +82,28 @@ pub enum Resolution {
     Length,
 }
 
+/// What is left out where a frame does not need it. Pictures are the same, with and without each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Skips {
+    /// Only views that can count are asked about a ray.
+    pub views: bool,
+    /// On the CPU, lenses without distortion take no more than a division.
+    pub lenses: bool,
+}
+
+impl Skips {
+    /// Whatever can be left out.
+    pub const ALL: Self = Self {
+        views: true,
+        lenses: true,
+    };
+    /// Nothing.
+    pub const NONE: Self = Self {
+        views: false,
+        lenses: false,
+    };
+}
+
 /// How the blending field is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {

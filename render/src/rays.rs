@@ -1,6 +1,7 @@
 //! The ray through each pixel of the desired image.
 
 use calibrate::{Distortion, Lens, Pixel, View};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The rays of the last lens and image size, for the next frame along a path.
@@ -16,6 +17,12 @@ impl RayCache {
         let last = last.unwrap_or_else(|| (view.lens, size, RayMap::of(view)));
         &self.last.insert(last).2
     }
+}
+
+/// The ray through a pixel before it is rounded: at z = 1 where there is a z, as a pinhole's.
+pub(crate) fn ray_of(lens: &Lens, pixel: Pixel) -> Option<DVec3> {
+    let ray = lens.unproject(pixel)?;
+    Some(if ray.z > 0.1 { ray / ray.z } else { ray })
 }
 
 /// Rays through pixel centres, in the desired camera's frame. A pinhole's are computed as
@@ -45,12 +52,7 @@ impl RayMap {
         let count = width * view.height as usize;
         let ray = |i: usize| {
             let pixel = Pixel::center_of((i % width) as u32, (i / width) as u32);
-            match lens.unproject(pixel) {
-                // At z = 1 where there is a z, as a pinhole's.
-                Some(ray) if ray.z > 0.1 => (ray / ray.z).as_vec3().extend(0.0).to_array(),
-                Some(ray) => ray.as_vec3().extend(0.0).to_array(),
-                None => [f32::NAN; 4],
-            }
+            ray_of(&lens, pixel).map_or([f32::NAN; 4], |ray| ray.as_vec3().extend(0.0).to_array())
         };
         Self::Table {
             width,

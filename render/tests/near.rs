@@ -6,13 +6,14 @@ use calibrate::{Distortion, Lens, Rigid3, View};
 use common::Random;
 use glam::{DVec2, DVec3};
 use image::{Rgba, RgbaImage};
-use proxy::{Plane, Proxy};
+use proxy::{Mesh, MeshKind, Plane, Proxy, Solid};
 use render::field::TriangulatedField;
 use render::reference::blend_at;
 use render::{
     Blend, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoStore, ProxyPoint, Resolution,
-    SourceView, cpu,
+    Skips, SourceView, Visibility, cpu,
 };
+use std::sync::Arc;
 
 fn lumigraph(views: Vec<View>, random: &mut Random) -> Lumigraph {
     let mut source = |(i, view): (usize, View)| SourceView {
@@ -147,7 +148,7 @@ fn a_triangulated_field_of_many_views_is_close_to_the_exact_one() {
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
         let field = TriangulatedField::new(&frame, 32).unwrap();
         let desired = frame.desired.clone();
-        let asking_all = Frame::new(&lumigraph, desired, frame.options).without_skipping();
+        let asking_all = Frame::new(&lumigraph, desired, frame.options).skipping(Skips::NONE);
         assert_eq!(field, TriangulatedField::new(&asking_all, 32).unwrap());
         let found = field.contributors(&frame);
         let (mut sum, mut count) = (0.0, 0);
@@ -189,9 +190,81 @@ fn pictures_are_the_same_bytes_when_all_views_are_asked() {
         let new = || Frame::new(&lumigraph, desired.clone(), FieldOptions::default());
         for method in [Method::Exact, Method::TRIANGULATED] {
             let picture = cpu::render(&new(), method).unwrap();
-            let asking_all = cpu::render(&new().without_skipping(), method).unwrap();
+            let asking_all = cpu::render(&new().skipping(Skips::NONE), method).unwrap();
             assert!(picture == asking_all, "{kind}, {method:?}");
             assert!(picture.pixels().any(|p| p.0[3] > 0), "{kind}");
         }
+    }
+}
+
+/// Of photos that differ alike the first decide: those beyond what may contribute, and one more whose
+/// difference caps the threshold, change nothing.
+#[test]
+fn a_crowd_at_one_place_is_as_good_as_its_first_seventeen() {
+    let mut random = Random(11);
+    let lens = lens_of(80.0, 100.0, 75.0);
+    let spot = DVec3::new(0.2, -0.1, 0.0);
+    let view = |center: DVec3, target: DVec3| View {
+        lens,
+        width: 100,
+        height: 75,
+        camera_from_world: Rigid3::looking_at(center, target, DVec3::Y),
+    };
+    let others: Vec<View> = (0..20)
+        .map(|_| {
+            let center = random.vector(1.0) * DVec3::new(1.0, 1.0, 0.2);
+            view(center, DVec3::Z * 4.0 + 0.3 * random.vector(1.0))
+        })
+        .collect();
+    // The wall that all see, or a part of it that a triangle before it hides.
+    let wall = Proxy::Plane(Plane::new(DVec3::Z * 4.0, DVec3::NEG_Z).unwrap());
+    let corners = |z: f64, reach: f64| {
+        [(-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)].map(|(x, y)| DVec3::new(reach * x, reach * y, z))
+    };
+    let two = Mesh {
+        positions: [corners(4.0, 20.0), corners(3.0, 0.4)].concat(),
+        triangles: vec![[0, 1, 2], [3, 4, 5]],
+    };
+    let mesh = Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, two)));
+    for proxy in [wall, mesh] {
+        let drawn = |crowd: usize| {
+            // They have all of the picture: of what they have in part, a triangle has no room for all.
+            let size = |i: usize| if i < 20 { (100, 75) } else { (400, 300) };
+            let alike = (0..crowd).map(|_| View {
+                lens: lens_of(80.0, 400.0, 300.0),
+                width: 400,
+                height: 300,
+                ..view(spot, DVec3::Z * 4.0)
+            });
+            let views: Vec<View> = others.iter().cloned().chain(alike).collect();
+            let mut lumigraph = lumigraph(views, &mut Random(1));
+            lumigraph.visibility = Visibility::of(&proxy, &lumigraph.sources);
+            lumigraph.proxy = proxy.clone();
+            lumigraph.photos = PhotoStore::new(lumigraph.sources.len(), move |i| {
+                let (width, height) = size(i);
+                Ok(RgbaImage::from_fn(width, height, |x, y| {
+                    let wave = |n: u32| (x * 7 * n + y * 3 + 40 * i as u32 * n) as u8;
+                    Rgba([wave(1), wave(2), wave(3), 255])
+                }))
+            });
+            let desired = View {
+                camera_from_world: Rigid3::looking_at(
+                    DVec3::new(0.1, 0.0, -0.3),
+                    DVec3::Z * 4.0,
+                    DVec3::Y,
+                ),
+                ..others[0].clone()
+            };
+            let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+            let methods = match lumigraph.visibility {
+                None => vec![Method::Exact, Method::TRIANGULATED],
+                Some(_) => vec![Method::Exact],
+            };
+            let drawn = |method| cpu::render(&frame, method).unwrap();
+            methods.into_iter().map(drawn).collect::<Vec<_>>()
+        };
+        let few = drawn(17);
+        assert!(few[0].pixels().any(|p| p.0[3] > 0));
+        assert!(drawn(300) == few, "{}", proxy.kind());
     }
 }

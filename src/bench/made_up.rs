@@ -20,6 +20,8 @@ pub enum Surroundings {
         /// Sectors, and rings.
         sides: u32,
     },
+    /// A ball of 480 faces, looked at from one place by all.
+    Crowd,
 }
 
 impl Surroundings {
@@ -32,6 +34,7 @@ impl Surroundings {
             Self::Plane => "plane",
             Self::Tunnel => "tunnel",
             Self::Ball { .. } => "hull",
+            Self::Crowd => "crowd",
         }
     }
 
@@ -41,6 +44,7 @@ impl Surroundings {
                 let ball = ball(DVec3::ZERO, 1.0, sides.max(3), sides.max(3));
                 Proxy::Mesh(Arc::new(Solid::new(MeshKind::Hull, ball)))
             }
+            Self::Crowd => Self::BALL.proxy(),
             Self::Tunnel => Proxy::Mesh(Arc::new(Solid::new(MeshKind::Tunnel, hallway()))),
             Self::Plane => {
                 let plane = Plane::new(DVec3::Z * 4.0, DVec3::NEG_Z);
@@ -75,6 +79,9 @@ pub fn lumigraph(kind: Surroundings, count: usize, photo_size: (u32, u32)) -> Lu
                 let direction = DVec3::new(aside * around.cos(), aside * around.sin(), cos);
                 let center = direction * (3.0 + 0.5 * v.z);
                 Rigid3::looking_at(center, 0.3 * target, DVec3::Y)
+            }
+            Surroundings::Crowd => {
+                Rigid3::looking_at(DVec3::new(0.9, -0.2, -3.0), 0.3 * target, DVec3::Y)
             }
             Surroundings::Tunnel => {
                 let center = DVec3::new(0.3 * v.x, 0.3 * v.y, 10.0 * v.z);
@@ -192,7 +199,7 @@ fn hallway() -> Mesh {
 pub fn desired(kind: Surroundings, (width, height): (u32, u32)) -> View {
     let size = DVec2::new(f64::from(width), f64::from(height));
     let pose = match kind {
-        Surroundings::Ball { .. } => {
+        Surroundings::Ball { .. } | Surroundings::Crowd => {
             Rigid3::looking_at(DVec3::new(0.4, 0.3, -3.1), DVec3::ZERO, DVec3::Y)
         }
         Surroundings::Plane | Surroundings::Tunnel => {

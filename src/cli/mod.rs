@@ -33,6 +33,7 @@ mod uncalibrated;
 mod view;
 mod walk;
 
+use anyhow::Context as _;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use output::say;
@@ -97,11 +98,12 @@ pub(super) fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
-    if let Some(threads) = cli.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.get())
-            .build_global()?;
-    }
+    // At once, as later there is nobody to tell that no more threads can be had.
+    let threads = cli.threads.map_or(0, NonZero::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    pool.build_global().context(
+        "worker threads cannot be started; try fewer --threads, or a higher limit (ulimit -u, -v)",
+    )?;
     match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Import(args) => import::run(&args),

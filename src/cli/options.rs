@@ -8,7 +8,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{Photo, Scene, Warning};
-use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution};
+use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -210,9 +210,11 @@ pub(super) struct DrawArgs {
     /// Size of the pictures in pixels [default: each view's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<(u32, u32)>,
-    /// Decode every photo and ask each about every ray, needed or not: the same bytes, later
-    #[arg(long)]
-    pub(super) no_skip: bool,
+    /// Leave nothing out, or nothing of what is named, though no picture needs it: decode every photo,
+    /// ask each view about every ray, see through every lens as if it bent. The same bytes, later
+    #[arg(long, value_enum, value_name = "WHAT", num_args = 0.., require_equals = true,
+        value_delimiter = ',', default_missing_value = "all")]
+    no_skip: Vec<NoSkip>,
     /// What decoded photos may take in memory, as in 512MiB or 1.5GB: those used last stay.
     /// Too little for one frame draws it from coarser mip levels [default: no limit]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
@@ -220,6 +222,35 @@ pub(super) struct DrawArgs {
     /// The same for photos on the graphics processor [default: no limit]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     pub(super) gpu_memory: Option<u64>,
+}
+
+/// What is not to be left out.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum NoSkip {
+    All,
+    Photos,
+    Views,
+    Lenses,
+}
+
+impl DrawArgs {
+    /// Whether photos are decoded that no picture needs.
+    pub(super) fn decodes_all(&self) -> bool {
+        self.keeps(NoSkip::Photos)
+    }
+
+    /// What frames leave out.
+    pub(super) fn skips(&self) -> Skips {
+        Skips {
+            views: !self.keeps(NoSkip::Views),
+            lenses: !self.keeps(NoSkip::Lenses),
+        }
+    }
+
+    fn keeps(&self, what: NoSkip) -> bool {
+        let named = |name| self.no_skip.contains(name);
+        named(&NoSkip::All) || named(&what)
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]

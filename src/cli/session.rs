@@ -16,11 +16,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     Bounded, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError,
-    RenderError, Residency, decode_ahead, prepare_within,
+    RenderError, Residency, Skips, decode_ahead, prepare_within,
 };
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::io::IsTerminal as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
 use std::time::Duration;
@@ -48,7 +49,8 @@ pub(super) struct Session {
     engine: Option<Engine>,
     device: DeviceChoice,
     strict: bool,
-    no_skip: bool,
+    decodes_all: bool,
+    skips: Skips,
     cpu_memory: Option<u64>,
     gpu_memory: Option<u64>,
 }
@@ -99,7 +101,8 @@ impl Session {
             engine: None,
             device: draw.device(),
             strict,
-            no_skip: draw.no_skip,
+            decodes_all: draw.decodes_all(),
+            skips: draw.skips(),
             cpu_memory: draw.cpu_memory,
             gpu_memory: draw.gpu_memory,
         })
@@ -164,7 +167,7 @@ impl Session {
         }
         self.engine = Some(engine);
         let mut source_idx = 0;
-        while self.no_skip && source_idx < self.lumigraph.photos.len() {
+        while self.decodes_all && source_idx < self.lumigraph.photos.len() {
             match self.lumigraph.photos.get(source_idx) {
                 Ok(_) => source_idx += 1,
                 Err(error) => {
@@ -204,7 +207,7 @@ impl Session {
     ) -> anyhow::Result<RgbaImage> {
         self.prepare()?;
         loop {
-            let frame = frame(&self.lumigraph, desired, self.options, moment, self.no_skip);
+            let frame = frame(&self.lumigraph, desired, self.options, moment, self.skips);
             if moment.is_some() {
                 self.in_window.note(frame.taking_part().count());
             }
@@ -253,12 +256,12 @@ impl Session {
             bail!("the engine was opened above");
         };
         let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
-        let (no_skip, max_error) = (self.no_skip, self.max_error);
+        let (skips, max_error) = (self.skips, self.max_error);
         let ledger = &self.ledger;
         let ready = |i: usize| {
             let (view, moment) = &views[i];
             let frame = ledger.time(i, Stage::Surface, || {
-                frame(lumigraph, view, options, moment.as_ref(), no_skip)
+                frame(lumigraph, view, options, moment.as_ref(), skips)
             });
             let prepared = match (max_error, method) {
                 (None, Method::Exact) => Ok(Bounded::EXACT),
@@ -297,7 +300,10 @@ impl Session {
                     }
                     (frame, prepared)
                 };
-                let coming = coming.map(|i| scope.spawn(move || prepare(i)));
+                // Where there is no thread for it the next frame is prepared in its turn.
+                let thread = std::thread::Builder::new();
+                let coming =
+                    coming.and_then(|i| thread.spawn_scoped(scope, move || prepare(i)).ok());
                 let ready = ledger.time(*done, Stage::Load, || engine.ready(&frame, prepared));
                 let picture = ready.and_then(|ready| {
                     let draw = || engine.draw_ready(&frame, prepared, &ready);
@@ -328,7 +334,7 @@ impl Session {
         moment: Option<&Moment>,
     ) -> anyhow::Result<Option<f64>> {
         loop {
-            let frame = frame(&self.lumigraph, desired, self.options, moment, self.no_skip);
+            let frame = frame(&self.lumigraph, desired, self.options, moment, self.skips);
             match render::seams(&frame) {
                 Ok(seams) => return Ok(seams),
                 Err(error) => self.leave_out(&error)?,
@@ -394,16 +400,13 @@ fn frame<'a>(
     desired: &View,
     options: FieldOptions,
     moment: Option<&Moment>,
-    no_skip: bool,
+    skips: Skips,
 ) -> Frame<'a> {
     let mut frame = Frame::new(lumigraph, desired.clone(), options);
     if let Some(moment) = moment {
         frame = frame.at(moment);
     }
-    if no_skip {
-        frame = frame.without_skipping();
-    }
-    frame
+    frame.skipping(skips)
 }
 
 /// A scene's sparse points that do not rest on the photos left out, in the world.
@@ -426,6 +429,9 @@ pub(super) fn progress(total: usize, doing: impl Into<Cow<'static, str>>) -> Pro
 pub(super) fn spinner(doing: &'static str) -> ProgressBar {
     let spinner = ProgressBar::new_spinner();
     spinner.set_message(doing);
-    spinner.enable_steady_tick(Duration::from_millis(200));
+    // On a thread of its own, which is for nothing where nobody sees it.
+    if std::io::stderr().is_terminal() {
+        spinner.enable_steady_tick(Duration::from_millis(200));
+    }
     spinner
 }

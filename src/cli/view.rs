@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         worker: WorkerOptions {
             device: args.draw.device(),
             gpu_memory: args.draw.gpu_memory,
-            no_skip: args.draw.no_skip,
+            skips: args.draw.skips(),
             walk,
             output: args.output.clone(),
         },

@@ -103,6 +103,11 @@ pub(super) struct Args {
     /// too; those not used for longest are made again when they are needed [default: no limit]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     cpu_memory: Option<u64>,
+    /// Leave nothing out, or nothing of what is named, though no picture needs it: cells as a whole,
+    /// columns of LDIs that are out of sight. The same bytes, later
+    #[arg(long, value_enum, value_name = "WHAT", num_args = 0.., require_equals = true,
+        value_delimiter = ',', default_missing_value = "all")]
+    no_skip: Vec<NoSkip>,
     #[command(flatten)]
     film: FilmArgs,
     /// Print times, and what was drawn and skipped, as JSON
@@ -111,6 +116,14 @@ pub(super) struct Args {
     /// The folder for the frames
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+/// What is not to be left out.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum NoSkip {
+    All,
+    Cells,
+    Columns,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -157,7 +170,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = "--reference-size: expected sides of up to 4096".to_owned();
         return Err(Usage(text).into());
     }
+    let keeps = |what| args.no_skip.iter().any(|n| *n == NoSkip::All || *n == what);
     let mut options = WalkOptions {
+        whole_cells: keeps(NoSkip::Cells),
+        whole_ldis: keeps(NoSkip::Columns),
         splat: args.splat.map_or(Splat::Footprint, Splat::Fixed),
         near: args.near,
         persist: args.persist,

@@ -31,7 +31,13 @@ fn a_scene_is_measured_once_and_the_report_is_whole() {
     assert!(number("default", "steps_from_exact") < 1.0);
     assert!(number("default", "psnr") > number("photos 1/2", "psnr"));
     assert!(number("photos 1/2", "image_bytes") < 0.5 * number("default", "image_bytes"));
-    assert_eq!(subject["skips"]["same_bytes"], true);
+    let skips = subject["skips"].as_array().unwrap();
+    let names: Vec<&str> = skips.iter().map(|s| s["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["photos", "views", "lenses"]);
+    for skip in skips {
+        assert_eq!(skip["same_bytes"], true, "{skip}");
+        assert!(skip["without"]["cpu_ms"].as_f64() > Some(0.0), "{skip}");
+    }
     assert!(subject["start_up"]["decode_ms"].as_f64() > Some(0.0));
 
     let out = folder.path().join("out");
@@ -111,6 +117,10 @@ fn an_interior_is_measured_by_what_portals_show() {
     let psnr = |name: &str| of(name)["psnr"].as_f64().unwrap();
     assert!(psnr("portals ldi") > psnr("portals texture"));
     assert!(of("portals ldi")["images_made"].as_u64() > Some(2));
+    let skips = result["subjects"][0]["skips"].as_array().unwrap();
+    let names: Vec<&str> = skips.iter().map(|s| s["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["cells", "columns"]);
+    assert!(skips.iter().all(|s| s["same_bytes"] == true), "{skips:?}");
 }
 
 #[test]

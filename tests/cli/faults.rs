@@ -101,6 +101,65 @@ fn a_full_disk_is_told_and_leaves_nothing_half_written() {
     assert!(text.contains("No space left"), "{text}");
 }
 
+/// Runs the program with so many kilobytes to map.
+fn within_memory(folder: &Path, kilobytes: u64, line: &str) -> std::process::Output {
+    let script = format!("ulimit -c 0; ulimit -v {kilobytes}; exec {PROGRAM} {line}");
+    let mut command = Command::new("bash");
+    command.args(["-c", &script]).current_dir(folder);
+    command.output().unwrap()
+}
+
+#[test]
+fn too_little_memory_is_told_and_leaves_nothing_half_written() {
+    let folder = with_wall();
+    // What the program itself needs, to one part in eight.
+    let mut own = 32 << 10;
+    while !within_memory(folder.path(), own, "--threads 2 info wall")
+        .status
+        .success()
+    {
+        own += own / 8;
+        assert!(own < 64 << 20, "{own} kB are not enough");
+    }
+    let large = "--threads 2 render wall --proxy plane --path sweep --frames 1 --size 6000x4500 \
+                 --device cpu -o frames";
+    let usual =
+        "--threads 2 render wall --proxy plane --path sweep --frames 1 --device cpu -o frames";
+    let before = files(folder.path());
+    let mut told = 0;
+    // From what hardly lets it begin to less than the picture takes.
+    for more in [0, 4 << 10, 16 << 10, 48 << 10, 80 << 10] {
+        let output = within_memory(folder.path(), own + more, large);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{own} and {more} kB: {text}");
+        let said = text
+            .lines()
+            .filter(|line| line.starts_with("error: "))
+            .count();
+        assert!(
+            said == 1 && !text.contains("panicked"),
+            "{own} and {more} kB: {text}"
+        );
+        let is_told = text.contains("out of memory") && text.contains("--size");
+        assert!(
+            is_told || text.contains("threads cannot be started"),
+            "{text}"
+        );
+        told += usize::from(is_told);
+        let after = files(folder.path());
+        assert!(
+            after.keys().all(|file| before.contains_key(file)),
+            "{after:?}"
+        );
+    }
+    assert!(told >= 2, "{told}");
+    // With a smaller picture there is enough, in the same folder.
+    let output = within_memory(folder.path(), own + (256 << 10), usual);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}");
+    assert_eq!(all_whole(&folder.path().join("frames")), 1);
+}
+
 #[test]
 fn what_stands_in_the_way_of_the_output_is_named() {
     let folder = with_wall();

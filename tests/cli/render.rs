@@ -155,6 +155,13 @@ fn only_photos_in_use_are_decoded() {
         lumigraph(folder.path(), &line).ok().json()["report"].clone()
     };
     let lazy = render("");
+    for what in ["photos", "views", "lenses", "views,lenses"] {
+        let named = render(&format!("-{what} --no-skip={what}"));
+        let decoded = if what == "photos" { 9 } else { 1 };
+        assert_eq!(named["photos_decoded"], decoded, "{what}");
+        let of = |name: &str| files(&folder.path().join(name));
+        assert!(of("out") == of(&format!("out-{what}")), "{what}");
+    }
     let eager = render("-all --no-skip");
     assert_eq!(eager["photos_decoded"], 9);
     assert_eq!(lazy["photos_decoded"], 1);

@@ -11,7 +11,7 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Prepared, RenderError,
+    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Prepared, RenderError, Skips,
     TriangulatedField, picture,
 };
 use std::collections::BTreeSet;
@@ -29,7 +29,7 @@ const ASKED: (u32, u32) = (8, 6);
 pub(crate) struct SceneDrawer<'a> {
     lumigraph: &'a Lumigraph,
     space: &'a Space,
-    no_skip: bool,
+    skips: Skips,
     ready: Option<Ready<'a>>,
     palette: Vec<[u8; 3]>,
     /// A photo that cannot be decoded.
@@ -50,11 +50,11 @@ pub(crate) type Drawn = (RgbaImage, Shown);
 
 impl<'a> SceneDrawer<'a> {
     /// Nothing is drawn yet.
-    pub(crate) fn new(lumigraph: &'a Lumigraph, space: &'a Space, no_skip: bool) -> Self {
+    pub(crate) fn new(lumigraph: &'a Lumigraph, space: &'a Space, skips: Skips) -> Self {
         Self {
             lumigraph,
             space,
-            no_skip,
+            skips,
             ready: None,
             palette: Vec::new(),
             gone: None,
@@ -153,11 +153,7 @@ impl<'a> SceneDrawer<'a> {
                     Some(moment) => frame.at(moment),
                     None => frame,
                 };
-                if self.no_skip {
-                    frame.without_skipping()
-                } else {
-                    frame
-                }
+                frame.skipping(self.skips)
             });
             let prepared = timed(&mut stages, "field", || Prepared::new(&frame, look.method))?;
             self.ready = Some(Ready {

@@ -434,7 +434,7 @@ mod tests {
             worker: WorkerOptions {
                 device: DeviceChoice::Cpu,
                 gpu_memory: None,
-                no_skip: false,
+                skips: render::Skips::ALL,
                 walk: WalkOptions::default(),
                 output: PathBuf::new(),
             },

@@ -33,7 +33,7 @@ pub struct WorkerOptions {
     /// For photos on the device, in bytes; none for no limit.
     pub gpu_memory: Option<u64>,
     /// Asks every photo about every ray: the same pictures, later.
-    pub no_skip: bool,
+    pub skips: render::Skips,
     /// Of walks.
     pub walk: WalkOptions,
     /// The folder for screenshots.
@@ -236,7 +236,7 @@ impl<'s> Desk<'s> {
         space: &Space,
         engine: &mut Engine,
     ) -> Option<Given> {
-        let mut drawer = SceneDrawer::new(lumigraph, space, self.options.no_skip);
+        let mut drawer = SceneDrawer::new(lumigraph, space, self.options.skips);
         let mut notes = engine.notes().len();
         let mut gone = None;
         // Of what comes later there is a picture on the screen already.
@@ -448,7 +448,7 @@ mod tests {
         let options = WorkerOptions {
             device: DeviceChoice::Cpu,
             gpu_memory: None,
-            no_skip: false,
+            skips: render::Skips::ALL,
             walk: WalkOptions::default(),
             output: folder.path().join("shots"),
         };
@@ -490,7 +490,7 @@ mod tests {
     fn the_first_photo_is_there_before_any_other() {
         let lumigraph = wall(0);
         let space = Space::of_scene(&lumigraph);
-        let drawer = SceneDrawer::new(&lumigraph, &space, false);
+        let drawer = SceneDrawer::new(&lumigraph, &space, render::Skips::ALL);
         assert!(drawer.preview(&request(1, 0.5)).is_none());
         let shown = drawer.preview(&request(1, 1.0)).unwrap();
         assert_eq!((shown.image.size, shown.reduction), ([20, 15], 2));
@@ -503,7 +503,7 @@ mod tests {
         let lumigraph = wall(0);
         let space = Space::of_scene(&lumigraph);
         let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
-        let mut drawer = SceneDrawer::new(&lumigraph, &space, true);
+        let mut drawer = SceneDrawer::new(&lumigraph, &space, render::Skips::NONE);
         for layer in Layer::ALL {
             for (reduction, method) in [
                 (1, render::Method::Exact),

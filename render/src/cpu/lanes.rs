@@ -2,6 +2,7 @@
 //! vector instructions: the widest that the machine has, found when the program runs. No fused
 //! multiply-adds, so every machine computes the same bytes.
 
+use super::scalar::Scalar;
 use pulp::Arch;
 use std::sync::LazyLock;
 
@@ -9,7 +10,7 @@ use std::sync::LazyLock;
 pub(crate) const LANES: usize = 32;
 
 /// One number a pixel.
-pub(crate) type Lane = [f32; LANES];
+pub(crate) type Lane<T = f32> = [T; LANES];
 
 /// Runs a function, which and all it calls should be `inline(always)`, with the widest vector
 /// instructions that there are.
@@ -21,8 +22,8 @@ pub(crate) fn vectorised<R>(f: impl FnOnce() -> R) -> R {
 
 /// One number a pixel, computed from its index.
 #[inline(always)]
-pub(crate) fn each(f: impl Fn(usize) -> f32) -> Lane {
-    let mut lane = [0.0; LANES];
+pub(crate) fn each<T: Scalar>(f: impl Fn(usize) -> T) -> Lane<T> {
+    let mut lane = [T::of(0.0); LANES];
     for k in 0..LANES {
         lane[k] = f(k);
     }
@@ -64,6 +65,23 @@ pub(crate) fn log2(x: f32) -> f32 {
         + m * (-0.718_145_2
             + m * (0.457_548_9 + m * (-0.277_904_7 + m * (0.121_797_4 - m * 0.025_841_27))));
     exponent + m * polynomial
+}
+
+/// Newton's steps for a cubic from 1, which approach its root from one side; beyond
+/// [`LARGEST_CUBIC_TERM`] they stop outside every image.
+const CUBIC_STEPS: usize = 8;
+/// See [`cubic_root`].
+pub(crate) const LARGEST_CUBIC_TERM: f32 = 1e6;
+
+/// g with g + t·g³ = 1, for −4/27 < t < [`LARGEST_CUBIC_TERM`].
+#[inline(always)]
+pub(crate) fn cubic_root(t: f32) -> f32 {
+    let mut g = 1.0;
+    for _ in 0..CUBIC_STEPS {
+        let term = t * g * g;
+        g = (1.0 + 2.0 * term * g) / (1.0 + 3.0 * term);
+    }
+    g
 }
 
 #[cfg(test)]

@@ -6,8 +6,10 @@
 mod asked;
 pub(crate) mod lanes;
 mod mark;
+pub(crate) mod probe;
+pub(crate) mod scalar;
 mod shade;
-mod source;
+pub(crate) mod source;
 mod weights;
 
 use crate::RenderError;
@@ -279,30 +281,14 @@ impl<'a> Engine<'a> {
 
     /// The rays of a tile and where they meet the proxy.
     fn tile(&self, x0: usize, row: usize, wanted: impl Fn(usize) -> bool) -> Tile {
-        let mut tile = Tile {
-            x: [0.0; LANES],
-            y: [0.0; LANES],
-            z: [1.0; LANES],
-            s: [-1.0; LANES],
-            q: [[0.0; LANES]; 3],
-        };
+        let mut tile = Tile::nothing();
         let width = self.frame.desired.width as usize;
         for k in 0..LANES.min(width - x0) {
-            let Some([x, y, z]) = self.rays.ray(x0 + k, row) else {
-                continue;
-            };
-            (tile.x[k], tile.y[k], tile.z[k]) = (x, y, z);
-            let Some(plane) = self
-                .frame
-                .surface
-                .plane_of(x0 + k, row)
-                .filter(|_| wanted(k))
-            else {
-                continue;
-            };
-            let [qx, qy, qz] = plane.as_vec3().to_array();
-            tile.s[k] = qx * x + qy * y + qz * z;
-            (tile.q[0][k], tile.q[1][k], tile.q[2][k]) = (qx, qy, qz);
+            let surface = &self.frame.surface;
+            let plane = surface.plane_of(x0 + k, row).filter(|_| wanted(k));
+            if let (Some(ray), Some(plane)) = (self.rays.ray(x0 + k, row), plane) {
+                tile.set(k, ray, plane);
+            }
         }
         tile
     }
@@ -312,24 +298,29 @@ impl<'a> Engine<'a> {
     fn weigh_tile(&self, asked: &mut Asked, tile_idx: usize, row: usize, seen: &mut Seen) {
         let tile = self.tile(tile_idx * LANES, row, |_| true);
         loop {
-            seen.clear();
-            for &i in asked.views(self, tile_idx, row) {
-                let source_idx = i as usize;
-                let source = self.source(source_idx);
-                let (sight, term) = seen.next();
-                if !source.see(&tile, sight) {
-                    continue;
-                }
-                self.mask(source_idx, sight, |_| true);
-                term.diff = source.difference(&tile);
-                term.a = sight.a;
-                seen.keep(source_idx);
-            }
+            let views = asked.views(self, tile_idx, row).iter();
+            self.score(views.map(|&i| i as usize), &tile, seen);
             let reach = weigh(seen.kept().1, &self.frame.options);
             let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
             if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
                 return;
             }
+        }
+    }
+
+    /// Of some source views those that see something of a tile, and by what they differ.
+    fn score(&self, views: impl Iterator<Item = usize>, tile: &Tile, seen: &mut Seen) {
+        seen.clear();
+        for source_idx in views {
+            let source = self.source(source_idx);
+            let (sight, term) = seen.next();
+            if !source.see(tile, sight) {
+                continue;
+            }
+            self.mask(source_idx, sight, |_| true);
+            term.diff = source.difference(tile);
+            term.a = sight.a;
+            seen.keep(source_idx);
         }
     }
 

@@ -2,104 +2,129 @@
 
 mod lens;
 
-use super::lanes::{LANES, Lane, angle, each, log2, vectorised};
+use super::lanes::{LANES, Lane, each, vectorised};
+use super::scalar::Scalar;
 use crate::frame::{Frame, LEVEL_BIAS};
 use crate::options::Resolution;
 use glam::DVec3;
-use lens::Lens32;
+use lens::LensOf;
 
-/// Neighbouring pixels of one row: their rays (desired camera's frame) and proxy points.
-pub(crate) struct Tile {
-    pub x: Lane,
-    pub y: Lane,
-    pub z: Lane,
+/// Pixels, of one row as a rule: their rays (desired camera's frame) and proxy points.
+pub(crate) struct Tile<T = f32> {
+    pub x: Lane<T>,
+    pub y: Lane<T>,
+    pub z: Lane<T>,
     /// Inverse distance along the ray; negative where there is no proxy point.
-    pub s: Lane,
+    pub s: Lane<T>,
     /// The proxy's plane there: s = q · ray.
-    pub q: [Lane; 3],
+    pub q: [Lane<T>; 3],
 }
 
-/// A source view in f32, relative to the desired camera.
-pub(crate) struct Source {
-    rotation: [[f32; 3]; 3],
-    translation: [f32; 3],
-    center: [f32; 3],
-    lens: Lens32,
-    size: [f32; 2],
-    inverse_feather: f32,
-    footprint_ratio: f32,
-    footprint_ratio_squared_less_one: f32,
+impl<T: Scalar> Tile<T> {
+    /// Of pixels that see nothing.
+    pub(crate) fn nothing() -> Self {
+        let lane = |value: f32| [T::of(value); LANES];
+        Self {
+            x: lane(0.0),
+            y: lane(0.0),
+            z: lane(1.0),
+            s: lane(-1.0),
+            q: [lane(0.0); 3],
+        }
+    }
+
+    /// Lets a pixel see a plane of the proxy along its ray.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, k: usize, [x, y, z]: [T; 3], plane: DVec3) {
+        let [qx, qy, qz] = plane.to_array().map(T::rounded);
+        (self.x[k], self.y[k], self.z[k]) = (x, y, z);
+        self.s[k] = qx * x + qy * y + qz * z;
+        (self.q[0][k], self.q[1][k], self.q[2][k]) = (qx, qy, qz);
+    }
+}
+
+/// A source view, relative to the desired camera.
+pub(crate) struct Source<T = f32> {
+    rotation: [[T; 3]; 3],
+    translation: [T; 3],
+    center: [T; 3],
+    lens: LensOf<T>,
+    size: [T; 2],
+    inverse_feather: T,
+    footprint_ratio: T,
+    footprint_ratio_squared_less_one: T,
     /// Of focal lengths, source to desired.
-    focal_ratio_squared: f32,
+    focal_ratio_squared: T,
     by_distance: bool,
     desired_by_distance: bool,
     /// What colours are multiplied by; alpha by one.
     pub exposure: glam::Vec4,
-    beta: f32,
+    beta: T,
     by_length: bool,
-    time_penalty: f32,
+    time_penalty: T,
     /// Whether something can hide points from it.
     occluded: bool,
 }
 
 /// Where a tile's proxy points fall in one photo, and what they are worth there.
-pub(crate) struct Sight {
+pub(crate) struct Sight<T = f32> {
     /// Pixels of the photo.
-    pub u: Lane,
-    pub v: Lane,
+    pub u: Lane<T>,
+    pub v: Lane<T>,
     /// Relevance: fovBlend, times the mask where that was asked for; zero where the photo
     /// does not see the point.
-    pub a: Lane,
+    pub a: Lane<T>,
     /// Mip level, ≥ 0.
-    pub level: Lane,
+    pub level: Lane<T>,
     /// Inverse distance from the source centre; only where something can hide the point.
-    pub inverse_distance: Lane,
+    pub inverse_distance: Lane<T>,
 }
 
-impl Sight {
+impl<T: Scalar> Sight<T> {
     /// Room for one.
     pub(crate) fn nothing() -> Self {
+        let zeros = [T::of(0.0); LANES];
         Self {
-            u: [0.0; LANES],
-            v: [0.0; LANES],
-            a: [0.0; LANES],
-            level: [0.0; LANES],
-            inverse_distance: [0.0; LANES],
+            u: zeros,
+            v: zeros,
+            a: zeros,
+            level: zeros,
+            inverse_distance: zeros,
         }
     }
 }
 
 /// What keeps a view on its image's very edge in play when there is no other: too little
 /// to be seen beside any.
-const EDGE: f32 = 1e-12;
+pub(crate) const EDGE: f32 = 1e-12;
 
-impl Source {
+impl<T: Scalar> Source<T> {
     pub(crate) fn new(frame: &Frame<'_>, source_idx: usize) -> Self {
         let source = &frame.sources[source_idx];
-        let row = |r: usize| source.rotation.row(r).as_vec3().to_array();
+        let row = |r: usize| source.rotation.row(r).to_array().map(T::rounded);
         let g = source.footprint_ratio;
         Self {
             rotation: [row(0), row(1), row(2)],
-            translation: source.translation.as_vec3().to_array(),
-            center: source.center.as_vec3().to_array(),
-            lens: Lens32::new(&source.lens),
-            size: source.size.map(|v| v as f32),
-            inverse_feather: (1.0 / source.feather_px.max(1e-9)) as f32,
-            footprint_ratio: g as f32,
-            footprint_ratio_squared_less_one: (g * g - 1.0) as f32,
-            focal_ratio_squared: frame.area_scale(source_idx, DVec3::ZERO) as f32,
+            translation: source.translation.to_array().map(T::rounded),
+            center: source.center.to_array().map(T::rounded),
+            lens: LensOf::new(&source.lens, frame.skips.lenses),
+            size: source.size.map(T::rounded),
+            inverse_feather: T::rounded(1.0 / source.feather_px.max(1e-9)),
+            footprint_ratio: T::rounded(g),
+            footprint_ratio_squared_less_one: T::rounded(g * g - 1.0),
+            focal_ratio_squared: T::rounded(frame.area_scale(source_idx, DVec3::ZERO)),
             by_distance: source.lens.is_wide(),
             desired_by_distance: frame.desired.lens.is_wide(),
             exposure: DVec3::from_array(source.exposure).as_vec3().extend(1.0),
-            beta: frame.options.beta as f32,
+            beta: T::rounded(frame.options.beta),
             by_length: frame.options.resolution == Resolution::Length,
-            time_penalty: source.time_penalty as f32,
+            time_penalty: T::rounded(source.time_penalty),
             occluded: frame.lumigraph.visibility.is_some(),
         }
     }
 
     /// Projects a tile into the photo; false where it sees nothing of it.
-    pub(crate) fn see(&self, tile: &Tile, sight: &mut Sight) -> bool {
+    pub(crate) fn see(&self, tile: &Tile<T>, sight: &mut Sight<T>) -> bool {
         vectorised(
             #[inline(always)]
             || self.see_by_lanes(tile, sight),
@@ -107,10 +132,11 @@ impl Source {
     }
 
     #[inline(always)]
-    fn see_by_lanes(&self, tile: &Tile, sight: &mut Sight) -> bool {
+    fn see_by_lanes(&self, tile: &Tile<T>, sight: &mut Sight<T>) -> bool {
+        let [zero, one] = [0.0, 1.0].map(T::of);
         let [rx, ry, rz] = self.rotation;
         let [tx, ty, tz] = self.translation;
-        let turn = |r: [f32; 3], t: f32| {
+        let turn = |r: [T; 3], t: T| {
             each(|k| r[0] * tile.x[k] + r[1] * tile.y[k] + r[2] * tile.z[k] + t * tile.s[k])
         };
         let (x, y, z) = (turn(rx, tx), turn(ry, ty), turn(rz, tz));
@@ -123,11 +149,11 @@ impl Source {
         let mut seen = false;
         for k in 0..LANES {
             let border = u[k].min(width - u[k]).min(v[k].min(height - v[k]));
-            let f = (border * self.inverse_feather).clamp(0.0, 1.0);
-            let fov = (f * f * (3.0 - 2.0 * f)).max(EDGE);
-            let inside = (border >= 0.0) & (tile.s[k] >= 0.0);
-            sight.a[k] = if inside { fov } else { 0.0 };
-            seen |= inside;
+            let f = (border * self.inverse_feather).clamp01();
+            let fov = (f.squared() * (T::of(3.0) - T::of(2.0) * f)).max(T::of(EDGE));
+            let inside = border.at_least(zero) & tile.s[k].at_least(zero);
+            sight.a[k] = T::either(inside, fov, zero);
+            seen |= T::may(inside);
         }
         if !seen {
             return false;
@@ -140,31 +166,31 @@ impl Source {
             #[inline(always)]
             |k| {
                 let there = if self.by_distance {
-                    (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt()
+                    (x[k].squared() + y[k].squared() + z[k].squared()).sqrt()
                 } else {
                     z[k]
                 };
                 let here = if self.desired_by_distance {
-                    (tile.x[k] * tile.x[k] + tile.y[k] * tile.y[k] + tile.z[k] * tile.z[k]).sqrt()
+                    (tile.x[k].squared() + tile.y[k].squared() + tile.z[k].squared()).sqrt()
                 } else {
                     tile.z[k]
                 };
                 let ratio = here / there;
-                let height = (1.0 - cx * qx[k] - cy * qy[k] - cz * qz[k]).abs();
+                let height = (one - cx * qx[k] - cy * qy[k] - cz * qz[k]).abs();
                 let area = self.focal_ratio_squared * height * ratio * ratio * ratio;
-                (0.5 * log2(area.max(1.0)) - LEVEL_BIAS as f32).max(0.0)
+                (T::of(0.5) * area.max(one).log2() - T::of(LEVEL_BIAS as f32)).max(zero)
             },
         );
         if self.occluded {
             sight.inverse_distance =
-                each(|k| tile.s[k] / (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt());
+                each(|k| tile.s[k] / (x[k].squared() + y[k].squared() + z[k].squared()).sqrt());
         }
         (sight.u, sight.v) = (u, v);
         true
     }
 
     /// angDiff + β·resDiff and what time adds; see [`Frame::difference`].
-    pub(crate) fn difference(&self, tile: &Tile) -> Lane {
+    pub(crate) fn difference(&self, tile: &Tile<T>) -> Lane<T> {
         vectorised(
             #[inline(always)]
             || self.difference_by_lanes(tile),
@@ -172,9 +198,10 @@ impl Source {
     }
 
     #[inline(always)]
-    fn difference_by_lanes(&self, tile: &Tile) -> Lane {
+    fn difference_by_lanes(&self, tile: &Tile<T>) -> Lane<T> {
+        let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
         let [cx, cy, cz] = self.center;
-        let center_squared = cx * cx + cy * cy + cz * cz;
+        let center_squared = cx.squared() + cy.squared() + cz.squared();
         let g = self.footprint_ratio;
         // Each loop without a branch, and its closure part of it: else it is no vector code.
         let angles = each(
@@ -182,10 +209,10 @@ impl Source {
             |k| {
                 let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
                 let (ax, ay, az) = (cy * z - cz * y, cz * x - cx * z, cx * y - cy * x);
-                let across = s * (ax * ax + ay * ay + az * az).sqrt();
-                let ray_squared = x * x + y * y + z * z;
+                let across = s * (ax.squared() + ay.squared() + az.squared()).sqrt();
+                let ray_squared = x.squared() + y.squared() + z.squared();
                 let towards = x * cx + y * cy + z * cz;
-                angle(across, ray_squared - s * towards)
+                T::angle(across, ray_squared - s * towards)
             },
         );
         let resolutions = if self.by_length {
@@ -193,10 +220,11 @@ impl Source {
                 #[inline(always)]
                 |k| {
                     let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
-                    let ray_squared = x * x + y * y + z * z;
-                    let squares = s * center_squared - 2.0 * (x * cx + y * cy + z * cz);
+                    let ray_squared = x.squared() + y.squared() + z.squared();
+                    let squares = s * center_squared - two * (x * cx + y * cy + z * cz);
                     let (dx, dy, dz) = (x - s * cx, y - s * cy, z - s * cz);
-                    squares / ((dx * dx + dy * dy + dz * dz).sqrt() + ray_squared.sqrt())
+                    let there = (dx.squared() + dy.squared() + dz.squared()).sqrt();
+                    squares / (there + ray_squared.sqrt())
                 },
             )
         } else {
@@ -204,17 +232,17 @@ impl Source {
                 #[inline(always)]
                 |k| {
                     let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
-                    let ray_squared = x * x + y * y + z * z;
+                    let ray_squared = x.squared() + y.squared() + z.squared();
                     let towards = x * cx + y * cy + z * cz;
-                    let excess = (s * s * center_squared - 2.0 * s * towards) / ray_squared;
+                    let excess = (s * s * center_squared - two * s * towards) / ray_squared;
                     (self.footprint_ratio_squared_less_one + g * g * excess)
-                        / (g * (1.0 + excess).max(0.0).sqrt() + 1.0)
+                        / (g * (one + excess).max(zero).sqrt() + one)
                 },
             )
         };
         each(
             #[inline(always)]
-            |k| angles[k] + self.time_penalty + self.beta * resolutions[k].max(0.0),
+            |k| angles[k] + self.time_penalty + self.beta * resolutions[k].max(zero),
         )
     }
 }

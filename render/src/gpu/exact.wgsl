@@ -84,8 +84,8 @@ fn weigh(nearest: ptr<function, Nearest>) -> u32 {
             tied = n + 1u;
         }
         sum += weight;
-        if relevance <= 0.0 {
-            // Sorted: the rest weighs nothing either.
+        if relevance <= 0.0 && tied <= n {
+            // Sorted: the rest weighs nothing either, and is not tied with the nearest.
             break;
         }
     }

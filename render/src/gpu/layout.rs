@@ -207,7 +207,7 @@ impl Source {
         let (focal, sensor) = focal_and_sensor(&source.lens);
         Self {
             axes: [axis(0), axis(1), axis(2)],
-            focal: focal.to_array(),
+            focal: focal.as_vec2().to_array(),
             principal: source.lens.principal.as_vec2().to_array(),
             lens: lens.map(f),
             lens_rest: lens_rest.map(f),
@@ -224,8 +224,8 @@ impl Source {
                 .extend(1.0)
                 .to_array(),
             prism: prism.map(f),
-            shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.to_array()),
-            horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.to_array()),
+            shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.as_vec2().to_array()),
+            horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.as_vec2().to_array()),
             mask_layer: mask.map_or(-1.0, |layer| layer as f32),
             time_penalty: f(source.time_penalty),
             distance_layer: distances.map_or(-1.0, |layer| layer as f32),

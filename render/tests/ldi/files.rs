@@ -58,6 +58,88 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     assert!(text(&changed(last, &(-1.0_f32).to_le_bytes())).contains("expected a positive number"));
 }
 
+/// What `fuzz/targets/ldi.rs` asserts, of files changed in several places at once, as a fuzzer does: bytes
+/// of any value and of those at which numbers turn over, parts cut out, doubled and swapped.
+#[test]
+fn files_changed_in_several_places_are_refused_or_sound() {
+    let mut state = 0x1d1_u64;
+    let mut below = |count: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % count.max(1)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let seeds: Vec<Vec<u8>> = [
+        (&[2_u8; 20][..], [5, 4]),
+        (&[0, 1, 255, 3][..], [2, 2]),
+        (&[1][..], [1, 1]),
+    ]
+    .map(|(counts, size)| {
+        let path = folder.path().join("x.ldi");
+        write(&path, &places::random_ldi(counts, size, 9)).unwrap();
+        std::fs::read(&path).unwrap()
+    })
+    .into();
+    const TELLING: [&[u8]; 8] = [
+        &[0; 8],
+        &[255; 8],
+        &[0, 0, 0x80, 0x7f],
+        &[0, 0, 0xc0, 0x7f],
+        &[0, 0, 0, 0, 0, 0, 0xf0, 0x7f],
+        &[1, 0, 0, 0],
+        &[0xff, 0xff, 0xff, 0x7f],
+        &[0, 0, 0, 0x80],
+    ];
+    let (mut sound, path) = (0, Path::new("x.ldi"));
+    for _ in 0..60_000 {
+        let mut content = seeds[below(seeds.len())].clone();
+        for _ in 0..1 + below(4) {
+            // The header and the rows' offsets decide most.
+            let reach = [content.len(), 160.min(content.len())][below(2)];
+            let at = below(reach);
+            match below(6) {
+                0 | 1 => content[at] = below(256) as u8,
+                2 => content[at] ^= 1 << below(8),
+                3 => {
+                    let bytes = TELLING[below(TELLING.len())];
+                    let end = (at + bytes.len()).min(content.len());
+                    content[at..end].copy_from_slice(&bytes[..end - at]);
+                }
+                4 => {
+                    let end = (at + 1 + below(16)).min(content.len());
+                    let part: Vec<u8> = content.drain(at..end).collect();
+                    if below(2) == 0 {
+                        let to = below(content.len() + 1);
+                        content.splice(to..to, part);
+                    }
+                }
+                _ => {
+                    let end = (at + 1 + below(16)).min(content.len());
+                    let part = content[at..end].to_vec();
+                    content.splice(at..at, part);
+                }
+            }
+            if content.is_empty() {
+                break;
+            }
+        }
+        match parse(path, &content) {
+            Err(error) => assert!(!error.to_string().is_empty()),
+            Ok(ldi) => {
+                sound += 1;
+                assert_eq!(layers(&ldi).total(), ldi.len());
+                let [width, height] = ldi.size();
+                for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+                    assert!(ldi.pixel(x, y).all(|sample| sample.inverse_depth > 0.0));
+                }
+                ClipTree::new(&ldi);
+            }
+        }
+    }
+    assert!(sound > 1000, "{sound}");
+}
+
 proptest! {
     #[test]
     fn corrupt_files_are_no_trouble(at in 0_usize..2000, byte: u8, cut in 0_usize..2000) {

@@ -1,8 +1,10 @@
 //! Scenes that try to break things, and what must hold of every one.
 
 mod layered;
+mod rounding;
 mod scene;
 
+pub use rounding::{Rounding, quantile};
 pub use scene::{Case, Placement};
 
 use super::Random;
@@ -10,7 +12,7 @@ use glam::DVec3;
 use image::RgbaImage;
 use render::blend::SAME_RAY;
 use render::score::on_black;
-use render::{FieldOptions, Frame, MAX_CONTRIBUTORS, Method, RenderError, cpu, reference};
+use render::{FieldOptions, Frame, MAX_CONTRIBUTORS, Method, RenderError, Skips, cpu, reference};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -105,7 +107,7 @@ pub fn check(seed: u64) -> Result<(), String> {
         case.desired.clone(),
         FieldOptions::default(),
     );
-    let asking = cpu::render(&asking.without_skipping(), Method::Exact).map_err(drawn)?;
+    let asking = cpu::render(&asking.skipping(Skips::NONE), Method::Exact).map_err(drawn)?;
     if asking != exact {
         return Err(named("a skip changes the picture"));
     }

@@ -1,6 +1,6 @@
 //! An interior measured: what portals show, against the model drawn whole.
 
-use super::measure::{Effort, Measured, Pictures, Subject, Times, in_turn, timed};
+use super::measure::{Effort, Measured, Pictures, Skip, Subject, Times, in_turn, skip, timed};
 use anyhow::Context;
 use calibrate::{Lens, View};
 use glam::DVec2;
@@ -207,6 +207,7 @@ pub(super) fn measure(
     for (measured, repeats) in measured.iter_mut().zip(&repeats) {
         measured.set_times(repeats);
     }
+    let skips = skips(&walk, first_view)?;
     let about = format!(
         "{} cells, {} portals, {} triangles; {} views through portals, up to 45° off their axis, \
          {} × {}; geometry drawn by {}",
@@ -225,7 +226,7 @@ pub(super) fn measure(
         views: (0..views.len()).map(|i| i.to_string()).collect(),
         size: [first_view.width, first_view.height],
         start_up: None,
-        skips: None,
+        skips,
         settings: measured,
         failed: BTreeMap::new(),
     };
@@ -236,4 +237,37 @@ pub(super) fn measure(
         exact: none,
     });
     Ok((result, pictures))
+}
+
+/// Each on its own, of the first view.
+fn skips<'a>(walk: &dyn Fn(WalkOptions) -> Walk<'a>, view: &View) -> anyhow::Result<Vec<Skip>> {
+    let base = WalkOptions::default();
+    let whole_cells = WalkOptions {
+        whole_cells: true,
+        ..base
+    };
+    let whole_ldis = WalkOptions {
+        whole_ldis: true,
+        ..base
+    };
+    let mut all = Vec::new();
+    for (name, fill, changed) in [
+        ("cells", PortalFill::Geometry, whole_cells),
+        ("columns", PortalFill::Ldi, whole_ldis),
+    ] {
+        let (mut with, mut without) = (walk(base), walk(changed));
+        let cost = with.draw(view, fill)?;
+        let fired = match name {
+            "cells" => (cost.triangles_in_cells - cost.triangles_tried, "triangles"),
+            _ => (cost.samples_clipped, "samples"),
+        };
+        let fired = (fired.0 > 0).then(|| format!("{} {}", fired.0, fired.1));
+        all.push(skip(name, fired, |skips| {
+            let walk = if skips { &mut with } else { &mut without };
+            let (drawn, times) = timed(|| walk.draw(view, fill).map(drop));
+            drawn?;
+            Ok((walk.picture().picture(), times))
+        })?);
+    }
+    Ok(all)
 }

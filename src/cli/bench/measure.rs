@@ -2,7 +2,7 @@
 
 use super::settings::{Renderer, Setting, settings};
 use anyhow::Context;
-use calibrate::View;
+use calibrate::{Distortion, View};
 use cpu_time::ProcessTime;
 use image::RgbaImage;
 use indicatif::ProgressBar;
@@ -11,7 +11,8 @@ use lumigraph::scene::{Kind, Scene, Truth, TruthScore};
 use proxy::Proxy;
 use render::score::{PSNR_CAP_DB, score};
 use render::{
-    DeviceChoice, Engine, Frame, Lumigraph, Method, Prepared, RenderError, prepare_within,
+    DeviceChoice, Engine, Frame, Lumigraph, Method, Prepared, RenderError, Skips, SourceView,
+    prepare_within,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -95,18 +96,25 @@ pub(super) struct StartUp {
     pub(super) photos_used: usize,
 }
 
-/// What skipping is worth for the scene's first view.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct Skips {
-    /// Views asked about vertices and pixels, with and without.
-    pub(super) frame: Times,
-    pub(super) frame_asking_all: Times,
-    pub(super) photos_decoded: usize,
-    pub(super) photos: usize,
-    /// Of those that the view does not use, what decoding them all would have taken.
-    pub(super) spared_decoding_ms: f64,
-    /// Whether the bytes are the same without skipping.
+/// What leaving one thing out is worth, for the first view.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Skip {
+    /// As `--no-skip` has it.
+    pub(super) name: String,
+    /// What was left out, for people; `None` where there was nothing to leave out.
+    pub(super) fired: Option<String>,
+    /// A picture's, with and without.
+    pub(super) with: Times,
+    pub(super) without: Times,
+    /// Whether the bytes are the same.
     pub(super) same_bytes: bool,
+}
+
+impl Skip {
+    /// CPU time without it over that with it.
+    pub(super) fn ratio(&self) -> f64 {
+        self.without.cpu_ms / self.with.cpu_ms.max(1e-6)
+    }
 }
 
 /// All that was measured of a scene or an interior.
@@ -119,7 +127,7 @@ pub(super) struct Subject {
     pub(super) views: Vec<String>,
     pub(super) size: [u32; 2],
     pub(super) start_up: Option<StartUp>,
-    pub(super) skips: Option<Skips>,
+    pub(super) skips: Vec<Skip>,
     pub(super) settings: Vec<Measured>,
     /// Settings that could not be measured, and why.
     pub(super) failed: BTreeMap<String, String>,
@@ -390,7 +398,7 @@ pub(super) fn measure(
         views: held_out.iter().map(|h| h.name.clone()).collect(),
         size,
         start_up: Some(start_up),
-        skips: Some(skips),
+        skips,
         settings: measured.collect(),
         failed,
     };
@@ -526,40 +534,82 @@ fn decode_all(lumigraph: &Lumigraph, photos: &[usize]) -> anyhow::Result<f64> {
     Ok(times.wall_ms)
 }
 
-fn skips(variants: &Variants<'_>, view: &View) -> anyhow::Result<Skips> {
-    const REPEATS: usize = 3;
-    let default = &Setting::default_one();
-    let lumigraph = variants.lumigraph(default)?;
-    let mut engine = Engine::open(DeviceChoice::Cpu)?;
-    let mut render = |asking_all: bool| {
-        timed(|| {
-            let frame = Frame::new(&lumigraph, view.clone(), default.options);
-            let frame = if asking_all {
-                frame.without_skipping()
-            } else {
-                frame
-            };
-            engine.render(&frame, Method::TRIANGULATED)
-        })
-    };
-    let skipping = render(false).0?;
-    let photos_decoded = lumigraph.photos.decoded();
-    let unused: Vec<usize> = (0..lumigraph.photos.len())
-        .filter(|&i| !lumigraph.photos.was_decoded(i))
-        .collect();
-    let spared_decoding_ms = decode_all(&lumigraph, &unused)?;
-    let same_bytes = render(true).0? == skipping;
+/// Of skips that are measured, repeats.
+const SKIP_REPEATS: usize = 5;
+
+/// Draws a picture with and without something left out, in turn: their times, the pictures' bytes.
+pub(super) fn skip(
+    name: &str,
+    fired: Option<String>,
+    mut draw: impl FnMut(bool) -> anyhow::Result<(RgbaImage, Times)>,
+) -> anyhow::Result<Skip> {
+    let same_bytes = draw(true)?.0 == draw(false)?.0;
     let (mut with, mut without) = (Vec::new(), Vec::new());
-    for _ in 0..REPEATS {
-        with.push(render(false).1);
-        without.push(render(true).1);
+    for _ in 0..SKIP_REPEATS {
+        with.push(draw(true)?.1);
+        without.push(draw(false)?.1);
     }
-    Ok(Skips {
-        frame: Times::median(&with),
-        frame_asking_all: Times::median(&without),
-        photos_decoded,
-        photos: lumigraph.photos.len(),
-        spared_decoding_ms,
+    Ok(Skip {
+        name: name.to_owned(),
+        fired,
+        with: Times::median(&with),
+        without: Times::median(&without),
         same_bytes,
     })
+}
+
+/// Each on its own, of the first view's triangulated picture by the CPU.
+fn skips(variants: &Variants<'_>, view: &View) -> anyhow::Result<Vec<Skip>> {
+    let default = &Setting::default_one();
+    let lumigraph = variants.lumigraph(default)?;
+    let render = |lumigraph: &Lumigraph, skips: Skips| {
+        let frame = Frame::new(lumigraph, view.clone(), default.options).skipping(skips);
+        let picture = Engine::open(DeviceChoice::Cpu)?.render(&frame, Method::TRIANGULATED)?;
+        Ok::<_, anyhow::Error>((picture, frame.scored().scorings))
+    };
+    let drawn = |skips: Skips| {
+        let (drawn, times) = timed(|| render(&lumigraph, skips));
+        Ok((drawn?.0, times))
+    };
+    let (_, few) = render(&lumigraph, Skips::ALL)?;
+    let views = Skips {
+        views: false,
+        ..Skips::ALL
+    };
+    let (_, all) = render(&lumigraph, views)?;
+    let (used, photos) = (lumigraph.photos.decoded(), lumigraph.photos.len());
+    let pinhole = |s: &&SourceView| s.view.lens.distortion() == Distortion::None;
+    let pinholes = lumigraph.sources.iter().filter(pinhole).count();
+    let lenses = Skips {
+        lenses: false,
+        ..Skips::ALL
+    };
+    let or = |skips: bool, others: Skips| if skips { Skips::ALL } else { others };
+    Ok(vec![
+        // From photos on disk.
+        skip(
+            "photos",
+            (used < photos).then(|| format!("{} of {photos} photos", photos - used)),
+            |skips| {
+                let fresh = variants.lumigraph(default)?;
+                let (drawn, times) = timed(|| {
+                    if !skips {
+                        decode_all(&fresh, &(0..photos).collect::<Vec<_>>())?;
+                    }
+                    render(&fresh, Skips::ALL)
+                });
+                Ok((drawn?.0, times))
+            },
+        )?,
+        skip(
+            "views",
+            (few < all).then(|| format!("{} of {all} scorings", all - few)),
+            |skips| drawn(or(skips, views)),
+        )?,
+        skip(
+            "lenses",
+            (pinholes > 0).then(|| format!("{pinholes} of {photos} lenses")),
+            |skips| drawn(or(skips, lenses)),
+        )?,
+    ])
 }

@@ -335,6 +335,17 @@ fn table(subject: &Subject) -> String {
             round(m.steps_from_exact)
         );
     }
+    for skip in &subject.skips {
+        let same = if skip.same_bytes { "the same" } else { "OTHER" };
+        let _ = writeln!(
+            text,
+            "  --no-skip={}: {} CPU ms, {} with all, {same} bytes; left out: {}",
+            skip.name,
+            round(skip.without.cpu_ms),
+            round(skip.with.cpu_ms),
+            skip.fired.as_deref().unwrap_or("nothing")
+        );
+    }
     for (name, reason) in &subject.failed {
         let _ = writeln!(text, "  {name}: {reason}");
     }

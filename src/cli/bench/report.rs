@@ -156,22 +156,27 @@ fn section(html: &mut String, subject: &Subject, thumbnails: &Thumbnails) {
             round(start.decode_ms)
         );
     }
-    if let Some(skips) = &subject.skips {
-        let same = if skips.same_bytes {
-            "the same bytes"
-        } else {
-            "OTHER BYTES"
-        };
-        let _ = writeln!(
-            html,
-            "<p>Skipping: {} of {} photos are decoded, which spares {} ms of decoding; asking only \
-             views that can count takes {} CPU ms a picture, asking all {}: {same}.</p>",
-            skips.photos_decoded,
-            skips.photos,
-            round(skips.spared_decoding_ms),
-            round(skips.frame.cpu_ms),
-            round(skips.frame_asking_all.cpu_ms)
-        );
+    if !subject.skips.is_empty() {
+        *html += "<table><tr><th>left out</th><th>what</th><th>CPU ms</th><th>without leaving it \
+                  out</th><th>ratio</th><th>bytes</th></tr>";
+        for skip in &subject.skips {
+            let same = if skip.same_bytes {
+                "the same"
+            } else {
+                "OTHERS"
+            };
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                html,
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{same}</td></tr>",
+                skip.name,
+                skip.fired.as_deref().unwrap_or("nothing"),
+                round(skip.with.cpu_ms),
+                round(skip.without.cpu_ms),
+                skip.ratio(),
+            );
+        }
+        *html += "</table>";
     }
 }
 

@@ -1,7 +1,8 @@
-//! Lenses in f32, the cheapest formula that is exact for each; `Lens` in `calibrate` says
+//! Lenses by the cheapest formula that is exact for each; `Lens` in `calibrate` says
 //! what they mean.
 
-use super::super::lanes::{LANES, Lane, angle, each};
+use super::super::lanes::{LANES, LARGEST_CUBIC_TERM, Lane, each};
+use super::super::scalar::Scalar;
 use crate::sensor::{Sensor, focal_and_sensor};
 use calibrate::{Distortion, Lens};
 
@@ -9,223 +10,217 @@ use calibrate::{Distortion, Lens};
 /// border, and it is a thousandth of a pixel at most.
 const ALMOST_PI: f32 = 3.141_591;
 
-/// A lens in f32.
-pub(super) struct Lens32 {
-    focal: [f32; 2],
-    principal: [f32; 2],
-    distortion: Distortion32,
-    sensor: Option<Sensor>,
+/// A lens in numbers of a kind.
+pub(super) struct LensOf<T> {
+    focal: [T; 2],
+    principal: [T; 2],
+    distortion: DistortionOf<T>,
+    /// Shear and horizon: see [`Sensor`].
+    sensor: Option<[[T; 2]; 2]>,
 }
 
 /// What a lens does not see is put here, far outside the image.
 const OUTSIDE: f32 = -1e9;
-/// Newton's steps for a cubic from 1, which approach its root from one side; beyond this
-/// term they stop outside every image.
-const CUBIC_STEPS: usize = 8;
-const LARGEST_CUBIC_TERM: f32 = 1e6;
-
-enum Distortion32 {
+enum DistortionOf<T> {
     None,
     Polynomial {
-        k: [f32; 3],
-        limit_squared: f32,
+        k: [T; 3],
+        limit_squared: T,
     },
     Rational {
-        k: [f32; 6],
-        p: [f32; 2],
-        limit_squared: f32,
+        k: [T; 6],
+        p: [T; 2],
+        limit_squared: T,
     },
     /// Rational with thin prisms.
     RationalPrism {
-        k: [f32; 6],
-        p: [f32; 2],
+        k: [T; 6],
+        p: [T; 2],
         /// By r² and by r⁴.
-        s: [[f32; 2]; 2],
-        limit_squared: f32,
+        s: [[T; 2]; 2],
+        limit_squared: T,
     },
     Fisheye {
-        k: [f32; 4],
-        limit: f32,
+        k: [T; 4],
+        limit: T,
     },
     /// Both fisheyes with tangential and prism terms: those are of the undistorted point, or
     /// of the bent one.
     Prism {
-        k: [f32; 6],
-        p: [f32; 2],
+        k: [T; 6],
+        p: [T; 2],
         /// By r² and by r⁴.
-        s: [[f32; 2]; 2],
+        s: [[T; 2]; 2],
         of_bent: bool,
-        limit: f32,
+        limit: T,
     },
     Fov {
         /// 2 tan(ω/2)
-        c: f32,
-        inverse_omega: f32,
+        c: T,
+        inverse_omega: T,
     },
     Division {
-        k: f32,
+        k: T,
     },
     InverseRadial {
-        k: f32,
+        k: T,
     },
     Eucm {
-        alpha: f32,
-        beta: f32,
+        alpha: T,
+        beta: T,
         /// z/ρ at the limit.
-        cotangent: f32,
+        cotangent: T,
     },
     Equirectangular,
 }
 
-impl Lens32 {
-    pub(super) fn new(lens: &Lens) -> Self {
+impl<T: Scalar> LensOf<T> {
+    /// Without distortion by a formula of its own, if it `may_skip` the others.
+    pub(super) fn new(lens: &Lens, may_skip: bool) -> Self {
         let limit = lens.limit();
-        let f = |v: f64| v as f32;
+        let f = T::rounded;
         let distortion = match lens.distortion() {
-            Distortion::None => Distortion32::None,
+            Distortion::None if may_skip => DistortionOf::None,
+            Distortion::None => DistortionOf::Polynomial {
+                k: [f(0.0); 3],
+                limit_squared: f(f64::INFINITY),
+            },
             Distortion::Rational { k, p } if k[3..] == [0.0; 3] && p == [0.0; 2] => {
-                Distortion32::Polynomial {
+                DistortionOf::Polynomial {
                     k: [f(k[0]), f(k[1]), f(k[2])],
                     limit_squared: f(limit * limit),
                 }
             }
-            Distortion::Rational { k, p } => Distortion32::Rational {
+            Distortion::Rational { k, p } => DistortionOf::Rational {
                 k: k.map(f),
                 p: p.map(f),
                 limit_squared: f(limit * limit),
             },
-            Distortion::Tilted { k, p, s, .. } => Distortion32::RationalPrism {
+            Distortion::Tilted { k, p, s, .. } => DistortionOf::RationalPrism {
                 k: k.map(f),
                 p: p.map(f),
                 s: [[f(s[0]), f(s[2])], [f(s[1]), f(s[3])]],
                 limit_squared: f(limit * limit),
             },
             Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
-                Distortion32::Fisheye {
+                DistortionOf::Fisheye {
                     k: k.map(f),
                     limit: f(limit),
                 }
             }
-            Distortion::ThinPrismFisheye { k, p, s } => Distortion32::Prism {
-                k: [f(k[0]), f(k[1]), f(k[2]), f(k[3]), 0.0, 0.0],
+            Distortion::ThinPrismFisheye { k, p, s } => DistortionOf::Prism {
+                k: [f(k[0]), f(k[1]), f(k[2]), f(k[3]), f(0.0), f(0.0)],
                 p: p.map(f),
-                s: [s.map(f), [0.0; 2]],
+                s: [s.map(f), [f(0.0); 2]],
                 of_bent: false,
                 limit: f(limit),
             },
-            Distortion::RadTanThinPrismFisheye { k, p, s } => Distortion32::Prism {
+            Distortion::RadTanThinPrismFisheye { k, p, s } => DistortionOf::Prism {
                 k: k.map(f),
                 p: [f(p[1]), f(p[0])],
                 s: [[f(s[0]), f(s[2])], [f(s[1]), f(s[3])]],
                 of_bent: true,
                 limit: f(limit),
             },
-            Distortion::Fov { omega } => Distortion32::Fov {
+            Distortion::Fov { omega } => DistortionOf::Fov {
                 c: f(2.0 * (0.5 * omega.abs()).tan()),
                 inverse_omega: f(1.0 / omega.abs()),
             },
-            Distortion::Division { k } => Distortion32::Division { k: f(k) },
-            Distortion::InverseRadial { k } => Distortion32::InverseRadial { k: f(k) },
-            Distortion::Eucm { alpha, beta } => Distortion32::Eucm {
+            Distortion::Division { k } => DistortionOf::Division { k: f(k) },
+            Distortion::InverseRadial { k } => DistortionOf::InverseRadial { k: f(k) },
+            Distortion::Eucm { alpha, beta } => DistortionOf::Eucm {
                 alpha: f(alpha),
                 beta: f(beta),
                 cotangent: f(limit.cos() / limit.sin()),
             },
-            Distortion::Equirectangular => Distortion32::Equirectangular,
+            Distortion::Equirectangular => DistortionOf::Equirectangular,
         };
         let (focal, sensor) = focal_and_sensor(lens);
         Self {
-            focal: focal.to_array(),
-            principal: lens.principal.as_vec2().to_array(),
+            focal: focal.to_array().map(f),
+            principal: lens.principal.to_array().map(f),
             distortion,
-            sensor,
+            sensor: sensor
+                .map(|Sensor { shear, horizon }| [shear, horizon].map(|v| v.to_array().map(f))),
         }
     }
 
     /// The pixels of points in the camera's frame; what the lens cannot see is put far
     /// outside the image.
     #[inline(always)]
-    pub(super) fn project(&self, x: &Lane, y: &Lane, z: &Lane) -> (Lane, Lane) {
-        let mut u = [OUTSIDE; LANES];
-        let mut v = [OUTSIDE; LANES];
+    pub(super) fn project(&self, x: &Lane<T>, y: &Lane<T>, z: &Lane<T>) -> (Lane<T>, Lane<T>) {
+        let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
+        let outside = T::of(OUTSIDE);
+        let mut u = [outside; LANES];
+        let mut v = [outside; LANES];
         match &self.distortion {
-            Distortion32::None => {
+            DistortionOf::None => {
                 for k in 0..LANES {
-                    let inverse_z = 1.0 / z[k];
-                    u[k] = if z[k] > 0.0 {
-                        x[k] * inverse_z
-                    } else {
-                        OUTSIDE
-                    };
-                    v[k] = if z[k] > 0.0 {
-                        y[k] * inverse_z
-                    } else {
-                        OUTSIDE
-                    };
+                    let inverse_z = one / z[k];
+                    let seen = z[k].above(zero);
+                    u[k] = T::either(seen, x[k] * inverse_z, outside);
+                    v[k] = T::either(seen, y[k] * inverse_z, outside);
                 }
             }
-            Distortion32::Polynomial {
+            DistortionOf::Polynomial {
                 k: [k1, k2, k3],
                 limit_squared,
             } => {
                 for k in 0..LANES {
-                    let inverse_z = 1.0 / z[k];
+                    let inverse_z = one / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
-                    let r2 = a * a + b * b;
-                    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-                    let seen = (z[k] > 0.0) & (r2 <= *limit_squared);
-                    u[k] = if seen { a * radial } else { OUTSIDE };
-                    v[k] = if seen { b * radial } else { OUTSIDE };
+                    let r2 = a.squared() + b.squared();
+                    let radial = one + r2 * (*k1 + r2 * (*k2 + r2 * *k3));
+                    let seen = z[k].above(zero) & limit_squared.at_least(r2);
+                    u[k] = T::either(seen, a * radial, outside);
+                    v[k] = T::either(seen, b * radial, outside);
                 }
             }
-            Distortion32::Rational {
+            DistortionOf::Rational {
                 k: c,
                 p,
                 limit_squared,
             } => {
                 for k in 0..LANES {
-                    let inverse_z = 1.0 / z[k];
+                    let inverse_z = one / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
                     let (r2, [bent_a, bent_b]) = rational(a, b, c, p);
-                    let seen = (z[k] > 0.0) & (r2 <= *limit_squared);
-                    u[k] = if seen { bent_a } else { OUTSIDE };
-                    v[k] = if seen { bent_b } else { OUTSIDE };
+                    let seen = z[k].above(zero) & limit_squared.at_least(r2);
+                    u[k] = T::either(seen, bent_a, outside);
+                    v[k] = T::either(seen, bent_b, outside);
                 }
             }
-            Distortion32::RationalPrism {
+            DistortionOf::RationalPrism {
                 k: c,
                 p,
                 s: [once, twice],
                 limit_squared,
             } => {
                 for k in 0..LANES {
-                    let inverse_z = 1.0 / z[k];
+                    let inverse_z = one / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
                     let (r2, [bent_a, bent_b]) = rational(a, b, c, p);
                     let du = r2 * (once[0] + r2 * twice[0]);
                     let dv = r2 * (once[1] + r2 * twice[1]);
-                    let seen = (z[k] > 0.0) & (r2 <= *limit_squared);
-                    u[k] = if seen { bent_a + du } else { OUTSIDE };
-                    v[k] = if seen { bent_b + dv } else { OUTSIDE };
+                    let seen = z[k].above(zero) & limit_squared.at_least(r2);
+                    u[k] = T::either(seen, bent_a + du, outside);
+                    v[k] = T::either(seen, bent_b + dv, outside);
                 }
             }
-            Distortion32::Fisheye { k: c, limit } => {
+            DistortionOf::Fisheye { k: c, limit } => {
                 for k in 0..LANES {
-                    let radius = (x[k] * x[k] + y[k] * y[k]).sqrt();
-                    let theta = angle(radius, z[k]);
-                    let t2 = theta * theta;
-                    let bent = theta * (1.0 + t2 * (c[0] + t2 * (c[1] + t2 * (c[2] + t2 * c[3]))));
-                    let scale = if radius > 0.0 {
-                        bent / radius
-                    } else {
-                        1.0 / z[k]
-                    };
-                    let seen = (theta <= *limit) & ((radius > 0.0) | (z[k] > 0.0));
-                    u[k] = if seen { x[k] * scale } else { OUTSIDE };
-                    v[k] = if seen { y[k] * scale } else { OUTSIDE };
+                    let radius = (x[k].squared() + y[k].squared()).sqrt();
+                    let theta = T::angle(radius, z[k]);
+                    let t2 = theta.squared();
+                    let bent = theta * (one + t2 * (c[0] + t2 * (c[1] + t2 * (c[2] + t2 * c[3]))));
+                    let aside = radius.above(zero);
+                    let scale = T::either(aside, bent / radius, one / z[k]);
+                    let seen = limit.at_least(theta) & (aside | z[k].above(zero));
+                    u[k] = T::either(seen, x[k] * scale, outside);
+                    v[k] = T::either(seen, y[k] * scale, outside);
                 }
             }
-            Distortion32::Prism {
+            DistortionOf::Prism {
                 k: c,
                 p,
                 s: [once, twice],
@@ -233,113 +228,108 @@ impl Lens32 {
                 limit,
             } => {
                 for k in 0..LANES {
-                    let radius = (x[k] * x[k] + y[k] * y[k]).sqrt();
-                    let theta = angle(radius, z[k]);
-                    let t2 = theta * theta;
+                    let radius = (x[k].squared() + y[k].squared()).sqrt();
+                    let theta = T::angle(radius, z[k]);
+                    let t2 = theta.squared();
                     let higher = c[2] + t2 * (c[3] + t2 * (c[4] + t2 * c[5]));
-                    let factor = 1.0 + t2 * (c[0] + t2 * (c[1] + t2 * higher));
-                    let unbent = if radius > 0.0 {
-                        theta / radius
-                    } else {
-                        1.0 / z[k]
-                    };
+                    let factor = one + t2 * (c[0] + t2 * (c[1] + t2 * higher));
+                    let aside = radius.above(zero);
+                    let unbent = T::either(aside, theta / radius, one / z[k]);
                     let scale = if *of_bent { unbent * factor } else { unbent };
                     let (a, b) = (x[k] * scale, y[k] * scale);
-                    let r2 = a * a + b * b;
-                    let du = 2.0 * p[0] * a * b
-                        + p[1] * (r2 + 2.0 * a * a)
+                    let r2 = a.squared() + b.squared();
+                    let du = two * p[0] * a * b
+                        + p[1] * (r2 + two * a.squared())
                         + r2 * (once[0] + r2 * twice[0]);
-                    let dv = 2.0 * p[1] * a * b
-                        + p[0] * (r2 + 2.0 * b * b)
+                    let dv = two * p[1] * a * b
+                        + p[0] * (r2 + two * b.squared())
                         + r2 * (once[1] + r2 * twice[1]);
                     let bent = unbent * factor;
-                    let seen = (theta <= *limit) & ((radius > 0.0) | (z[k] > 0.0));
-                    u[k] = if seen { x[k] * bent + du } else { OUTSIDE };
-                    v[k] = if seen { y[k] * bent + dv } else { OUTSIDE };
+                    let seen = limit.at_least(theta) & (aside | z[k].above(zero));
+                    u[k] = T::either(seen, x[k] * bent + du, outside);
+                    v[k] = T::either(seen, y[k] * bent + dv, outside);
                 }
             }
-            Distortion32::Fov { c, inverse_omega } => {
+            DistortionOf::Fov { c, inverse_omega } => {
                 for k in 0..LANES {
-                    let radius = (x[k] * x[k] + y[k] * y[k]).sqrt();
-                    let bent = angle(c * radius, z[k]) * inverse_omega;
-                    let scale = if radius > 0.0 {
-                        bent / radius
-                    } else {
-                        c * inverse_omega / z[k]
-                    };
-                    u[k] = if z[k] > 0.0 { x[k] * scale } else { OUTSIDE };
-                    v[k] = if z[k] > 0.0 { y[k] * scale } else { OUTSIDE };
+                    let radius = (x[k].squared() + y[k].squared()).sqrt();
+                    let bent = T::angle(*c * radius, z[k]) * *inverse_omega;
+                    let straight = *c * *inverse_omega / z[k];
+                    let scale = T::either(radius.above(zero), bent / radius, straight);
+                    let seen = z[k].above(zero);
+                    u[k] = T::either(seen, x[k] * scale, outside);
+                    v[k] = T::either(seen, y[k] * scale, outside);
                 }
             }
-            Distortion32::Division { k: c } => {
+            DistortionOf::Division { k: c } => {
                 for k in 0..LANES {
-                    let four = 4.0 * c * (x[k] * x[k] + y[k] * y[k]);
-                    let square = z[k] * z[k] - four;
-                    let root = square.max(0.0).sqrt();
+                    let four = T::of(4.0) * *c * (x[k].squared() + y[k].squared());
+                    let square = z[k].squared() - four;
+                    let root = square.max(zero).sqrt();
                     // z + root, without its cancelling behind.
-                    let below = if z[k] >= 0.0 {
-                        z[k] + root
-                    } else {
-                        -four / (root - z[k])
-                    };
+                    let behind = -four / (root - z[k]);
+                    let below = T::either(z[k].at_least(zero), z[k] + root, behind);
                     // Straight back is nowhere.
-                    let seen = (square > 0.0) & ((z[k] > 0.0) | (*c < 0.0)) & (below > 1e-6 * root);
-                    u[k] = if seen { x[k] * (2.0 / below) } else { OUTSIDE };
-                    v[k] = if seen { y[k] * (2.0 / below) } else { OUTSIDE };
+                    let seen = square.above(zero)
+                        & (z[k].above(zero) | zero.above(*c))
+                        & below.above(T::of(1e-6) * root);
+                    u[k] = T::either(seen, x[k] * (two / below), outside);
+                    v[k] = T::either(seen, y[k] * (two / below), outside);
                 }
             }
-            Distortion32::InverseRadial { k: c } => {
+            DistortionOf::InverseRadial { k: c } => {
                 for k in 0..LANES {
-                    let inverse_z = 1.0 / z[k];
+                    let inverse_z = one / z[k];
                     let (a, b) = (x[k] * inverse_z, y[k] * inverse_z);
                     // r = ρg/z, of which the cubic is g + t·g³ = 1.
-                    let t = c * (a * a + b * b);
-                    let mut g = 1.0;
-                    for _ in 0..CUBIC_STEPS {
-                        let term = t * g * g;
-                        g = (1.0 + 2.0 * term * g) / (1.0 + 3.0 * term);
-                    }
+                    let t = *c * (a.squared() + b.squared());
+                    let g = t.cubic_root();
                     // Where t is −4/27 the image folds.
-                    let seen = (z[k] > 0.0) & (t > -4.0 / 27.0) & (t < LARGEST_CUBIC_TERM);
-                    u[k] = if seen { a * g } else { OUTSIDE };
-                    v[k] = if seen { b * g } else { OUTSIDE };
+                    let seen = z[k].above(zero)
+                        & t.above(T::of(-4.0 / 27.0))
+                        & T::of(LARGEST_CUBIC_TERM).above(t);
+                    u[k] = T::either(seen, a * g, outside);
+                    v[k] = T::either(seen, b * g, outside);
                 }
             }
-            Distortion32::Eucm {
+            DistortionOf::Eucm {
                 alpha,
                 beta,
                 cotangent,
             } => {
                 for k in 0..LANES {
-                    let r2 = x[k] * x[k] + y[k] * y[k];
-                    let distance = (beta * r2 + z[k] * z[k]).sqrt();
-                    let (a, b) = (alpha * distance, (1.0 - alpha) * z[k]);
+                    let r2 = x[k].squared() + y[k].squared();
+                    let distance = (*beta * r2 + z[k].squared()).sqrt();
+                    let (a, b) = (*alpha * distance, (one - *alpha) * z[k]);
                     // a + b, without its cancelling behind.
-                    let below = if z[k] >= 0.0 {
-                        a + b
-                    } else {
-                        (alpha * alpha * beta * r2 + (2.0 * alpha - 1.0) * z[k] * z[k]) / (a - b)
-                    };
-                    let seen = (z[k] >= cotangent * r2.sqrt()) & (below > 1e-12 * distance);
-                    u[k] = if seen { x[k] / below } else { OUTSIDE };
-                    v[k] = if seen { y[k] / below } else { OUTSIDE };
+                    let behind = (*alpha * *alpha * *beta * r2
+                        + (two * *alpha - one) * z[k] * z[k])
+                        / (a - b);
+                    let below = T::either(z[k].at_least(zero), a + b, behind);
+                    let seen = z[k].at_least(*cotangent * r2.sqrt())
+                        & below.above(T::of(1e-12) * distance);
+                    u[k] = T::either(seen, x[k] / below, outside);
+                    v[k] = T::either(seen, y[k] / below, outside);
                 }
             }
-            Distortion32::Equirectangular => {
+            DistortionOf::Equirectangular => {
+                let most = T::of(ALMOST_PI);
                 for k in 0..LANES {
-                    let level = (x[k] * x[k] + z[k] * z[k]).sqrt();
-                    u[k] = angle(x[k].abs(), z[k]).min(ALMOST_PI).copysign(x[k]);
-                    v[k] = angle(y[k].abs(), level).min(0.5 * ALMOST_PI).copysign(y[k]);
+                    let level = (x[k].squared() + z[k].squared()).sqrt();
+                    let azimuth = T::angle(x[k].abs(), z[k]).min(most);
+                    let elevation = T::angle(y[k].abs(), level).min(T::of(0.5 * ALMOST_PI));
+                    u[k] = azimuth.with_sign_of(x[k]);
+                    v[k] = elevation.with_sign_of(y[k]);
                 }
             }
         }
-        if let Some(Sensor { shear, horizon }) = &self.sensor {
+        if let Some([shear, horizon]) = &self.sensor {
             for k in 0..LANES {
                 let (a, b) = (u[k], v[k]);
-                let w = 1.0 + horizon.x * a + horizon.y * b;
-                let seen = (a != OUTSIDE) & (w > 0.0);
-                u[k] = if seen { (a + shear.x * b) / w } else { OUTSIDE };
-                v[k] = if seen { (b + shear.y * a) / w } else { OUTSIDE };
+                let w = one + horizon[0] * a + horizon[1] * b;
+                let seen = a.above(outside) & w.above(zero);
+                u[k] = T::either(seen, (a + shear[0] * b) / w, outside);
+                v[k] = T::either(seen, (b + shear[1] * a) / w, outside);
             }
         }
         (
@@ -351,11 +341,12 @@ impl Lens32 {
 
 /// r² and the distorted point of the rational model.
 #[inline(always)]
-fn rational(a: f32, b: f32, k: &[f32; 6], p: &[f32; 2]) -> (f32, [f32; 2]) {
-    let r2 = a * a + b * b;
-    let radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2])))
-        / (1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5])));
-    let du = 2.0 * p[0] * a * b + p[1] * (r2 + 2.0 * a * a);
-    let dv = 2.0 * p[1] * a * b + p[0] * (r2 + 2.0 * b * b);
+fn rational<T: Scalar>(a: T, b: T, k: &[T; 6], p: &[T; 2]) -> (T, [T; 2]) {
+    let [one, two] = [1.0, 2.0].map(T::of);
+    let r2 = a.squared() + b.squared();
+    let radial = (one + r2 * (k[0] + r2 * (k[1] + r2 * k[2])))
+        / (one + r2 * (k[3] + r2 * (k[4] + r2 * k[5])));
+    let du = two * p[0] * a * b + p[1] * (r2 + two * a.squared());
+    let dv = two * p[1] * a * b + p[0] * (r2 + two * b.squared());
     (r2, [a * radial + du, b * radial + dv])
 }

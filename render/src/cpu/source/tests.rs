@@ -42,6 +42,50 @@ fn every_lens_projects_as_the_f64_model_does() {
     }
 }
 
+/// What a lens makes of points in intervals holds what f64 and f32 make of them, and little else.
+#[test]
+fn every_lens_stays_within_its_bounds() {
+    type Bound = crate::rounding::Interval<1>;
+    let lumigraph = every_lens::lumigraph();
+    let frame = every_lens::frame(&lumigraph);
+    for (source_idx, view) in lumigraph.sources.iter().enumerate() {
+        let source = Source::new(&frame, source_idx);
+        let of_bounds: Source<Bound> = Source::new(&frame, source_idx);
+        let mut widest = Vec::new();
+        let points = every_lens::points(&frame, source_idx);
+        for chunk in points.chunks(LANES).step_by(3) {
+            let rays: Vec<[f32; 4]> = chunk.iter().map(|(point, _)| *point).collect();
+            let tile = tile(&rays);
+            let exactly = |lane: &Lane| each(|k| Bound::of(lane[k]));
+            let bounds = Tile {
+                x: exactly(&tile.x),
+                y: exactly(&tile.y),
+                z: exactly(&tile.z),
+                s: exactly(&tile.s),
+                q: [0, 1, 2].map(|c| exactly(&tile.q[c])),
+            };
+            let (mut sight, mut bound) = (Sight::nothing(), Sight::nothing());
+            assert!(source.see(&tile, &mut sight) && of_bounds.see(&bounds, &mut bound));
+            for (k, (_, pixel)) in chunk.iter().enumerate() {
+                for (bound, exact, found) in [
+                    (bound.u[k], pixel.x, sight.u[k]),
+                    (bound.v[k], pixel.y, sight.v[k]),
+                ] {
+                    let (lo, hi) = (bound.lo, bound.hi);
+                    let values = [exact, f64::from(found)];
+                    let within = values.iter().all(|v| lo <= *v && *v <= hi);
+                    assert!(within, "{}: {values:?} not in {lo} to {hi}", view.name);
+                    widest.push(hi - lo);
+                }
+            }
+        }
+        widest.sort_by(f64::total_cmp);
+        let (middle, most) = (widest[widest.len() / 2], widest[widest.len() * 99 / 100]);
+        println!("{}: {middle:.5} px, 99 % {most:.5} px", view.name);
+        assert!(middle < TOLERANCE_PX, "{}: {middle} px", view.name);
+    }
+}
+
 #[test]
 fn levels_of_detail_are_those_of_the_f64_model() {
     let lumigraph = every_lens::lumigraph();
