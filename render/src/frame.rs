@@ -329,6 +329,11 @@ impl<'a> Frame<'a> {
         self
     }
 
+    /// Whether source views that cannot count are passed over.
+    pub(crate) fn may_skip(&self) -> bool {
+        !self.no_skip
+    }
+
     pub(crate) fn view_tree(&self) -> &ViewTree {
         self.view_tree
             .get_or_init(|| ViewTree::new(&self.sources, !self.no_skip))
