@@ -35,6 +35,16 @@ pub(super) struct Met {
     pub(super) touching: Option<usize>,
 }
 
+/// A run that is waiting.
+struct Queued<'a> {
+    /// Of its box from the eye, squared.
+    distance: f64,
+    list: &'a [u32],
+    /// The box' least and greatest coordinates.
+    corners: [DVec3; 2],
+    window: &'a Window,
+}
+
 /// Pixels along a side of the finest squares.
 const SIDE: usize = 8;
 /// The most squares along a side that one run is compared with.
@@ -57,15 +67,20 @@ pub(super) fn meet(
     hidden: &mut Hidden,
 ) -> Met {
     // 1. By their boxes' distance.
-    let mut queue: Vec<(f64, &[u32], [DVec3; 2], &Window)> = Vec::new();
+    let mut queue: Vec<Queued<'_>> = Vec::new();
     for (runs, window) in parts {
-        for (list, [low, high]) in runs.boxes() {
+        for (list, corners) in runs.boxes() {
+            let [low, high] = corners;
             let off = (low - camera.center).max(camera.center - high);
-            let off = off.max(DVec3::ZERO).length_squared();
-            queue.push((off, list, [low, high], window));
+            queue.push(Queued {
+                distance: off.max(DVec3::ZERO).length_squared(),
+                list,
+                corners,
+                window,
+            });
         }
     }
-    queue.sort_by(|a, b| a.0.total_cmp(&b.0));
+    queue.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     // 2. More and more of them at once, but for those that are hidden by then.
     let (mut tried, mut touching) = (0, 0);
     let (mut rest, mut count) = (&queue[..], FIRST);
@@ -76,12 +91,12 @@ pub(super) fn meet(
     }
     while !rest.is_empty() {
         let (part, others) = rest.split_at(count.min(rest.len()));
-        let draw = |(_, list, corners, window): &(f64, &[u32], [DVec3; 2], &Window)| {
-            if is_known && hidden.hides(corners, camera) {
+        let draw = |run: &Queued<'_>| {
+            if is_known && hidden.hides(&run.corners, camera) {
                 return (0, 0);
             }
-            let touching = raster.draw_list(model, list, camera, window, None);
-            (list.len(), touching)
+            let touching = raster.draw_list(model, run.list, camera, run.window, None);
+            (run.list.len(), touching)
         };
         let drawn = part.par_iter().with_min_len(2).map(draw);
         let drawn = drawn.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
