@@ -60,7 +60,7 @@ impl Default for WalkOptions {
             ldi: FreeOptions::default(),
             whole_ldis: false,
             near: 1.0,
-            near_photos: 0.75,
+            near_photos: 0.55,
             whole_cells: false,
             persist: false,
         }
