@@ -328,6 +328,11 @@ impl<'a> Frame<'a> {
         self
     }
 
+    /// Whether source views that cannot count are passed over.
+    pub(crate) fn may_skip(&self) -> bool {
+        self.skips.views
+    }
+
     pub(crate) fn view_tree(&self) -> &ViewTree {
         self.view_tree
             .get_or_init(|| ViewTree::new(&self.sources, self.skips.views))

@@ -25,12 +25,15 @@ struct Prepared {
     /// Opposite corner 0, 1, 2.
     edges: [Edge; 3],
     inverse_area: f32,
-    rows: (usize, usize),
 }
 
 /// The triangles of a field, ready to be scanned row by row.
 pub(crate) struct Raster {
     triangles: Vec<Prepared>,
+    /// The triangles that may cross each row, in order, one row after the other.
+    of_rows: Vec<u32>,
+    /// By row, where its triangles begin; one more at the end.
+    first: Vec<usize>,
 }
 
 impl Raster {
@@ -44,29 +47,52 @@ impl Raster {
             );
             [on_lattice.x as i64, on_lattice.y as i64]
         };
-        let prepare = |corners: [u32; 3]| {
+        let mut rows: Vec<(usize, usize)> = Vec::with_capacity(field.triangles.len());
+        let mut prepare = |corners: [u32; 3]| {
             let [a, b, c] = corners.map(corner);
             let top = a[1].min(b[1]).min(c[1]).div_euclid(STEPS).max(0);
             let bottom = a[1].max(b[1]).max(c[1]).div_euclid(STEPS) + 1;
+            rows.push((top as usize, bottom.max(0) as usize));
             let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
             Prepared {
                 edges: [edge(b, c), edge(c, a), edge(a, b)],
                 inverse_area: 1.0 / area as f32,
-                rows: (top as usize, bottom.max(0) as usize),
             }
         };
+        let triangles = field.triangles.iter().map(|t| prepare(t.corners)).collect();
+        // Which of them each row may have.
+        let count = rows.iter().map(|(_, bottom)| *bottom).max().unwrap_or(0);
+        let mut first = vec![0; count + 1];
+        for &(top, bottom) in &rows {
+            (top..bottom).for_each(|row| first[row + 1] += 1);
+        }
+        for row in 0..count {
+            first[row + 1] += first[row];
+        }
+        let mut next = first.clone();
+        let mut of_rows = vec![0; first[count]];
+        for (i, &(top, bottom)) in (0..).zip(&rows) {
+            for next in &mut next[top.min(count)..bottom] {
+                of_rows[*next] = i;
+                *next += 1;
+            }
+        }
         Self {
-            triangles: field.triangles.iter().map(|t| prepare(t.corners)).collect(),
+            triangles,
+            of_rows,
+            first,
         }
     }
 
     /// The spans of a row, in the triangles' order; replaces what `spans` held.
     pub(crate) fn spans(&self, row: usize, spans: &mut Vec<Span>) {
         spans.clear();
-        for (triangle_idx, triangle) in self.triangles.iter().enumerate() {
-            if !(triangle.rows.0..triangle.rows.1).contains(&row) {
-                continue;
-            }
+        let of_row = match self.first.get(row..row + 2) {
+            Some(of_row) => &self.of_rows[of_row[0]..of_row[1]],
+            None => &[],
+        };
+        for triangle_idx in of_row.iter().map(|i| *i as usize) {
+            let triangle = &self.triangles[triangle_idx];
             let (mut start, mut end) = (0, i64::MAX);
             for edge in triangle.edges {
                 let constant = edge.b * row as i64 + edge.c;

@@ -6,6 +6,7 @@ use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::Rays;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The factor between inverse distances that are tried, and how many on either side.
 const STEP: f64 = 1.15;
@@ -76,7 +77,8 @@ impl Seers {
 /// made of, or on a dome. A guess that photos can answer paints what they show there, and
 /// not nothing. (Of house-walk's held-out pixels that are 2 to 4 %, black before.)
 ///
-/// Pixels are asked one by one only where no photo has all that is seen of a facet.
+/// Pixels are asked one by one only where no photo has all that a tile shows, nor all that is seen of
+/// a facet there.
 ///
 /// `rays` are the desired view's, where they are known.
 pub(crate) fn within_sight(
@@ -85,8 +87,8 @@ pub(crate) fn within_sight(
     rays: Option<&Rays>,
     sources: &[FrameSource],
 ) -> FacetMap {
-    let whole = rays.map_or_else(Vec::new, |rays| seen_whole(&map, rays, sources));
-    let moved = moved(&map, desired, rays, sources, &whole);
+    let known = rays.map_or_else(Known::default, |rays| Known::of(&map, rays, sources));
+    let moved = moved(&map, desired, rays, sources, &known);
     if moved.iter().any(|row| !row.is_empty()) {
         map.seers = Seers::new(map.size.map(|side| side as usize));
     }
@@ -109,13 +111,115 @@ struct Moved {
     source_idx: u32,
 }
 
-/// What is moved, row by row. Facets that are known to be seen are skipped.
+/// What is known to be seen without asking for each pixel.
+#[derive(Default)]
+struct Known {
+    across: usize,
+    /// By tile, row by row: whether some source view has all that its pixels see.
+    tiles: Vec<bool>,
+    /// By facet: whether some source view has all that pixels of other tiles see of it.
+    facets: Vec<bool>,
+}
+
+impl Known {
+    fn of(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Self {
+        let mut known = Self {
+            across: (map.size[0] as usize).div_ceil(TILE),
+            tiles: tiles_seen_whole(map, rays, sources),
+            facets: Vec::new(),
+        };
+        known.facets = facets_seen_whole(map, rays, sources, &known);
+        known
+    }
+
+    /// The pixels of a row in one tile after the other, but for tiles that are known to be seen.
+    fn rest_of_row(&self, y: usize, width: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+        let tile = y / TILE * self.across;
+        let tiles = (0..width.div_ceil(TILE)).filter(move |i| !self.has_tile(tile + i));
+        tiles.map(move |i| i * TILE..((i + 1) * TILE).min(width))
+    }
+
+    fn has_tile(&self, tile: usize) -> bool {
+        self.tiles.get(tile) == Some(&true)
+    }
+
+    fn has_facet(&self, facet: u32) -> bool {
+        self.facets.get(facet as usize) == Some(&true)
+    }
+}
+
+/// For each tile, whether some source view has all that its pixels see: all between the least and the
+/// greatest inverse depth before the smallest rectangle around their rays, in the plane z = 1.
+fn tiles_seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool> {
+    let [width, height] = map.size.map(|side| side as usize);
+    let across = width.div_ceil(TILE);
+    let mut whole = vec![false; across * height.div_ceil(TILE)];
+    let of_row = |(row, whole): (usize, &mut [bool])| {
+        // Tiles beside one another are mostly seen by the same.
+        let mut last = 0;
+        for (i, whole) in whole.iter_mut().enumerate() {
+            let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+            let (mut far, mut near) = (f64::INFINITY, f64::NEG_INFINITY);
+            for y in row * TILE..((row + 1) * TILE).min(height) {
+                for x in i * TILE..((i + 1) * TILE).min(width) {
+                    let facet = map.facet_of[y * width + x];
+                    if facet == NO_FACET {
+                        continue;
+                    }
+                    if let Some(at) = rays.at(x, y) {
+                        let s = map.planes[facet as usize].dot(at.extend(1.0));
+                        (least, most) = (least.min(at), most.max(at));
+                        (far, near) = (far.min(s), near.max(s));
+                    }
+                }
+            }
+            if !(least.x <= most.x) {
+                // It sees nothing.
+                *whole = true;
+                continue;
+            }
+            let corner = |k: usize| {
+                let side =
+                    |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
+                let at = DVec2::new(side(0, least.x, most.x), side(1, least.y, most.y));
+                (at.extend(1.0), side(2, far, near))
+            };
+            *whole = has_all(sources, &mut last, &std::array::from_fn::<_, 8, _>(corner));
+        }
+    };
+    let rows = whole.par_chunks_mut(across.max(1)).enumerate();
+    rows.for_each(of_row);
+    whole
+}
+
+/// Whether the source view of a guess has all points between some well inside its image, or the
+/// first that sees one of them, which is the next guess.
+fn has_all<const N: usize>(
+    sources: &[FrameSource],
+    guess: &mut usize,
+    corners: &[(DVec3, f64); N],
+) -> bool {
+    let has_all = |source: &FrameSource| has_well_inside(source, corners);
+    if sources.get(*guess).is_some_and(has_all) {
+        return true;
+    }
+    let (ray, s) = corners[0];
+    match sources.iter().position(|source| sees(source, ray, s)) {
+        Some(found) => {
+            *guess = found;
+            has_all(&sources[found])
+        }
+        None => false,
+    }
+}
+
+/// What is moved, row by row. What is known to be seen is skipped.
 fn moved(
     map: &FacetMap,
     desired: &View,
     rays: Option<&Rays>,
     sources: &[FrameSource],
-    whole: &[bool],
+    known: &Known,
 ) -> Vec<Vec<Moved>> {
     let [width, height] = map.size.map(|side| side as usize);
     let first = |ray, s| sources.iter().position(|source| sees(source, ray, s));
@@ -134,11 +238,8 @@ fn moved(
         // The view that saw the last pixel mostly sees the next.
         let mut last = 0;
         let mut moved = Vec::new();
-        let mut next = 0;
-        for run in row.chunk_by(|a, b| a == b) {
-            let pixels = next..next + run.len();
-            next = pixels.end;
-            if run[0] == NO_FACET || whole.get(run[0] as usize) == Some(&true) {
+        for pixels in known.rest_of_row(y, width).flat_map(|part| runs(row, part)) {
+            if row[pixels.start] == NO_FACET || known.has_facet(row[pixels.start]) {
                 continue;
             }
             // What they see lies on a line.
@@ -175,17 +276,31 @@ fn moved(
     (0..height).into_par_iter().map(of_row).collect()
 }
 
-/// For each facet, whether some source view has all that pixels see of it: then it has the part of the
-/// facet's plane before the smallest rectangle around their rays, in the plane z = 1.
-fn seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool> {
+/// Parts of a row whose pixels see one facet.
+fn runs(row: &[u32], pixels: Range<usize>) -> impl Iterator<Item = Range<usize>> + '_ {
+    let mut next = pixels.start;
+    row[pixels].chunk_by(|a, b| a == b).map(move |run| {
+        let first = next;
+        next += run.len();
+        first..next
+    })
+}
+
+/// For each facet, whether some source view has all that pixels of tiles that are not known yet see
+/// of it: then it has the part of the facet's plane before the smallest rectangle around their rays,
+/// in the plane z = 1.
+fn facets_seen_whole(
+    map: &FacetMap,
+    rays: &Rays,
+    sources: &[FrameSource],
+    known: &Known,
+) -> Vec<bool> {
     // 1. The rectangles.
     let width = map.size[0] as usize;
     let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let of_row = |(y, row): (usize, &[u32])| {
-        let mut next = 0;
-        let of_run = |run: &[u32]| {
-            let pixels = next..next + run.len();
-            next = pixels.end;
+        let of_run = |pixels: Range<usize>| {
+            let facet = row[pixels.start];
             let ends = [pixels.start, pixels.end - 1];
             // A pixel without a ray sees nothing.
             let at = |x: usize| rays.at(x, y);
@@ -195,9 +310,11 @@ fn seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool>
             } else {
                 pixels.filter_map(at).fold(none, grown)
             };
-            (run[0], bounds)
+            (facet, bounds)
         };
-        row.chunk_by(|a, b| a == b).map(of_run).collect::<Vec<_>>()
+        let parts = known.rest_of_row(y, width);
+        let runs = parts.flat_map(|part| runs(row, part));
+        runs.map(of_run).collect::<Vec<_>>()
     };
     let rows = map.facet_of.par_chunks(width.max(1)).enumerate();
     let runs: Vec<Vec<(u32, (DVec2, DVec2))>> = rows.map(of_row).collect();
@@ -226,16 +343,7 @@ fn seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool>
                 DVec2::new(least.x, most.y),
             ];
             let corners = corners.map(|at| (at.extend(1.0), plane.dot(at.extend(1.0))));
-            let has_all = |source: &FrameSource| has_well_inside(source, &corners);
-            if sources.get(last).is_some_and(has_all) {
-                *whole = true;
-                continue;
-            }
-            let sees_corner = |source: &FrameSource| sees(source, corners[0].0, corners[0].1);
-            if let Some(found) = sources.iter().position(sees_corner) {
-                last = found;
-                *whole = has_all(&sources[found]);
-            }
+            *whole = has_all(sources, &mut last, &corners);
         }
     });
     whole
@@ -244,8 +352,8 @@ fn seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool>
 /// Facets that are asked one after the other.
 const FACETS: usize = 256;
 
-/// Whether all points between some, which are in one plane and each at ray / s, lie inside a source
-/// view's image, beyond doubt of rounding.
+/// Whether all points between some, each at ray / s, lie inside a source view's image, beyond doubt
+/// of rounding.
 fn has_well_inside<const N: usize>(source: &FrameSource, corners: &[(DVec3, f64); N]) -> bool {
     let points = corners.map(|(ray, s)| source.rotation * ray + source.translation * s);
     let is_ahead = points.iter().all(|p| p.z > 0.0) && corners.iter().all(|(_, s)| *s >= 0.0);
@@ -409,12 +517,16 @@ mod tests {
             };
             if let Some(rays) = Rays::of(&desired.lens, (40, 40)) {
                 let all = super::within_sight(map.clone(), &desired, Some(&rays), &sources);
-                let whole = seen_whole(&map, &rays, &sources);
-                let one_by_one = moved(&map, &desired, None, &sources, &[]);
+                let known = Known::of(&map, &rays, &sources);
+                let facets = facets_seen_whole(&map, &rays, &sources, &Known::default());
+                let one_by_one = moved(&map, &desired, None, &sources, &Known::default());
                 for (y, row) in one_by_one.iter().enumerate() {
                     for at in row {
                         let facet = map.facet_of[y * 40 + at.x] as usize;
-                        prop_assert!(!whole[facet], "{} {y} of {facet}", at.x);
+                        prop_assert!(!facets[facet], "{} {y} of {facet}", at.x);
+                        let tile = y / TILE * known.across + at.x / TILE;
+                        prop_assert!(!known.tiles[tile], "{} {y} of tile {tile}", at.x);
+                        prop_assert!(!known.facets[facet], "{} {y} of {facet}", at.x);
                     }
                 }
                 let count: usize = one_by_one.iter().map(Vec::len).sum();

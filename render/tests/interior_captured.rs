@@ -2,20 +2,15 @@
 
 mod house;
 
-use calibrate::{Lens, Rigid3, View};
-use capture::DepthMap;
+use calibrate::View;
 use datasets::house::House;
 use glam::DVec3;
-use house::{random, room, small_house, view, viewpoint};
+use house::{room, small_house, view, viewpoint};
 use image::{Rgba, RgbaImage};
-use proxy::interior::{Contents, Portal, SemicircleOptions, SemicircleView};
+use proxy::interior::{Contents, Portal};
 use proxy::mesh::Mesh;
 use proxy::{MeshKind, Proxy, Solid};
-use render::interior::{
-    Captured, CellGeometry, DepthMaps, LdiSource, Library, LibraryOptions, Painter, Pinhole,
-    PortalFill, PortalLdi, Reference, Target, Walk, WalkError, WalkOptions, Window,
-};
-use render::ldi::{Clipped, Free, FreeOptions, free as free_order};
+use render::interior::{Captured, Painter, PortalFill, Walk, WalkError, WalkOptions};
 use render::score::score;
 use render::{
     DeviceChoice, Engine, FieldOptions, Lumigraph, Method, PhotoStore, RenderError, SourceView,
@@ -256,152 +251,4 @@ fn photos_that_cannot_be_decoded_are_left_out() {
     let failed = none.draw(&desired, PortalFill::Geometry);
     let is_photo = matches!(failed, Err(WalkError::Photos(RenderError::Photo(_))));
     assert!(is_photo, "{failed:?}");
-}
-
-/// Of portals before which all places are free: how many samples an LDI has that is made of photos with
-/// depth from those places, and one that is made of images drawn there; and what each scores beside
-/// the middle place. Inverse depths of photos have so much noise.
-fn planned(deviation: f64) -> Vec<[(f64, f64); 2]> {
-    const VIEWS: usize = 5;
-    let (mut house, contents) = small_house(2, 2);
-    let geometry = CellGeometry::new(&house.model, &contents);
-    let semicircles = SemicircleOptions {
-        views: VIEWS,
-        ..SemicircleOptions::default()
-    };
-    let options = |ldi_of| LibraryOptions {
-        size: [96; 2],
-        semicircles,
-        ldi_of,
-        ..LibraryOptions::default()
-    };
-    let places = proxy::interior::semicircles(&house.interior, &semicircles);
-    let sides: Vec<&[SemicircleView]> = places.chunks(VIEWS).collect();
-    let free: Vec<usize> = (0..sides.len())
-        .filter(|i| sides[*i].iter().all(|p| p.is_inside && p.from.is_some()))
-        .collect();
-    // 1. The photos, through the lenses that images have.
-    let mut random = random(7);
-    let mut photos = Vec::new();
-    for place in free.iter().flat_map(|i| sides[*i]) {
-        let Pinhole {
-            focal, principal, ..
-        } = Reference::new(&house.interior, &house.model, &geometry, place, [96; 2]).camera;
-        let view = View {
-            lens: Lens::pinhole(focal, principal),
-            width: 96,
-            height: 96,
-            camera_from_world: place.camera_from_world,
-        };
-        let (pixels, depths) = datasets::house::render(&house, &view);
-        let mut noisy = |z: &f64| {
-            let normal = (0..12).map(|_| random()).sum::<f64>() - 6.0;
-            (1.0 / (1.0 / z + deviation * normal)) as f32
-        };
-        let depths = DepthMap {
-            width: 96,
-            height: 96,
-            depths: depths.iter().map(&mut noisy).collect(),
-        };
-        photos.push((view, pixels, depths));
-    }
-    let sources = photos.iter().enumerate().map(|(i, (view, ..))| SourceView {
-        name: format!("{i}.jpg"),
-        view: view.clone(),
-        gain: [1.0; 3],
-        time_s: None,
-    });
-    let lumigraph = Lumigraph {
-        visibility: None,
-        photos: PhotoStore::from_images(photos.iter().map(|(_, p, _)| p.clone()).collect()),
-        sources: sources.collect(),
-        proxy: Proxy::Mesh(Arc::new(Solid::new(
-            MeshKind::Depth,
-            house.model.mesh.clone(),
-        ))),
-        points: Vec::new(),
-    };
-    let of_views = Library::new(&house.interior, &options(LdiSource::Views))
-        .ldis(&free, &house.interior, &house.model, &geometry, None)
-        .unwrap()
-        .0;
-    house.interior.show_photos("photos");
-    let maps: Vec<DepthMap> = photos.iter().map(|(.., d)| d.clone()).collect();
-    let mut captured = Captured::new(
-        lumigraph,
-        Engine::open(DeviceChoice::Cpu).unwrap(),
-        FieldOptions::default(),
-        Method::Exact,
-        &house.interior,
-        &contents,
-        &house.model,
-        0..0,
-    )
-    .with_depth_maps(DepthMaps::new(vec![true; maps.len()], move |i| {
-        Ok(maps[i].clone())
-    }));
-    // 2. The LDIs.
-    let (of_photos, made) = Library::new(&house.interior, &options(LdiSource::Photos))
-        .ldis(
-            &free,
-            &house.interior,
-            &house.model,
-            &geometry,
-            Some(&mut captured),
-        )
-        .unwrap();
-    assert!(made >= free.len() * VIEWS, "{made}");
-    // 3. What they are worth, beside the middle place.
-    let psnr = |side: usize, portal: &PortalLdi| {
-        let eye = |i: usize| sides[side][i].camera_from_world.center();
-        let mut place = sides[side][2].clone();
-        let center = house.interior.portal(place.portal).polygon.center();
-        place.camera_from_world = Rigid3::looking_at(eye(2).lerp(eye(3), 0.4), center, DVec3::Y);
-        let truth = Reference::new(&house.interior, &house.model, &geometry, &place, [128; 2]);
-        let (whole, mut target) = (Window::whole(128, 128), Target::new(128, 128));
-        let (columns, options) = (Clipped::whole(&portal.ldi), FreeOptions::default());
-        let scratch = &mut Free::default();
-        free_order(
-            &portal.ldi,
-            &columns,
-            &truth.camera,
-            &whole,
-            &options,
-            scratch,
-            &mut target,
-        );
-        // What an LDI has beside the portal's outline is not asked for.
-        for (color, truth) in target.color.iter_mut().zip(&truth.seen.color) {
-            if truth[3] == 0 {
-                *color = *truth;
-            }
-        }
-        let [found, truth] = [target, truth.seen].map(|seen| seen.picture());
-        score(&found, &truth).unwrap().psnr
-    };
-    let worth = |side: usize, ldi: &Option<PortalLdi>| {
-        let portal = ldi.as_ref().expect("samples");
-        (portal.ldi.len() as f64, psnr(side, portal))
-    };
-    let pairs = free.iter().zip(of_photos.iter().zip(&of_views));
-    pairs
-        .map(|(side, (a, b))| [worth(*side, a), worth(*side, b)])
-        .collect()
-}
-
-#[test]
-fn photos_taken_where_planned_make_the_ldi_that_images_make() {
-    let exact = planned(0.0);
-    assert!(exact.len() > 1);
-    for [(samples, psnr), (of_views, psnr_of_views)] in &exact {
-        let share = samples / of_views;
-        assert!((0.85..1.05).contains(&share), "{share}");
-        assert!(*psnr > psnr_of_views - 0.2, "{psnr} {psnr_of_views}");
-    }
-    // Noise doubles no surface, though two depths of a wall are rarely within the range.
-    for ([(noisy, psnr), _], [(exact, psnr_of_exact), _]) in planned(0.003).iter().zip(&exact) {
-        let share = noisy / exact;
-        assert!((0.85..1.0).contains(&share), "{share}");
-        assert!(*psnr > psnr_of_exact - 2.0, "{psnr} {psnr_of_exact}");
-    }
 }

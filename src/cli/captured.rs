@@ -1,20 +1,101 @@
-//! The photos that show an interior's cells.
+//! An interior opened, with the photos that show its cells.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::film::files_of;
+use super::interior::open;
 use super::options::print_warnings;
 use super::output::say;
 use anyhow::{Context, bail};
 use lumigraph::scene::{Scene, Truth};
 use proxy::interior::{Contents, Interior};
-use proxy::mesh::Model;
+use proxy::mesh::{Model, read_model};
 use proxy::{MeshKind, Proxy, Solid};
 use render::interior::{Captured, Painter};
 use render::{DeviceChoice, Engine, FieldOptions, Method};
 use std::collections::BTreeSet;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// An interior, its model, and what shows it.
+pub(super) struct Opened {
+    /// The interior's file.
+    pub(super) file: PathBuf,
+    pub(super) interior: Interior,
+    pub(super) model: Model,
+    /// What of the model each cell has.
+    pub(super) contents: Contents,
+    /// None where no cell is a scene.
+    pub(super) photos: Option<Photos>,
+}
+
+impl Opened {
+    /// Opens an interior, given by its folder or its file; `exposure` says how its photos' are
+    /// matched, `None` that photos are of no interest. `warn` is told what is odd.
+    pub(super) fn new(
+        given: &Path,
+        exposure: Option<&ExposureArgs>,
+        warn: impl Fn(String),
+    ) -> anyhow::Result<Self> {
+        let (file, interior) = open(given)?;
+        let (model, warnings) = model_of(&file, &interior)?;
+        warnings.into_iter().for_each(&warn);
+        let named = || given.display().to_string();
+        let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
+        warnings
+            .iter()
+            .for_each(|warning| warn(warning.to_string()));
+        let photos = match exposure {
+            Some(exposure) => Photos::open(&file, &interior, exposure)?,
+            None => None,
+        };
+        Ok(Self {
+            file,
+            interior,
+            model,
+            contents,
+            photos,
+        })
+    }
+
+    /// The files that it was read from, and its photos'.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let photos = self.photos.iter().flat_map(Photos::files);
+        let model = model_file(&self.file, &self.interior);
+        photos.chain(model).chain([self.file.clone()]).collect()
+    }
+
+    /// What draws it, from its photos if there are any, with so many bytes for those that are
+    /// decoded. What is seen behind all surfaces is added to the model.
+    pub(super) fn painter(
+        &mut self,
+        device: DeviceChoice,
+        budget: Option<u64>,
+    ) -> anyhow::Result<Painter> {
+        let Some(photos) = &self.photos else {
+            return Ok(Painter::open(device, &self.model));
+        };
+        let (contents, model) = (&mut self.contents, &mut self.model);
+        photos.painter(device, budget, &self.interior, contents, model)
+    }
+}
+
+/// The model of an interior whose file is `path`.
+fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
+    let name = interior.model.as_ref()?;
+    Some(path.parent().unwrap_or(Path::new("")).join(name))
+}
+
+fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Model, Vec<String>)> {
+    let Some(file) = model_file(path, interior) else {
+        bail!(
+            "{}: it has no model; cells that are scenes are not drawn yet",
+            path.display()
+        );
+    };
+    let (model, warnings) = read_model(&file)?;
+    let named = |warning| format!("{}: {warning}", file.display());
+    Ok((model, warnings.into_iter().map(named).collect()))
+}
 
 /// The scene whose photos show an interior's cells.
 pub(super) struct Photos {
@@ -29,7 +110,7 @@ const GRID: u32 = 32;
 impl Photos {
     /// Opens the scene that an interior's cells name; `None` where none does. `file` is the
     /// interior's.
-    pub(super) fn open(
+    fn open(
         file: &Path,
         interior: &Interior,
         exposure: &ExposureArgs,
@@ -67,29 +148,21 @@ impl Photos {
     }
 
     /// The scene's files; see [`files_of`].
-    pub(super) fn files(&self) -> Vec<PathBuf> {
+    fn files(&self) -> Vec<PathBuf> {
         files_of(&self.scene)
     }
 
-    /// Adds what is seen where the model has no surface; see [`Scene::add_backdrop`].
-    pub(super) fn add_backdrop(
-        &self,
-        model: &mut Model,
-        contents: &mut Contents,
-    ) -> anyhow::Result<Range<u32>> {
-        Ok(self.scene.add_backdrop(&self.without, model, contents)?)
-    }
-
-    /// What draws the model's surface from them, with so many bytes for decoded photos.
+    /// What draws the model's surface from them, with so many bytes for decoded photos. What is
+    /// seen where there is no surface is added to the model; see [`Scene::add_backdrop`].
     pub(super) fn painter(
         &self,
         device: DeviceChoice,
         budget: Option<u64>,
         interior: &Interior,
-        contents: &Contents,
-        model: &Model,
-        backdrop: Range<u32>,
+        contents: &mut Contents,
+        model: &mut Model,
     ) -> anyhow::Result<Painter> {
+        let backdrop = self.scene.add_backdrop(&self.without, model, contents)?;
         let solid = Solid::new(MeshKind::Depth, model.mesh.clone());
         let mut lumigraph = self
             .scene

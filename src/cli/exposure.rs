@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// Whether photos are brought to one exposure.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Default)]
 pub(super) struct ExposureArgs {
     /// Blend photos as they were exposed, without matching them
     #[arg(long)]

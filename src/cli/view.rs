@@ -1,18 +1,15 @@
 //! `lumigraph view`
 
 use super::Usage;
-use super::captured::Photos;
+use super::captured::Opened;
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
-use super::interior::open;
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text};
 use super::time::{AtArgs, Clock, TimeArgs};
-use super::walk::model_of;
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
-use proxy::interior::Contents;
 use render::DeviceChoice;
 use render::interior::{PortalFill, WalkOptions};
 use render::path::read_keyframes;
@@ -174,22 +171,15 @@ impl Load {
 
     fn load_house(&self, teller: &Teller) -> anyhow::Result<()> {
         let given = &self.scene.scene;
-        let (path, interior) = open(given)?;
         teller.doing("reading the model");
-        let model = model_of(&path, &interior)?;
-        let named = || given.display().to_string();
-        let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
-        if let Some(warning) = warnings.first() {
-            teller.say(Progress::Note(warning.to_string()));
-        }
-        let photos = Photos::open(&path, &interior, &self.exposure)?;
-        let mut house = House::new(interior, contents, model);
-        if let Some(photos) = photos {
+        let warn = |text| teller.say(Progress::Note(text));
+        let opened = Opened::new(given, Some(&self.exposure), warn)?;
+        let mut house = House::new(opened.interior, opened.contents, opened.model);
+        if let Some(photos) = opened.photos {
             teller.doing("measuring what photos see");
+            let (device, budget) = (self.device, self.budget);
             house = house.with_photos(|interior, contents, model| {
-                let backdrop = photos.add_backdrop(model, contents)?;
-                let (device, budget) = (self.device, self.budget);
-                photos.painter(device, budget, interior, contents, model, backdrop)
+                photos.painter(device, budget, interior, contents, model)
             })?;
         }
         teller.show(Content::Interior(Arc::new(house)));

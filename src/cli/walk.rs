@@ -3,10 +3,9 @@
 mod report;
 
 use super::Usage;
-use super::captured::Photos;
+use super::captured::{Opened, Photos};
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::interior::open;
 use super::options::{bytes, resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
@@ -18,10 +17,9 @@ use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::DVec2;
 use lumigraph::scene::{Truth, picture_files};
-use proxy::interior::{CellId, Contents, Interior};
-use proxy::mesh::{Model, read_model};
+use proxy::interior::{CellId, Interior};
 use render::interior::{
-    CAPTURED_REFERENCE_SIZE, LdiSource, Painter, PortalFill, Splat, Tour, Walk, WalkOptions,
+    CAPTURED_REFERENCE_SIZE, LdiSource, PortalFill, Splat, Tour, Walk, WalkOptions,
 };
 use render::{DeviceChoice, path};
 use report::{Drawn, Scored, Walked, ms};
@@ -85,9 +83,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
     /// Nearer to a portal than this, in radii of its semicircle (of 1.5 widths), what is beyond is
-    /// geometry; images are mixed in from 2/3 of it on
-    #[arg(long, value_name = "RADII", default_value_t = 1.0)]
-    near: f64,
+    /// geometry; images are mixed in from 2/3 of it on [default: 1; of LDIs made of photos 0.55]
+    #[arg(long, value_name = "RADII")]
+    near: Option<f64>,
     /// Keep the last frame's colours where no image shows anything
     #[arg(long, conflicts_with = "resume")]
     persist: bool,
@@ -154,8 +152,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--reference-views is {found}; expected an odd number up to 999");
         return Err(Usage(text).into());
     }
-    if !(args.near >= 0.0 && args.near.is_finite()) {
-        let text = format!("--near is {}; expected 0 or more", args.near);
+    if let Some(near) = args.near.filter(|near| !(*near >= 0.0 && near.is_finite())) {
+        let text = format!("--near is {near}; expected 0 or more");
         return Err(Usage(text).into());
     }
     if args.persist && args.frames.is_part() {
@@ -171,13 +169,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return Err(Usage(text).into());
     }
     let keeps = |what| args.no_skip.iter().any(|n| *n == NoSkip::All || *n == what);
+    let defaults = WalkOptions::default();
     let mut options = WalkOptions {
         whole_cells: keeps(NoSkip::Cells),
         whole_ldis: keeps(NoSkip::Columns),
         splat: args.splat.map_or(Splat::Footprint, Splat::Fixed),
-        near: args.near,
+        near: args.near.unwrap_or(defaults.near),
+        near_photos: args.near.unwrap_or(defaults.near_photos),
         persist: args.persist,
-        ..WalkOptions::default()
+        ..defaults
     };
     options.library.semicircles.views = args.reference_views;
     options.library.budget = args.cpu_memory;
@@ -191,44 +191,35 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Device::Cpu => DeviceChoice::Cpu,
     };
     // 2. What there is.
-    let (path, interior) = open(&args.interior)?;
-    let mut model = model_of(&path, &interior)?;
+    let warn = |text| say!("warning: {text}");
+    let use_photos = !args.no_photos || args.held_out;
+    let exposure = use_photos.then_some(&args.exposure);
+    let mut opened = Opened::new(&args.interior, exposure, warn)?;
     let named = || args.interior.display().to_string();
-    let (mut contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
-    for warning in warnings {
-        say!("warning: {warning}");
-    }
-    let photos = match args.no_photos && !args.held_out {
-        true => None,
-        false => Photos::open(&path, &interior, &args.exposure)?,
-    };
-    options.library.size = match (args.reference_size, &photos) {
+    options.library.size = match (args.reference_size, &opened.photos) {
         (Some(size), _) => size.into(),
         (None, Some(_)) if !args.no_photos => CAPTURED_REFERENCE_SIZE,
         _ => options.library.size,
     };
     let (frames, fps) = match args.held_out {
         true => (
-            held_out(photos.as_ref(), args.size).with_context(named)?,
+            held_out(opened.photos.as_ref(), args.size).with_context(named)?,
             FPS,
         ),
-        false => frames(args, &interior, &contents, &model)?,
+        false => frames(args, &opened)?,
     };
-    let mut inputs: Vec<PathBuf> = photos.iter().flat_map(Photos::files).collect();
+    let mut inputs = opened.files();
     inputs.extend(args.path.clone());
-    inputs.extend(model_file(&path, &interior));
-    inputs.push(path);
     // 3. The walks: one walker, so that images are made once for all kinds.
-    let painter = match photos.as_ref().filter(|_| !args.no_photos) {
-        Some(photos) => {
-            say!("exposure: {}", photos.exposure.text());
-            let backdrop = photos.add_backdrop(&mut model, &mut contents)?;
-            let budget = args.cpu_memory;
-            photos.painter(device, budget, &interior, &contents, &model, backdrop)?
-        }
-        None => Painter::open(device, &model),
-    };
-    let mut walk = Walk::with(painter, &interior, &contents, &model, options);
+    if args.no_photos {
+        opened.photos = None;
+    }
+    if let Some(photos) = &opened.photos {
+        say!("exposure: {}", photos.exposure.text());
+    }
+    let painter = opened.painter(device, args.cpu_memory)?;
+    let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
+    let mut walk = Walk::with(painter, interior, contents, model, options);
     let mut walks = Vec::new();
     for fill in &fills {
         let folder = match fills.len() {
@@ -262,7 +253,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let svg = plot(&lines, "frame", "ms a frame");
     write_file(&args.output.join("times.svg"), svg.as_bytes())?;
     if args.json {
-        let walks: Vec<Value> = walks.iter().map(|w| w.json(&interior)).collect();
+        let walks: Vec<Value> = walks.iter().map(|w| w.json(interior)).collect();
         return print_json(&json!({
             "triangles": model.mesh.triangles.len(),
             "cells": interior.cells.len(),
@@ -325,26 +316,6 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
     Ok(once)
 }
 
-/// The model of an interior whose file is `path`.
-fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
-    let name = interior.model.as_ref()?;
-    Some(path.parent().unwrap_or(Path::new("")).join(name))
-}
-
-pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<Model> {
-    let Some(file) = model_file(path, interior) else {
-        bail!(
-            "{}: it has no model; cells that are scenes are not drawn yet",
-            path.display()
-        );
-    };
-    let (model, warnings) = read_model(&file)?;
-    for warning in warnings {
-        say!("warning: {}: {warning}", file.display());
-    }
-    Ok(model)
-}
-
 struct Named {
     name: String,
     view: View,
@@ -370,12 +341,8 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
 }
 
 /// The frames to draw, and how many a second a film of them shows.
-fn frames(
-    args: &Args,
-    interior: &Interior,
-    contents: &Contents,
-    model: &Model,
-) -> anyhow::Result<(Vec<Named>, f64)> {
+fn frames(args: &Args, opened: &Opened) -> anyhow::Result<(Vec<Named>, f64)> {
+    let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     let path = match &args.path {
         Some(file) => path::read_in(file, &args.nerfstudio.frame()?)?,
         None => {

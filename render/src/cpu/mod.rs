@@ -101,6 +101,7 @@ fn draw_field(
     let engine = Engine::new(frame, rays);
     let raster = Raster::new(field);
     let photos = Held::new(frame, &field.listed());
+    let may_skip = frame.may_skip();
     draw(frame, |row, scratch: &mut Scratch, pixels| {
         let Scratch {
             spans,
@@ -112,21 +113,29 @@ fn draw_field(
         let mut triangle_of = [None; LANES];
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let x0 = tile_idx * LANES;
+            let crossing = |s: &&Span| s.start < x0 + LANES && s.end > x0;
+            let within = |s: &Span| s.start.max(x0) - x0..s.end.min(x0 + LANES) - x0;
+            triangle_of.fill(None);
+            for span in spans.iter().filter(crossing) {
+                triangle_of[within(span)].fill(Some(span.triangle_idx));
+            }
+            let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
+            if tile.s.iter().all(|s| *s < 0.0) {
+                continue;
+            }
             // 1. The interpolated weights, or differences, of the triangles that cross the
             // tile.
-            triangle_of.fill(None);
             active.clear();
-            let mut any_bordered = false;
-            for span in spans.iter().filter(|s| s.start < x0 + LANES && s.end > x0) {
-                let (start, end) = (span.start.max(x0), span.end.min(x0 + LANES));
+            let mut is_bordered = [false; LANES];
+            for span in spans.iter().filter(crossing) {
+                let lanes = within(span);
                 let mut shares = [[0.0; LANES]; 3];
-                for x in start..end {
-                    triangle_of[x - x0] = Some(span.triangle_idx);
-                    let share = raster.barycentric(span.triangle_idx, x, row);
-                    (0..3).for_each(|corner| shares[corner][x - x0] = share[corner]);
+                for k in lanes.clone() {
+                    let share = raster.barycentric(span.triangle_idx, x0 + k, row);
+                    (0..3).for_each(|corner| shares[corner][k] = share[corner]);
                 }
                 let bordered = field.triangles[span.triangle_idx].bordered;
-                any_bordered |= bordered;
+                is_bordered[lanes.clone()].fill(bordered);
                 for entry in field.entries_of(span.triangle_idx) {
                     let i = entry.source_idx as usize;
                     let at = active
@@ -143,22 +152,41 @@ fn draw_field(
                     } else {
                         &mut into.weight
                     };
-                    for k in start - x0..end - x0 {
+                    for k in lanes.clone() {
                         values[k] = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
                     }
                     if bordered {
-                        into.blended[start - x0..end - x0].fill(1.0);
+                        into.blended[lanes.clone()].fill(1.0);
                     }
                 }
             }
+            for k in 0..LANES {
+                is_bordered[k] &= tile.s[k] >= 0.0;
+            }
+            let any_bordered = is_bordered.contains(&true);
             // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
-            // triangle, with the mask, a term of the blend.
-            let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
+            // triangle, with the mask, a term of the blend. Of the latter the views that
+            // differ least come first, as far as they leave room for more.
             order.clear();
-            order.extend(0..active.len());
-            order.sort_unstable_by_key(|&i| active[i].source_idx);
+            let least = active.iter().map(|source| source.least(&is_bordered));
+            order.extend(least.zip(0..).filter(|(least, _)| *least < f32::INFINITY));
+            order.sort_unstable_by(|a, b| {
+                let source_idx = |i: usize| active[i].source_idx;
+                a.0.total_cmp(&b.0)
+                    .then_with(|| source_idx(a.1).cmp(&source_idx(b.1)))
+            });
             seen.clear();
-            for source in order.iter().map(|&i| &active[i]) {
+            let mut check = FIRST_ASKED;
+            for (asked, &(least, i)) in order.iter().enumerate() {
+                let source = &active[i];
+                if asked >= check && least >= 0.0 && may_skip {
+                    let reach = weigh(seen.kept().1, &frame.options);
+                    let wanted = (0..LANES).filter(|&k| is_bordered[k]);
+                    if wanted.map(|k| reach[k]).fold(0.0, f32::max) <= least {
+                        break;
+                    }
+                    check = asked + THEN_ASKED;
+                }
                 let (sight, term) = seen.next();
                 if !engine.source(source.source_idx).see(&tile, sight) {
                     continue;
@@ -173,6 +201,7 @@ fn draw_field(
                 seen.keep(source.source_idx);
             }
             if any_bordered {
+                seen.sort();
                 let (sights, terms) = seen.kept();
                 weigh(terms, &frame.options);
                 for (sight, term) in sights.iter_mut().zip(terms) {
@@ -185,13 +214,18 @@ fn draw_field(
     })
 }
 
+/// Source views that are asked about a tile before it is seen whether others may count, and again
+/// after so many more.
+const FIRST_ASKED: usize = 8;
+const THEN_ASKED: usize = 4;
+
 /// What a thread uses again for every tile that it draws of a triangulated field.
 #[derive(Default)]
 struct Scratch {
     spans: Vec<Span>,
     active: Vec<Interpolated>,
-    /// Indices of what is active, by source view.
-    order: Vec<usize>,
+    /// Of what is active, by the least difference: that and its index.
+    order: Vec<(f32, usize)>,
     seen: Seen,
 }
 
@@ -224,6 +258,20 @@ impl Seen {
         self.source_idxs.push(source_idx);
     }
 
+    /// By source view.
+    fn sort(&mut self) {
+        // They are few, and mostly in order.
+        for end in 1..self.source_idxs.len() {
+            let mut at = end;
+            while at > 0 && self.source_idxs[at - 1] > self.source_idxs[at] {
+                self.source_idxs.swap(at - 1, at);
+                self.sights.swap(at - 1, at);
+                self.terms.swap(at - 1, at);
+                at -= 1;
+            }
+        }
+    }
+
     fn kept(&mut self) -> (&mut [Sight], &mut [Term]) {
         let count = self.source_idxs.len();
         (&mut self.sights[..count], &mut self.terms[..count])
@@ -254,6 +302,17 @@ impl Interpolated {
             diff: [1.0; LANES],
             blended: [0.0; LANES],
         }
+    }
+
+    /// The least difference in bordered triangles; less than any where it has weights, too, and
+    /// infinite where it has nothing.
+    fn least(&self, is_bordered: &[bool; LANES]) -> f32 {
+        if self.weight != [0.0; LANES] {
+            return -1.0;
+        }
+        let counts = |k: &usize| is_bordered[*k] && self.blended[*k] > 0.0;
+        let diffs = (0..LANES).filter(counts).map(|k| self.diff[k].max(0.0));
+        diffs.fold(f32::INFINITY, f32::min)
     }
 }
 
@@ -341,10 +400,13 @@ impl<'a> Engine<'a> {
                 return;
             }
             let map = visibility.map(source_idx);
+            let visible = vectorised(
+                #[inline(always)]
+                || shade::visible(map, sight),
+            );
             for k in 0..LANES {
                 if seen(sight, k) {
-                    let at = [sight.u[k], sight.v[k]];
-                    sight.a[k] *= shade::visible(map, at, sight.inverse_distance[k]);
+                    sight.a[k] *= visible[k];
                 }
             }
         }

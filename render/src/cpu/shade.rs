@@ -1,6 +1,6 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
-use super::lanes::{LANES, Lane};
+use super::lanes::{LANES, Lane, each};
 use super::source::Sight;
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
@@ -127,15 +127,65 @@ where
     top + (low - top) * fy
 }
 
-/// How much a photo counts at a point: see [`crate::visibility`].
-pub(super) fn visible(map: &DistanceMap, [u, v]: [f32; 2], inverse_distance: f32) -> f32 {
-    let nearest = map.sample(u * TEXEL_PER_PIXEL, v * TEXEL_PER_PIXEL);
-    let slack = nearest * TOLERANCE as f32;
-    let beyond = nearest - inverse_distance / map.unit as f32;
-    if beyond <= slack {
-        return 1.0;
+/// How much a photo counts at the points of a tile: see [`crate::visibility`]. Of pixels that it
+/// does not see, any number.
+#[inline(always)]
+pub(super) fn visible(map: &DistanceMap, sight: &Sight) -> Lane {
+    let nearest = nearest(map, sight);
+    each(
+        #[inline(always)]
+        |k| {
+            let nearest = nearest[k];
+            let slack = nearest * TOLERANCE as f32;
+            let beyond = nearest - sight.inverse_distance[k] / map.unit as f32;
+            let r = ((beyond - slack) / (FADE as f32 * slack)).clamp(0.0, 1.0);
+            let root = 1.0 - (1.0 - HIDDEN_ROOT as f32) * r * r * (3.0 - 2.0 * r);
+            let hidden = (root * root) * (root * root);
+            if beyond <= slack { 1.0 } else { hidden }
+        },
+    )
+}
+
+/// [`DistanceMap::sample`] of a tile's pixels.
+#[inline(always)]
+fn nearest(map: &DistanceMap, sight: &Sight) -> Lane {
+    let [width, height] = map.size.map(|side| side as i32);
+    let (mut at, mut shares) = ([[0; LANES]; 4], [[0.0; LANES]; 2]);
+    // What is not in the photo may be anywhere, and no number.
+    let within = |at: f32, side: i32| at.max(-1.0).min(side as f32);
+    for k in 0..LANES {
+        let x = within(sight.u[k] * TEXEL_PER_PIXEL - 0.5, width);
+        let y = within(sight.v[k] * TEXEL_PER_PIXEL - 0.5, height);
+        let (left, top) = (floor(x), floor(y));
+        (shares[0][k], shares[1][k]) = (x - left as f32, y - top as f32);
+        let column = |i: i32| i.clamp(0, width - 1);
+        let row = |i: i32| i.clamp(0, height - 1) * width;
+        let (x0, x1, y0, y1) = (column(left), column(left + 1), row(top), row(top + 1));
+        at[0][k] = y0 + x0;
+        at[1][k] = y0 + x1;
+        at[2][k] = y1 + x0;
+        at[3][k] = y1 + x1;
     }
-    let r = ((beyond - slack) / (FADE as f32 * slack)).clamp(0.0, 1.0);
-    let root = 1.0 - (1.0 - HIDDEN_ROOT as f32) * r * r * (3.0 - 2.0 * r);
-    (root * root) * (root * root)
+    let mut corners = [[0.0; LANES]; 4];
+    for (corner, at) in corners.iter_mut().zip(&at) {
+        for k in 0..LANES {
+            corner[k] = map.values[at[k] as usize];
+        }
+    }
+    let [a, b, c, d] = &corners;
+    each(
+        #[inline(always)]
+        |k| {
+            let upper = a[k] + shares[0][k] * (b[k] - a[k]);
+            let lower = c[k] + shares[0][k] * (d[k] - c[k]);
+            upper + shares[1][k] * (lower - upper)
+        },
+    )
+}
+
+/// Without a call.
+#[inline(always)]
+fn floor(x: f32) -> i32 {
+    let whole = x as i32;
+    whole - i32::from(x < whole as f32)
 }

@@ -8,6 +8,7 @@
 mod captured;
 mod fill;
 mod floor_map;
+mod front;
 mod geometry;
 mod library;
 mod painter;

@@ -1,6 +1,7 @@
 //! One door to those that draw triangles: the CPU's raster, a graphics device, and the lumigraph
 //! where photos show them.
 
+use super::front::{Hidden, Met, meet};
 use super::{Captured, Pinhole, Raster, Runs, Target, Window};
 use crate::RenderError;
 use crate::engine::DeviceChoice;
@@ -13,6 +14,7 @@ use proxy::mesh::Model;
 pub struct Painter {
     gpu: Option<Box<GpuRaster>>,
     raster: Raster,
+    hidden: Hidden,
     /// What the device drew of this frame; none where the CPU draws it.
     drawn: Option<Target>,
     /// What photos show of it.
@@ -97,20 +99,26 @@ impl Painter {
         }
     }
 
-    /// Finds what each pixel sees of some triangles, in windows. How many of them touch a pixel's
-    /// centre, where the CPU drew them.
+    /// Finds what each pixel sees of some triangles, in windows. With a floor, the CPU passes over
+    /// those that are hidden by others, or, where there is one, by what is seen before it: of some
+    /// pixels the inverse depth behind which nothing is wanted.
     pub(super) fn meet(
         &mut self,
         model: &Model,
         parts: &[(Runs<'_>, Window)],
         camera: &Pinhole,
-    ) -> Option<usize> {
+        floor: Option<&Vec<f32>>,
+    ) -> Met {
+        let tried = parts.iter().map(|(runs, _)| runs.count()).sum();
         if let Some(gpu) = &mut self.gpu {
             let mut drawn = self.drawn.take().unwrap_or_default();
             match gpu.draw(model, parts, camera, &mut drawn) {
                 Ok(()) => {
                     self.drawn = Some(drawn);
-                    return None;
+                    return Met {
+                        tried,
+                        touching: None,
+                    };
                 }
                 Err(error) => {
                     let is_lost = gpu.is_lost();
@@ -131,10 +139,17 @@ impl Painter {
         }
         self.drawn = None;
         self.raster.clear(camera);
+        if let Some(floor) = floor {
+            let (raster, hidden) = (&self.raster, &mut self.hidden);
+            return meet(model, parts, camera, floor, raster, hidden);
+        }
         let draw = |(runs, window): &(Runs<'_>, Window)| {
             self.raster.draw(model, &runs.lists, camera, window, None)
         };
-        Some(parts.iter().map(draw).sum())
+        Met {
+            tried,
+            touching: Some(parts.iter().map(draw).sum()),
+        }
     }
 
     /// The inverse depth of what a pixel sees, if it sees anything.

@@ -5,7 +5,7 @@
 
 use super::reference::lens;
 use super::{Captured, Pinhole, Reference, Target, normal_at};
-use crate::RenderError;
+use crate::{Lumigraph, PhotoError, RenderError};
 use calibrate::{Distortion, Lens, View};
 use capture::DepthMap;
 use glam::{DVec2, DVec3};
@@ -21,7 +21,7 @@ pub struct DepthMaps {
     /// By source view.
     has: Vec<bool>,
     load: Box<dyn Fn(usize) -> Result<DepthMap, String> + Send + Sync>,
-    noise: OnceLock<Option<DepthNoise>>,
+    noise: OnceLock<Result<DepthNoise, String>>,
 }
 
 impl DepthMaps {
@@ -38,26 +38,34 @@ impl DepthMaps {
         }
     }
 
-    /// How noisy those are that can be decoded; nothing where they say nothing.
-    fn noise(&self, view: impl Fn(usize) -> View) -> Option<DepthNoise> {
-        *self.noise.get_or_init(|| {
+    /// How noisy those are that can be decoded.
+    ///
+    /// # Errors
+    /// They say nothing, or what is wrong with the first if none can be decoded.
+    fn noise(&self, view: impl Fn(usize) -> View) -> Result<DepthNoise, String> {
+        let found = self.noise.get_or_init(|| {
             let with: Vec<usize> = (0..self.has.len()).filter(|i| self.has[*i]).collect();
+            let mut first_error = None;
             let frame = |k: usize| {
                 let view = view(with[k]);
                 let (width, height) = (view.width, view.height);
                 let count = width as usize * height as usize;
                 let fits =
                     |m: &DepthMap| (m.width, m.height, m.depths.len()) == (width, height, count);
-                let map = (self.load)(with[k]).ok().filter(fits);
+                let map = (self.load)(with[k]);
+                let map = map.map_err(|error| first_error.get_or_insert(error).clone());
                 let nothing = || DepthMap {
                     width,
                     height,
                     depths: vec![0.0; count],
                 };
-                Ok::<_, String>((view, map.unwrap_or_else(nothing)))
+                let map = map.ok().filter(fits).unwrap_or_else(nothing);
+                Ok::<_, String>((view, map))
             };
-            depth::noise(with.len(), frame).ok()
-        })
+            let noise = depth::noise(with.len(), frame);
+            noise.map_err(|error| first_error.unwrap_or_else(|| error.to_string()))
+        });
+        found.clone()
     }
 }
 
@@ -115,8 +123,15 @@ pub(super) fn photographed(
         camera_from_world: place.camera_from_world,
     });
     let sources = &captured.lumigraph().sources;
-    let noise = maps.noise(|i| sources[i].view.clone());
-    let (Ok(camera), Some(noise)) = (camera, noise) else {
+    let noise = match maps.noise(|i| sources[i].view.clone()) {
+        Ok(noise) => noise,
+        Err(error) => {
+            let why = "LDIs are made of views: the depth maps cannot be used";
+            captured.note(format!("{why}: {error}"));
+            return Ok(None);
+        }
+    };
+    let Ok(camera) = camera else {
         return Ok(None);
     };
     // 1. Who may see it.
@@ -130,16 +145,29 @@ pub(super) fn photographed(
         })
         .collect();
     ranked.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    // 2. What they show.
+    // 2. What they show; as many at once as may be missing, and judged in their order.
     let opening = Opening::new(portal, side);
     let mut found: Vec<(usize, Reference)> = Vec::new();
-    for (_, _, i) in ranked.into_iter().take(TRIED * side.len()) {
-        if found.len() == side.len() {
-            break;
+    let mut rest: Vec<usize> = ranked.into_iter().map(|(_, _, i)| i).collect();
+    rest.truncate(TRIED * side.len());
+    while !rest.is_empty() && found.len() < side.len() {
+        let later = rest.split_off(rest.len().min(side.len() - found.len()));
+        let (lumigraph, maps) = (captured.lumigraph(), captured.depth_maps());
+        let image = |i: &usize| image(lumigraph, maps?, *i, noise, &opening, place).transpose();
+        let images: Vec<Option<Result<Reference, Unusable>>> = rest.par_iter().map(image).collect();
+        for (i, image) in rest.into_iter().zip(images) {
+            match image {
+                Some(Ok(image)) => found.push((i, image)),
+                Some(Err(Unusable::DepthMap(error))) => {
+                    let name = &captured.lumigraph().sources[i].name;
+                    let note = format!("the depth map of photo {name} is left out: {error}");
+                    captured.note(note);
+                }
+                Some(Err(Unusable::Photo(error))) => captured.leave_out(error)?,
+                None => {}
+            }
         }
-        if let Some(image) = image(captured, i, noise, &opening, place)? {
-            found.push((i, image));
-        }
+        rest = later;
     }
     // 3. Exposed alike.
     let sources = &captured.lumigraph().sources;
@@ -232,34 +260,32 @@ impl Opening {
     }
 }
 
-/// What a photo shows through an opening, in its own colours; nothing where that is hardly anything,
-/// or it cannot be decoded.
+/// Why a photo is of no use.
+enum Unusable {
+    DepthMap(String),
+    Photo(PhotoError),
+}
+
+/// What a photo shows through an opening, in its own colours; nothing where that is hardly anything.
+///
+/// # Errors
+/// Its depth map, or itself, cannot be decoded.
 fn image(
-    captured: &mut Captured,
+    lumigraph: &Lumigraph,
+    maps: &DepthMaps,
     source_idx: usize,
     noise: DepthNoise,
     opening: &Opening,
     place: &SemicircleView,
-) -> Result<Option<Reference>, RenderError> {
+) -> Result<Option<Reference>, Unusable> {
     // 1. The depths that neighbours confirm.
-    let source = &captured.lumigraph().sources[source_idx];
-    let (view, name) = (source.view.clone(), source.name.clone());
-    let Some(maps) = captured.depth_maps() else {
-        return Ok(None);
-    };
+    let view = lumigraph.sources[source_idx].view.clone();
     let believed = |map: DepthMap| {
         let inverse = depth::believed(&view, &map, noise, MAX_SLANT);
         inverse.map_err(|e: DepthError| e.to_string())
     };
-    let inverse = match (maps.load)(source_idx).and_then(believed) {
-        Ok(inverse) => inverse,
-        Err(error) => {
-            captured.note(format!(
-                "the depth map of photo {name} is left out: {error}"
-            ));
-            return Ok(None);
-        }
-    };
+    let inverse = (maps.load)(source_idx).and_then(believed);
+    let inverse = inverse.map_err(Unusable::DepthMap)?;
     // 2. In a camera without distortion, by the nearest pixels.
     let straight = View {
         lens: Lens::pinhole(view.lens.focal, view.lens.principal),
@@ -301,14 +327,8 @@ fn image(
         return Ok(None);
     }
     // 4. Its colours.
-    let photos = &captured.lumigraph().photos;
-    let photo = match photos.get(source_idx) {
-        Ok(photo) => photo,
-        Err(error) => {
-            captured.leave_out(error)?;
-            return Ok(None);
-        }
-    };
+    let photos = &lumigraph.photos;
+    let photo = photos.get(source_idx).map_err(Unusable::Photo)?;
     let texels = &photo.levels[0];
     let mask = photos.mask(source_idx).map(|mask| &mask.levels[0]);
     let mut seen = Target::new(view.width, view.height);

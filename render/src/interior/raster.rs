@@ -46,6 +46,11 @@ impl Beyond {
         Self { normal, distance }
     }
 
+    /// Whether the eye is before the plane, not on it or beyond.
+    pub(super) fn is_ahead(&self) -> bool {
+        self.distance > 0.0
+    }
+
     /// The inverse depth of the plane along a ray with z = 1; infinite where the eye is
     /// on the plane, and not positive where the ray does not meet it.
     pub fn inverse_depth(&self, ray: DVec3) -> f64 {
@@ -67,6 +72,8 @@ impl Beyond {
 struct Ready {
     edges: [DVec3; 3],
     inverse_depth: DVec3,
+    /// The greatest inverse depth of its corners; infinite where one is not in front.
+    nearest: f64,
     columns: [u32; 2],
     rows: [u32; 2],
 }
@@ -108,13 +115,25 @@ impl Raster {
         beyond: Option<&Beyond>,
     ) -> usize {
         assert_eq!(self.width, camera.width, "cleared for the camera");
+        let list = |list: &&[u32]| self.draw_list(model, list, camera, window, beyond);
+        lists.par_iter().with_min_len(GRAIN).map(list).sum()
+    }
+
+    /// One list of [`Self::draw`]'s.
+    pub(super) fn draw_list(
+        &self,
+        model: &Model,
+        list: &[u32],
+        camera: &Pinhole,
+        window: &Window,
+        beyond: Option<&Beyond>,
+    ) -> usize {
         let draw = |i: &u32| {
             let corners = model.mesh.corners(*i as usize).map(|p| camera.point(p));
             let ready = Ready::new(corners, camera);
             usize::from(ready.is_some_and(|t| self.fill(&t, *i, camera, window, beyond)))
         };
-        let list = |list: &&[u32]| -> usize { list.iter().map(draw).sum() };
-        lists.par_iter().with_min_len(GRAIN).map(list).sum()
+        list.iter().map(draw).sum()
     }
 
     fn fill(
@@ -161,7 +180,11 @@ impl Raster {
                     continue;
                 }
                 inside = true;
-                let inverse_depth = depth.x * dx + depth_rest;
+                let mut inverse_depth = depth.x * dx + depth_rest;
+                // Rounding does not bring what is seen edge on before its corners.
+                if inverse_depth > triangle.nearest {
+                    inverse_depth = triangle.nearest;
+                }
                 let stored = inverse_depth as f32;
                 if !(stored > 0.0 && stored.is_finite()) {
                     continue;
@@ -186,6 +209,11 @@ impl Raster {
         let key = self.keys[pixel].load(Relaxed);
         let bits = (key >> 32) as u32;
         (key != 0).then(|| (!(key as u32), f32::from_bits(bits)))
+    }
+
+    /// The inverse depth of what a pixel sees, 0 for nothing.
+    pub(super) fn inverse_depth(&self, pixel: usize) -> f32 {
+        f32::from_bits((self.keys[pixel].load(Relaxed) >> 32) as u32)
     }
 
     /// Colours what was drawn, but for pixels that `is_wanted` declines (by pixel, and its inverse
@@ -269,6 +297,11 @@ impl Ready {
     /// `None` where no pixel's centre can be inside.
     fn new(corners: [DVec3; 3], camera: &Pinhole) -> Option<Self> {
         let (columns, rows) = pixels_around(&corners, camera)?;
+        let depth = corners.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        let nearest = match depth > 0.0 {
+            true => 1.0 / depth,
+            false => f64::INFINITY,
+        };
         let [a, b, c] = edges(corners);
         let volume = corners[0].dot(a);
         let (edges, volume) = match volume < 0.0 {
@@ -280,6 +313,7 @@ impl Ready {
         inverse_depth.is_finite().then_some(Self {
             edges,
             inverse_depth,
+            nearest,
             columns,
             rows,
         })

@@ -119,7 +119,7 @@ impl Reference {
             true => all_cells(interior, &region),
             false => visible_through(interior, place.portal, place.into, eye, &region),
         };
-        let runs = geometry.seen(eye, &visibility);
+        let runs = geometry.seen(eye, &visibility, &region);
         let beyond = plane_of(&camera, portal, Some(place.into));
         let mut raster = Raster::default();
         raster.clear(&camera);

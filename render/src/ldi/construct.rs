@@ -5,6 +5,8 @@ use super::{Layered, LdiError, Look, Sample};
 use crate::interior::{Pinhole, Reference, Warp, normal_at};
 use glam::{DVec2, DVec3};
 use proxy::interior::SemicircleView;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// When two samples count as one surface, and what becomes of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,6 +68,7 @@ pub struct Constructed {
 }
 
 /// A sample while the LDI is made; lists of them hang on pixels.
+#[derive(Clone, Copy)]
 struct Node {
     sample: Sample,
     /// The patch's area.
@@ -80,6 +83,8 @@ struct Node {
 }
 
 const NONE: u32 = u32::MAX;
+/// Bands of rows that are made at once.
+const BANDS: usize = 16;
 /// The least cosine that a patch's area is divided by.
 const GRAZING: f64 = 1e-3;
 /// Measured depths that differ by up to so many standard deviations of their difference may be of
@@ -143,11 +148,14 @@ fn made(
     let (mut low, mut high) = (DVec2::ZERO, size);
     for image in &images[usize::from(first == 0)..] {
         let warp = Warp::new(&image.camera, camera);
-        for (pixel, s) in pixels(image) {
-            if let Some(at) = warp.at(pixel, s) {
-                (low, high) = (low.min(at.pixel), high.max(at.pixel));
-            }
-        }
+        let of_row = |y: u32| {
+            let row = pixels(image, y).filter_map(|(pixel, s)| warp.at(pixel, s));
+            row.fold((low, high), |(low, high), at| {
+                (low.min(at.pixel), high.max(at.pixel))
+            })
+        };
+        let rows = (0..image.seen.height).into_par_iter().map(of_row);
+        (low, high) = rows.reduce(|| (low, high), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     }
     let most = (room * size).floor();
     let low = low.floor().max(-most);
@@ -159,33 +167,28 @@ fn made(
         [size.x as u32, size.y as u32],
     );
     let width = view.width as usize;
-    let mut made = Making {
-        heads: vec![NONE; width * view.height as usize],
-        nodes: Vec::new(),
-        options: *options,
-        merged: 0,
-    };
     let ldi_camera = Pinhole::new(&view)?;
-    // 2. Samples, image by image.
+    // 2. Samples, image by image, into bands of the LDI, each of which keeps that order.
+    let rows = (view.height as usize).div_ceil(BANDS);
+    let mut bands: Vec<Making> = (0..BANDS)
+        .map(|band| {
+            let of = |row: usize| width * row.min(view.height as usize);
+            Making::new(of(band * rows)..of((band + 1) * rows), *options)
+        })
+        .collect();
     let (mut offered, mut outside) = (0, 0);
     for (rank, &image) in (first..).zip(images) {
         let warp = Warp::new(&image.camera, &ldi_camera);
         let turn = ldi_camera.rotation * image.camera.rotation.transpose();
-        for (pixel, s) in pixels(image) {
-            offered += 1;
-            let Some(at) = warp.at(pixel, s) else {
-                outside += 1;
-                continue;
-            };
+        let node = |(pixel, s): (DVec2, f64)| {
+            let at = warp.at(pixel, s)?;
             let corner = at.pixel.floor();
             let inverse_depth = at.inverse_depth as f32;
             let is_inside = corner.cmpge(DVec2::ZERO).all() && corner.cmplt(size).all();
             if !is_inside || !(inverse_depth > 0.0) || !inverse_depth.is_finite() {
-                outside += 1;
-                continue;
+                return None;
             }
             let (normal, area) = patch(image, pixel, s);
-            let at_pixel = corner.y as usize * width + corner.x as usize;
             let offset = (256.0 * (at.pixel - corner - 0.5)).floor();
             let sample = Sample {
                 color: image.seen.color[index(image, pixel)],
@@ -195,77 +198,53 @@ fn made(
             };
             // Depth here is there / s plus what no depth changes.
             let change = warp.pixel_from_pixel.row(2).dot(pixel.extend(1.0)).abs() / (s * s);
-            made.add(
-                Node {
-                    sample,
-                    area,
-                    image: rank,
-                    of: 1,
-                    deviation: noise * change,
-                    next: made.heads[at_pixel],
-                },
-                at_pixel,
-            );
-        }
+            let node = Node {
+                sample,
+                area,
+                image: rank,
+                of: 1,
+                deviation: noise * change,
+                next: NONE,
+            };
+            Some((corner.y as usize * width + corner.x as usize, node))
+        };
+        let row = |y: u32| -> Vec<Option<(usize, Node)>> { pixels(image, y).map(node).collect() };
+        let nodes: Vec<_> = (0..image.seen.height).into_par_iter().map(row).collect();
+        let all = || nodes.iter().flatten();
+        offered += all().count();
+        outside += all().filter(|node| node.is_none()).count();
+        bands.par_iter_mut().for_each(|band| {
+            for (pixel, node) in all().flatten() {
+                if band.pixels.contains(pixel) {
+                    band.add(*node, *pixel);
+                }
+            }
+        });
     }
     // 3. Back to front.
-    let mut counts = Vec::with_capacity(made.heads.len());
-    let mut samples: Vec<Sample> = Vec::with_capacity(made.nodes.len());
-    let (mut crowded, mut before_center) = (0, 0);
-    let mut pixel: Vec<&Node> = Vec::new();
-    for head in &made.heads {
-        pixel.clear();
-        let mut at = *head;
-        while let Some(node) = made.nodes.get(at as usize) {
-            pixel.push(node);
-            at = node.next;
-        }
-        let depth = |node: &Node| node.sample.inverse_depth;
-        pixel.sort_by(|a, b| {
-            let in_front = |node: &Node| options.center_in_front && node.image == 0;
-            let slot = in_front(a).cmp(&in_front(b));
-            slot.then(depth(a).total_cmp(&depth(b)))
-                .then(a.image.cmp(&b.image))
-        });
-        let center = pixel.iter().find(|node| node.image == 0).copied();
-        if let Some(center) = center {
-            let nearer = pixel.iter().filter(|node| depth(node) > depth(center));
-            before_center += nearer.count();
-        }
-        // Of too many the farthest go, but for the central image's.
-        let most = pixel.len().min(Layered::MOST);
-        let from = pixel.len() - most;
-        crowded += from;
-        if from > 0
-            && let Some(i) = pixel[..from].iter().position(|node| node.image == 0)
-        {
-            pixel[i..=from].rotate_left(1);
-        }
-        counts.push(most as u8);
-        samples.extend(pixel[from..].iter().map(|node| node.sample));
-    }
+    let sorted: Vec<Sorted> = bands.par_iter().map(Making::sorted).collect();
+    let counts: Vec<u8> = sorted.iter().flat_map(|s| &s.counts).copied().collect();
+    let samples: Vec<Sample> = sorted.iter().flat_map(|s| &s.samples).copied().collect();
+    let crowded = sorted.iter().map(|s| s.crowded).sum();
+    let before_center = sorted.iter().map(|s| s.before_center).sum();
+    let merged = bands.iter().map(|band| band.merged).sum();
     let ldi = Layered::new(view, place.portal.0, &counts, samples.into_iter())?;
     Ok(Constructed {
         ldi,
         offered,
-        merged: made.merged,
+        merged,
         outside,
         crowded,
         before_center,
     })
 }
 
-/// The middles of pixels that show anything, with their inverse depths.
-fn pixels(image: &Reference) -> impl Iterator<Item = (DVec2, f64)> + '_ {
-    let width = image.seen.width.max(1);
-    let depths = image.seen.inverse_depth.iter().enumerate();
-    depths.filter(|(_, s)| **s > 0.0).map(move |(i, s)| {
-        let (x, y) = (i as u32 % width, i as u32 / width);
-        (
-            DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5),
-            f64::from(*s),
-        )
-    })
+/// The middles of a row's pixels that show anything, with their inverse depths.
+fn pixels(image: &Reference, y: u32) -> impl Iterator<Item = (DVec2, f64)> + '_ {
+    let width = image.seen.width as usize;
+    let row = &image.seen.inverse_depth[y as usize * width..][..width];
+    let seen = row.iter().enumerate().filter(|(_, s)| **s > 0.0);
+    seen.map(move |(x, s)| (DVec2::new(x as f64, f64::from(y)) + 0.5, f64::from(*s)))
 }
 
 fn index(image: &Reference, pixel: DVec2) -> usize {
@@ -285,18 +264,84 @@ fn patch(image: &Reference, pixel: DVec2, s: f64) -> (DVec3, f64) {
     (normal, area)
 }
 
-/// An LDI that is being made.
+/// A band of rows of an LDI that is being made.
 struct Making {
+    /// Its pixels, counted row by row.
+    pixels: Range<usize>,
     heads: Vec<u32>,
     nodes: Vec<Node>,
     options: ConstructOptions,
     merged: usize,
 }
 
+/// What a band holds in the end.
+struct Sorted {
+    /// By pixel.
+    counts: Vec<u8>,
+    /// Pixel by pixel, back to front.
+    samples: Vec<Sample>,
+    crowded: usize,
+    before_center: usize,
+}
+
 impl Making {
+    fn new(pixels: Range<usize>, options: ConstructOptions) -> Self {
+        Self {
+            heads: vec![NONE; pixels.len()],
+            pixels,
+            nodes: Vec::new(),
+            options,
+            merged: 0,
+        }
+    }
+
+    fn sorted(&self) -> Sorted {
+        let mut sorted = Sorted {
+            counts: Vec::with_capacity(self.heads.len()),
+            samples: Vec::with_capacity(self.nodes.len()),
+            crowded: 0,
+            before_center: 0,
+        };
+        let mut pixel: Vec<&Node> = Vec::new();
+        for head in &self.heads {
+            pixel.clear();
+            let mut at = *head;
+            while let Some(node) = self.nodes.get(at as usize) {
+                pixel.push(node);
+                at = node.next;
+            }
+            let depth = |node: &Node| node.sample.inverse_depth;
+            pixel.sort_by(|a, b| {
+                let in_front = |node: &Node| self.options.center_in_front && node.image == 0;
+                let slot = in_front(a).cmp(&in_front(b));
+                slot.then(depth(a).total_cmp(&depth(b)))
+                    .then(a.image.cmp(&b.image))
+            });
+            let center = pixel.iter().find(|node| node.image == 0).copied();
+            if let Some(center) = center {
+                let nearer = pixel.iter().filter(|node| depth(node) > depth(center));
+                sorted.before_center += nearer.count();
+            }
+            // Of too many the farthest go, but for the central image's.
+            let most = pixel.len().min(Layered::MOST);
+            let from = pixel.len() - most;
+            sorted.crowded += from;
+            if from > 0
+                && let Some(i) = pixel[..from].iter().position(|node| node.image == 0)
+            {
+                pixel[i..=from].rotate_left(1);
+            }
+            sorted.counts.push(most as u8);
+            let samples = pixel[from..].iter().map(|node| node.sample);
+            sorted.samples.extend(samples);
+        }
+        sorted
+    }
+
     /// Puts a sample into a pixel's list, or merges it with the one nearest in depth of those that it
     /// is in conflict with.
     fn add(&mut self, new: Node, pixel: usize) {
+        let pixel = pixel - self.pixels.start;
         let (sample, s) = (new.sample, f64::from(new.sample.inverse_depth));
         let mut found: Option<(usize, f64)> = None;
         let mut at = self.heads[pixel];
@@ -320,7 +365,8 @@ impl Making {
             at = node.next;
         }
         let Some((i, _)) = found else {
-            self.nodes.push(new);
+            let next = self.heads[pixel];
+            self.nodes.push(Node { next, ..new });
             self.heads[pixel] = self.nodes.len() as u32 - 1;
             return;
         };

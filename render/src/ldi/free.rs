@@ -664,11 +664,21 @@ fn add(
     let [red, green, blue, sum] = sums;
     for below in 0..tiles.count[1] {
         for right in 0..tiles.count[0] {
+            let column = (tiles.first[0] + right * WIDE as i32) as usize;
+            let row = |j: usize| (tiles.first[1] + below * WIDE as i32 + j as i32) as usize;
+            // Most of what is behind something is so all over.
+            let mut is_any = false;
+            for y in (0..WIDE).map(row).filter(|y| *y < BAND) {
+                let nearest = *row_of(depths, y * at.stride + column);
+                is_any |= nearest.iter().fold(false, |any, n| any | is_same(s, *n));
+            }
+            if !is_any {
+                continue;
+            }
             let across = weights(tiles.offset[0], right, narrow[0], reach[0]);
             let down = weights(tiles.offset[1], below, narrow[1], reach[1]);
-            let column = (tiles.first[0] + right * WIDE as i32) as usize;
             for j in 0..WIDE {
-                let y = (tiles.first[1] + below * WIDE as i32 + j as i32) as usize;
+                let y = row(j);
                 if y >= BAND || down[j] == 0.0 {
                     continue;
                 }
@@ -676,8 +686,8 @@ fn add(
                 let nearest = *row_of(depths, i);
                 let mut here = [0.0; WIDE];
                 for k in 0..WIDE {
-                    let is_same = (s >= nearest[k]) & (nearest[k] > 0.0);
-                    here[k] = if is_same { down[j] * across[k] } else { 0.0 };
+                    let weight = down[j] * across[k];
+                    here[k] = if is_same(s, nearest[k]) { weight } else { 0.0 };
                 }
                 more(row_of(red, i), here, r);
                 more(row_of(green, i), here, g);
@@ -686,6 +696,12 @@ fn add(
             }
         }
     }
+}
+
+/// Whether a sample counts where that is the farthest that does; 0 where nothing is.
+#[inline(always)]
+fn is_same(s: f32, farthest: f32) -> bool {
+    (s >= farthest) & (farthest > 0.0)
 }
 
 /// e⁻ᵗ within 6 % of 1 for t ≥ 0: (1 − t/16)¹⁶, zero from 16 on.

@@ -5,7 +5,7 @@
 mod shared;
 
 use calibrate::View;
-use proxy::interior::{Contents, Interior, visible};
+use proxy::interior::{Contents, Interior, Region, visible};
 use render::interior::{CellGeometry, Runs, Target};
 #[allow(unused_imports)]
 pub(crate) use shared::{random, room, small_house, view, viewpoint};
@@ -18,7 +18,8 @@ pub(crate) fn drawn<'a>(
     view: &View,
 ) -> Runs<'a> {
     let cell = contents.locate(interior, view.center());
-    geometry.seen(view.center(), &visible(interior, cell, view))
+    let visibility = visible(interior, cell, view);
+    geometry.seen(view.center(), &visibility, &Region::of(view))
 }
 
 /// A picture with what its edges follow from.

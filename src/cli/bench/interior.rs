@@ -1,4 +1,5 @@
-//! An interior measured: what portals show, against the model drawn whole.
+//! An interior measured: what portals show, against the model drawn whole, of a capture from its
+//! photos.
 
 use super::measure::{Effort, Measured, Pictures, Skip, Subject, Times, in_turn, skip, timed};
 use anyhow::Context;
@@ -9,8 +10,7 @@ use indicatif::ProgressBar;
 use lumigraph::bench::before_doorways;
 use proxy::interior::{Contents, Interior, SemicircleOptions};
 use proxy::mesh::Model;
-use render::DeviceChoice;
-use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, PortalFill, Splat, Walk, WalkOptions};
 use render::score::{PSNR_CAP_DB, score};
 use std::collections::BTreeMap;
 
@@ -103,48 +103,47 @@ fn views(interior: &Interior, contents: &Contents, effort: Effort) -> Vec<View> 
         .collect()
 }
 
-/// Measures an interior.
+/// Measures an interior. One painter draws all settings in turn, as it holds the model, or the photos.
 pub(super) fn measure(
     interior: &Interior,
     contents: &Contents,
     model: &Model,
+    mut painter: Painter,
     name: &str,
     effort: Effort,
-    device: DeviceChoice,
     bar: &ProgressBar,
 ) -> anyhow::Result<(Subject, Pictures)> {
     let views = views(interior, contents, effort);
     let first_view = views.first();
     let first_view =
         first_view.context("no portal can be looked through from where one can stand")?;
-    let settings = settings(effort.thorough);
+    let mut settings = settings(effort.thorough);
+    if painter.captured().is_some() {
+        for setting in settings.iter_mut().filter(|s| s.knob != "ldi of pixels") {
+            setting.options.library.size = CAPTURED_REFERENCE_SIZE;
+        }
+    }
     bar.set_length(settings.len() as u64 * (1 + effort.repeats as u64));
     bar.set_message(format!("{name}: measuring"));
-    let walk = |options: WalkOptions| {
-        Walk::with(
-            Painter::open(device, model),
-            interior,
-            contents,
-            model,
-            options,
-        )
-    };
+    let drawn_by = painter.description();
 
     // 1. The truth, then each setting's first picture, with making its images, and its error.
-    let mut whole = walk(WalkOptions {
+    let whole = WalkOptions {
         whole_cells: true,
         ..WalkOptions::default()
-    });
+    };
+    let mut whole = Walk::with(painter, interior, contents, model, whole);
     let mut truths = Vec::new();
     for view in &views {
         whole.draw(view, PortalFill::Geometry)?;
         truths.push(whole.picture().picture());
     }
+    painter = std::mem::take(whole.painter_mut());
     let mut walks = Vec::new();
     let mut measured = Vec::new();
     let mut pictures = None;
     for setting in &settings {
-        let mut walk = walk(setting.options);
+        let mut walk = Walk::with(painter, interior, contents, model, setting.options);
         let (drawn, first) = timed(|| walk.draw(first_view, setting.fill).map(drop));
         drawn?;
         let (image_bytes, images_made) = {
@@ -192,6 +191,7 @@ pub(super) fn measure(
             steps_from_exact: steps,
             psnr_to_exact: (20.0 * (255.0 / steps).log10()).min(PSNR_CAP_DB),
         });
+        painter = std::mem::take(walk.painter_mut());
         walks.push(walk);
         bar.inc(1);
     }
@@ -202,12 +202,22 @@ pub(super) fn measure(
         effort.repeats,
         views.len(),
         bar,
-        |i, view| Ok(walks[i].draw(&views[view], settings[i].fill).map(drop)?),
+        |i, view| {
+            std::mem::swap(walks[i].painter_mut(), &mut painter);
+            let drawn = walks[i].draw(&views[view], settings[i].fill).map(drop);
+            std::mem::swap(walks[i].painter_mut(), &mut painter);
+            Ok(drawn?)
+        },
     )?;
     for (measured, repeats) in measured.iter_mut().zip(&repeats) {
         measured.set_times(repeats);
     }
-    let skips = skips(&walk, first_view)?;
+    let mut base = WalkOptions::default();
+    if painter.captured().is_some() {
+        base.library.size = CAPTURED_REFERENCE_SIZE;
+    }
+    let walk = |options| Walk::with(Painter::default(), interior, contents, model, options);
+    let skips = skips(&walk, base, &mut painter, first_view)?;
     let about = format!(
         "{} cells, {} portals, {} triangles; {} views through portals, up to 45° off their axis, \
          {} × {}; geometry drawn by {}",
@@ -217,7 +227,7 @@ pub(super) fn measure(
         views.len(),
         first_view.width,
         first_view.height,
-        whole.painter().description(),
+        drawn_by,
     );
     let result = Subject {
         name: name.to_owned(),
@@ -240,8 +250,12 @@ pub(super) fn measure(
 }
 
 /// Each on its own, of the first view.
-fn skips<'a>(walk: &dyn Fn(WalkOptions) -> Walk<'a>, view: &View) -> anyhow::Result<Vec<Skip>> {
-    let base = WalkOptions::default();
+fn skips<'a>(
+    walk: &dyn Fn(WalkOptions) -> Walk<'a>,
+    base: WalkOptions,
+    painter: &mut Painter,
+    view: &View,
+) -> anyhow::Result<Vec<Skip>> {
     let whole_cells = WalkOptions {
         whole_cells: true,
         ..base
@@ -256,7 +270,9 @@ fn skips<'a>(walk: &dyn Fn(WalkOptions) -> Walk<'a>, view: &View) -> anyhow::Res
         ("columns", PortalFill::Ldi, whole_ldis),
     ] {
         let (mut with, mut without) = (walk(base), walk(changed));
+        std::mem::swap(with.painter_mut(), painter);
         let cost = with.draw(view, fill)?;
+        std::mem::swap(with.painter_mut(), painter);
         let fired = match name {
             "cells" => (cost.triangles_in_cells - cost.triangles_tried, "triangles"),
             _ => (cost.samples_clipped, "samples"),
@@ -264,7 +280,9 @@ fn skips<'a>(walk: &dyn Fn(WalkOptions) -> Walk<'a>, view: &View) -> anyhow::Res
         let fired = (fired.0 > 0).then(|| format!("{} {}", fired.0, fired.1));
         all.push(skip(name, fired, |skips| {
             let walk = if skips { &mut with } else { &mut without };
+            std::mem::swap(walk.painter_mut(), painter);
             let (drawn, times) = timed(|| walk.draw(view, fill).map(drop));
+            std::mem::swap(walk.painter_mut(), painter);
             drawn?;
             Ok((walk.picture().picture(), times))
         })?);

@@ -10,6 +10,8 @@ mod settings;
 mod stress;
 
 use super::Usage;
+use super::captured::Opened;
+use super::exposure::ExposureArgs;
 use super::options::DeviceName;
 use super::output::{print, print_json, say, write_file};
 use super::session::progress;
@@ -20,6 +22,7 @@ use judge::judge;
 use lumigraph::scene::Scene;
 use measure::{Effort, Pictures, Subject};
 use proxy::interior::Contents;
+use render::interior::Painter;
 use report::{Thumbnails, page, thumbnails};
 use scaling::Scaling;
 use scatter::round;
@@ -230,13 +233,20 @@ fn measure_one(
     };
     match given {
         Given::Folder(folder) if folder.join(super::interior::INTERIOR).is_file() => {
-            let (path, interior) = super::interior::open(folder)?;
-            let model = super::walk::model_of(&path, &interior)?;
-            let (contents, warnings) = Contents::new(&interior, &model)?;
-            for warning in warnings {
-                say!("warning: {warning}");
-            }
-            interior::measure(&interior, &contents, &model, name, effort, device, bar)
+            let warn = |text| say!("warning: {text}");
+            let exposure = ExposureArgs::default();
+            let mut opened = Opened::new(folder, Some(&exposure), warn)?;
+            let painter = opened.painter(device, None)?;
+            let (interior, contents) = (&opened.interior, &opened.contents);
+            interior::measure(
+                interior,
+                contents,
+                &opened.model,
+                painter,
+                name,
+                effort,
+                bar,
+            )
         }
         Given::Folder(folder) => scene(folder),
         Given::Synthetic("house") => {
@@ -248,7 +258,8 @@ fn measure_one(
             let house = house(&options)?;
             let (contents, _) = Contents::new(&house.interior, &house.model)?;
             let (interior, model) = (&house.interior, &house.model);
-            interior::measure(interior, &contents, model, name, effort, device, bar)
+            let painter = Painter::open(device, model);
+            interior::measure(interior, &contents, model, painter, name, effort, bar)
         }
         Given::Synthetic(dataset) => {
             let folder = tempfile::tempdir()?;
