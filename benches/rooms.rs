@@ -4,7 +4,7 @@
 use calibrate::{Camera, ImageId, Lens, colmap};
 use clap::Parser;
 use cpu_time::ProcessTime;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use lumigraph::scene::Scene;
 use proxy::interior::Contents;
 use proxy::interior::find::FindOptions;
@@ -121,7 +121,15 @@ fn measure(capture: &Path, given: &Path) -> Result<(), Box<dyn Error>> {
         640,
         512,
     );
-    let path = Tour::new(&interior, &contents, &model, &camera, 200, 15.0)?.path;
+    let path = Tour::new(&interior, &contents, &model, &camera, 1500, 15.0)?.path;
+    let walls = Solid::new(MeshKind::Mesh, model.mesh.clone());
+    let eyes: Vec<DVec3> = path.frames.iter().map(|f| f.view.center()).collect();
+    let crosses = |step: &&[DVec3]| {
+        let hit = walls.first_hit(step[0], step[1] - step[0]);
+        hit.is_some_and(|hit| hit.along <= 1.0)
+    };
+    let crossed = eyes.windows(2).filter(crosses).count();
+    let steps = eyes.len() - 1;
     let painter = stage("photos made ready", || {
         let backdrop = scene.add_backdrop(&none, &mut model, &mut contents)?;
         let solid = Solid::new(MeshKind::Depth, model.mesh.clone());
@@ -151,7 +159,8 @@ fn measure(capture: &Path, given: &Path) -> Result<(), Box<dyn Error>> {
     let shown = start.elapsed().as_secs_f64();
     stage("again", || walk.draw(first, PortalFill::Geometry))?;
     println!(
-        " | {triangles} triangles, {:.1} MB, shown after {shown:.2} s",
+        " | {triangles} triangles, {:.1} MB, shown after {shown:.2} s, {crossed} of a tour's {steps} \
+         steps through them",
         bytes.len() as f64 / 1e6
     );
     Ok(())

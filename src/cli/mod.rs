@@ -81,7 +81,8 @@ struct Usage(String);
 /// usage, 1 for bad data.
 pub(super) fn main() -> ExitCode {
     let cli = Cli::parse();
-    let Err(error) = run(cli) else {
+    let done = start_threads(cli.threads).and_then(|()| run(cli));
+    let Err(error) = done else {
         return ExitCode::SUCCESS;
     };
     if let Some(Usage(message)) = error.downcast_ref() {
@@ -97,13 +98,16 @@ pub(super) fn main() -> ExitCode {
     ExitCode::from(1)
 }
 
-fn run(cli: Cli) -> anyhow::Result<()> {
-    // At once, as later there is nobody to tell that no more threads can be had.
-    let threads = cli.threads.map_or(0, NonZero::get);
+/// At once, as later there is nobody to tell that no more threads can be had.
+fn start_threads(threads: Option<NonZero<usize>>) -> anyhow::Result<()> {
+    let threads = threads.map_or(0, NonZero::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
     pool.build_global().context(
         "worker threads cannot be started; try fewer --threads, or a higher limit (ulimit -u, -v)",
-    )?;
+    )
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Import(args) => import::run(&args),

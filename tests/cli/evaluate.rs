@@ -69,8 +69,10 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
             assert!((result["mean"][key].as_f64().unwrap() - sum / 3.0).abs() < 1e-9);
         }
         let mean = |key: &str| result["mean"][key].as_f64().unwrap();
-        // Nothing of the photo is ignored, so inside its mask is inside its matte.
-        assert_eq!(mean("coverage_matte"), mean("coverage_masked"));
+        // Nothing of the photo is ignored, so inside its mask is inside its matte. There a pixel
+        // counts by its alpha, here by whether that is half or more.
+        let rim = mean("coverage_matte") - mean("coverage_masked");
+        assert!((0.0..0.05).contains(&rim), "{rim}");
         [
             mean("coverage_matte"),
             mean("coverage_background"),
@@ -80,7 +82,7 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
     // What the silhouettes leave is the car and nothing else; a plane smears it.
     let [matte, background, points] = of("hull");
     assert!(
-        matte > 0.95 && background < 0.05 && points > 0.95,
+        matte > 0.98 && background < 0.05 && points > 0.98,
         "{matte} {background} {points}"
     );
     let [_, smeared, _] = of("plane");
