@@ -8,11 +8,15 @@ use serde::Serialize;
 /// How much a rendered picture covers of an object, and of what lies behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MatteCoverage {
-    /// The share of the pixels inside the object's matte that are covered, by half or more;
-    /// `None` where it is nowhere.
+    /// The mean alpha inside the object's matte, 0…1; `None` where it is nowhere.
     pub coverage_matte: Option<f64>,
-    /// The share of those outside that are: best is 0. `None` where all is object.
+    /// The mean alpha outside, 0…1: best is 0. `None` where all is object.
     pub coverage_background: Option<f64>,
+    /// The share of the pixels inside that are covered, by half or more: unlike a mean of alpha it
+    /// does not count the soft rim of the matte itself as a lack.
+    pub covered_matte: Option<f64>,
+    /// The share of those outside that are: best is 0.
+    pub covered_background: Option<f64>,
 }
 
 /// The share of the pixels at the given places that are covered: of the points that a photo
@@ -37,8 +41,7 @@ pub fn coverage_points(
 }
 
 /// How much a rendered picture covers of the pixels inside a matte, where it is half or more,
-/// and of the others. A mean of alpha would count the soft rim of the matte itself against it.
-/// Pixels that are `used` less than half count as neither.
+/// and of the others. Pixels that are `used` less than half count as neither.
 ///
 /// # Errors
 /// The sizes differ.
@@ -55,20 +58,25 @@ pub fn coverage_matte(
             });
         }
     }
-    // Those covered, and all: inside and outside.
-    let mut counts = [(0_usize, 0_usize); 2];
+    // The sums of alpha, those covered, and the pixels: inside and outside.
+    let mut sums = [(0_u64, 0_u64, 0_u64); 2];
     for (i, pixel) in rendered.pixels().enumerate() {
         if used.is_none_or(|used| used.as_raw()[i] >= HALF) {
-            let (covered, count) = &mut counts[usize::from(matte.as_raw()[i] < HALF)];
-            *covered += usize::from(pixel.0[3] >= HALF);
+            let (sum, covered, count) = &mut sums[usize::from(matte.as_raw()[i] < HALF)];
+            *sum += u64::from(pixel.0[3]);
+            *covered += u64::from(pixel.0[3] >= HALF);
             *count += 1;
         }
     }
     let [coverage_matte, coverage_background] =
-        counts.map(|(covered, count)| (count > 0).then(|| covered as f64 / count as f64));
+        sums.map(|(sum, _, count)| (count > 0).then(|| sum as f64 / (255.0 * count as f64)));
+    let [covered_matte, covered_background] =
+        sums.map(|(_, covered, count)| (count > 0).then(|| covered as f64 / count as f64));
     Ok(MatteCoverage {
         coverage_matte,
         coverage_background,
+        covered_matte,
+        covered_background,
     })
 }
 
@@ -80,6 +88,8 @@ pub fn mean_matte(coverages: &[MatteCoverage]) -> Option<MatteCoverage> {
     (!coverages.is_empty()).then(|| MatteCoverage {
         coverage_matte: mean(|c| c.coverage_matte),
         coverage_background: mean(|c| c.coverage_background),
+        covered_matte: mean(|c| c.covered_matte),
+        covered_background: mean(|c| c.covered_background),
     })
 }
 
@@ -124,12 +134,14 @@ mod tests {
         let rendered = RgbaImage::from_fn(10, 4, |x, y| match (x, y) {
             (_, 0) => Rgba([9, 9, 9, 0]),
             (0..5, _) => Rgba([9, 9, 9, 255]),
-            (5, _) => Rgba([9, 9, 9, 128]),
-            _ => Rgba([9, 9, 9, 127]),
+            (5, _) => Rgba([9, 9, 9, 51]),
+            _ => Rgba([0; 4]),
         });
         let found = coverage_matte(&rendered, &matte, None).unwrap();
         assert_eq!(found.coverage_matte, Some(0.75));
-        assert!((found.coverage_background.unwrap() - 3.0 / 20.0).abs() < 1e-12);
+        assert!((found.coverage_background.unwrap() - 0.2 * 3.0 / 20.0).abs() < 1e-12);
+        assert_eq!(found.covered_matte, Some(0.75));
+        assert_eq!(found.covered_background, Some(0.0));
 
         // What is ignored is neither.
         let used = GrayImage::from_fn(10, 4, |x, y| Luma([if x < 5 && y > 0 { 255 } else { 0 }]));

@@ -25,9 +25,10 @@ use std::path::PathBuf;
 /// which two or more other photos see (coverage_points), how far the photos that share a pixel
 /// are apart in steps of 255, details aside (seams), and processor time without decoding. Where
 /// a photo has an ignore mask or a matte, also PSNR, SSIM and coverage inside; with a matte, the
-/// share of covered pixels inside it (coverage_matte) and outside (coverage_background: best is
-/// 0). Held out are the photos that the capture's split.json names, else every 8th. With --period
-/// or --time-window each is rendered as of its own time.
+/// mean alpha inside it (coverage_matte) and outside (coverage_background: best is 0), and with
+/// --json the shares of pixels covered by half or more (covered_matte, covered_background). Held
+/// out are the photos that the capture's split.json names, else every 8th. With --period or
+/// --time-window each is rendered as of its own time.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]

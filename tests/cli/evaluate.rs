@@ -63,16 +63,21 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
         let keys: Vec<&String> = result["photos"][0].as_object().unwrap().keys().collect();
         assert_eq!(keys[6..8], ["coverage_points", "psnr_masked"]);
         assert_eq!(keys[10..12], ["coverage_matte", "coverage_background"]);
-        for key in ["coverage_matte", "coverage_background", "coverage_points"] {
+        assert_eq!(keys[12..14], ["covered_matte", "covered_background"]);
+        for key in [
+            "coverage_matte",
+            "coverage_background",
+            "coverage_points",
+            "covered_matte",
+            "covered_background",
+        ] {
             let photos = result["photos"].as_array().unwrap();
             let sum: f64 = photos.iter().map(|p| p[key].as_f64().unwrap()).sum();
             assert!((result["mean"][key].as_f64().unwrap() - sum / 3.0).abs() < 1e-9);
         }
         let mean = |key: &str| result["mean"][key].as_f64().unwrap();
-        // Nothing of the photo is ignored, so inside its mask is inside its matte. There a pixel
-        // counts by its alpha, here by whether that is half or more.
-        let rim = mean("coverage_matte") - mean("coverage_masked");
-        assert!(rim.abs() < 0.05, "{rim}");
+        // Nothing of the photo is ignored, so inside its mask is inside its matte.
+        assert_eq!(mean("coverage_matte"), mean("coverage_masked"));
         [
             mean("coverage_matte"),
             mean("coverage_background"),
@@ -82,7 +87,7 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
     // What the silhouettes leave is the car and nothing else; a plane smears it.
     let [matte, background, points] = of("hull");
     assert!(
-        matte > 0.98 && background < 0.05 && points > 0.98,
+        matte > 0.95 && background < 0.05 && points > 0.95,
         "{matte} {background} {points}"
     );
     let [_, smeared, _] = of("plane");
