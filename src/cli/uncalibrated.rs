@@ -127,6 +127,13 @@ impl Bars {
                 say!("note: photos or options changed since COLMAP last ran: it starts over");
             }
             Event::Finished(step) => say!("note: {step} was finished by an earlier run"),
+            Event::PhotosAreClose => {
+                self.end();
+                say!(
+                    "note: no two photos see the scene at the angle that COLMAP asks for; it \
+                     tries closer ones"
+                );
+            }
             Event::Progress { step, done, total } => {
                 if self.current.as_ref().is_none_or(|(of, _)| *of != step) {
                     self.end();

@@ -12,13 +12,14 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Writes down each call; says what lies in `help-COMMAND` and `say-COMMAND`, fails where
-/// there is `fail-COMMAND`, and makes of the mapper's output a copy of `models`.
+/// there is `fail-COMMAND` (unless told an angle), and makes of the mapper's output a copy of `models`.
 const SCRIPT: &str = r#"#!/bin/sh
 here=$(dirname "$0")
 if [ "$1" = help ]; then echo 'COLMAP 3.8 -- a script'; exit; fi
 if [ "$2" = -h ]; then cat "$here/help-$1" 2>/dev/null; exit; fi
 echo "$*" >>"$here/calls"
 cat "$here/say-$1" 2>/dev/null
+case "$*" in *tri_angle*) rm -f "$here/fail-$1" ;; esac
 if [ -e "$here/fail-$1" ]; then echo 'no luck' >&2; exit 1; fi
 if [ "$1" = feature_extractor ]; then echo features >"$3"; fi
 if [ "$1" = mapper ]; then
@@ -301,6 +302,36 @@ fn other_photos_or_options_start_over() {
     let error = bench.run().unwrap_err().to_string();
     assert!(error.contains("something other than"), "{error}");
     assert!(bench.at("work/thesis.txt").is_file());
+}
+
+#[test]
+fn photos_that_lie_close_are_placed_at_the_second_try() {
+    let none = "  => No good initial image pair found.\n";
+    let mut bench = Bench::new();
+    bench.write("say-mapper", none);
+    bench.write("help-mapper", "--Mapper.init_min_tri_angle arg (=16)");
+    bench.write("fail-mapper", "");
+    bench.run().unwrap();
+    let calls = bench.calls();
+    assert_eq!(calls.len(), 4, "{calls:?}");
+    assert_eq!(
+        calls[3],
+        calls[2].clone() + " --Mapper.init_min_tri_angle 4"
+    );
+    assert!(bench.events.contains(&Event::PhotosAreClose));
+
+    // Not where COLMAP had a pair, or cannot be told.
+    for (said, help) in [
+        (MAPPING_LOG.to_owned() + none, "--Mapper.init_min_tri_angle"),
+        (none.to_owned(), "--Mapper.num_threads"),
+    ] {
+        let mut bench = Bench::new();
+        bench.write("say-mapper", &said);
+        bench.write("help-mapper", help);
+        bench.write("fail-mapper", "");
+        bench.run().unwrap_err();
+        assert_eq!(bench.calls().len(), 3);
+    }
 }
 
 #[test]

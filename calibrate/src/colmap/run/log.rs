@@ -99,6 +99,12 @@ pub(super) fn tried(log: &str) -> BTreeSet<u32> {
     ids
 }
 
+/// Whether the mapper placed no photo as it found no two to begin with.
+pub(super) fn found_no_pair(log: &str) -> bool {
+    let no_pair = |line: &str| line.contains("No good initial image pair found");
+    tried(log).is_empty() && messages(log).any(no_pair)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -70,6 +70,9 @@ pub enum Event {
     StartingOver,
     /// An earlier run finished this step.
     Finished(Step),
+    /// No two photos lie far enough apart to begin with by COLMAP's measure: photos are
+    /// placed once more, from a pair that may be closer.
+    PhotosAreClose,
     /// A step is so far.
     Progress {
         /// Which.

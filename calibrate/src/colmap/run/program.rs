@@ -16,6 +16,11 @@ pub(super) const MODELS: &str = "sparse";
 /// nobody would learn why their photos are in none.
 const SMALLEST_MODEL: &str = "3";
 
+/// The least angle, in degrees, at which the first two photos see the scene where no pair
+/// reaches COLMAP's own 16: it goes down to half of it by itself, so to 2. Photos taken side
+/// by side for a lumigraph are often that close.
+const CLOSE_PAIR: &str = "4";
+
 /// COLMAP, about to be run on a photo set.
 pub(super) struct Program<'a> {
     colmap: &'a Tool,
@@ -117,6 +122,7 @@ impl<'a> Program<'a> {
             fs::create_dir(&partial).map_err(io_error(&partial, "make the folder"))?;
         }
 
+        // 1. What the program is told.
         let mut arguments = Arguments::new(command, &help);
         arguments.give("--database_path", self.work.join(DATABASE));
         match step {
@@ -143,19 +149,15 @@ impl<'a> Program<'a> {
             }
         }
 
-        let photos = self.photos.photos.len() as u64;
-        report(Event::Progress {
-            step,
-            done: 0,
-            total: photos,
-        });
-        let mut on_line = |line: &str| {
-            if let Some((done, total)) = log::progress(step, line, photos) {
-                report(Event::Progress { step, done, total });
-            }
-        };
-        let log = self.work.join(step.log());
-        let ran = self.colmap.run(&arguments.words, &log, &mut on_line);
+        // 2. It runs; the mapper a second time where no photos lie far enough apart for it.
+        let mut ran = self.run_once(step, &arguments.words, report);
+        if let (Step::Mapping, Err(ToolError::Failed { .. })) = (step, &ran)
+            && self.found_no_pair()?
+            && arguments.give_known(&["--Mapper.init_min_tri_angle"], CLOSE_PAIR)
+        {
+            report(Event::PhotosAreClose);
+            ran = self.run_once(step, &arguments.words, report);
+        }
         ran.map_err(|source| match source {
             ToolError::Failed { .. } => RunError::Failed {
                 source,
@@ -167,6 +169,34 @@ impl<'a> Program<'a> {
             fs::rename(&partial, &models).map_err(io_error(models, "rename a folder to this"))?;
         }
         Ok(())
+    }
+
+    fn run_once(
+        &self,
+        step: Step,
+        words: &[OsString],
+        report: &mut dyn FnMut(Event),
+    ) -> Result<(), ToolError> {
+        let photos = self.photos.photos.len() as u64;
+        report(Event::Progress {
+            step,
+            done: 0,
+            total: photos,
+        });
+        let mut on_line = |line: &str| {
+            if let Some((done, total)) = log::progress(step, line, photos) {
+                report(Event::Progress { step, done, total });
+            }
+        };
+        self.colmap
+            .run(words, &self.work.join(step.log()), &mut on_line)
+    }
+
+    /// Whether the mapper gave up as no two photos suit it to begin with.
+    fn found_no_pair(&self) -> Result<bool, RunError> {
+        let path = self.work.join(Step::Mapping.log());
+        let said = fs::read(&path).map_err(io_error(path, "read"))?;
+        Ok(log::found_no_pair(&String::from_utf8_lossy(&said)))
     }
 }
 
@@ -189,12 +219,14 @@ impl<'a> Arguments<'a> {
     }
 
     /// Gives an option that has had several names by the one that this COLMAP's help
-    /// knows; not at all where it knows none.
-    fn give_known(&mut self, names: &[&str], value: &str) {
+    /// knows; not at all where it knows none. Returns whether it was given.
+    fn give_known(&mut self, names: &[&str], value: &str) -> bool {
         let is_known = |name: &&&str| self.help.split_whitespace().any(|word| word == **name);
-        if let Some(name) = names.iter().find(is_known) {
+        let known = names.iter().find(is_known);
+        if let Some(name) = known {
             self.give(name, value);
         }
+        known.is_some()
     }
 }
 
