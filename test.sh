@@ -91,12 +91,13 @@ if [ "$(uname -s)" = Linux ]; then
     step "tests on the graphics device, by OpenGL"
     export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1
     cargo test --workspace --lib gpu::
-    cargo test --workspace --test engines --test limits --test residency
     # Of these, what a device draws.
-    cargo test --workspace --test exposure --test masks --test mesh --test points --test time \
-        --test invariance -- engine close_to_exact own exposure white moving batch mattes hole
-    cargo test --workspace --test cli gpu::
-    cargo test --workspace --test cli a_graphics_device
+    cargo test --workspace --test pictures -- engines:: limits:: residency::the_device \
+        exposure::a_frame exposure::at exposure::white invariance::moving invariance::a_batch \
+        masks::at masks::masked masks::mattes masks::triangulated masks::soft masks::what_every \
+        mesh::every_engine mesh::a_view points::every_engine points::a_view \
+        time::engines time::triangulated time::a_whole_period
+    cargo test --workspace --test cli -- gpu:: a_graphics_device
 fi
 
 step "all is well"

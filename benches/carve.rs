@@ -4,7 +4,7 @@ use cpu_time::ProcessTime;
 use proxy::carve;
 use std::time::Instant;
 
-#[path = "../proxy/tests/room/mod.rs"]
+#[path = "../proxy/tests/surfaces/room/mod.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod room;
 

@@ -1,6 +1,6 @@
 //! Depth maps fused into a surface: time, memory and error against depth maps held out.
 
-#[path = "../proxy/tests/common/mod.rs"]
+#[path = "../proxy/tests/surfaces/common/mod.rs"]
 mod common;
 
 use common::{capture, decode, errors, find_capture, shown};

@@ -24,8 +24,8 @@ caught() {
         "$(grep -c '^test .* \.\.\. ' "$log") tests of \"$*\""
 }
 
-caught shifted-field --test near triangulated
-caught turned-penalty --test goals resolution
+caught shifted-field --test pictures near::a_triangulated
+caught turned-penalty --test pictures goals::resolution
 caught missing-constraint --lib triangulation::
-caught front-to-back --test ldi_order order
-caught dropped-view --test near all_views
+caught front-to-back --test pictures ldi_order::
+caught dropped-view --test pictures -- near::the_field near::pictures

@@ -1,7 +1,8 @@
-use crate::points::sparse_points;
-use crate::{Motion, Scene, car, hallway, helicopter, knick_knacks, shelf, wall};
+use crate::picture::srgb_from_linear;
+use crate::points::{Seen, sparse_points};
+use crate::{Finish, Motion, Scene, car, hallway, helicopter, knick_knacks, shelf, wall};
 use calibrate::{Camera, CameraId, Image, ImageId, Lens, ModelKind, Reconstruction, Rigid3, View};
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -73,7 +74,7 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// No dataset has this name.
-    #[error("no dataset is called {name:?}; there are: {}, house", names().join(", "))]
+    #[error("no dataset is called {name:?}; there are: {}, house, survey", names().join(", "))]
     UnknownName {
         /// What was asked for.
         name: String,
@@ -87,6 +88,12 @@ pub enum DatasetError {
         found: String,
         /// Its range.
         expected: &'static str,
+    },
+    /// Rooms without a place to stand in.
+    #[error("no place to take photos from: {why}")]
+    NoPlace {
+        /// What is missing.
+        why: &'static str,
     },
     /// The destination holds something already.
     #[error("{}: the folder is not empty; choose another or remove it first", folder.display())]
@@ -121,6 +128,9 @@ pub enum DatasetError {
     /// An interior could not be written.
     #[error(transparent)]
     Interior(#[from] proxy::interior::InteriorFileError),
+    /// An interior that does not go with its model.
+    #[error(transparent)]
+    Cells(#[from] proxy::interior::InteriorError),
     /// The COLMAP model could not be written.
     #[error(transparent)]
     Colmap(#[from] calibrate::colmap::ColmapError),
@@ -261,12 +271,15 @@ impl Plan {
             reconstruction.images.insert(ImageId(i as u32 + 1), image);
         }
         let motion = self.motion.as_ref();
-        let seen: Vec<(&View, Cow<'_, Scene>)> = photos
-            .iter()
-            .map(|photo| (&photo.view, scene_at(&self.scene, motion, photo.time_s)))
-            .collect();
-        let still = |object_idx| motion.is_none_or(|motion| !motion.moves(object_idx));
-        sparse_points(&seen, still, self.points, self.seed, &mut reconstruction);
+        let scenes = photos.iter();
+        let seen = SeenInScenes {
+            scenes: scenes
+                .map(|photo| scene_at(&self.scene, motion, photo.time_s))
+                .collect(),
+            motion,
+        };
+        let views: Vec<&View> = photos.iter().map(|photo| &photo.view).collect();
+        sparse_points(&views, &seen, self.points, self.seed, &mut reconstruction);
         Dataset {
             name: self.name,
             scene: self.scene,
@@ -282,9 +295,33 @@ impl Plan {
     }
 }
 
+/// The scene that each photo shows; points lie on what stays where it is.
+struct SeenInScenes<'a> {
+    scenes: Vec<Cow<'a, Scene>>,
+    motion: Option<&'a Motion>,
+}
+
+impl Seen for SeenInScenes<'_> {
+    fn trace(&self, view_idx: usize, from: DVec3, direction: DVec3) -> Option<(DVec3, [u8; 3])> {
+        let scene = &self.scenes[view_idx];
+        let hit = scene.trace(from, direction)?;
+        // Mirrors show places that are elsewhere: fine for a photo, not for a feature.
+        let mirrors = matches!(
+            scene.objects()[hit.object_idx].material.finish,
+            Finish::Glossy { mirror, .. } if mirror > 0.5
+        );
+        let moves = self.motion.is_some_and(|m| m.moves(hit.object_idx));
+        (!mirrors && !moves).then(|| (hit.point, srgb_from_linear(hit.color)))
+    }
+
+    fn distance(&self, view_idx: usize, from: DVec3, direction: DVec3) -> Option<f64> {
+        self.scenes[view_idx].distance(from, direction)
+    }
+}
+
 /// The same pose with a quaternion that normalising leaves as it is and whose real part
 /// is not negative: so it reads back from a file bit for bit.
-fn settled(pose: Rigid3) -> Rigid3 {
+pub(crate) fn settled(pose: Rigid3) -> Rigid3 {
     let mut rotation = pose.rotation;
     if rotation.w < 0.0 {
         rotation = -rotation;

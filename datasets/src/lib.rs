@@ -14,7 +14,8 @@
 //! | `hallway` | a hallway 14 m long: doors, pictures, cabinets, lamps | 28 views walking down it, looking ahead, 480 × 360, SIMPLE_PINHOLE | epipoles in the image, near and far views of the same wall: resolution counts (Figure 10); a tunnel is a fair proxy, and [`HALLWAY`] the true one |
 //!
 //! [`house`] is another kind of dataset: no photos but an interior of many rooms, its model and
-//! its portals, and the truth for any camera in it.
+//! its portals, and the truth for any camera in it. [`survey()`] photographs it, or the model of
+//! any other interior, as a capture with depth.
 //!
 //! ```
 //! use datasets::{Options, by_name, render_view};
@@ -33,6 +34,7 @@ mod hand_held;
 mod helicopter;
 pub mod house;
 mod knick_knacks;
+mod model_picture;
 mod motion;
 mod noise;
 mod picture;
@@ -43,6 +45,7 @@ mod scene;
 mod shading;
 mod shape;
 mod shelf;
+mod survey;
 mod texture;
 mod wall;
 mod write;
@@ -57,6 +60,7 @@ pub use picture::{render_depth, render_view, srgb_from_linear};
 pub use scene::{Finish, Hit, Lighting, Material, Object, Scene};
 pub use shape::{Shape, Surface};
 pub use shelf::shelf;
+pub use survey::{Survey, survey, write_survey};
 pub use texture::{Motif, Texture};
 pub use wall::wall;
 pub use write::{DEPTH_STEPS_PER_UNIT, Written, in_new_folder, write};

@@ -1,8 +1,8 @@
 //! A dataset on disk: the folder a user would have, with the truth beside it.
 
 use crate::picture::{LensRays, depth_through, render_through};
-use crate::{Dataset, DatasetError, Photo, Scene};
-use calibrate::colmap;
+use crate::{Dataset, DatasetError, Photo};
+use calibrate::{Reconstruction, colmap};
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::{Path, PathBuf};
 
@@ -35,14 +35,7 @@ pub struct Written {
 /// behind.
 pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> {
     in_new_folder(folder, |_| false, |partial| fill(dataset, partial))?;
-    let points = &dataset.reconstruction.points;
-    Ok(Written {
-        folder: folder.to_owned(),
-        photos: dataset.photos.len(),
-        held_out: dataset.held_out.len(),
-        points: points.len(),
-        observations: points.values().map(|point| point.track.len()).sum(),
-    })
+    Ok(capture_of(dataset).written(folder))
 }
 
 /// Fills a folder that takes its name only when it is complete.
@@ -76,16 +69,11 @@ pub fn in_new_folder<E: From<DatasetError>>(
     done
 }
 
-fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
-    let [images, depths, sparse] = ["images", "depth", "sparse/0"].map(|name| folder.join(name));
-    for folder in [&images, &depths, &sparse] {
-        make_folder(folder)?;
-    }
-    colmap::write_binary(&dataset.reconstruction, &sparse)?;
+fn fill<'a>(dataset: &'a Dataset, folder: &Path) -> Result<(), DatasetError> {
     let mut last: Option<(&Photo, LensRays)> = None;
-    for photo in &dataset.photos {
+    let seen = |photo: &'a Photo| {
         // Photos through one lens share its rays.
-        let lens_rays = match last {
+        let lens_rays = match last.take() {
             Some((before, lens_rays)) if before.camera == photo.camera => lens_rays,
             _ => LensRays::of(&photo.view),
         };
@@ -97,36 +85,82 @@ fn fill(dataset: &Dataset, folder: &Path) -> Result<(), DatasetError> {
         } else {
             DynamicImage::from(picture.into_rgb8())
         };
-        save(picture, &images.join(&photo.name))?;
-        let depth = DynamicImage::from(depth_steps(&scene, photo, &lens_rays));
-        let name = Path::new(&photo.name).with_extension("png");
-        save(depth, &depths.join(name))?;
+        let depths = depth_through(&scene, &photo.view, &lens_rays);
         last = Some((photo, lens_rays));
-    }
+        (picture, depths)
+    };
+    capture_of(dataset).fill(folder, seen)?;
     if dataset.motion.is_some() {
         write_text(&folder.join("times.csv"), &times(dataset))?;
     }
-    write_text(&folder.join("split.json"), &split(dataset))?;
-    write_text(&folder.join("README.md"), &readme(dataset))
+    Ok(())
+}
+
+fn capture_of(dataset: &Dataset) -> Capture<'_> {
+    Capture {
+        photos: &dataset.photos,
+        held_out: &dataset.held_out,
+        reconstruction: &dataset.reconstruction,
+        readme: readme(dataset),
+    }
+}
+
+/// What every capture has, but for its pictures.
+pub(crate) struct Capture<'a> {
+    pub(crate) photos: &'a [Photo],
+    pub(crate) held_out: &'a [String],
+    pub(crate) reconstruction: &'a Reconstruction,
+    pub(crate) readme: String,
+}
+
+impl<'a> Capture<'a> {
+    /// Writes it into a folder, photo by photo: the picture, and the depth along z of each
+    /// pixel's centre, row by row.
+    pub(crate) fn fill(
+        &self,
+        folder: &Path,
+        mut seen: impl FnMut(&'a Photo) -> (DynamicImage, Vec<f64>),
+    ) -> Result<(), DatasetError> {
+        let [images, depths, sparse] =
+            ["images", "depth", "sparse/0"].map(|name| folder.join(name));
+        for folder in [&images, &depths, &sparse] {
+            make_folder(folder)?;
+        }
+        colmap::write_binary(self.reconstruction, &sparse)?;
+        for photo in self.photos {
+            let (picture, depth) = seen(photo);
+            save(picture, &images.join(&photo.name))?;
+            let depth = DynamicImage::from(depth_steps(photo, &depth));
+            let name = Path::new(&photo.name).with_extension("png");
+            save(depth, &depths.join(name))?;
+        }
+        write_text(&folder.join("split.json"), &split(self.held_out))?;
+        write_text(&folder.join("README.md"), &self.readme)
+    }
+
+    pub(crate) fn written(&self, folder: &Path) -> Written {
+        let points = &self.reconstruction.points;
+        Written {
+            folder: folder.to_owned(),
+            photos: self.photos.len(),
+            held_out: self.held_out.len(),
+            points: points.len(),
+            observations: points.values().map(|point| point.track.len()).sum(),
+        }
+    }
 }
 
 /// Depth along z in steps; 0 where there is no surface or it is too far to say.
-fn depth_steps(
-    scene: &Scene,
-    photo: &Photo,
-    lens_rays: &LensRays,
-) -> ImageBuffer<Luma<u16>, Vec<u16>> {
-    let steps = depth_through(scene, &photo.view, lens_rays)
-        .into_iter()
-        .map(|depth| {
-            let steps = (depth * DEPTH_STEPS_PER_UNIT).round();
-            if (0.0..=f64::from(u16::MAX)).contains(&steps) {
-                steps as u16
-            } else {
-                0
-            }
-        })
-        .collect();
+fn depth_steps(photo: &Photo, depths: &[f64]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let steps = depths.iter().map(|depth| {
+        let steps = (depth * DEPTH_STEPS_PER_UNIT).round();
+        if (0.0..=f64::from(u16::MAX)).contains(&steps) {
+            steps as u16
+        } else {
+            0
+        }
+    });
+    let steps = steps.collect();
     ImageBuffer::from_raw(photo.view.width, photo.view.height, steps).expect("a step a pixel")
 }
 
@@ -140,10 +174,9 @@ fn times(dataset: &Dataset) -> String {
     format!("name,seconds\n{}", lines.collect::<String>())
 }
 
-fn split(dataset: &Dataset) -> String {
+fn split(held_out: &[String]) -> String {
     // Names are ours: nothing in them needs escaping.
-    let names: Vec<String> = dataset
-        .held_out
+    let names: Vec<String> = held_out
         .iter()
         .map(|name| format!("  \"{name}\""))
         .collect();

@@ -256,7 +256,7 @@ fn mistakes_are_told() {
     assert_eq!(
         error.to_string(),
         "no dataset is called \"shelv\"; there are: shelf, wall, helicopter, knick-knacks, \
-         hallway, car, house"
+         hallway, car, house, survey"
     );
     let one_view = Options {
         views: Some(1),

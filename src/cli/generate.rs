@@ -1,24 +1,28 @@
 //! `lumigraph generate`
 
 use super::Usage;
+use super::captured::Opened;
 use super::options::size;
-use super::output::print;
+use super::output::{print, say};
 use super::session::spinner;
+use anyhow::Context;
 use datasets::house::{self, HouseOptions};
-use datasets::{DatasetError, Options};
-use std::path::PathBuf;
+use datasets::{DatasetError, Options, Written};
+use std::path::{Path, PathBuf};
 
 /// Write a synthetic scene with exact truth, in users' formats
 ///
 /// Photos, a COLMAP model, depth maps and a split, as a capture of real photos would have; of
-/// `house`, a textured model of many rooms (.glb) and its cells and portals (interior.json).
+/// `house`, a textured model of many rooms (.glb) and its cells and portals (interior.json). Of
+/// `survey`, photos with depth of all rooms of such an interior, or any other that has a model.
 ///
 ///     lumigraph generate shelf -o shelf
 ///     lumigraph generate house --rooms 19 -o house
+///     lumigraph generate survey --of house -o house-survey
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// Which: shelf, wall, helicopter, knick-knacks, hallway, car or house
+    /// Which: shelf, wall, helicopter, knick-knacks, hallway, car, house or survey
     name: String,
     /// Size of the photos in pixels [default: the scene's own]
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -35,12 +39,22 @@ pub(super) struct Args {
     /// Another number is another house [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
+    /// What a survey is of: an interior's folder, or its interior.json
+    #[arg(long, value_name = "INTERIOR")]
+    of: Option<PathBuf>,
     /// The capture's folder, or the interior's
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.of.is_some() != (args.name == "survey") {
+        let text = match &args.of {
+            Some(_) => "--of belongs to `survey`",
+            None => "a survey needs --of, the interior that it is of",
+        };
+        return Err(Usage(text.to_owned()).into());
+    }
     if args.name == "house" {
         return house(args);
     }
@@ -53,11 +67,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         views: args.photos,
         ..Options::default()
     };
-    let dataset = datasets::by_name(&args.name, &options).map_err(usage)?;
-    let bar = spinner("rendering the photos");
-    let written = datasets::write(&dataset, &args.output);
-    bar.finish_and_clear();
-    let written = written?;
+    let written = match &args.of {
+        Some(interior) => survey(args, interior, &options)?,
+        None => {
+            let dataset = datasets::by_name(&args.name, &options).map_err(usage)?;
+            let bar = spinner("rendering the photos");
+            let written = datasets::write(&dataset, &args.output);
+            bar.finish_and_clear();
+            written?
+        }
+    };
     print(&format!(
         "{}: {} photos ({} to hold out), {} points\n",
         written.folder.display(),
@@ -65,6 +84,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         written.held_out,
         written.points
     ))
+}
+
+fn survey(args: &Args, interior: &Path, options: &Options) -> anyhow::Result<Written> {
+    let opened = Opened::new(interior, None, |text| say!("warning: {text}"))?;
+    let named = || interior.display().to_string();
+    let bar = spinner("photographing the rooms");
+    let survey = datasets::survey(&opened.interior, &opened.model, options).map_err(usage);
+    let written = survey.map(|survey| datasets::write_survey(&survey, &args.output));
+    bar.finish_and_clear();
+    Ok(written.with_context(named)??)
 }
 
 fn house(args: &Args) -> anyhow::Result<()> {

@@ -59,9 +59,9 @@ pub(super) struct Args {
         conflicts_with = "rooms"
     )]
     meter: f64,
-    /// Print how what was found compares with rooms and openings that are known, as --rooms has them;
-    /// portals count within 0.3 m
-    #[arg(long, value_name = "FILE", conflicts_with = "rooms")]
+    /// Print how what was found compares with rooms and openings that are known: a file as --rooms has
+    /// them, or another interior's folder; portals count within 0.3 m
+    #[arg(long, value_name = "FILE|DIR", conflicts_with = "rooms")]
     compare: Option<PathBuf>,
     /// The interior's folder: interior.json, and the model beside it
     #[arg(short, long, value_name = "DIR")]
@@ -205,8 +205,11 @@ fn finish(
     pictures: &Pictures,
 ) -> anyhow::Result<()> {
     let named = || args.model.display().to_string();
-    let known = args.compare.as_ref().map(|rooms| read_rooms(rooms, file));
-    let compared = known.transpose()?.map(|(known, _)| {
+    let known = args.compare.as_ref().map(|known| match known.is_dir() {
+        true => anyhow::Ok(open(known)?.1),
+        false => Ok(read_rooms(known, file)?.0),
+    });
+    let compared = known.transpose()?.map(|known| {
         let tolerance = SAME_PORTAL * args.meter;
         compare(&known, &interior, tolerance).to_string()
     });

@@ -27,8 +27,9 @@ pub struct SceneSurface {
 
 /// The model's triangles at most.
 const MOST_TRIANGLES: usize = 600_000;
-/// Every so-manieth column and row of a depth map is a line of sight.
-const SIGHTS: u32 = 4;
+/// About so many pixels of a depth map are lines of sight, every so-manieth column and row: one for
+/// 0.6° where 70° are seen.
+const SIGHTS: f64 = 12_000.0;
 /// Holes with a border of so many voxels are closed: sensors miss what is dark or shiny.
 const SMALL_HOLE: f64 = 24.0;
 /// A photo's colours are a corner's within so many voxels.
@@ -68,7 +69,9 @@ impl Scene {
                 None => photo.decode_depth(size)?,
             };
             let Some(map) = map else { continue };
-            lines.extend(sights(view, &map, SIGHTS));
+            let pixels = f64::from(map.width) * f64::from(map.height);
+            let every = (pixels / SIGHTS).sqrt().round().max(1.0);
+            lines.extend(sights(view, &map, every as u32));
             painting.add(view, &photo.decode(size)?, &map);
         }
         let colors = painting.colors();

@@ -13,9 +13,9 @@ fn all_fail(folder: &TempDir) -> String {
     let errors: Vec<String> = [
         "import wall -o out",
         "info wall --json",
-        "render wall --path orbit --frames 2 -o out",
-        "evaluate wall --json -o out",
-        "field wall --view 0001.png -o out/f.png --weights out/w.npz",
+        "render wall --proxy plane --path orbit --frames 2 -o out",
+        "evaluate wall --proxy plane --json -o out",
+        "field wall --proxy plane --view 0001.png -o out/f.png --weights out/w.npz",
         "proxy wall plane -o out/p.json",
     ]
     .map(|line| {
@@ -154,7 +154,11 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
 
     // Found out only when drawn: reported, left out, and the frame drawn again.
-    let ran = lumigraph(folder.path(), "render wall --views wall --json -o left").ok();
+    let ran = lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views wall --json -o left",
+    )
+    .ok();
     assert_eq!(
         ran.stderr
             .matches("warning: photo 0004.png is left out")
@@ -168,7 +172,7 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     assert_eq!(left.len(), 9);
 
     // Decoding everything at once finds it too, and the frames are the same.
-    let line = "render wall --views wall --no-skip -o all";
+    let line = "render wall --proxy plane --views wall --no-skip -o all";
     let ran = lumigraph(folder.path(), line).ok();
     assert!(
         ran.stderr.contains("0004.png is left out"),
@@ -177,7 +181,7 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     );
     assert!(left == files(&folder.path().join("all")));
 
-    let line = "render wall --views wall --strict -o strict";
+    let line = "render wall --proxy plane --views wall --strict -o strict";
     let error = lumigraph(folder.path(), line).error(1);
     assert!(error.contains("0004.png"), "{error}");
 }
@@ -188,14 +192,14 @@ fn a_corrupt_held_out_photo_cannot_be_scored() {
     let path = folder.path().join("wall/images/0008.png");
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let ran = lumigraph(folder.path(), "evaluate wall --json").ok();
+    let ran = lumigraph(folder.path(), "evaluate wall --proxy plane --json").ok();
     assert_eq!(ran.json()["photos"].as_array().unwrap().len(), 1);
     assert!(
         ran.stderr.contains("0008.png is left out"),
         "{}",
         ran.stderr
     );
-    let error = lumigraph(folder.path(), "evaluate wall --strict").error(1);
+    let error = lumigraph(folder.path(), "evaluate wall --proxy plane --strict").error(1);
     assert!(error.contains("0008.png"), "{error}");
 }
 
@@ -205,7 +209,11 @@ fn splits_must_name_photos() {
     let split = folder.path().join("s.json");
     let error = |text: &str| {
         fs::write(&split, text).unwrap();
-        lumigraph(folder.path(), "evaluate wall --hold-out s.json").error(1)
+        lumigraph(
+            folder.path(),
+            "evaluate wall --proxy plane --hold-out s.json",
+        )
+        .error(1)
     };
     assert_eq!(
         error(r#"{"test": ["0001.png", "0010.png", "x.jpg"]}"#),
@@ -222,7 +230,11 @@ fn splits_must_name_photos() {
         none,
         "no photo is left to render from: all 9 are held out or corrupt"
     );
-    let missing = lumigraph(folder.path(), "evaluate wall --hold-out none.json").error(1);
+    let missing = lumigraph(
+        folder.path(),
+        "evaluate wall --proxy plane --hold-out none.json",
+    )
+    .error(1);
     assert!(
         missing.starts_with("none.json: cannot read the split"),
         "{missing}"

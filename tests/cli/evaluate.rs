@@ -184,7 +184,7 @@ fn a_proxy_that_saw_held_out_photos_is_fitted_again() {
 #[test]
 fn smaller_pictures_score_against_reduced_photos() {
     let folder = with_wall();
-    let line = "evaluate wall --size 48x36 --json -o small";
+    let line = "evaluate wall --proxy plane --size 48x36 --json -o small";
     let result = lumigraph(folder.path(), line).ok().json();
     assert!(
         result["mean"]["psnr_covered"].as_f64().unwrap() > 30.0,

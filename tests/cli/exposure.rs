@@ -28,7 +28,7 @@ fn expose(folder: &Path, gain: impl Fn(usize) -> [f64; 3]) {
 }
 
 fn evaluate(folder: &Path, options: &str) -> Value {
-    lumigraph(folder, &format!("evaluate {options} --json"))
+    lumigraph(folder, &format!("evaluate {options} --proxy plane --json"))
         .ok()
         .json()
 }
@@ -87,7 +87,7 @@ fn known_gains_are_found_and_seams_go() {
 
     // 3. A path from photo to photo ends at the photos as they were exposed.
     let drawn = |options: &str| {
-        let line = format!("render scene --views wall/sparse/0 {options}");
+        let line = format!("render scene --proxy plane --views wall/sparse/0 {options}");
         lumigraph(folder.path(), &line).ok();
     };
     drawn("-o all");
@@ -98,13 +98,13 @@ fn known_gains_are_found_and_seams_go() {
 #[test]
 fn photos_of_one_exposure_are_drawn_as_they_are() {
     let folder = with_wall();
-    let with = evaluate(folder.path(), "wall --proxy plane -o with");
+    let with = evaluate(folder.path(), "wall -o with");
     assert_eq!(
         with["exposure"]["how"], "not measurable",
         "{}",
         with["exposure"]
     );
-    evaluate(folder.path(), "wall --proxy plane --no-exposure -o without");
+    evaluate(folder.path(), "wall --no-exposure -o without");
     assert!(files(&folder.path().join("with")) == files(&folder.path().join("without")));
     lumigraph(folder.path(), "import wall -o scene").ok();
     assert!(gains(folder.path()).iter().all(Option::is_none));
@@ -120,7 +120,7 @@ fn held_out_photos_have_no_say() {
     for scene in ["wall", "scene"] {
         let render = |out: &str| {
             let line = format!(
-                "render {scene} --hold-out wall/split.json --path orbit --frames 2 -o {out}"
+                "render {scene} --proxy plane --hold-out wall/split.json --path orbit --frames 2 -o {out}"
             );
             lumigraph(folder.path(), &line).ok();
             files(&folder.path().join(out))
@@ -149,7 +149,7 @@ fn without_exposure_nothing_is_stored_or_used() {
     assert!(files(&folder.path().join("plain")) == files(&folder.path().join("none")));
     lumigraph(
         folder.path(),
-        "field wall --no-exposure --view 0004.png -o f.png",
+        "field wall --proxy plane --no-exposure --view 0004.png -o f.png",
     )
     .ok();
 }

@@ -1,15 +1,48 @@
 //! Field pictures, weights and triangulations.
 
 use crate::run::{lumigraph, with_wall};
-use npyz::npz::NpzArchive;
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
+use zip::ZipArchive;
 
-/// An array's shape and values.
-fn array<T: npyz::Deserialize>(file: &Path, name: &str) -> (Vec<u64>, Vec<T>) {
-    let mut archive = NpzArchive::open(file).unwrap();
-    let array = archive.by_name(name).unwrap().unwrap();
-    (array.shape().to_vec(), array.into_vec().unwrap())
+/// An array's type and shape in numpy's words, and its bytes.
+fn array(file: &Path, name: &str) -> (String, Vec<u8>) {
+    let mut archive = ZipArchive::new(File::open(file).unwrap()).unwrap();
+    let mut bytes = Vec::new();
+    let mut array = archive.by_name(&format!("{name}.npy")).unwrap();
+    array.read_to_end(&mut bytes).unwrap();
+    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
+    let values = bytes.split_off(10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]])));
+    let about = String::from_utf8(bytes.split_off(10)).unwrap();
+    assert!(about.ends_with(" \n") && (10 + about.len()).is_multiple_of(64));
+    (about.trim_end().to_owned(), values)
+}
+
+/// The shape of an array of a type, and its values.
+fn numbers<T, const N: usize>(
+    file: &Path,
+    (name, kind): (&str, &str),
+    value: impl Fn([u8; N]) -> T,
+) -> (Vec<usize>, Vec<T>) {
+    let (about, bytes) = array(file, name);
+    let begin = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (");
+    let shape = about.strip_prefix(&begin).unwrap();
+    let shape = shape.strip_suffix("), }").unwrap();
+    let shape: Vec<usize> = shape.split(", ").map(|n| n.parse().unwrap()).collect();
+    let values = bytes.chunks(N).map(|b| value(b.try_into().unwrap()));
+    let values: Vec<T> = values.collect();
+    assert_eq!(values.len(), shape.iter().product::<usize>());
+    (shape, values)
+}
+
+fn ids(file: &Path) -> (Vec<usize>, Vec<i32>) {
+    numbers(file, ("ids", "<i4"), i32::from_le_bytes)
+}
+
+fn weights(file: &Path) -> Vec<f32> {
+    numbers(file, ("weights", "<f4"), f32::from_le_bytes).1
 }
 
 #[test]
@@ -17,7 +50,7 @@ fn weights_are_complete_and_points_lie_on_the_proxy() {
     let folder = with_wall();
     for renderer in ["exact", "triangulated"] {
         let line = format!(
-            "field wall --view 0004.png --without-view --renderer {renderer} -o f.png \
+            "field wall --proxy plane --view 0004.png --without-view --renderer {renderer} -o f.png \
              --weights w.npz --triangulation t.svg"
         );
         let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -25,14 +58,18 @@ fn weights_are_complete_and_points_lie_on_the_proxy() {
         assert_eq!(ran.stdout, "f.png\nw.npz\nt.svg\n");
         let file = folder.path().join("w.npz");
 
-        let (_, names) = array::<String>(&file, "camera_names");
-        assert_eq!(names.len(), 8);
-        assert!(!names.contains(&"0004.png".to_owned()));
-        let (shape, ids) = array::<i32>(&file, "ids");
+        // UTF-32: a letter and three zeros.
+        let (about, names) = array(&file, "camera_names");
+        assert!(about.contains("'<U8'") && about.contains("(8,)"), "{about}");
+        let names: Vec<u8> = names.into_iter().filter(|letter| *letter > 0).collect();
+        let names = String::from_utf8(names).unwrap();
+        let others = (0..9).filter(|i| *i != 4).map(|i| format!("000{i}.png"));
+        assert_eq!(names, others.collect::<String>());
+        let (shape, ids) = ids(&file);
         assert_eq!(shape[..2], [72, 96]);
-        let slots = shape[2] as usize;
-        let (_, weights) = array::<f32>(&file, "weights");
-        let (shape, points) = array::<f64>(&file, "points");
+        let slots = shape[2];
+        let weights = weights(&file);
+        let (shape, points) = numbers(&file, ("points", "<f8"), f64::from_le_bytes);
         assert_eq!(shape, [72, 96, 3]);
 
         for (ids, weights) in ids.chunks(slots).zip(weights.chunks(slots)) {
@@ -65,13 +102,12 @@ fn a_photo_paints_its_own_view_alone() {
     let folder = with_wall();
     lumigraph(
         folder.path(),
-        "field wall --view 0004.png -o f.png --weights w.npz",
+        "field wall --proxy plane --view 0004.png -o f.png --weights w.npz",
     )
     .ok();
     let file = folder.path().join("w.npz");
-    let (shape, ids) = array::<i32>(&file, "ids");
-    let (_, weights) = array::<f32>(&file, "weights");
-    let slots = shape[2] as usize;
+    let ((shape, ids), weights) = (ids(&file), weights(&file));
+    let slots = shape[2];
     // Within the feather others share.
     let at = |x: usize, y: usize| (y * 96 + x) * slots;
     for (x, y) in [(48, 36), (10, 10), (85, 60)] {
@@ -83,7 +119,11 @@ fn a_photo_paints_its_own_view_alone() {
 #[test]
 fn unknown_views_are_named() {
     let folder = with_wall();
-    let error = lumigraph(folder.path(), "field wall --view 4.png -o f.png").error(1);
+    let error = lumigraph(
+        folder.path(),
+        "field wall --proxy plane --view 4.png -o f.png",
+    )
+    .error(1);
     assert_eq!(
         error,
         "no photo is called 4.png; the scene has 0000.png, 0001.png and 7 more"

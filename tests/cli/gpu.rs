@@ -8,7 +8,7 @@ fn the_gpu_draws_what_the_cpu_draws_and_again_the_same() {
     for renderer in ["triangulated", "exact"] {
         let render = |device: &str, out: &str| {
             let line = format!(
-                "render wall --path sweep --frames 3 --renderer {renderer} --device {device} \
+                "render wall --proxy plane --path sweep --frames 3 --renderer {renderer} --device {device} \
                  -o {out}"
             );
             let ran = lumigraph(folder.path(), &line);

@@ -2,6 +2,7 @@
 
 use crate::run::lumigraph;
 use glam::{DQuat, DVec3};
+use proxy::interior::read_interior;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -138,6 +139,75 @@ fn rooms_that_nobody_names_are_found() {
     // It can be walked through at once.
     let walk = "walk found --tour --frames 2 --size 32x24 -o out";
     lumigraph(here, walk).ok();
+}
+
+/// How far a box's or a polygon's sides are from another's, at most.
+fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let extent = |corners: &[DVec3]| {
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let grown = |(l, h): (DVec3, DVec3), p: &DVec3| (l.min(*p), h.max(*p));
+        corners.iter().fold(none, grown)
+    };
+    let ((l, h), (m, i)) = (extent(a), extent(b));
+    (l - m).abs().max((h - i).abs()).max_element()
+}
+
+/// The corners of an interior's cells, then those of its portals.
+fn corners(folder: &Path) -> [Vec<Vec<DVec3>>; 2] {
+    let (interior, _) = read_interior(&folder.join("interior.json")).unwrap();
+    let cells = interior.cells.iter().map(|cell| {
+        let room = cell.content.room().unwrap();
+        vec![room.min, room.max]
+    });
+    let portals = interior.portals.iter();
+    let portals = portals.map(|p| p.polygon.corners().to_vec());
+    [cells.collect(), portals.collect()]
+}
+
+/// Makes an interior of a model, and one of photos with depth taken all around in its rooms, and
+/// looks for each cell and portal of either in the other.
+fn same_from_model_and_photos(here: &Path, model: &Path, survey: &str) {
+    let line = format!("interior {} --find -o model", model.display());
+    lumigraph(here, &line).ok();
+    lumigraph(
+        here,
+        &format!("generate survey --of model {survey} -o survey"),
+    )
+    .ok();
+    let ran = lumigraph(here, "interior survey --compare model -o photos").ok();
+    let (model, photos) = (corners(&here.join("model")), corners(&here.join("photos")));
+    let [rooms, openings] = [&model[0], &model[1]].map(Vec::len);
+    let said = format!("{rooms} of {rooms} rooms, {openings} of {openings} portals found");
+    assert!(ran.stdout.contains(&said), "{}", ran.stdout);
+    for (of_model, of_photos) in model.iter().zip(&photos) {
+        assert_eq!(of_model.len(), of_photos.len(), "{}", ran.stdout);
+        for (some, others) in [(of_model, of_photos), (of_photos, of_model)] {
+            for one in some {
+                let nearest = others.iter().map(|other| apart(one, other));
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                assert!(nearest <= 0.2, "{nearest}: {one:?}\n{}", ran.stdout);
+            }
+        }
+    }
+}
+
+#[test]
+fn photos_of_a_house_give_the_cells_and_portals_of_its_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate house --rooms 3 --triangles 1 -o house").ok();
+    let (model, survey) = ("house/house.glb", "--photos 96 --size 160x128");
+    same_from_model_and_photos(here, Path::new(model), survey);
+
+    let captures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/captures"));
+    let model = captures.join("interior-house/house.glb");
+    if !model.exists() {
+        eprintln!("SKIPPED: {} is not there", model.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let survey = "--photos 160 --size 192x144";
+    same_from_model_and_photos(folder.path(), &model, survey);
 }
 
 #[test]

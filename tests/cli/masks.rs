@@ -125,7 +125,9 @@ fn what_masks_cover_is_not_seen() {
         assert_eq!(magenta(&at(&folder, &format!("with-{device}"))), 0);
         assert!(magenta(&at(&folder, &format!("without-{device}"))) > 500);
     }
-    let table = lumigraph(folder.path(), "evaluate scene").ok().stdout;
+    let table = lumigraph(folder.path(), "evaluate scene --proxy plane")
+        .ok()
+        .stdout;
     assert!(
         table.lines().next().unwrap().contains("psnr_masked"),
         "{table}"
@@ -178,7 +180,7 @@ fn masks_go_by_several_names_and_may_be_missing() {
             Value::Null
         ]
     );
-    lumigraph(folder.path(), "evaluate scene").ok();
+    lumigraph(folder.path(), "evaluate scene --proxy plane").ok();
 }
 
 #[test]
@@ -189,7 +191,7 @@ fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
     for line in [
         "import wall -o out",
         "info wall",
-        "render wall --path orbit -o out",
+        "render wall --proxy plane --path orbit -o out",
     ] {
         assert_eq!(
             lumigraph(folder.path(), line).error(1),
@@ -217,12 +219,12 @@ fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
     save(mask.clone(), &mask_of(3));
     let whole = fs::read(&mask).unwrap();
     fs::write(&mask, &whole[..whole.len() / 2]).unwrap();
-    let ran = lumigraph(folder.path(), "evaluate wall").ok();
+    let ran = lumigraph(folder.path(), "evaluate wall --proxy plane").ok();
     let warning = "warning: photo 0003.png is left out: cannot decode wall/masks/0003.png.png";
     assert!(ran.stderr.contains(warning), "{}", ran.stderr);
-    let error = lumigraph(folder.path(), "evaluate wall --strict").error(1);
+    let error = lumigraph(folder.path(), "evaluate wall --proxy plane --strict").error(1);
     assert!(error.contains("wall/masks/0003.png.png"), "{error}");
-    let line = "field wall --view 0004.png --without-view -o f.png";
+    let line = "field wall --proxy plane --view 0004.png --without-view -o f.png";
     let error = lumigraph(folder.path(), line).error(1);
     assert!(error.contains("wall/masks/0003.png.png"), "{error}");
 }
@@ -239,9 +241,12 @@ fn mattes_cut_the_photos_out() {
     let photo = scene_json(&folder)["photos"][2].clone();
     assert_eq!(photo["object_matte"], "../wall/masks/0002.png");
     assert!(photo.get("ignore_mask").is_none(), "{photo}");
-    let result = lumigraph(folder.path(), "evaluate scene --json -o frames")
-        .ok()
-        .json();
+    let result = lumigraph(
+        folder.path(),
+        "evaluate scene --proxy plane --json -o frames",
+    )
+    .ok()
+    .json();
     // Outside the matte the held-out photo is black, and so is most of what is drawn there.
     let coverage = result["mean"]["coverage"].as_f64().unwrap();
     assert!((0.4..0.9).contains(&coverage), "{result}");
@@ -262,7 +267,7 @@ fn mattes_cut_the_photos_out() {
     let ran = lumigraph(folder.path(), line).ok();
     let counts = ", 9 ignore masks, 9 object mattes, 9 depth maps\n";
     assert!(ran.stdout.ends_with(counts), "{}", ran.stdout);
-    lumigraph(folder.path(), "evaluate both").ok();
+    lumigraph(folder.path(), "evaluate both --proxy plane").ok();
 }
 
 #[test]
@@ -289,7 +294,7 @@ fn masks_that_repeat_the_alpha_are_pointed_out() {
     assert!(ran.stderr.contains(note), "{}", ran.stderr);
     assert!(ran.stdout.contains("9 ignore masks"), "{}", ran.stdout);
     let evaluated = |scene: &str| {
-        let line = format!("evaluate {scene} --json");
+        let line = format!("evaluate {scene} --proxy plane --json");
         lumigraph(folder.path(), &line).ok().json()["mean"]["psnr"].clone()
     };
     assert_eq!(evaluated("b"), evaluated("c"));

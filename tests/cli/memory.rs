@@ -19,7 +19,10 @@ fn a_budget_that_is_no_size_is_a_usage_error() {
             "99999999999TiB",
             "",
         ] {
-            for command in ["render wall --path orbit -o out", "evaluate wall"] {
+            for command in [
+                "render wall --proxy plane --path orbit -o out",
+                "evaluate wall --proxy plane",
+            ] {
                 let error = lumigraph(folder.path(), &format!("{command} {option} {size}"));
                 let error = error.error(2);
                 assert!(error.contains(option), "{error}");

@@ -8,7 +8,11 @@ use std::fs;
 #[test]
 fn a_source_view_gives_its_photo_back() {
     let folder = with_wall();
-    lumigraph(folder.path(), "render wall --views wall/sparse/0 -o frames").ok();
+    lumigraph(
+        folder.path(),
+        "render wall --proxy plane --views wall/sparse/0 -o frames",
+    )
+    .ok();
     let open = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgba8();
     for i in 0..9 {
         let photo = open(&format!("wall/images/000{i}.png"));
@@ -186,7 +190,11 @@ fn a_view_that_sees_nothing_is_transparent() {
     let frame = PathFrame::new("back".to_owned(), camera, pose, None).unwrap();
     let path = CameraPath::new(30.0, vec![frame]).unwrap();
     render::path::write(&folder.path().join("path.json"), &path).unwrap();
-    lumigraph(folder.path(), "render wall --path path.json -o out").ok();
+    lumigraph(
+        folder.path(),
+        "render wall --proxy plane --path path.json -o out",
+    )
+    .ok();
     let frame = image::open(folder.path().join("out/back.png"))
         .unwrap()
         .into_rgba8();

@@ -19,10 +19,14 @@ fn twice_and_on_one_thread_or_two() {
         words("proxy OUT/scene plane");
         words("proxy OUT/scene plane -o OUT/plane.glb");
         words("render OUT/scene --path orbit --frames 3 -o OUT/frames");
-        words("render OUT/scene --path orbit --frames 3 --renderer exact -o OUT/exact");
-        words("render OUT/scene --path orbit --frames 2 --device reference -o OUT/reference");
         words(
-            "field OUT/scene --view 0004.png -o OUT/f.png --weights OUT/w.npz --triangulation OUT/t.svg",
+            "render OUT/scene --proxy points --path orbit --frames 3 --renderer exact -o OUT/exact",
+        );
+        words(
+            "render OUT/scene --proxy points --path orbit --frames 2 --device reference -o OUT/reference",
+        );
+        words(
+            "field OUT/scene --proxy points --view 0004.png -o OUT/f.png --weights OUT/w.npz --triangulation OUT/t.svg",
         );
         words("evaluate OUT/scene -o OUT/evaluated");
         files(&folder.path().join(out))

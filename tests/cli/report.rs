@@ -170,12 +170,12 @@ fn a_bound_on_the_error_chooses_frame_by_frame() {
     }
 
     for wrong in ["-1", "NaN", "50dB"] {
-        let line = format!("render wall --path orbit -o out --max-error {wrong}");
+        let line = format!("render wall --proxy plane --path orbit -o out --max-error {wrong}");
         let error = lumigraph(folder.path(), &line).error(2);
         assert!(error.contains("steps of 255"), "{error}");
     }
     for other in ["--grid 16", "--renderer exact"] {
-        let line = format!("render wall --path orbit -o out --max-error 1 {other}");
+        let line = format!("render wall --proxy plane --path orbit -o out --max-error 1 {other}");
         assert!(
             lumigraph(folder.path(), &line)
                 .error(2)

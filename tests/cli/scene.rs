@@ -31,7 +31,9 @@ fn a_scene_renders_like_its_capture_and_copies_no_photo() {
     assert_eq!(file["photos"][0]["path"], "../../wall/images/0000.png");
     assert_eq!(file["settings"]["capture"], "../../wall");
 
-    let line = |scene: &str, out: &str| format!("render {scene} --path sweep --frames 3 -o {out}");
+    let line = |scene: &str, out: &str| {
+        format!("render {scene} --proxy plane --path sweep --frames 3 -o {out}")
+    };
     lumigraph(folder.path(), &line("wall", "a")).ok();
     lumigraph(folder.path(), &line("deep/scene", "b")).ok();
     let frames = files(&folder.path().join("a"));

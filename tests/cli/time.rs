@@ -127,8 +127,8 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
 fn a_scene_without_times_or_period_says_so() {
     let folder = with_wall();
     for line in [
-        "evaluate wall --period 2",
-        "render wall --path orbit --time 1 -o out",
+        "evaluate wall --proxy plane --period 2",
+        "render wall --proxy plane --path orbit --time 1 -o out",
     ] {
         let error = lumigraph(folder.path(), line).error(1);
         assert!(
@@ -138,12 +138,12 @@ fn a_scene_without_times_or_period_says_so() {
     }
     let error = lumigraph(folder.path(), "import wall --frame-rate 2 -o scene").ok();
     assert!(error.stdout.contains("scene: 9 photos"));
-    let error = lumigraph(folder.path(), "evaluate scene --period auto").error(1);
+    let error = lumigraph(folder.path(), "evaluate scene --proxy plane --period auto").error(1);
     assert!(
         error.contains("7 photos with different times; at least 12"),
         "{error}"
     );
-    let ran = lumigraph(folder.path(), "evaluate scene --period never");
+    let ran = lumigraph(folder.path(), "evaluate scene --proxy plane --period never");
     assert!(
         ran.code == 2 && ran.stderr.contains("or auto"),
         "{}",

@@ -1,6 +1,6 @@
 //! How a found interior compares with a known one.
 
-use super::{CellId, Interior};
+use super::{Cell, CellId, Interior};
 use glam::DVec3;
 use std::fmt;
 
@@ -13,6 +13,8 @@ pub struct ComparedCell {
     pub found: Option<String>,
     /// Floor area that both have, over floor area that either has.
     pub iou: f64,
+    /// How far apart the same sides of their boxes are at most, in world units.
+    pub apart: Option<f64>,
 }
 
 /// A portal of the known interior, and the found one where it is.
@@ -70,6 +72,7 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64) -> Comparison
         name: known.cells[t].name.clone(),
         found: of_known[t].map(name),
         iou: of_known[t].map_or(0.0, |f| iou(t, f)),
+        apart: of_known[t].and_then(|f| apart(&known.cells[t], &found.cells[f])),
     });
     let cells = cells.collect();
     let extra_cells = (0..m).filter(|f| !is_matched[*f]).map(name).collect();
@@ -114,6 +117,13 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64) -> Comparison
         portals,
         extra_portals: extra.map(|f| found.portals[f].name.clone()).collect(),
     }
+}
+
+/// How far apart the same sides of two cells' boxes are at most.
+fn apart(a: &Cell, b: &Cell) -> Option<f64> {
+    let (a, b) = (a.content.room()?, b.content.room()?);
+    let sides = (a.min - b.min).abs().max((a.max - b.max).abs());
+    Some(sides.max_element())
 }
 
 /// Squares of floor, by cell.
@@ -196,10 +206,14 @@ fn is_over(interior: &Interior, id: CellId, p: DVec3, up: DVec3) -> bool {
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for ComparedCell { name, found, iou } in &self.cells {
-            match found {
-                Some(found) => writeln!(f, "{name}: {found}, IoU {iou:.3}")?,
-                None => writeln!(f, "{name}: not found")?,
+        for cell in &self.cells {
+            match &cell.found {
+                Some(found) => write!(f, "{}: {found}, IoU {:.3}", cell.name, cell.iou)?,
+                None => write!(f, "{}: not found", cell.name)?,
+            }
+            match cell.apart {
+                Some(apart) => writeln!(f, ", sides {apart:.2} apart at most")?,
+                None => writeln!(f)?,
             }
         }
         for name in &self.extra_cells {

@@ -52,7 +52,32 @@ pub(super) struct Side {
     lintel: usize,
     /// How much of it is wall.
     walled: usize,
+    /// The squares that it lies between, and those where it goes straight on though labels do not.
+    span: Squares,
+    straightened: Vec<Squares>,
     pub(super) openings: Vec<Opening>,
+}
+
+/// The least and the greatest of squares along both axes of the plan.
+#[derive(Clone, Copy)]
+struct Squares {
+    least: [usize; 2],
+    most: [usize; 2],
+}
+
+impl Squares {
+    /// By ranges on an axis and along it.
+    fn of(axis: usize, at: Range<usize>, along: Range<usize>) -> Self {
+        let pair = |at: usize, along: usize| if axis == 0 { [at, along] } else { [along, at] };
+        Self {
+            least: pair(at.start, along.start),
+            most: pair(at.end, along.end),
+        }
+    }
+
+    fn has(&self, other: &Self) -> bool {
+        (0..2).all(|k| self.least[k] <= other.least[k] && other.most[k] <= self.most[k])
+    }
 }
 
 /// Sides of two rooms are one if they lie within this; metres.
@@ -67,6 +92,9 @@ const LEAST_AREA: f64 = 0.15;
 /// Floors are rough: an opening that begins lower begins at the floor; metres.
 const THRESHOLD: f64 = 0.3;
 const ROUGH: f64 = 0.15;
+/// Where rooms meet in the open, the line between them bends towards the end of a wall. What parts
+/// them goes straight on, if there is a wall within this; metres.
+const BENT: f64 = 0.6;
 /// The highest an opening is believed without a ceiling; metres.
 const NO_CEILING: f64 = 2.2;
 /// Rooms are one if this much of what parts them is open, and this much of that below a beam.
@@ -122,9 +150,19 @@ pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
                 .into_iter()
                 .partition(|(at, _)| at.abs_diff(best) <= reach);
             left = rest;
-            sides.push(side(columns, rooms, axis, near));
+            sides.push(side(columns, &grown.labels, rooms, axis, near));
         }
     }
+    // 3. Without the bends of lines that go straight on.
+    let is_bend = |side: &Side| {
+        let is_of = |other: &&Side| side.rooms.iter().all(|r| other.rooms.contains(r));
+        let others = sides.iter().filter(is_of);
+        let mut bends = others.flat_map(|other| &other.straightened);
+        bends.any(|bend| bend.has(&side.span))
+    };
+    let bends: Vec<bool> = sides.iter().map(is_bend).collect();
+    let mut bends = bends.into_iter();
+    sides.retain(|_| bends.next() != Some(true));
     sides
 }
 
@@ -186,7 +224,7 @@ pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)>
     found.map(|(pair, _)| pair)
 }
 
-fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Side {
+fn side(columns: &Columns, labels: &[u32], rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Side {
     let index = |at: usize, along: usize| match axis {
         0 => along * columns.size[0] + at,
         _ => at * columns.size[0] + along,
@@ -198,6 +236,28 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Si
     let mut alongs: Vec<usize> = edges.iter().map(|(_, along)| *along).collect();
     alongs.sort_unstable();
     alongs.dedup();
+    let (first, last) = (alongs[0], alongs[alongs.len() - 1] + 1);
+    let span = Squares::of(axis, places[0]..places[places.len() - 1], first..last);
+    let is_inside = |along: &usize| {
+        let both = [middle.saturating_sub(1), middle.min(most - 1)];
+        let mut labels = both.iter().map(|at| labels[index(*at, *along)]);
+        labels.all(|label| rooms.contains(&label))
+    };
+    let bent = columns.squares(BENT).round() as usize;
+    let ahead = (last..columns.size[1 - axis]).take_while(is_inside);
+    let behind = (0..first).rev().take_while(is_inside);
+    let ahead = last..last + ahead.take(bent + 1).count();
+    let behind = first - behind.take(bent + 1).count()..first;
+    let mut straightened = Vec::new();
+    for more in [ahead, behind] {
+        if (1..=bent).contains(&more.len()) {
+            let around = middle.saturating_sub(bent)..middle + bent;
+            let beside = more.start.saturating_sub(bent)..more.end + bent;
+            straightened.push(Squares::of(axis, around, beside));
+            alongs.extend(more);
+        }
+    }
+    alongs.sort_unstable();
     // 1. How thick the wall is, and where its middle is.
     let reach = columns.squares(REACH).round() as usize;
     let around = middle.saturating_sub(reach)..(middle + reach).min(most);
@@ -286,6 +346,8 @@ fn side(columns: &Columns, rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Si
         open: open_count,
         lintel: lintel_count,
         walled: walls.len(),
+        span,
+        straightened,
         openings: holes.into_iter().map(opening).collect(),
     }
 }

@@ -1,0 +1,418 @@
+//! Rooms found in models and captures, against what is known of them.
+
+use crate::common;
+use crate::house;
+
+use glam::{DMat4, DQuat, DVec3};
+use house::small_house;
+use proxy::Mesh;
+use proxy::interior::find::{
+    Evidence, FindError, FindOptions, FoundInterior, find_interior, sights,
+};
+use proxy::interior::{Content, Interior, RoomBox, compare, parse_rooms};
+
+fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
+    let evidence = Evidence {
+        mesh,
+        cameras: &[],
+        sights: &[],
+    };
+    find_interior(&evidence, "model.glb", options)
+}
+
+fn bounds(found: &FoundInterior, cell: usize) -> RoomBox {
+    match found.interior.cells[cell].content {
+        Content::Box(room) => room,
+        _ => panic!("found cells are boxes"),
+    }
+}
+
+/// For looking at, where a folder is named.
+fn look_at(found: &FoundInterior, name: &str) {
+    if let Ok(folder) = std::env::var("FLOOR_PLANS") {
+        let path = format!("{folder}/{name}.png");
+        found.picture().save(path).unwrap();
+    }
+}
+
+#[test]
+fn rooms_and_openings_of_procedural_houses_are_found() {
+    for (rooms, seed) in [(2, 1), (5, 2), (9, 3), (19, 1)] {
+        let (house, _) = small_house(rooms, seed);
+        let found = find(&house.model.mesh, &FindOptions::default()).unwrap();
+        look_at(&found, &format!("house-{rooms}"));
+        let compared = compare(&house.interior, &found.interior, 0.2);
+        let iou = || compared.cells.iter().map(|c| c.iou);
+        let worst = iou().fold(1.0, f64::min);
+        let mean = iou().sum::<f64>() / rooms as f64;
+        eprintln!("{rooms} rooms: IoU {mean:.3}, least {worst:.3}");
+        assert!(worst > 0.93, "{compared}");
+        assert!(compared.portals.iter().all(|p| p.is_found), "{compared}");
+        assert!(compared.extra_cells.is_empty(), "{compared}");
+        assert!(compared.extra_portals.is_empty(), "{compared}");
+        assert_eq!(found.warnings, []);
+        let svg = found.svg();
+        assert!(svg.starts_with("<svg ") && svg.contains("room 2"));
+    }
+}
+
+#[test]
+fn turning_and_shifting_the_world_turns_and_shifts_the_rooms() {
+    let (house, _) = small_house(5, 4);
+    let there = DMat4::from_rotation_translation(
+        DQuat::from_euler(glam::EulerRot::XYZ, 0.9, 0.5, -0.7),
+        DVec3::new(310.0, -40.0, 95.0),
+    );
+    let mut mesh = house.model.mesh.clone();
+    mesh.transform(&there);
+    // Up is not known, and y is not it.
+    let found = find(&mesh, &FindOptions::default()).unwrap();
+    let up = there.transform_vector3(DVec3::Y);
+    assert!(found.interior.up.dot(up) > 0.99999, "{}", found.interior.up);
+    assert_eq!(found.interior.cells.len(), 5);
+    let back = there.inverse();
+    let mut left: Vec<DVec3> = house
+        .interior
+        .portals
+        .iter()
+        .map(|p| p.polygon.center())
+        .collect();
+    for portal in &found.interior.portals {
+        let center = back.transform_point3(portal.polygon.center());
+        let near = left.iter().position(|c| c.distance(center) < 0.15);
+        left.remove(near.unwrap_or_else(|| panic!("{} at {center}", portal.name)));
+    }
+    assert!(left.is_empty(), "{left:?}");
+    // Outlines, and boxes around them.
+    for cell in &found.interior.cells {
+        assert!(cell.floor.is_some(), "{}", cell.name);
+    }
+    // Another scale, said to be one.
+    let mut mesh = house.model.mesh.clone();
+    mesh.transform(&DMat4::from_scale(DVec3::splat(40.0)));
+    let options = FindOptions {
+        meter: 40.0,
+        ..FindOptions::default()
+    };
+    let larger = find(&mesh, &options).unwrap();
+    assert_eq!(larger.interior.cells.len(), 5);
+    assert_eq!(larger.interior.portals.len(), house.interior.portals.len());
+}
+
+/// A room without ceiling or floor, as may be, from faces of a box.
+fn open_box(min: DVec3, max: DVec3, faces: &[usize]) -> Mesh {
+    let mut mesh = Mesh::default();
+    for face in faces {
+        let (axis, side) = (face / 2, face % 2);
+        let corner = |u: bool, v: bool| {
+            let mut p = if side == 0 { min } else { max };
+            p[(axis + 1) % 3] = if u { max } else { min }[(axis + 1) % 3];
+            p[(axis + 2) % 3] = if v { max } else { min }[(axis + 2) % 3];
+            if side == 0 {
+                p[axis] = min[axis];
+            }
+            p
+        };
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([
+            corner(false, false),
+            corner(true, false),
+            corner(true, true),
+            corner(false, true),
+        ]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.triangles.push([first, first + 2, first + 3]);
+    }
+    mesh
+}
+
+#[test]
+fn one_room_is_one_cell_and_two_apart_are_two() {
+    let size = DVec3::new(5.0, 2.6, 4.0);
+    let one = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let found = find(&one, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 1);
+    assert_eq!(found.interior.portals.len(), 0);
+    let room = bounds(&found, 0);
+    for (a, b) in [(room.min, DVec3::ZERO), (room.max, size)] {
+        assert!((a - b).abs().max_element() < 0.2, "{room:?}");
+    }
+    // Without a ceiling.
+    let open = open_box(DVec3::ZERO, size, &[0, 1, 2, 4, 5]);
+    let found = find(&open, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 1);
+    // Apart.
+    let mut two = one.clone();
+    let shift = DVec3::X * 9.0;
+    two.append(&open_box(shift, shift + size, &[0, 1, 2, 3, 4, 5]));
+    let found = find(&two, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 2);
+    assert_eq!(found.interior.portals.len(), 0);
+}
+
+#[test]
+fn what_is_no_room_is_told() {
+    let none = find(&Mesh::default(), &FindOptions::default()).unwrap_err();
+    assert_eq!(none, FindError::NoSurface);
+    let triangle = Mesh {
+        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Z],
+        triangles: vec![[0, 1, 2]],
+    };
+    let error = find(&triangle, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+    let nan = Mesh {
+        positions: vec![DVec3::NAN, DVec3::X, DVec3::Z],
+        triangles: vec![[0, 1, 2]],
+    };
+    assert_eq!(
+        find(&nan, &FindOptions::default()).unwrap_err(),
+        FindError::NoSurface
+    );
+    // A field is no room: nothing encloses it.
+    let field = open_box(DVec3::ZERO, DVec3::new(30.0, 0.0, 30.0), &[2]);
+    let error = find(&field, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+    let options = FindOptions {
+        meter: 0.0,
+        ..FindOptions::default()
+    };
+    assert_eq!(
+        find(&field, &options).unwrap_err(),
+        FindError::Option("the metre", 0.0)
+    );
+}
+
+#[test]
+fn rooms_of_a_modelled_house_are_where_its_description_says() {
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
+    let found = find(&model.mesh, &FindOptions::default()).unwrap();
+    look_at(&found, "house");
+    // Bedroom and study. Folding doors without panes and a balcony's open front part nothing.
+    let said = [[-9.3, -3.1, -2.5, 1.5], [-9.3, 1.5, -2.5, 5.4]];
+    for [x0, z0, x1, z1] in said {
+        let is_there = (0..found.interior.cells.len()).any(|i| {
+            let RoomBox { min, max } = bounds(&found, i);
+            let off = [min.x - x0, min.z - z0, max.x - x1, max.z - z1];
+            off.iter().all(|o| o.abs() < 0.2)
+        });
+        assert!(is_there, "{:?}", found.interior.cells);
+    }
+    // One sees from both into the living room.
+    let doors = found.interior.portals.iter().filter(|p| {
+        let at = p.polygon.center();
+        (at.x + 2.5).abs() < 0.2 && at.z > -0.6 && at.z < 2.8
+    });
+    let width: f64 = doors.map(|p| p.width(found.interior.up)).sum();
+    assert!((width - 3.4).abs() < 0.2, "{width}");
+}
+
+/// Rooms found in a capture's fused depth maps.
+fn found_in(name: &str) -> Option<(FoundInterior, Vec<[DVec3; 2]>)> {
+    let capture = common::capture(&common::find_capture(name)?);
+    let all: Vec<_> = capture.used.iter().chain(&capture.held_out).collect();
+    let frame = |i: usize| common::decode(all[i]);
+    let options = proxy::depth::Options {
+        voxel_size: Some(0.05),
+        ..proxy::depth::Options::default()
+    };
+    let fusion = proxy::depth::fuse(all.len(), frame, &options).unwrap();
+    let cameras: Vec<_> = all.iter().map(|(v, _)| (v.center(), v.up())).collect();
+    let mut lines = Vec::new();
+    for each in &all {
+        let (view, map) = common::decode(each).unwrap();
+        lines.extend(sights(&view, &map, 4));
+    }
+    let evidence = Evidence {
+        mesh: &fusion.mesh,
+        cameras: &cameras,
+        sights: &lines,
+    };
+    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
+    look_at(&found, name);
+    for (i, cell) in found.interior.cells.iter().enumerate() {
+        eprintln!("{name}: {} {:?}", cell.name, bounds(&found, i));
+    }
+    for portal in &found.interior.portals {
+        let width = portal.width(found.interior.up);
+        eprintln!(
+            "{name}: {} at {} width {width:.2}",
+            portal.name,
+            portal.polygon.center()
+        );
+    }
+    Some((found, lines))
+}
+
+#[test]
+fn a_capture_of_the_house_has_the_same_rooms_as_its_model() {
+    let Some((found, sights)) = found_in("house-walk") else {
+        return;
+    };
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
+    assert!((found.interior.eye_height - 1.55).abs() < 0.1);
+    let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
+    let model = find(&model.mesh, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), model.interior.cells.len());
+    // 1. Cells: their sides are within 0.2 m, but where no photo saw as far.
+    let mut west = f64::NEG_INFINITY;
+    for i in 0..model.interior.cells.len() {
+        let truth = bounds(&model, i);
+        let off = |j: &usize| {
+            let of = bounds(&found, *j);
+            (of.max - truth.max).length() + (of.min.z - truth.min.z).abs()
+        };
+        let nearest = (0..found.interior.cells.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let of = bounds(&found, nearest.unwrap());
+        let (min, max) = (of.min - truth.min, of.max - truth.max);
+        eprintln!("cell {i}: {min:.2} {max:.2}");
+        let same = [min.z, max.x, max.z, min.y, max.y];
+        assert!(same.iter().all(|d| d.abs() <= 0.2), "{truth:?} {of:?}");
+        if min.x.abs() > 0.2 {
+            // Nothing was seen between what was found and the true wall: no line of sight ends there.
+            let is_in = |p: &DVec3| p.x < of.min.x - 0.2 && p.z > of.min.z && p.z < of.max.z;
+            let beyond = sights.iter().filter(|s| is_in(&s[1])).count();
+            let farthest = sights
+                .iter()
+                .map(|s| s[1])
+                .filter(|p| p.z > of.min.z && p.z < of.max.z);
+            let farthest = farthest.map(|p| p.x).fold(f64::INFINITY, f64::min);
+            eprintln!(
+                "cell {i}: {beyond} of {} sights end beyond, the farthest {farthest:.2}",
+                sights.len()
+            );
+            assert_eq!(beyond, 0);
+            west = west.max(of.min.x);
+        }
+    }
+    // 2. Portals, as far as photos saw.
+    let extent = |interior: &Interior, i: usize| {
+        let corners = interior.portals[i].polygon.corners().iter();
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+            (l.min(*p), h.max(*p))
+        })
+    };
+    let mut left: Vec<usize> = (0..found.interior.portals.len()).collect();
+    for i in 0..model.interior.portals.len() {
+        let (low, high) = extent(&model.interior, i);
+        if high.x < west {
+            eprintln!("portal {i}: never seen");
+            continue;
+        }
+        let seen = |low: DVec3| low.with_x(low.x.max(west));
+        let worst = |j: usize| {
+            let (l, h) = extent(&found.interior, j);
+            (seen(l) - seen(low))
+                .abs()
+                .max((h - high).abs())
+                .max_element()
+        };
+        let best = left
+            .iter()
+            .copied()
+            .min_by(|a, b| worst(*a).total_cmp(&worst(*b)));
+        let best = best.unwrap();
+        eprintln!("portal {i}: {:.2}", worst(best));
+        assert!(
+            worst(best) <= 0.2,
+            "{low} {high} {:?}",
+            extent(&found.interior, best)
+        );
+        left.retain(|j| *j != best);
+    }
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn the_hall_of_an_office_is_found() {
+    let Some((found, _)) = found_in("office-walk") else {
+        return;
+    };
+    let rooms = include_bytes!("../data/office-walk-rooms.json");
+    let (truth, _) = parse_rooms("rooms.json".as_ref(), rooms, "model.glb").unwrap();
+    let compared = compare(&truth, &found.interior, 0.3);
+    eprint!("office-walk\n{compared}");
+    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
+    assert!(compared.cells[0].iou > 0.9 && compared.cells[1].iou > 0.6);
+    assert!(compared.extra_cells.is_empty());
+    // The corridor's mouth is as wide as it; above it nothing was seen.
+    let [said, mouth] = [&truth, &found.interior].map(|i| &i.portals[0]);
+    let off = mouth.polygon.center() - said.polygon.center();
+    assert!(off.with_y(0.0).length() < 0.2, "{off}");
+    assert!((mouth.width(DVec3::Y) - said.width(DVec3::Y)).abs() < 0.1);
+}
+
+#[test]
+fn corridors_as_wide_as_their_mouths_are_rooms() {
+    // A hall, and out of its wall a corridor 1.4 m wide; no lintel, no bottleneck.
+    let mut mesh = Mesh::default();
+    let mut wall = |from: [f64; 2], to: [f64; 2]| {
+        let [a, b] = [from, to].map(|[x, z]| DVec3::new(x, 0.0, z));
+        let first = mesh.positions.len() as u32;
+        let up = DVec3::Y * 2.6;
+        mesh.positions.extend([a, b, b + up, a + up]);
+        mesh.triangles
+            .extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
+    };
+    let corners = [
+        [0.0, 0.0],
+        [6.0, 0.0],
+        [6.0, 5.0],
+        [4.4, 5.0],
+        [4.4, 9.0],
+        [3.0, 9.0],
+        [3.0, 5.0],
+        [0.0, 5.0],
+    ];
+    for i in 0..8 {
+        wall(corners[i], corners[(i + 1) % 8]);
+    }
+    for (min, max) in [([0.0, 0.0], [6.0, 5.0]), ([3.0, 5.0], [4.4, 9.0])] {
+        let [a, b] = [min, max].map(|[x, z]: [f64; 2]| DVec3::new(x, 0.0, z));
+        mesh.append(&open_box(a, b + DVec3::Y * 2.6, &[2, 3]));
+    }
+    let found = find(&mesh, &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 2, "{:?}", found.interior.cells);
+    let mouth = &found.interior.portals[0];
+    assert!(mouth.polygon.center().distance(DVec3::new(3.7, 1.3, 5.0)) < 0.2);
+    assert!((mouth.width(DVec3::Y) - 1.4).abs() < 0.2);
+}
+
+#[test]
+fn what_was_not_seen_of_a_room_is_of_it() {
+    // Who stands in one corner and looks into the opposite one sees neither of the others.
+    let size = DVec3::new(6.0, 2.6, 4.0);
+    let room = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let eye = DVec3::new(0.5, 1.6, 0.5);
+    let mut sights = Vec::new();
+    for i in 0..200 {
+        for j in 0..60 {
+            let turn = 0.25 + 0.7 * f64::from(i) / 200.0;
+            let ray = DVec3::new(turn.cos(), 0.02 * f64::from(j) - 0.6, turn.sin());
+            let limits = [
+                (size.x - eye.x) / ray.x,
+                (size.z - eye.z) / ray.z,
+                if ray.y > 0.0 { size.y - eye.y } else { -eye.y } / ray.y,
+            ];
+            let end = limits.into_iter().filter(|t| *t > 0.0).fold(1e9, f64::min);
+            sights.push([eye, eye + end * ray]);
+        }
+    }
+    let evidence = Evidence {
+        mesh: &room,
+        cameras: &[(eye, DVec3::Y)],
+        sights: &sights,
+    };
+    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
+    assert_eq!(found.interior.cells.len(), 1);
+    let of = bounds(&found, 0);
+    let off = [of.min.x, of.min.z, of.max.x - size.x, of.max.z - size.z];
+    // Nobody knows what is behind who looks.
+    assert!(off[0] < 1.2 && off[1] < 1.0, "{of:?}");
+    assert!(off[2].abs() < 0.2 && off[3].abs() < 0.2, "{of:?}");
+}

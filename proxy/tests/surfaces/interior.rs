@@ -1,0 +1,489 @@
+//! Interiors: files, what is said of bad ones, contents, cameras before portals.
+
+use crate::common;
+
+use glam::DVec3;
+use proptest::prelude::*;
+use proxy::interior::{
+    CellId, Content, Contents, Interior, InteriorFileError, InteriorWarning, PortalId, RoomBox,
+    SemicircleOptions, interior_from_nodes, parse_interior, parse_rooms, read_rooms, semicircles,
+    write_interior,
+};
+use proxy::mesh::{self, Mesh, Model, ModelNode, Part};
+use std::path::Path;
+
+/// Two rooms side by side along x, a door and a window.
+const TWO_ROOMS: &str = r#"{
+  "version": 1,
+  "rooms": [
+    {"name": "west", "min": [0, 0, 0], "max": [4, 3, 4]},
+    {"name": "east", "min": [4, 0, 0], "max": [8, 3, 4]}
+  ],
+  "openings": [
+    {"name": "door", "between": ["west", "east"],
+     "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]]},
+    {"name": "window", "between": ["east", null], "radius": 0.7,
+     "polygon": [[8, 1, 1], [8, 1, 3], [8, 2, 3], [8, 2, 1]]}
+  ]
+}"#;
+
+fn two_rooms() -> Interior {
+    let (interior, warnings) = rooms(TWO_ROOMS).unwrap();
+    assert_eq!(warnings, []);
+    interior
+}
+
+fn rooms(text: &str) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+    parse_rooms(Path::new("rooms.json"), text.as_bytes(), "house.glb")
+}
+
+#[test]
+fn an_interior_comes_back_from_its_file_to_the_last_digit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("interior.json");
+    let mut interior = two_rooms();
+    interior.eye_height = 1.0 / 3.0;
+    interior.up = DVec3::new(0.1, 0.9, -0.2).normalize();
+    interior.cells[0].content = Content::Scene {
+        folder: "../west wing".to_owned(),
+        room: None,
+    };
+    interior.cells[1].content = Content::Box(RoomBox {
+        min: DVec3::new(4.0, 0.1 + 0.2, -1e-300),
+        max: DVec3::new(5e6 + 0.1, 1.0 / 3.0, 7.0),
+    });
+    interior.cells[0].floor = Some(interior.portals[1].polygon.clone());
+    let keep = |v: &str| serde_json::from_str(v).unwrap();
+    interior.other.insert(
+        "architect".to_owned(),
+        keep(r#"{"name": [1, 2.5e-7, null]}"#),
+    );
+    interior.cells[1]
+        .other
+        .insert("paint".to_owned(), keep("true"));
+    interior.portals[0]
+        .other
+        .insert("leaf".to_owned(), keep("\"oak\""));
+    write_interior(&path, &interior).unwrap();
+    let (back, _) = proxy::interior::read_interior(&path).unwrap();
+    assert_eq!(back, interior);
+    assert_eq!(back.cells[0].content.room(), None);
+    assert_eq!(back.cells[1].content.scene(), None);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    // Again, byte for byte.
+    let bytes = std::fs::read(&path).unwrap();
+    write_interior(&path, &back).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    // Boxes that photos show, and those that have no say.
+    let room = back.cells[1].content.room();
+    let mut shown = back;
+    shown.show_photos("../east wing");
+    shown.held_out = vec!["a.jpg".to_owned()];
+    assert_eq!(shown.cells[0].content.scene(), Some("../west wing"));
+    assert_eq!(shown.cells[1].content.scene(), Some("../east wing"));
+    assert_eq!(shown.cells[1].content.room(), room);
+    write_interior(&path, &shown).unwrap();
+    let (back, _) = proxy::interior::read_interior(&path).unwrap();
+    assert_eq!(back, shown);
+}
+
+/// What is said of an interior file.
+fn message(text: &str) -> String {
+    match parse_interior(Path::new("i.json"), text.as_bytes()) {
+        Ok((interior, warnings)) => panic!("{interior:?} {warnings:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+const TWO_PORTALS: &str = r#"
+    {"name": "p", "cells": ["a", null], "polygon": [[1, 0, 0], [1, 1, 0], [1, 1, 1]]},
+    {"name": "q", "cells": [null, "a"], "polygon": [[0, 0, 0], [0, 1, 0], [0, 1, 1]]}"#;
+
+/// One cell and what is given.
+fn with(cells: &str, portals: &str) -> String {
+    format!(
+        r#"{{"version": 1, "model": "m.glb", "up": [0, 1, 0], "eye_height": 1.6,
+            "cells": [{{"name": "a", "box": {{"min": [0, 0, 0], "max": [1, 1, 1]}}}}{cells}],
+            "portals": [{portals}]}}"#
+    )
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let portal = |polygon: &str, cells: &str| {
+        with(
+            "",
+            &format!(r#"{{"name": "p", "polygon": {polygon}, "cells": {cells}}}"#),
+        )
+    };
+    let square = "[[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]]";
+    for (text, said) in [
+        ("{", "not an interior: EOF"),
+        (
+            r#"{"version": 2}"#,
+            "version 2; this program reads version 1",
+        ),
+        (r#"{"version": 1}"#, "missing field `up`"),
+        (
+            &portal("[[0, 0, 0], [0, 1, 0]]", r#"["a", null]"#),
+            "portal `p`: it has 2 corners; give 3 to 256",
+        ),
+        (
+            &portal("[[0, 0, 0], [0, 1, 0], [0, 2, 0]]", r#"["a", null]"#),
+            "portal `p`: its corners lie on a line",
+        ),
+        (
+            &portal(
+                "[[0, 0, 0], [0, 1, 0], [0.1, 1, 1], [0, 0, 1]]",
+                r#"["a", null]"#,
+            ),
+            "off the plane of the others",
+        ),
+        (
+            &portal(square, r#"["a", "b"]"#),
+            "portal `p` leads to the cell `b`; there are: a",
+        ),
+        (&portal(square, r#"["a", "a"]"#), "leads from `a` to `a`"),
+        (&portal(square, "[null, null]"), "leads from null to null"),
+        (
+            &portal("[[0, 0, NaN], [0, 1, 0], [0, 1, 1]]", r#"["a", null]"#),
+            "not an interior: expected value",
+        ),
+        (
+            &portal("[[0, 0, 1e999], [0, 1, 0], [0, 1, 1]]", r#"["a", null]"#),
+            "number out of range",
+        ),
+        (
+            &with(r#", {"name": "a", "nodes": ["x"]}"#, ""),
+            "two cells are called `a`",
+        ),
+        (
+            &with(r#", {"name": "", "nodes": ["x"]}"#, ""),
+            "a cell has no name",
+        ),
+        (
+            &with(r#", {"name": "b"}"#, ""),
+            "cell `b` must have one of `box`, `nodes` and `scene`, or `scene` and `box`, and has 0",
+        ),
+        (
+            &with(r#", {"name": "b", "nodes": [], "scene": "s"}"#, ""),
+            "and has 2",
+        ),
+        (
+            &with(
+                r#", {"name": "b", "box": {"min": [0, 0, 0], "max": [1, 0, 1]}}"#,
+                "",
+            ),
+            "the box of cell `b` is empty",
+        ),
+        (
+            &with(r#", {"name": "b", "scene": "s", "floor": [[0, 0, 0]]}"#, ""),
+            "the floor of cell `b`: it has 1 corners",
+        ),
+        (
+            r#"{"version": 1, "up": [0, 0, 0], "eye_height": 1, "cells": [], "portals": []}"#,
+            "`up` is [0.0, 0.0, 0.0]",
+        ),
+        (
+            r#"{"version": 1, "up": [0, 0, 2], "eye_height": -1, "cells": [], "portals": []}"#,
+            "`eye_height` is -1; expected a positive number",
+        ),
+        (
+            r#"{"version": 1, "up": [0, 0, 2], "eye_height": 1, "cells": [], "portals": []}"#,
+            "there are no cells",
+        ),
+        (
+            r#"{"version": 1, "up": [0, 0, 2], "eye_height": 1,
+                "cells": [{"name": "a", "nodes": ["x"]}], "portals": []}"#,
+            "no `model` is named",
+        ),
+    ] {
+        let found = message(text);
+        assert!(found.starts_with("i.json: "), "{found}");
+        assert!(found.contains(said), "{found} does not say {said}");
+    }
+    // In memory, too.
+    let mut interior = two_rooms();
+    interior.portals[0].radius = Some(f64::NAN);
+    let error = interior.check().unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "the radius of portal `door` is NaN; expected a positive number"
+    );
+    interior.portals[0].radius = None;
+    interior.portals[0].cells[1] = Some(CellId(7));
+    assert!(interior.check().is_err());
+}
+
+#[test]
+fn what_is_odd_is_told() {
+    let odd = |text: &str| {
+        let (_, warnings) = rooms(text).unwrap();
+        let said: Vec<String> = warnings.iter().map(|w| w.to_string()).collect();
+        said.join("\n")
+    };
+    let overlapping = TWO_ROOMS.replace("\"max\": [4, 3, 4]", "\"max\": [4.5, 3, 4]");
+    let said = odd(&overlapping);
+    assert!(
+        said.contains("the boxes of cells `west` and `east` overlap"),
+        "{said}"
+    );
+    let apart = TWO_ROOMS.replace("[\"west\", \"east\"]", "[null, \"east\"]");
+    assert!(odd(&apart).contains("cell `west` has no portal"));
+    let far = TWO_ROOMS.replace(
+        "\"min\": [0, 0, 0], \"max\": [4, 3, 4]",
+        "\"min\": [-9, 0, 0], \"max\": [-5, 3, 4]",
+    );
+    assert!(odd(&far).contains("portal `door` is 9 away from the box of its cell `west`"));
+    // Rooms' outlines are turned the right way; an interior's are believed, and doubted.
+    let mut interior = two_rooms();
+    assert!((interior.portals[0].polygon.normal() + DVec3::X).length() < 1e-12);
+    interior.portals[0].polygon = interior.portals[0].polygon.clone().reversed();
+    let warnings = interior.check().unwrap();
+    assert_eq!(warnings, [InteriorWarning::Turned("door".to_owned())]);
+}
+
+/// A model of single triangles.
+fn model(triangles: &[[[f64; 3]; 3]], nodes: &[&str]) -> Model {
+    let corners: Vec<DVec3> = triangles
+        .as_flattened()
+        .iter()
+        .map(|p| DVec3::from_array(*p))
+        .collect();
+    let count = triangles.len() as u32;
+    let name = |i: u32| nodes.get(i as usize).copied().unwrap_or("thing").to_owned();
+    Model {
+        uvs: vec![[0.0; 2]; corners.len()],
+        colors: vec![[255; 4]; corners.len()],
+        mesh: Mesh {
+            triangles: (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            positions: corners,
+        },
+        parts: (0..count)
+            .map(|i| Part {
+                triangles: i..i + 1,
+                node_idx: i,
+                material_idx: 0,
+            })
+            .collect(),
+        nodes: (0..count)
+            .map(|i| ModelNode {
+                name: name(i),
+                parent_idx: None,
+            })
+            .collect(),
+        materials: vec![mesh::Material::default()],
+        textures: Vec::new(),
+    }
+}
+
+/// A triangle around a place.
+fn around([x, y, z]: [f64; 3], size: f64) -> [[f64; 3]; 3] {
+    [
+        [x - size, y, z - size],
+        [x + size, y, z - size],
+        [x, y, z + size],
+    ]
+}
+
+#[test]
+fn cells_have_what_touches_them() {
+    let model = model(
+        &[
+            around([1.0, 1.0, 1.0], 0.1),
+            around([4.0, 1.0, 1.0], 0.1),
+            around([7.0, 1.0, 1.0], 0.1),
+            around([7.0, 9.0, 1.0], 0.1),
+        ],
+        &[],
+    );
+    let interior = two_rooms();
+    let (contents, warnings) = Contents::new(&interior, &model).unwrap();
+    assert_eq!(contents.triangles, [vec![0, 1], vec![1, 2]]);
+    assert_eq!(contents.elsewhere, [3]);
+    assert_eq!(warnings, [InteriorWarning::Elsewhere(1)]);
+    // Of an empty model there is nothing to see, and everything else works.
+    let (empty, warnings) = Contents::new(&interior, &Model::default()).unwrap();
+    assert_eq!(warnings.len(), 2);
+    assert_eq!(empty.locate(&interior, DVec3::ONE), Some(CellId(0)));
+}
+
+#[test]
+fn nodes_name_cells_and_portals() {
+    let mut model = model(
+        &[
+            around([1.0, 1.0, 1.0], 1.0),
+            around([5.0, 1.0, 1.0], 1.0),
+            [[3.0, 0.0, 0.0], [3.0, 0.0, 2.0], [3.0, 2.0, 2.0]],
+            [[3.0, 0.0, 0.0], [3.0, 2.0, 2.0], [3.0, 2.0, 0.0]],
+        ],
+        &["cell:a", "cell:b", "portal:a|b"],
+    );
+    model.parts[3].node_idx = 2;
+    let (interior, warnings) = interior_from_nodes(&model, "m.glb").unwrap();
+    assert_eq!(warnings, []);
+    let portal = interior.portal(PortalId(0));
+    assert_eq!(portal.cells, [Some(CellId(0)), Some(CellId(1))]);
+    assert_eq!(portal.polygon.corners().len(), 4);
+    assert!((portal.polygon.normal() + DVec3::X).length() < 1e-12);
+    let (contents, warnings) = Contents::new(&interior, &model).unwrap();
+    assert_eq!(contents.triangles, [vec![0], vec![1]]);
+    assert_eq!((contents.elsewhere.len(), warnings.len()), (0, 0));
+    // What is not there.
+    let mut unknown = interior.clone();
+    unknown.cells[0].content = Content::Nodes(vec!["moon".to_owned()]);
+    let error = Contents::new(&unknown, &model).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "cell `a` shows the node `moon`, which the model does not have"
+    );
+    model.nodes[2].name = "portal:a|c".to_owned();
+    let error = interior_from_nodes(&model, "m.glb")
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("leads to the cell `c`"), "{error}");
+    model.parts[3].node_idx = 0;
+    model.parts[2].node_idx = 0;
+    model.nodes[2].name = "portal:a|b".to_owned();
+    let error = interior_from_nodes(&model, "m.glb")
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("it has no triangles"), "{error}");
+    for node in &mut model.nodes {
+        node.name.clear();
+    }
+    assert!(interior_from_nodes(&model, "m.glb").is_err());
+}
+
+#[test]
+fn viewers_are_found() {
+    let interior = two_rooms();
+    let [west, east] = [Some(CellId(0)), Some(CellId(1))];
+    let at = DVec3::new;
+    let (a, b) = (at(1.0, 1.0, 1.5), at(7.0, 1.0, 1.5));
+    let (contents, _) = Contents::new(&interior, &Model::default()).unwrap();
+    assert_eq!(contents.locate(&interior, a), west);
+    assert_eq!(contents.locate(&interior, b), east);
+    assert_eq!(contents.locate(&interior, at(9.0, 1.0, 1.0)), None);
+    assert_eq!(contents.locate(&interior, DVec3::NAN), None);
+    // Boxes that leave out the wall between them: in the doorway, on the same side.
+    let thick = TWO_ROOMS
+        .replace("\"max\": [4, 3, 4]", "\"max\": [3.9, 3, 4]")
+        .replace("\"min\": [4, 0, 0]", "\"min\": [4.1, 0, 0]");
+    let (thick, _) = rooms(&thick).unwrap();
+    let (contents, _) = Contents::new(&thick, &Model::default()).unwrap();
+    assert_eq!(contents.locate(&thick, at(3.95, 1.0, 1.5)), west);
+    assert_eq!(contents.locate(&thick, at(4.05, 1.0, 1.5)), east);
+    assert_eq!(contents.locate(&thick, at(4.05, 1.0, 3.5)), None);
+}
+
+#[test]
+fn cameras_stand_on_semicircles_before_portals() {
+    let interior = two_rooms();
+    let views = semicircles(&interior, &SemicircleOptions::default());
+    // Two sides of the door; the window from outside alone.
+    assert_eq!(views.len(), 3 * 13);
+    let sides: Vec<_> = views.chunks(13).map(|v| (v[0].from, v[0].into)).collect();
+    let [west, east] = [CellId(0), CellId(1)];
+    assert_eq!(
+        sides,
+        [(Some(west), east), (Some(east), west), (None, east)]
+    );
+    for (side, radius) in views.chunks(13).zip([1.5, 1.5, 0.7]) {
+        let portal = interior.portal(side[0].portal);
+        let center = portal.polygon.center();
+        for (i, view) in side.iter().enumerate() {
+            let eye = view.camera_from_world.center();
+            let level = (eye - center).with_y(0.0);
+            assert!((level.length() - radius).abs() < 1e-9);
+            // At eye height over the floor of the viewer's cell; outside, over the portal's foot.
+            let floor = if view.from.is_some() { 0.0 } else { 1.0 };
+            assert!((eye.y - floor - 1.6).abs() < 1e-9);
+            // On the viewer's side.
+            let height = portal.polygon.height(eye);
+            assert_eq!(height > 0.0, portal.cells[0] == view.from);
+            assert!(height.abs() > 0.49 * radius);
+            assert!(view.is_inside);
+            // Aimed at the portal's centre, upright.
+            let target = view.camera_from_world * center;
+            assert!(target.truncate().length() < 1e-9 && target.z > 0.0);
+            let right = view.camera_from_world.rotation.conjugate() * DVec3::X;
+            assert!(right.y.abs() < 1e-9);
+            let angle = (i as f64 - 6.0) * 10.0;
+            assert!((view.angle.to_degrees() - angle).abs() < 1e-9);
+        }
+        // From left to right as one looks at the portal.
+        let middle = side[6].camera_from_world;
+        let [first, last] = [&side[0], &side[12]].map(|v| v.camera_from_world.center());
+        assert!((middle * first).x < 0.0 && (middle * last).x > 0.0);
+    }
+    let few = SemicircleOptions {
+        views: 1,
+        span: 1.0,
+    };
+    assert_eq!(semicircles(&interior, &few).len(), 3);
+    let mut large = interior.clone();
+    large.portals[0].radius = Some(5.0);
+    let views = semicircles(&large, &few);
+    let inside: Vec<bool> = views.iter().map(|v| v.is_inside).collect();
+    assert_eq!(inside, [false, false, true]);
+}
+
+#[test]
+fn the_captured_house_has_three_cells() {
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/interior-house-rooms.json");
+    let (interior, warnings) = read_rooms(&path, "house.glb").unwrap();
+    assert_eq!(warnings, []);
+    let (model, _) = mesh::read_model(&folder.join("house.glb")).unwrap();
+    let (contents, warnings) = Contents::new(&interior, &model).unwrap();
+    let count = model.mesh.triangles.len();
+    let counts: Vec<usize> = contents.triangles.iter().map(Vec::len).collect();
+    eprintln!("{count} triangles, {counts:?} in cells: {warnings:?}");
+    assert!(counts.iter().all(|n| *n > 1000), "{counts:?}");
+    assert!(contents.elsewhere.len() < count / 50, "{warnings:?}");
+    assert_eq!(
+        semicircles(&interior, &SemicircleOptions::default()).len(),
+        4 * 13
+    );
+}
+
+proptest! {
+    #[test]
+    fn broken_files_are_errors_and_no_panics(
+        changes in prop::collection::vec((0_usize..2000, prop::sample::select(b"0-9e[]{},:\"na.".to_vec())), 1..4),
+    ) {
+        for text in [TWO_ROOMS.to_owned(), with("", TWO_PORTALS)] {
+            let mut bytes = text.into_bytes();
+            for (at, byte) in &changes {
+                let at = at % bytes.len();
+                bytes[at] = *byte;
+            }
+            if let Ok((interior, _)) = parse_rooms(Path::new("r.json"), &bytes, "m.glb") {
+                prop_assert!(interior.check().is_ok());
+                let views = semicircles(&interior, &SemicircleOptions::default());
+                prop_assert!(views.iter().all(|v| v.camera_from_world.is_finite()));
+            }
+            if let Err(error) = parse_interior(Path::new("i.json"), &bytes) {
+                prop_assert!(error.to_string().starts_with("i.json: "));
+            }
+        }
+    }
+
+    #[test]
+    fn anything_that_is_read_is_written_and_read_the_same(
+        x in -1e7..1e7, y in 0.1..1e3, tilt in -1.0..1.0, eye in 1e-3..1e3,
+    ) {
+        let text = with("", &format!(
+            r#"{{"name": "p", "cells": ["a", null],
+                "polygon": [[{x}, 0, 0], [{x}, {y}, {tilt}], [{x}, {y}, 5], [{x}, 0, 5]]}}"#
+        )).replace("1.6", &format!("{eye}"));
+        let (interior, _) = parse_interior(Path::new("i.json"), text.as_bytes()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("i.json");
+        write_interior(&path, &interior).unwrap();
+        prop_assert_eq!(proxy::interior::read_interior(&path).unwrap().0, interior);
+    }
+}

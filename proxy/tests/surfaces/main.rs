@@ -1,0 +1,16 @@
+//! Surfaces made, read, and found rooms in.
+//!
+//! One program, as linking one for each file takes minutes.
+
+mod carve;
+mod common;
+mod depth;
+mod find;
+mod hostile;
+mod house;
+mod hull;
+mod interior;
+mod mesh_files;
+mod model_files;
+mod portals;
+mod room;

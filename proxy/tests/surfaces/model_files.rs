@@ -1,0 +1,261 @@
+//! Textured models: what is read of their looks, and that they come back from their files.
+
+use crate::common;
+
+use glam::DVec3;
+use image::{Rgba, RgbaImage};
+use proxy::mesh::{self, Material, Mesh, Model, ModelNode, Part, Wrap};
+use std::path::Path;
+
+/// Two nodes, one below the other; a texture, a base colour and corners' colours.
+fn small() -> Model {
+    let texture = RgbaImage::from_fn(4, 2, |x, y| Rgba([60 * x as u8, 100 * y as u8, 7, 255]));
+    let corner = |x: f64, y: f64| DVec3::new(x, y, 0.25);
+    Model {
+        mesh: Mesh {
+            positions: vec![
+                corner(0.0, 0.0),
+                corner(1.0, 0.0),
+                corner(1.0, 1.0),
+                corner(0.0, 1.0),
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        },
+        uvs: vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]],
+        colors: vec![
+            [255; 4],
+            [0, 1, 2, 255],
+            [128, 127, 3, 255],
+            [254, 255, 0, 255],
+        ],
+        parts: vec![
+            Part {
+                triangles: 0..1,
+                node_idx: 0,
+                material_idx: 0,
+            },
+            Part {
+                triangles: 1..2,
+                node_idx: 1,
+                material_idx: 1,
+            },
+        ],
+        nodes: vec![
+            ModelNode {
+                name: "cell:a".to_owned(),
+                parent_idx: None,
+            },
+            ModelNode {
+                name: "chair".to_owned(),
+                parent_idx: Some(0),
+            },
+        ],
+        materials: vec![
+            Material {
+                texture_idx: Some(0),
+                wrap: [Wrap::Clamp, Wrap::Mirror],
+                ..Material::default()
+            },
+            Material {
+                base_color: [0.5, 0.25, 1.0],
+                ..Material::default()
+            },
+        ],
+        textures: vec![texture],
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<(Model, Vec<String>), String> {
+    mesh::parse_model(Path::new("m.glb"), bytes).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_model_comes_back_from_its_file() {
+    let model = small();
+    let bytes = mesh::model_to_glb(&model).unwrap();
+    let (back, warnings) = read(&bytes).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!(
+        (&back.nodes, &back.textures),
+        (&model.nodes, &model.textures)
+    );
+    // Parts share no corners in a file.
+    let by_corner = |model: &Model| -> Vec<_> {
+        let corners = model.mesh.triangles.as_flattened().iter();
+        corners
+            .map(|i| *i as usize)
+            .map(|i| (model.mesh.positions[i], model.uvs[i], model.colors[i]))
+            .collect()
+    };
+    assert_eq!(by_corner(&back), by_corner(&model));
+    assert_eq!(back.parts, model.parts);
+    assert_eq!(back.materials[0], model.materials[0]);
+    for (a, b) in back.materials[1].base_color.iter().zip([0.5, 0.25, 1.0]) {
+        assert!((a - b).abs() < 1e-6);
+    }
+    assert_eq!(back.nodes, model.nodes);
+    // The geometry is what the reader of meshes finds.
+    let mesh = mesh::parse(Path::new("m.glb"), &bytes).unwrap();
+    assert_eq!(mesh, back.mesh);
+}
+
+#[test]
+fn colours_are_products_of_what_colours_a_place() {
+    let model = small();
+    // At the corner (1, 1): the texture's top right pixel, by the corner's colour.
+    let color = model.color(0, [0.0, 0.0, 1.0]);
+    let expected = [180.0 * 128.0 / 255.0, 0.0, 7.0 * 3.0 / 255.0];
+    for (a, b) in color.iter().zip(expected) {
+        assert!((a - b).abs() < 1e-9, "{color:?}");
+    }
+    let color = model.color(1, [1.0, 0.0, 0.0]);
+    assert_eq!(color, [127.5, 63.75, 255.0]);
+}
+
+/// The file with its JSON changed.
+fn changed(bytes: &[u8], change: impl Fn(String) -> String) -> Vec<u8> {
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let text = String::from_utf8(bytes[20..20 + length].to_vec()).unwrap();
+    let mut text = change(text.trim_end().to_owned()).into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let rest = &bytes[20 + length..];
+    let total = (20 + text.len() + rest.len()) as u32;
+    let mut out = [
+        b"glTF".as_slice(),
+        &2_u32.to_le_bytes(),
+        &total.to_le_bytes(),
+    ]
+    .concat();
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(b"JSON");
+    out.extend(text);
+    out.extend(rest);
+    out
+}
+
+#[test]
+fn what_is_missing_is_a_plain_colour_and_told() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, warnings) = read(&changed(&bytes, |t| {
+        t.replace("\"source\":0", "\"source\":9")
+    }))
+    .unwrap();
+    assert_eq!(
+        warnings,
+        ["texture 0 has no picture that can be read: a plain colour instead"]
+    );
+    assert_eq!(plain.materials[0].texture_idx, None);
+    // A picture in a file that is not there.
+    let view = small_view(&bytes);
+    let elsewhere = changed(&bytes, |t| t.replace(&view, "\"uri\":\"gone.png\""));
+    let (plain, warnings) = read(&elsewhere).unwrap();
+    assert!(warnings[0].starts_with("gone.png: "), "{warnings:?}");
+    assert_eq!(plain.materials[0].texture_idx, None);
+    let (_, warnings) = read(&changed(&bytes, |t| {
+        t.replace("\"material\":1", "\"material\":7")
+    }))
+    .unwrap();
+    assert_eq!(warnings, ["there is no material 7: it is white"]);
+}
+
+#[test]
+fn what_has_no_triangles_takes_nobodys_looks() {
+    let model = small();
+    let bytes = mesh::model_to_glb(&model).unwrap();
+    // Corners without a triangle, before all others.
+    let with_none = changed(&bytes, |text| {
+        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let mut none = json["meshes"][0]["primitives"][0].clone();
+        let indices = none["indices"].as_u64().unwrap() as usize;
+        let mut one = json["accessors"][indices].clone();
+        one["count"] = 1.into();
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors.push(one);
+        none["indices"] = (accessors.len() - 1).into();
+        let primitives = json["meshes"][0]["primitives"].as_array_mut().unwrap();
+        primitives.insert(0, none);
+        json.to_string()
+    });
+    let (plain, _) = read(&bytes).unwrap();
+    let (read, _) = read(&with_none).unwrap();
+    assert!(read.mesh.positions.len() > plain.mesh.positions.len());
+    assert_eq!(read.uvs.len(), read.mesh.positions.len());
+    assert_eq!(read.colors.len(), read.mesh.positions.len());
+    let shares = [0.2, 0.3, 0.5];
+    for i in 0..plain.mesh.triangles.len() as u32 {
+        assert_eq!(read.color(i, shares), plain.color(i, shares));
+    }
+}
+
+/// How the file names its picture's bytes.
+fn small_view(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let images = &text[text.find("\"images\"").unwrap()..];
+    let from = images.find("\"bufferView\"").unwrap();
+    let length = images[from..].find([',', '}']).unwrap();
+    images[from..from + length].to_owned()
+}
+
+#[test]
+fn what_is_corrupt_is_named() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let at = bytes.windows(4).position(|w| w == b"IDAT").unwrap();
+    let mut corrupt = bytes.clone();
+    corrupt[at + 6] ^= 0xff;
+    let error = read(&corrupt).unwrap_err();
+    assert!(
+        error.starts_with("m.glb, image 0: it cannot be decoded"),
+        "{error}"
+    );
+    let error = read(&bytes[..bytes.len() / 2]).unwrap_err();
+    assert!(
+        error.starts_with("m.glb: not a glTF file: it is cut off"),
+        "{error}"
+    );
+    let error = read(&changed(&bytes, |t| {
+        t.replace("\"TEXCOORD_0\":1", "\"TEXCOORD_0\":99")
+    }));
+    assert!(
+        error
+            .unwrap_err()
+            .contains("accessor 99: there is no such accessor")
+    );
+    let error = read(&changed(&bytes, |t| {
+        t.replace("\"materials\":[", "\"materials\":[5,")
+    }));
+    assert!(error.unwrap_err().contains("its materials"));
+    let empty = br#"{"asset": {"version": "2.0"}}"#;
+    let error = mesh::parse_model(Path::new("e.gltf"), empty).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .starts_with("e.gltf: 0 corners but no triangle")
+    );
+    let error = mesh::read_model(Path::new("e.ply"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("textured models are read from .glb and .gltf"),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_captured_house_has_its_textures() {
+    let Some(folder) = common::find_capture("interior-house") else {
+        return;
+    };
+    let (model, warnings) = mesh::read_model(&folder.join("house.glb")).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!((model.nodes.len(), model.parts.len()), (105, 105));
+    assert_eq!(model.textures.len(), 44);
+    assert_eq!(model.mesh.positions.len(), model.uvs.len());
+    assert_eq!(
+        model.parts.last().unwrap().triangles.end as usize,
+        model.mesh.triangles.len()
+    );
+    for triangle in (0..model.mesh.triangles.len() as u32).step_by(97) {
+        let color = model.color(triangle, [0.2, 0.3, 0.5]);
+        assert!(color.iter().all(|c| (0.0..=255.0).contains(c)), "{color:?}");
+    }
+}

@@ -1,0 +1,29 @@
+//! Blending fields, pictures, interiors and layered depth images.
+//!
+//! One program, as linking one for each file takes minutes.
+
+mod blend;
+mod bounded;
+mod common;
+mod engines;
+mod exposure;
+mod goals;
+mod hard_places;
+mod house;
+mod interior_captured;
+mod interior_geometry;
+mod interior_gpu;
+mod interior_kept;
+mod interior_photos;
+mod interior_tour;
+mod interior_walk;
+mod invariance;
+mod ldi;
+mod ldi_order;
+mod limits;
+mod masks;
+mod mesh;
+mod near;
+mod points;
+mod residency;
+mod time;

@@ -1,0 +1,267 @@
+//! Meshes as proxies, and what hides what from a photo.
+
+use crate::common;
+
+use calibrate::{Distortion, Lens, Pixel, View};
+use common::{METHODS, Shot, assert_close, by_all, pinhole, psnr, psnr_covered, unmoved};
+use glam::{DVec2, DVec3};
+use image::{Rgba, RgbaImage};
+use proxy::{Mesh, MeshKind, Proxy, Solid};
+use render::{
+    FieldOptions, Frame, Lumigraph, Method, PhotoStore, SourceView, Visibility, cpu, reference,
+};
+use std::sync::Arc;
+
+fn quad(corners: [DVec3; 4]) -> Mesh {
+    Mesh {
+        positions: corners.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// A wall with a pillar before it: a box of 1 × 2 × 0.3 in the middle, 1.5 off the wall.
+fn pillar() -> Mesh {
+    let mut mesh = wall();
+    let corner = |x: f64, y: f64, z: f64| DVec3::new(0.5 * x, y, 2.35 + 0.15 * z);
+    for (a, b, c) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+        for side in [-1.0, 1.0] {
+            let at = |u: f64, v: f64| {
+                let mut p = [0.0; 3];
+                (p[a], p[b], p[c]) = (side, u, v);
+                corner(p[0], p[1], p[2])
+            };
+            mesh.append(&quad([
+                at(-1.0, -1.0),
+                at(1.0, -1.0),
+                at(1.0, 1.0),
+                at(-1.0, 1.0),
+            ]));
+        }
+    }
+    mesh
+}
+
+fn wall() -> Mesh {
+    let corner = |x: f64, y: f64| DVec3::new(6.0 * x, 4.0 * y, 4.0);
+    quad([
+        corner(-1.0, -1.0),
+        corner(1.0, -1.0),
+        corner(1.0, 1.0),
+        corner(-1.0, 1.0),
+    ])
+}
+
+/// Smooth colours, the pillar's unlike the wall's.
+fn color(p: DVec3) -> [f64; 3] {
+    let wave = |v: f64| 0.5 + 0.3 * (3.0 * v).sin();
+    if p.z > 3.9 {
+        [wave(p.x), wave(p.y + 1.0), 0.2]
+    } else {
+        [0.1, 0.2 * wave(2.0 * p.y), wave(p.x + p.y)]
+    }
+}
+
+/// What a camera sees of the mesh, 4 × 4 rays a pixel.
+fn photo(solid: &Solid, view: &View) -> RgbaImage {
+    let world_from_camera = view.camera_from_world.rotation.conjugate();
+    let center = view.center();
+    RgbaImage::from_fn(view.width, view.height, |x, y| {
+        let mut sum = DVec3::ZERO;
+        for k in 0..16 {
+            let at = |i: u32, k: u32| f64::from(i) + (f64::from(k) + 0.5) / 4.0;
+            let ray = view
+                .lens
+                .unproject(Pixel::new(at(x, k % 4), at(y, k / 4)))
+                .unwrap();
+            let ray = world_from_camera * ray;
+            if let Some(hit) = solid.first_hit(center, ray) {
+                sum += DVec3::from_array(color(center + ray * hit.along));
+            }
+        }
+        let [r, g, b] = (sum / 16.0 * 255.0).to_array().map(|v| v.round() as u8);
+        Rgba([r, g, b, 255])
+    })
+}
+
+/// Cameras along a line, all looking straight ahead.
+fn views() -> Vec<View> {
+    let view = |i: i32| {
+        let center = DVec3::new(0.5 * f64::from(i - 3), 0.1 * f64::from(i % 3), 0.0);
+        pinhole(center, center + DVec3::Z, 110.0, (160, 120))
+    };
+    (0..7).map(view).collect()
+}
+
+fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
+    let solid = Solid::new(kind, mesh);
+    let views = views();
+    let photos = views.iter().map(|view| photo(&solid, view)).collect();
+    let source = |(i, view): (usize, View)| SourceView {
+        name: format!("{i}.png"),
+        view,
+        gain: [1.0; 3],
+        time_s: None,
+    };
+    let sources: Vec<SourceView> = views.into_iter().enumerate().map(source).collect();
+    let proxy = Proxy::Mesh(Arc::new(solid));
+    Lumigraph {
+        visibility: Visibility::of(&proxy, &sources),
+        sources,
+        photos: PhotoStore::from_images(photos),
+        proxy,
+        points: Vec::new(),
+    }
+}
+
+fn solid_of(lumigraph: &Lumigraph) -> &Solid {
+    match &lumigraph.proxy {
+        Proxy::Mesh(solid) => solid,
+        _ => panic!("a mesh"),
+    }
+}
+
+/// Between two photos, and nearer; through another lens, too.
+fn desired_views() -> Vec<(&'static str, View)> {
+    let from = |x: f64, z: f64| {
+        let center = DVec3::new(x, 0.05, z);
+        pinhole(center, center + DVec3::Z, 110.0, (160, 120))
+    };
+    let fisheye = Distortion::Fisheye {
+        k: [0.02, -0.01, 0.002, 0.0],
+    };
+    let lens = Lens::new(DVec2::splat(95.0), DVec2::new(81.0, 59.5), fisheye);
+    vec![
+        ("between", from(0.25, 0.0)),
+        ("aside", from(-0.8, 0.0)),
+        ("nearer", from(0.3, 0.5)),
+        (
+            "fisheye",
+            View {
+                lens,
+                ..from(0.25, 0.0)
+            },
+        ),
+    ]
+}
+
+#[test]
+fn every_engine_draws_the_same_picture() {
+    let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    for (name, desired) in desired_views() {
+        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        let exact = reference::render_exact(&frame).unwrap();
+        for (engine, picture) in by_all(&frame, Method::Exact) {
+            assert_close(&picture.unwrap(), &exact, &format!("{name}, {engine}"));
+        }
+        for (engine, picture) in by_all(&frame, Method::TRIANGULATED) {
+            let picture = picture.unwrap();
+            let holes = picture.pixels().zip(exact.pixels());
+            let holes = holes.filter(|(p, e)| p.0[3] != e.0[3]).count();
+            assert!(
+                holes * 500 <= (160 * 120),
+                "{name}, {engine}: {holes} holes"
+            );
+            let db = psnr(&unmoved(&frame, &picture), &unmoved(&frame, &exact));
+            println!("{name}, {engine}, triangulated against exact: {db:.1} dB");
+            assert!(db >= 40.0, "{name}, {engine}: {db} dB");
+        }
+    }
+}
+
+/// Those that see no more than the photos do together.
+fn within_the_photos() -> Vec<(&'static str, View)> {
+    let all = desired_views().into_iter();
+    all.filter(|(name, _)| *name != "fisheye").collect()
+}
+
+#[test]
+fn what_is_hidden_from_a_photo_is_not_painted_with_what_hides_it() {
+    let mut lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    let truth: Vec<RgbaImage> = within_the_photos()
+        .iter()
+        .map(|(_, view)| photo(solid_of(&lumigraph), view))
+        .collect();
+    let scores = |lumigraph: &Lumigraph| -> Vec<f64> {
+        let draw = |(_, desired): &(_, View)| {
+            let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+            cpu::render(&frame, Method::Exact).unwrap()
+        };
+        let pictures: Vec<RgbaImage> = within_the_photos().iter().map(draw).collect();
+        let scored = pictures.iter().zip(&truth);
+        scored.map(|(p, t)| psnr_covered(p, t)).collect()
+    };
+    let with = scores(&lumigraph);
+    lumigraph.visibility = None;
+    let without = scores(&lumigraph);
+    for (((name, _), with), without) in within_the_photos().iter().zip(&with).zip(&without) {
+        println!("{name}: {with:.1} dB with visibility, {without:.1} without");
+        assert!(*with > without + 5.0, "{name}: {with} against {without}");
+        assert!(*with > 26.0, "{name}: {with}");
+    }
+}
+
+#[test]
+fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
+    let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    for (i, view) in views().into_iter().enumerate() {
+        let frame = Frame::new(&lumigraph, view, FieldOptions::default());
+        let own = lumigraph.photos.get(i).unwrap();
+        for method in METHODS {
+            for (engine, picture) in by_all(&frame, method) {
+                let db = psnr_covered(&picture.unwrap(), &own.levels[0]);
+                assert!(db >= 50.0, "{i}, {engine}, {method:?}: {db} dB");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flat_mesh_is_a_plane() {
+    let shot = Shot::of("wall", 6, None);
+    let plane = shot.plane;
+    let across = plane.normal().any_orthonormal_vector();
+    let along = plane.normal().cross(across);
+    let corner = |x: f64, y: f64| plane.point() + 50.0 * (x * across + y * along);
+    let mesh = quad([
+        corner(-1.0, -1.0),
+        corner(1.0, -1.0),
+        corner(1.0, 1.0),
+        corner(-1.0, 1.0),
+    ]);
+    let flat = shot.lumigraph();
+    let meshed = Lumigraph {
+        proxy: Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh))),
+        ..shot.lumigraph()
+    };
+    let desired = shot.views[0].between(&shot.views[3], 0.4);
+    let of = |lumigraph: &Lumigraph, method| {
+        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        cpu::render(&frame, method).unwrap()
+    };
+    for method in METHODS {
+        // Where photos show the plane; a mesh is moved to where they show it elsewhere, too.
+        let db = psnr_covered(&of(&flat, method), &of(&meshed, method));
+        assert!(db >= 60.0, "{method:?}: {db} dB");
+    }
+}
+
+#[test]
+fn surfaces_that_cannot_hide_themselves_ask_for_no_distances() {
+    let convex = lumigraph(wall(), MeshKind::Tunnel);
+    assert!(convex.visibility.is_none());
+    assert!(Visibility::of(&Proxy::Points { within: None }, &convex.sources).is_none());
+}
+
+#[test]
+fn where_no_photo_sees_a_point_they_all_say_what_they_can() {
+    // Between wall and pillar, looking at the wall from where no photo sees it.
+    let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    let center = DVec3::new(0.0, 0.0, 2.6);
+    let desired = pinhole(center, DVec3::new(0.0, 0.0, 4.0), 100.0, (80, 60));
+    let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+    for (engine, picture) in by_all(&frame, Method::Exact) {
+        let picture = picture.unwrap();
+        let covered = picture.pixels().filter(|p| p.0[3] == 255).count();
+        assert_eq!(covered, 80 * 60, "{engine}");
+    }
+}
