@@ -92,8 +92,8 @@ if [ "$(uname -s)" = Linux ]; then
     export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1
     cargo test --workspace --lib gpu::
     # Of these, what a device draws.
-    cargo test --workspace --test pictures -- engines:: limits:: residency::the_device \
-        exposure::a_frame exposure::at exposure::white invariance::moving invariance::a_batch \
+    cargo test --workspace --test pictures -- engines:: limits:: residency:: exposure:: \
+        invariance::moving invariance::a_batch \
         masks::at masks::masked masks::mattes masks::triangulated masks::soft masks::what_every \
         mesh::every_engine mesh::a_view points::every_engine points::a_view \
         time::engines time::triangulated time::a_whole_period

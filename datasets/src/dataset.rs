@@ -90,11 +90,11 @@ pub enum DatasetError {
         expected: &'static str,
     },
     /// Rooms without a place to stand in.
-    #[error("no place to take photos from: {why}")]
-    NoPlace {
-        /// What is missing.
-        why: &'static str,
-    },
+    #[error(
+        "no place to take photos from: at eye height no room has one that is clear of walls and \
+         furniture"
+    )]
+    NoPlace,
     /// The destination holds something already.
     #[error("{}: the folder is not empty; choose another or remove it first", folder.display())]
     NotEmpty {
@@ -258,18 +258,7 @@ impl Plan {
                 time_s: self.times_s.get(i).copied(),
             })
             .collect();
-        let mut reconstruction = Reconstruction::default();
-        let camera_id = CameraId(1);
-        reconstruction.cameras.insert(camera_id, camera);
-        for (i, photo) in photos.iter().enumerate() {
-            let image = Image {
-                name: photo.name.clone(),
-                camera_id,
-                camera_from_world: photo.view.camera_from_world,
-                keypoints: Vec::new(),
-            };
-            reconstruction.images.insert(ImageId(i as u32 + 1), image);
-        }
+        let mut reconstruction = posed(&camera, &photos);
         let motion = self.motion.as_ref();
         let scenes = photos.iter();
         let seen = SeenInScenes {
@@ -293,6 +282,23 @@ impl Plan {
             stresses: self.stresses,
         }
     }
+}
+
+/// The camera and the poses of photos that it took, without points.
+pub(crate) fn posed(camera: &Camera, photos: &[Photo]) -> Reconstruction {
+    let mut reconstruction = Reconstruction::default();
+    let camera_id = CameraId(1);
+    reconstruction.cameras.insert(camera_id, camera.clone());
+    for (i, photo) in photos.iter().enumerate() {
+        let image = Image {
+            name: photo.name.clone(),
+            camera_id,
+            camera_from_world: photo.view.camera_from_world,
+            keypoints: Vec::new(),
+        };
+        reconstruction.images.insert(ImageId(i as u32 + 1), image);
+    }
+    reconstruction
 }
 
 /// The scene that each photo shows; points lie on what stays where it is.

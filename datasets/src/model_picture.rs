@@ -5,7 +5,7 @@ use calibrate::{Pixel, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use proxy::Solid;
-use proxy::mesh::Model;
+use proxy::mesh::{Model, linear_from_srgb};
 use rayon::prelude::*;
 
 /// The picture and the depth along z of each pixel's centre, row by row, in world units; alpha
@@ -39,7 +39,10 @@ pub(crate) fn render_model(
             look(Pixel::new(f64::from(x) + dx, f64::from(y) + dy))
         });
         let (sum, count) = samples.fold((DVec3::ZERO, 0.0), |(sum, count), (color, _)| {
-            (sum + DVec3::from(color.map(linear_from_srgb)), count + 1.0)
+            (
+                sum + DVec3::from(color.map(|c| linear_from_srgb(c / 255.0))),
+                count + 1.0,
+            )
         });
         let mean = if count > 0.0 {
             srgb_from_linear((sum / count).to_array())
@@ -73,16 +76,6 @@ pub(crate) fn look(
     let point = from + hit.along * direction;
     let color = model.color(hit.triangle_idx, shares(corners, point));
     Some((point, hit.along, color))
-}
-
-/// Linear light of a colour in steps of 255.
-fn linear_from_srgb(steps: f64) -> f64 {
-    let code = (steps / 255.0).clamp(0.0, 1.0);
-    if code <= 0.040_45 {
-        code / 12.92
-    } else {
-        ((code + 0.055) / 1.055).powf(2.4)
-    }
 }
 
 /// Barycentric weights of a point of a triangle, none negative.

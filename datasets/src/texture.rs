@@ -7,6 +7,7 @@ use crate::noise::{fractal2, fractal3, signed, unit};
 use crate::print::{self, glyphs};
 use crate::shape::{Surface, TURN, longitude};
 use glam::{DVec2, DVec3};
+use proxy::mesh::linear_from_srgb;
 
 /// A texture. Lengths are world units, colours linear light, `seed` chooses its noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -212,14 +213,7 @@ impl Texture {
 
 /// The linear light of an sRGB colour such as 0xff8000.
 pub(crate) fn rgb(hex: u32) -> DVec3 {
-    let channel = |shift: u32| {
-        let code = f64::from((hex >> shift) & 0xff) / 255.0;
-        if code <= 0.04045 {
-            code / 12.92
-        } else {
-            ((code + 0.055) / 1.055).powf(2.4)
-        }
-    };
+    let channel = |shift: u32| linear_from_srgb(f64::from((hex >> shift) & 0xff) / 255.0);
     DVec3::new(channel(16), channel(8), channel(0))
 }
 

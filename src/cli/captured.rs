@@ -88,7 +88,7 @@ fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
 fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Model, Vec<String>)> {
     let Some(file) = model_file(path, interior) else {
         bail!(
-            "{}: it has no model; cells that are scenes are not drawn yet",
+            "{}: it names no model, and cells are drawn from one; make it with `lumigraph interior`",
             path.display()
         );
     };

@@ -299,7 +299,7 @@ fn a_house_is_walked_through() {
         "cells": [{"name": "a", "scene": "../a"}], "portals": []}"#;
     std::fs::write(here.join("interior.json"), scenes).unwrap();
     let ran = lumigraph(here, "walk interior.json -o out");
-    assert!(ran.error(1).contains("it has no model"), "{}", ran.stderr);
+    assert!(ran.error(1).contains("it names no model"), "{}", ran.stderr);
 }
 
 const HALVES: &str = r#"{"version": 1, "rooms": [

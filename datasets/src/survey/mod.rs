@@ -15,12 +15,12 @@
 
 mod places;
 
-use crate::dataset::settled;
+use crate::dataset::{posed, settled};
 use crate::model_picture::{look, render_model};
 use crate::points::{Seen, sparse_points};
 use crate::write::{Capture, in_new_folder};
 use crate::{DEPTH_STEPS_PER_UNIT, DatasetError, Options, Photo, Written};
-use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3, View};
+use calibrate::{Camera, ModelKind, Reconstruction, Rigid3, View};
 use glam::{DQuat, DVec3};
 use image::DynamicImage;
 use proxy::interior::{Contents, Interior};
@@ -58,7 +58,8 @@ const SEED: u32 = 31;
 /// farthest from all places so far, at eye height, clear of walls and furniture, all around in
 /// steps of 45°, by turns a little up and down, with a field of view of 90°.
 ///
-/// By default 32 for each room, of 320 × 256 pixels. World units should be metres, as depth
+/// By default 32 for each room, of 320 × 256 pixels; rooms have none for which fewer than eight
+/// a room are too few. World units should be metres, as depth
 /// maps hold thousandths of them.
 ///
 /// # Errors
@@ -107,18 +108,7 @@ pub fn survey<'a>(
     let photos: Vec<Photo> = (0..chosen.views).map(photo).collect();
 
     // 2. What structure from motion would leave.
-    let mut reconstruction = Reconstruction::default();
-    let camera_id = CameraId(1);
-    reconstruction.cameras.insert(camera_id, camera);
-    for (i, photo) in photos.iter().enumerate() {
-        let image = Image {
-            name: photo.name.clone(),
-            camera_id,
-            camera_from_world: photo.view.camera_from_world,
-            keypoints: Vec::new(),
-        };
-        reconstruction.images.insert(ImageId(i as u32 + 1), image);
-    }
+    let mut reconstruction = posed(&camera, &photos);
     let views: Vec<&View> = photos.iter().map(|photo| &photo.view).collect();
     let seen = SeenInModel {
         model,

@@ -49,9 +49,7 @@ pub(super) fn places(
     }
     chosen.truncate(count);
     if chosen.is_empty() {
-        return Err(DatasetError::NoPlace {
-            why: "at eye height no room has a place clear of walls and furniture",
-        });
+        return Err(DatasetError::NoPlace);
     }
     Ok(chosen)
 }
@@ -61,20 +59,14 @@ fn free_places(interior: &Interior, contents: &Contents, solid: &Solid) -> Vec<(
     let up = interior.up.normalize_or(DVec3::Y);
     let across = up.any_orthonormal_vector();
     let along = up.cross(across);
+    let in_frame = |at: DVec3| DVec3::new(at.dot(across), at.dot(along), at.dot(up));
     let mut tried = Vec::new();
     for (i, bounds) in contents.bounds.iter().enumerate() {
         let Some(bounds) = bounds else { continue };
         // The box, in directions across the floor and up.
-        let corner = |k: usize| {
-            let pick = |axis: usize| match k >> axis & 1 {
-                0 => bounds.min[axis],
-                _ => bounds.max[axis],
-            };
-            let at = DVec3::new(pick(0), pick(1), pick(2));
-            DVec3::new(at.dot(across), at.dot(along), at.dot(up))
-        };
-        let (low, high) = (0..8)
-            .map(corner)
+        let corners = bounds.corners().map(in_frame);
+        let (low, high) = corners
+            .into_iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
                 (l.min(p), h.max(p))
             });

@@ -146,15 +146,8 @@ fn shared_floor(known: &Interior, found: &Interior, tolerance: f64) -> Shared {
     let axes = [along, up.cross(along)];
     // 1. What all boxes span.
     let boxes = known.cells.iter().chain(&found.cells);
-    let corners = boxes.filter_map(|c| c.content.room()).flat_map(|b| {
-        (0..8).map(move |i| {
-            DVec3::select(
-                glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0),
-                b.max,
-                b.min,
-            )
-        })
-    });
+    let boxes = boxes.filter_map(|c| c.content.room());
+    let corners = boxes.flat_map(|room| room.corners());
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for p in corners {
         for k in 0..2 {

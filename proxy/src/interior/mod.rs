@@ -28,7 +28,7 @@ pub use rooms::{interior_from_nodes, interior_from_rooms, parse_rooms, read_room
 pub use semicircle::{SemicircleOptions, SemicircleView, angle_before, semicircles};
 pub use visibility::{Pass, Region, Visibility, VisibleCell, clip, visible, visible_through};
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 /// Keys that this version does not know, with their values.
 pub type Extra = serde_json::Map<String, serde_json::Value>;
@@ -128,6 +128,17 @@ impl RoomBox {
     /// How far a point is outside; zero inside.
     pub fn distance(&self, point: DVec3) -> f64 {
         point.distance(point.clamp(self.min, self.max))
+    }
+
+    /// Its corners; corner i has x, y and z of `max` where bits 0, 1 and 2 of i are set.
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            DVec3::select(
+                BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0),
+                self.max,
+                self.min,
+            )
+        })
     }
 
     /// Its volume.

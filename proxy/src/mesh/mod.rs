@@ -20,7 +20,7 @@ pub use error::{ExportError, MeshFileError};
 pub use file::{parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
-pub use model::{Material, Model, ModelNode, Part, Wrap};
+pub use model::{Material, Model, ModelNode, Part, Wrap, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::to_ply;

@@ -237,8 +237,8 @@ pub(super) fn srgb_from_linear(linear: f64) -> f64 {
     }
 }
 
-/// Linear light of an sRGB code, 0 to 1.
-pub(super) fn linear_from_srgb(code: f64) -> f64 {
+/// Linear light of an sRGB code, 0 to 1; what is beyond is clipped.
+pub fn linear_from_srgb(code: f64) -> f64 {
     let code = code.clamp(0.0, 1.0);
     match code <= 0.040_45 {
         true => code / 12.92,

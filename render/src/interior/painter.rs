@@ -107,7 +107,7 @@ impl Painter {
         model: &Model,
         parts: &[(Runs<'_>, Window)],
         camera: &Pinhole,
-        floor: Option<&Vec<f32>>,
+        floor: Option<&[f32]>,
     ) -> Met {
         let tried = parts.iter().map(|(runs, _)| runs.count()).sum();
         if let Some(gpu) = &mut self.gpu {

@@ -270,9 +270,12 @@ impl<'a> Walk<'a> {
             true => self.floor(&fills, &camera),
             false => Vec::new(),
         };
-        let met = self
-            .painter
-            .meet(self.model, &windows, &camera, may_skip.then_some(&floor));
+        let met = self.painter.meet(
+            self.model,
+            &windows,
+            &camera,
+            may_skip.then_some(&floor[..]),
+        );
         cost.triangles_tried = met.tried;
         cost.triangles_met = met.touching;
         cost.geometry = start.elapsed();

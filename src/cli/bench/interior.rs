@@ -10,7 +10,9 @@ use indicatif::ProgressBar;
 use lumigraph::bench::before_doorways;
 use proxy::interior::{Contents, Interior, SemicircleOptions};
 use proxy::mesh::Model;
-use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{
+    CAPTURED_REFERENCE_SIZE, FrameCost, Painter, PortalFill, Splat, Walk, WalkOptions,
+};
 use render::score::{PSNR_CAP_DB, score};
 use std::collections::BTreeMap;
 
@@ -33,12 +35,12 @@ impl Setting {
 
 /// The default, and one thing changed at a time. Images are what is changed, so they are those that
 /// layered depth images are made of.
-fn settings(thorough: bool) -> Vec<Setting> {
+fn settings(thorough: bool, options: WalkOptions) -> Vec<Setting> {
     let base = Setting {
         knob: "default",
         value: String::new(),
         fill: PortalFill::Geometry,
-        options: WalkOptions::default(),
+        options,
     };
     let mut all = vec![base.clone()];
     let mut add = |knob, value: String, fill, change: &dyn Fn(&mut WalkOptions)| {
@@ -117,12 +119,11 @@ pub(super) fn measure(
     let first_view = views.first();
     let first_view =
         first_view.context("no portal can be looked through from where one can stand")?;
-    let mut settings = settings(effort.thorough);
+    let mut base = WalkOptions::default();
     if painter.captured().is_some() {
-        for setting in settings.iter_mut().filter(|s| s.knob != "ldi of pixels") {
-            setting.options.library.size = CAPTURED_REFERENCE_SIZE;
-        }
+        base.library.size = CAPTURED_REFERENCE_SIZE;
     }
+    let settings = settings(effort.thorough, base);
     bar.set_length(settings.len() as u64 * (1 + effort.repeats as u64));
     bar.set_message(format!("{name}: measuring"));
     let drawn_by = painter.description();
@@ -202,19 +203,10 @@ pub(super) fn measure(
         effort.repeats,
         views.len(),
         bar,
-        |i, view| {
-            std::mem::swap(walks[i].painter_mut(), &mut painter);
-            let drawn = walks[i].draw(&views[view], settings[i].fill).map(drop);
-            std::mem::swap(walks[i].painter_mut(), &mut painter);
-            Ok(drawn?)
-        },
+        |i, view| draw_by(&mut painter, &mut walks[i], &views[view], settings[i].fill).map(drop),
     )?;
     for (measured, repeats) in measured.iter_mut().zip(&repeats) {
         measured.set_times(repeats);
-    }
-    let mut base = WalkOptions::default();
-    if painter.captured().is_some() {
-        base.library.size = CAPTURED_REFERENCE_SIZE;
     }
     let walk = |options| Walk::with(Painter::default(), interior, contents, model, options);
     let skips = skips(&walk, base, &mut painter, first_view)?;
@@ -249,6 +241,19 @@ pub(super) fn measure(
     Ok((result, pictures))
 }
 
+/// Draws a view by a painter that other walks use, too.
+fn draw_by(
+    painter: &mut Painter,
+    walk: &mut Walk<'_>,
+    view: &View,
+    fill: PortalFill,
+) -> anyhow::Result<FrameCost> {
+    std::mem::swap(walk.painter_mut(), painter);
+    let drawn = walk.draw(view, fill);
+    std::mem::swap(walk.painter_mut(), painter);
+    Ok(drawn?)
+}
+
 /// Each on its own, of the first view.
 fn skips<'a>(
     walk: &dyn Fn(WalkOptions) -> Walk<'a>,
@@ -270,9 +275,7 @@ fn skips<'a>(
         ("columns", PortalFill::Ldi, whole_ldis),
     ] {
         let (mut with, mut without) = (walk(base), walk(changed));
-        std::mem::swap(with.painter_mut(), painter);
-        let cost = with.draw(view, fill)?;
-        std::mem::swap(with.painter_mut(), painter);
+        let cost = draw_by(painter, &mut with, view, fill)?;
         let fired = match name {
             "cells" => (cost.triangles_in_cells - cost.triangles_tried, "triangles"),
             _ => (cost.samples_clipped, "samples"),
@@ -280,9 +283,7 @@ fn skips<'a>(
         let fired = (fired.0 > 0).then(|| format!("{} {}", fired.0, fired.1));
         all.push(skip(name, fired, |skips| {
             let walk = if skips { &mut with } else { &mut without };
-            std::mem::swap(walk.painter_mut(), painter);
-            let (drawn, times) = timed(|| walk.draw(view, fill).map(drop));
-            std::mem::swap(walk.painter_mut(), painter);
+            let (drawn, times) = timed(|| draw_by(painter, walk, view, fill).map(drop));
             drawn?;
             Ok((walk.picture().picture(), times))
         })?);

@@ -52,10 +52,14 @@ pub(super) struct Side {
     lintel: usize,
     /// How much of it is wall.
     walled: usize,
-    /// The squares that it lies between, and those where it goes straight on though labels do not.
+    pub(super) openings: Vec<Opening>,
+}
+
+/// Where a side is: what it lies between by its labels, and where it goes straight on though they
+/// do not.
+struct Place {
     span: Squares,
     straightened: Vec<Squares>,
-    pub(super) openings: Vec<Opening>,
 }
 
 /// The least and the greatest of squares along both axes of the plan.
@@ -154,16 +158,15 @@ pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
         }
     }
     // 3. Without the bends of lines that go straight on.
-    let is_bend = |side: &Side| {
-        let is_of = |other: &&Side| side.rooms.iter().all(|r| other.rooms.contains(r));
-        let others = sides.iter().filter(is_of);
-        let mut bends = others.flat_map(|other| &other.straightened);
-        bends.any(|bend| bend.has(&side.span))
+    let is_bend = |(side, place): &(Side, Place)| {
+        let is_of = |other: &Side| side.rooms.iter().all(|r| other.rooms.contains(r));
+        let others = sides.iter().filter(|(other, _)| is_of(other));
+        let mut bends = others.flat_map(|(_, other)| &other.straightened);
+        bends.any(|bend| bend.has(&place.span))
     };
     let bends: Vec<bool> = sides.iter().map(is_bend).collect();
-    let mut bends = bends.into_iter();
-    sides.retain(|_| bends.next() != Some(true));
-    sides
+    let sides = sides.into_iter().zip(bends).filter(|(_, bend)| !bend);
+    sides.map(|((side, _), _)| side).collect()
 }
 
 /// Where openings of one room into two others meet, the wall between those two begins: both end at its
@@ -224,7 +227,13 @@ pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)>
     found.map(|(pair, _)| pair)
 }
 
-fn side(columns: &Columns, labels: &[u32], rooms: [u32; 2], axis: usize, edges: Vec<Edge>) -> Side {
+fn side(
+    columns: &Columns,
+    labels: &[u32],
+    rooms: [u32; 2],
+    axis: usize,
+    edges: Vec<Edge>,
+) -> (Side, Place) {
     let index = |at: usize, along: usize| match axis {
         0 => along * columns.size[0] + at,
         _ => at * columns.size[0] + along,
@@ -340,16 +349,15 @@ fn side(columns: &Columns, labels: &[u32], rooms: [u32; 2], axis: usize, edges: 
         }
     };
     let holes = holes(&open, columns.step_m);
-    Side {
+    let side = Side {
         rooms,
         length: alongs.len(),
         open: open_count,
         lintel: lintel_count,
         walled: walls.len(),
-        span,
-        straightened,
         openings: holes.into_iter().map(opening).collect(),
-    }
+    };
+    (side, Place { span, straightened })
 }
 
 /// All of a column's free bins that join what was seen to be open: an opening ends where there is
