@@ -92,7 +92,7 @@ if [ "$(uname -s)" = Linux ]; then
     export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1
     cargo test --workspace --lib gpu::
     # Of these, what a device draws.
-    cargo test --workspace --test pictures -- engines:: limits:: residency:: exposure:: \
+    cargo test --workspace --test pictures -- engines:: limits:: residency:: exposure:: ldi::device:: \
         invariance::moving invariance::a_batch \
         masks::at masks::masked masks::mattes masks::triangulated masks::soft masks::what_every \
         mesh::every_engine mesh::a_view points::every_engine points::a_view \

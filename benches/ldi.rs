@@ -13,6 +13,7 @@ use cpu_time::ProcessTime;
 use datasets::house::{self, HouseOptions};
 use glam::DVec2;
 use proxy::interior::{Contents, SemicircleOptions, SemicircleView, semicircles, visible};
+use render::gpu::{DeviceLimits, GpuWarp};
 use render::interior::{CellGeometry, Pinhole, Reference, Target, Window};
 use render::ldi::{
     ClipTree, Clipped, ConstructOptions, Free, FreeOptions, Layered, Ordered, OrderedOptions,
@@ -34,6 +35,9 @@ struct Args {
     /// Of each time the least of so many counts
     #[arg(long, default_value_t = 9)]
     repeats: usize,
+    /// Also draw with whatever graphics driver there is
+    #[arg(long)]
+    gpu: bool,
     /// Where to write the numbers, too
     #[arg(long)]
     json: Option<PathBuf>,
@@ -228,6 +232,31 @@ fn main() {
             one,
             two,
         );
+    }
+    let warp = args
+        .gpu
+        .then(|| GpuWarp::open(&DeviceLimits::default(), false));
+    match warp {
+        Some(Ok(mut warp)) => {
+            let [one, two] = [0, 1].map(|k| {
+                pools[k].install(|| {
+                    timed(&mut |look| {
+                        let (ldi, tree) = &ldis[look.ldi];
+                        let (camera, window) = (&look.camera, &look.window);
+                        let columns = tree.columns(ldi, camera, window, reach);
+                        free_target.clear(SIZE[0], SIZE[1]);
+                        let options = FreeOptions::default();
+                        let into = &mut free_target;
+                        warp.free(ldi, &columns, camera, window, &options, into)
+                            .expect("it draws");
+                    })
+                })
+            });
+            println!("by {}:", warp.description());
+            line("in any order, device", one, two);
+        }
+        Some(Err(error)) => println!("graphics: {error}"),
+        None => {}
     }
     // Fragments, by count.
     println!(

@@ -35,6 +35,7 @@ impl DeviceLimits {
 }
 
 /// A device that answers.
+#[derive(Clone)]
 pub(super) struct Opened {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,

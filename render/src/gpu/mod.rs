@@ -13,10 +13,12 @@ mod shader_tests;
 mod tables;
 mod target;
 mod timing;
+mod warp;
 
 pub use device::DeviceLimits;
 pub use load::Loaded;
 pub use raster::GpuRaster;
+pub use warp::GpuWarp;
 
 use crate::RenderError;
 use crate::field::{FieldEntry, TriangulatedField};

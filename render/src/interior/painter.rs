@@ -1,11 +1,12 @@
-//! One door to those that draw triangles: the CPU's raster, a graphics device, and the lumigraph
+//! One door to those that draw triangles and layered depth images: the CPU, a graphics device, and the lumigraph
 //! where photos show them.
 
 use super::front::{Hidden, Met, meet};
 use super::{Captured, Pinhole, Raster, Runs, Target, Window};
 use crate::RenderError;
 use crate::engine::DeviceChoice;
-use crate::gpu::{DeviceLimits, GpuRaster};
+use crate::gpu::{DeviceLimits, GpuRaster, GpuWarp};
+use crate::ldi::{Clipped, Free, FreeCost, FreeOptions, Layered, free};
 use calibrate::View;
 use proxy::mesh::Model;
 
@@ -13,6 +14,10 @@ use proxy::mesh::Model;
 #[derive(Debug, Default)]
 pub struct Painter {
     gpu: Option<Box<GpuRaster>>,
+    /// Draws LDIs on the same device, once there were some.
+    warp: Option<Box<GpuWarp>>,
+    warps_by_cpu: bool,
+    loose: Free,
     raster: Raster,
     hidden: Hidden,
     /// What the device drew of this frame; none where the CPU draws it.
@@ -127,12 +132,9 @@ impl Painter {
                     } else {
                         "the CPU draws such frames"
                     };
-                    let note = format!("{error}; {rest}");
-                    if !self.notes.contains(&note) {
-                        self.notes.push(note);
-                    }
+                    self.note(format!("{error}; {rest}"));
                     if is_lost {
-                        self.gpu = None;
+                        (self.gpu, self.warp) = (None, None);
                     }
                 }
             }
@@ -149,6 +151,46 @@ impl Painter {
         Met {
             tried,
             touching: Some(parts.iter().map(draw).sum()),
+        }
+    }
+
+    /// Draws what is left of an LDI, in a window, in any order: see [`free`].
+    pub(super) fn free(
+        &mut self,
+        (ldi, columns): (&Layered, &Clipped),
+        camera: &Pinhole,
+        window: &Window,
+        options: &FreeOptions,
+        into: &mut Target,
+    ) -> FreeCost {
+        if let Some(warp) = self.warp() {
+            match warp.free(ldi, columns, camera, window, options, into) {
+                Ok(cost) => return cost,
+                Err(error) => self.note(format!("{error}; the CPU draws such images")),
+            }
+        }
+        let scratch = &mut self.loose;
+        free(ldi, columns, camera, window, options, scratch, into)
+    }
+
+    /// What draws LDIs on the graphics device, if there is one.
+    fn warp(&mut self) -> Option<&mut GpuWarp> {
+        let gpu = self.gpu.as_ref()?;
+        if self.warp.is_none() && !self.warps_by_cpu {
+            match gpu.warp() {
+                Ok(warp) => self.warp = Some(Box::new(warp)),
+                Err(error) => {
+                    self.warps_by_cpu = true;
+                    self.note(format!("{error}; the CPU draws layered depth images"));
+                }
+            }
+        }
+        self.warp.as_deref_mut()
+    }
+
+    fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
         }
     }
 

@@ -17,7 +17,7 @@ use super::{
     Target,
 };
 use crate::RenderError;
-use crate::ldi::{Free, FreeOptions};
+use crate::ldi::FreeOptions;
 use asked::Asked;
 use calibrate::View;
 use filled::Filled;
@@ -133,8 +133,6 @@ pub struct Walk<'a> {
     options: WalkOptions,
     painter: Painter,
     filled: Target,
-    /// Memory of the last LDI's drawing.
-    scratch: Free,
     /// By pixel: one more than the place in the frame's list of fills; 0 for none.
     owners: Vec<u16>,
     picture: Target,
@@ -176,7 +174,6 @@ impl<'a> Walk<'a> {
             options,
             painter,
             filled: Target::default(),
-            scratch: Free::default(),
             owners: Vec::new(),
             picture: Target::default(),
         }

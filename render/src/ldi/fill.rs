@@ -40,7 +40,7 @@ impl Met {
 
 /// Fills the pixels of a window that show nothing from those that do, along their row and
 /// column, where one of the two is open over no more than a distance; how many are left.
-pub(super) fn fill(
+pub(crate) fn fill(
     window: &Window,
     [across, down]: [&Range<u32>; 2],
     reach: u32,

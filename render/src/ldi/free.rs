@@ -40,7 +40,11 @@ impl FreeOptions {
     /// How far from its place a sample is drawn at most, in pixels.
     pub fn reach(&self) -> f32 {
         // What is beyond a patch counts only where another covers.
-        BEYOND * Options::of(self).most
+        BEYOND * self.within_bounds().most
+    }
+
+    pub(crate) fn within_bounds(&self) -> Options {
+        Options::of(self)
     }
 }
 
@@ -125,12 +129,12 @@ const MARGIN: usize = 16;
 /// Pixels across that have their holes found together.
 const COLUMN: usize = 8;
 /// How far beyond its patch a sample counts, in half sides, for pixels that another covers.
-const BEYOND: f32 = 1.25;
+pub(crate) const BEYOND: f32 = 1.25;
 /// The greatest half side of a patch, and what a Gaussian may reach.
 const MOST: f32 = 4.0;
 
 /// The pixels of a window: from the least to the greatest column and row.
-pub(super) fn bounds(window: &Window, into: &Target) -> Option<[Range<u32>; 2]> {
+pub(crate) fn bounds(window: &Window, into: &Target) -> Option<[Range<u32>; 2]> {
     let open = |y: u32| {
         let row = window.row(y);
         row.start..row.end.min(into.width)
@@ -176,7 +180,7 @@ pub fn free(
         columns,
         projection: &projection,
         sizes: &sizes,
-        options: Options::of(options),
+        options: options.within_bounds(),
         size: [width as f32, down.len() as f32],
         band_count,
     };
@@ -247,14 +251,15 @@ pub fn free(
 
 /// The options, within their bounds.
 #[derive(Clone, Copy)]
-struct Options {
-    nearer: f32,
-    deviation: f32,
-    grow: f32,
-    least: f32,
-    wide: f32,
-    least_wide: f32,
-    most: f32,
+pub(crate) struct Options {
+    /// What makes the nearest inverse depth the farthest of the same surface.
+    pub(crate) nearer: f32,
+    pub(crate) deviation: f32,
+    pub(crate) grow: f32,
+    pub(crate) least: f32,
+    pub(crate) wide: f32,
+    pub(crate) least_wide: f32,
+    pub(crate) most: f32,
 }
 
 impl Options {

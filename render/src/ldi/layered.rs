@@ -5,6 +5,7 @@ use crate::interior::{Pinhole, PinholeError};
 use calibrate::{Lens, Rigid3, View};
 use glam::DVec2;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Samples of several images as one camera's, any number in a pixel.
 ///
@@ -12,6 +13,8 @@ use std::ops::Range;
 /// so each property is a list of its own, padded by [`PAD`](Self::PAD) entries that mean nothing.
 #[derive(Clone, Debug)]
 pub struct Layered {
+    /// Tells it from every other in the program, for caches; copies have it, too.
+    id: u64,
     /// The camera: a pinhole, wider than the portal.
     pub view: View,
     /// The same, as drawing takes it.
@@ -107,9 +110,11 @@ impl Layered {
             let found = samples.len();
             return Err(LdiError::Samples { found, expected });
         }
+        static NEXT_ID: AtomicU64 = AtomicU64::new(0);
         let mut first = Vec::with_capacity(counts.len() + 1);
         let room = expected + Self::PAD;
         let mut ldi = Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             x: Vec::with_capacity(room),
             y: Vec::with_capacity(room),
             inverse_depth: Vec::with_capacity(room),
@@ -152,6 +157,21 @@ impl Layered {
         ldi.color.resize(room, [0; 4]);
         ldi.look.resize(room, Look::default());
         Ok(ldi)
+    }
+
+    /// Tells it from every other in the program, but not from copies.
+    pub(crate) fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// Its samples as a graphics device has them: x, y from the row's middle, inverse depth, colour
+    /// and look.
+    pub(crate) fn words(&self) -> impl ExactSizeIterator<Item = [u32; 5]> + '_ {
+        (0..self.len()).map(|i| {
+            let [x, y, s] = [self.x[i], self.y[i], self.inverse_depth[i]].map(f32::to_bits);
+            let color = u32::from_le_bytes(self.color[i]);
+            [x, y, s, color, u32::from(self.look[i].0)]
+        })
     }
 
     /// How many samples it has.

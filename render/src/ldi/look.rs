@@ -69,7 +69,7 @@ fn side(index: usize) -> f64 {
 
 /// Half the width and height of patches as a desired camera sees them, in pixels times the
 /// warp's divisor.
-pub(super) struct Sizes {
+pub(crate) struct Sizes {
     normals: Vec<[f32; 2]>,
     sides: Vec<f32>,
 }
@@ -77,7 +77,7 @@ pub(super) struct Sizes {
 impl Sizes {
     /// For a desired camera. A patch is a disc, as tall as the LDI's pixels are in proportion,
     /// seen from so far that all rays are as the axis (as in Gortler et al. 1997).
-    pub(super) fn new(ldi: &Pinhole, desired: &Pinhole) -> Self {
+    pub(crate) fn new(ldi: &Pinhole, desired: &Pinhole) -> Self {
         let desired_from_ldi: DMat3 = desired.rotation * ldi.rotation.transpose();
         let tall = (ldi.focal.x / ldi.focal.y).sqrt().clamp(0.25, 4.0);
         let extent = |i: usize| {
@@ -91,6 +91,12 @@ impl Sizes {
             normals: (0..NORMALS).map(extent).collect(),
             sides: (0..SIDES).map(|i| side(i) as f32).collect(),
         }
+    }
+
+    /// By normal, half the width and height; then by step, the sides.
+    pub(crate) fn words(&self) -> Vec<f32> {
+        let normals = self.normals.as_flattened().iter();
+        normals.chain(&self.sides).copied().collect()
     }
 
     /// To be divided by the warp's divisor.

@@ -33,3 +33,9 @@ pub use order::{Run, Traversal};
 pub use ordered::{Ordered, OrderedCost, OrderedOptions, ordered, ordered_by};
 pub use splat::Stamp;
 pub use stats::{Layers, layers};
+
+// What the twin on a graphics device shares.
+pub(crate) use fill::fill;
+pub(crate) use free::{BEYOND, bounds};
+pub(crate) use look::Sizes;
+pub(crate) use project::Projection;

@@ -13,11 +13,13 @@ pub(super) const LANES: usize = 32;
 
 /// The warp from an LDI to a desired image.
 #[derive(Clone, Copy)]
-pub(super) struct Projection {
+pub(crate) struct Projection {
     row: [DVec3; 2],
-    per_x: [f32; 3],
-    per_y: [f32; 3],
-    per_depth: [f32; 3],
+    /// What a sample adds to its row's homogeneous position: for its x, for how far below its row's
+    /// middle it is, and for its inverse depth.
+    pub(crate) per_x: [f32; 3],
+    pub(crate) per_y: [f32; 3],
+    pub(crate) per_depth: [f32; 3],
 }
 
 /// Where up to [`LANES`] samples fall.
@@ -42,7 +44,7 @@ impl Block {
 
 impl Projection {
     /// To the desired image, whose pixels count from `origin`.
-    pub(super) fn new(ldi: &Layered, desired: &Pinhole, origin: [i32; 2]) -> Self {
+    pub(crate) fn new(ldi: &Layered, desired: &Pinhole, origin: [i32; 2]) -> Self {
         let warp = Warp::new(&ldi.camera, desired);
         let shifted = |v: DVec3| {
             let [x, y] = origin.map(f64::from);
@@ -61,7 +63,7 @@ impl Projection {
 
     /// What all samples of a row have in common.
     #[inline(always)]
-    pub(super) fn row(&self, row: u32) -> [f32; 3] {
+    pub(crate) fn row(&self, row: u32) -> [f32; 3] {
         let base = self.row[0] + f64::from(row) * self.row[1];
         base.to_array().map(|v| v as f32)
     }

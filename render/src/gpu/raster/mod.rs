@@ -9,6 +9,7 @@ mod pipelines;
 mod tables;
 
 use super::DeviceLimits;
+use super::GpuWarp;
 use super::device::{self, Opened};
 use super::target::Target as Picture;
 use crate::RenderError;
@@ -91,6 +92,14 @@ impl GpuRaster {
     /// The device's name and its driver, for people.
     pub fn description(&self) -> &str {
         &self.description
+    }
+
+    /// What draws layered depth images on the same device.
+    ///
+    /// # Errors
+    /// The device lacks something.
+    pub(crate) fn warp(&self) -> Result<GpuWarp, RenderError> {
+        GpuWarp::on(self.opened.clone())
     }
 
     /// Gives the device up, as if its driver had: every drawing fails.

@@ -6,7 +6,7 @@ use crate::interior::reference::plane_of;
 use crate::interior::{
     Beyond, Captured, LdiSource, Pinhole, PortalFill, PortalLdi, Reference, Window, texture, warp,
 };
-use crate::ldi::{Clipped, free};
+use crate::ldi::Clipped;
 use glam::DVec3;
 use proxy::interior::{CellId, Pass, Portal};
 use std::sync::Arc;
@@ -198,8 +198,8 @@ impl Walk<'_> {
                         true => Clipped::whole(ldi),
                         false => portal.tree.columns(ldi, camera, &f.window, reach),
                     };
-                    let scratch = &mut self.scratch;
-                    let took = free(ldi, &columns, camera, &f.window, options, scratch, into);
+                    let drawn = (ldi, &columns);
+                    let took = self.painter.free(drawn, camera, &f.window, options, into);
                     cost.samples += took.drawn;
                     if took.pixels > 0 {
                         cost.samples_clipped += ldi.len() - took.samples;

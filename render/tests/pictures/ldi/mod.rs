@@ -1,5 +1,6 @@
 //! Layered depth images: made, drawn, clipped, kept in files.
 
+mod device;
 mod files;
 use crate::house;
 mod made;

@@ -4,7 +4,7 @@ use super::*;
 
 /// Views of a portal from near the middle of its semicircle, some with only a half of it in the
 /// picture.
-fn viewers(set: &Set, side: usize, count: u64, size: [u32; 2]) -> Vec<(View, Window)> {
+pub(super) fn viewers(set: &Set, side: usize, count: u64, size: [u32; 2]) -> Vec<(View, Window)> {
     let place = &set.sides[side][0].place;
     let interior = &set.house.interior;
     let portal = interior.portal(place.portal);
