@@ -125,9 +125,18 @@ pub(crate) fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer 
 
 /// Waits for the device and reads a buffer.
 pub(crate) fn read(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
+    read_first(device, buffer, buffer.size())
+}
+
+/// Waits for the device and reads so many bytes of a buffer, a multiple of four.
+pub(crate) fn read_first(
+    device: &wgpu::Device,
+    buffer: &wgpu::Buffer,
+    bytes: u64,
+) -> Result<Vec<u8>, RenderError> {
     let failed = |what: String| RenderError::Gpu(format!("reading back failed: {what}"));
     let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+    buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
         // The receiver waits below; if it is gone there is no one to tell.
         let _ = sender.send(result);
     });
@@ -140,7 +149,7 @@ pub(crate) fn read(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u
         .map_err(|_| failed("the device does not answer".to_owned()))?
         .map_err(|e| failed(e.to_string()))?;
     let bytes = buffer
-        .get_mapped_range(..)
+        .get_mapped_range(..bytes)
         .map_err(|e| failed(e.to_string()))?
         .to_vec();
     buffer.unmap();

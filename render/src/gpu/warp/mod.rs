@@ -8,7 +8,7 @@
 use super::DeviceLimits;
 use super::device::{self, Opened};
 use super::pipelines::group;
-use super::target::{read, readback_buffer};
+use super::target::{read_first, readback_buffer};
 use crate::RenderError;
 use crate::interior::{Pinhole, Target, Window};
 use crate::ldi::{Clipped, FreeCost, FreeOptions, Layered, Projection, Sizes, bounds, fill};
@@ -272,7 +272,7 @@ impl GpuWarp {
         self.opened.trouble.take()?;
 
         // 3. The way back.
-        let mut shown = read(device, &room.shown)?;
+        let mut shown = read_first(device, &room.shown, shown + 4)?;
         let end = (4 * SHOWN_WORDS * pixels) as usize;
         let drawn: [u8; 4] = shown[end..end + 4].try_into().expect("four bytes");
         cost.drawn = u32::from_le_bytes(drawn) as usize;
