@@ -16,6 +16,7 @@ mod photographed;
 mod pinhole;
 mod raster;
 mod reference;
+mod shade;
 mod target;
 mod texture;
 mod tour;

@@ -10,10 +10,10 @@
 //! greatest is the same in whatever order and on however many threads triangles come. Colours are
 //! found afterwards, once a pixel.
 
-use super::{Pinhole, Target, Window};
+use super::{Pinhole, Window};
 use glam::DVec3;
 use proxy::interior::clip;
-use proxy::mesh::{Material, Model};
+use proxy::mesh::Model;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -215,50 +215,6 @@ impl Raster {
     pub(super) fn inverse_depth(&self, pixel: usize) -> f32 {
         f32::from_bits((self.keys[pixel].load(Relaxed) >> 32) as u32)
     }
-
-    /// Colours what was drawn, but for pixels that `is_wanted` declines (by pixel, and its inverse
-    /// depth); the others stay as they are. How many were coloured.
-    pub fn shade(
-        &self,
-        model: &Model,
-        camera: &Pinhole,
-        target: &mut Target,
-        is_wanted: impl Fn(usize, f32) -> bool + Sync,
-    ) -> usize {
-        let width = camera.width as usize;
-        let colors = target.color.par_chunks_mut(width);
-        let rows = colors.zip(target.inverse_depth.par_chunks_mut(width));
-        let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
-            let mut last: Option<(u32, [DVec3; 3], Option<&Material>)> = None;
-            let mut count = 0;
-            for (x, (color, depth)) in colors.iter_mut().zip(depths).enumerate() {
-                let pixel = y * width + x;
-                let Some((idx, inverse_depth)) = self.at(pixel) else {
-                    continue;
-                };
-                if !is_wanted(pixel, inverse_depth) {
-                    continue;
-                }
-                let (edges, material) = match last {
-                    Some((same, edges, material)) if same == idx => (edges, material),
-                    _ => {
-                        let corners = model.mesh.corners(idx as usize);
-                        let edges = edges(corners.map(|p| camera.point(p)));
-                        (edges, model.material_of(idx))
-                    }
-                };
-                last = Some((idx, edges, material));
-                let ray = camera.ray(x as u32, y as u32);
-                let [r, g, b] = model.color_with(material, idx, shares(edges, ray));
-                // Rounded without a call: they are not negative.
-                *color = [(r + 0.5) as u8, (g + 0.5) as u8, (b + 0.5) as u8, 255];
-                *depth = inverse_depth;
-                count += 1;
-            }
-            count
-        };
-        rows.enumerate().map(row).sum()
-    }
 }
 
 /// The columns of from … to where slope·x + rest may be positive, but for rounding, which a
@@ -276,21 +232,9 @@ fn narrowed(slope: f64, rest: f64, camera: &Pinhole, from: u32, to: u32) -> (u32
     }
 }
 
-fn edges([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+/// Edges of a triangle as seen from the eye: along a ray each is its opposite corner's weight.
+pub(super) fn edges([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     [b.cross(c), c.cross(a), a.cross(b)]
-}
-
-/// Barycentric weights along a ray; none negative.
-fn shares(edges: [DVec3; 3], ray: DVec3) -> [f64; 3] {
-    let weights = edges.map(|e| e.dot(ray));
-    let sum: f64 = weights.iter().sum();
-    let sign = if sum < 0.0 { -1.0 } else { 1.0 };
-    let weights = weights.map(|w| (sign * w).max(0.0));
-    let sum: f64 = weights.iter().sum();
-    match sum > 0.0 {
-        true => weights.map(|w| w / sum),
-        false => [1.0, 0.0, 0.0],
-    }
 }
 
 impl Ready {
