@@ -32,24 +32,28 @@ impl<'a> Skin<'a> {
             let is_empty = texture.width() == 0 || texture.height() == 0;
             (!is_empty).then_some((texture, material.wrap))
         });
-        let corners = model.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
-        let color = |corner: usize| {
-            let [r, g, b, _] = model.colors[corner].map(f32::from);
-            [r * base[0], g * base[1], b * base[2], 0.0]
-        };
-        let uv = |corner: usize| model.uvs[corner].map(f64::from);
-        let (first, uv_first) = (color(corners[0]), uv(corners[0]));
-        let more = |corner: usize| {
-            let color = color(corner);
-            [0, 1, 2, 3].map(|k| color[k] - first[k])
-        };
-        let uv_more = |corner: usize| {
-            let uv = uv(corner);
-            [uv[0] - uv_first[0], uv[1] - uv_first[1]]
-        };
+        // Loops, not chains of calls, here and below: those are not always compiled in place.
+        let corners = model.mesh.triangles[triangle_idx as usize];
+        let (mut colors, mut uvs) = ([[0.0; 4]; 3], [[0.0; 2]; 3]);
+        for i in 0..3 {
+            let corner = corners[i] as usize;
+            let (color, uv) = (model.colors[corner], model.uvs[corner]);
+            for k in 0..3 {
+                colors[i][k] = f32::from(color[k]) * base[k];
+            }
+            uvs[i] = [f64::from(uv[0]), f64::from(uv[1])];
+        }
+        for i in 1..3 {
+            for k in 0..3 {
+                colors[i][k] -= colors[0][k];
+            }
+            for k in 0..2 {
+                uvs[i][k] -= uvs[0][k];
+            }
+        }
         Self {
-            colors: [first, more(corners[1]), more(corners[2])],
-            uvs: [uv_first, uv_more(corners[1]), uv_more(corners[2])],
+            colors,
+            uvs,
             texture,
         }
     }
@@ -69,8 +73,9 @@ impl<'a> Skin<'a> {
             return color;
         };
         let [first, b, c] = &self.uvs;
-        let uv = |k: usize| first[k] + second * b[k] + third * c[k];
-        let texel = sample(texture, [uv(0), uv(1)], wrap);
+        let u = first[0] + second * b[0] + third * c[0];
+        let v = first[1] + second * b[1] + third * c[1];
+        let texel = sample(texture, [u, v], wrap);
         for k in 0..4 {
             color[k] *= texel[k] * (1.0 / 255.0);
         }
@@ -104,9 +109,9 @@ impl Wrap {
             }
         };
         // Casts keep within range; so do rounding and what is no number.
-        let within = |at: f64| (at as u32).min(count - 1) as usize;
+        let [first, next] = [first as u32, next as u32];
         Around {
-            texels: [within(first), within(next)],
+            texels: [first.min(count - 1) as usize, next.min(count - 1) as usize],
             share: x as f32,
         }
     }
@@ -119,20 +124,25 @@ fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
     let across = wrap[0].around(uv[0], width);
     let down = wrap[1].around(uv[1], height);
     let (texels, _) = texture.as_raw().as_chunks::<4>();
-    let row = |row: usize| {
-        let texels = &texels[row * width as usize..(row + 1) * width as usize];
-        let [left, right] = across.texels.map(|column| texels[column].map(f32::from));
-        mixed(left, right, across.share)
-    };
-    let [above, below] = down.texels.map(row);
-    mixed(above, below, down.share)
+    let [above, below] = down.texels;
+    let [above, below] = [above * width as usize, below * width as usize];
+    let [left, right] = across.texels;
+    let above = mixed(&texels[above + left], &texels[above + right], across.share);
+    let below = mixed(&texels[below + left], &texels[below + right], across.share);
+    let mut color = [0.0; 4];
+    for k in 0..4 {
+        color[k] = above[k] + down.share * (below[k] - above[k]);
+    }
+    color
 }
 
+/// Two texels' mean, so much of the second.
 #[inline(always)]
-fn mixed(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+fn mixed(a: &[u8; 4], b: &[u8; 4], share: f32) -> [f32; 4] {
     let mut mix = [0.0; 4];
     for k in 0..4 {
-        mix[k] = a[k] + share * (b[k] - a[k]);
+        let (a, b) = (f32::from(a[k]), f32::from(b[k]));
+        mix[k] = a + share * (b - a);
     }
     mix
 }

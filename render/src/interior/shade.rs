@@ -86,18 +86,20 @@ impl Raster {
                     let face = faces.at(model, camera, idx);
                     if last != Some(idx) {
                         last = Some(idx);
-                        rest = face.weights.map(|w| w.y * dy + w.z);
+                        for k in 0..3 {
+                            rest[k] = face.weights[k].y * dy + face.weights[k].z;
+                        }
                     }
                     let dx = camera.columns[x];
-                    let weight = |k: usize| face.weights[k].x * dx + rest[k];
-                    let scale = 1.0 / weight(2);
+                    let [second, third, all] = &face.weights;
+                    let scale = 1.0 / (all.x * dx + rest[2]);
                     // Rounding does not leave the triangle; nor does what is seen edge on.
-                    let second = (weight(0) * scale).max(0.0).min(1.0);
-                    let third = (weight(1) * scale).max(0.0).min(1.0 - second);
+                    let second = ((second.x * dx + rest[0]) * scale).max(0.0).min(1.0);
+                    let third = ((third.x * dx + rest[1]) * scale).max(0.0);
+                    let [r, g, b, _] = face.skin.color(second, third.min(1.0 - second));
                     // Rounded without a call: they are not negative.
-                    let code = |channel: f32| (channel + 0.5) as u8;
-                    let [r, g, b, _] = face.skin.color(second, third);
-                    colors[here] = [code(r), code(g), code(b), 255];
+                    let [r, g, b] = [r + 0.5, g + 0.5, b + 0.5];
+                    colors[here] = [r as u8, g as u8, b as u8, 255];
                     depths[here] = inverse_depth;
                     count += 1;
                 }
@@ -136,8 +138,9 @@ impl<'a> Faces<'a> {
 impl<'a> Face<'a> {
     #[inline(never)]
     fn new(model: &'a Model, part: Option<&Part>, camera: &Pinhole, idx: u32) -> Self {
-        let corners = model.mesh.corners(idx as usize);
-        let [a, b, c] = edges(corners.map(|p| camera.point(p)));
+        let [a, b, c] = model.mesh.triangles[idx as usize];
+        let corner = |i: u32| camera.point(model.mesh.positions[i as usize]);
+        let [a, b, c] = edges([corner(a), corner(b), corner(c)]);
         Self {
             idx,
             weights: [b, c, a + b + c],
