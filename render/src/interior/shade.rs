@@ -93,9 +93,10 @@ impl Raster {
                     let dx = camera.columns[x];
                     let [second, third, all] = &face.weights;
                     let scale = 1.0 / (all.x * dx + rest[2]);
-                    // Rounding does not leave the triangle; nor does what is seen edge on.
-                    let second = ((second.x * dx + rest[0]) * scale).max(0.0).min(1.0);
+                    let second = ((second.x * dx + rest[0]) * scale).max(0.0);
                     let third = ((third.x * dx + rest[1]) * scale).max(0.0);
+                    // Rounding does not leave the triangle; nor does what is seen edge on.
+                    let second = second.min(1.0);
                     let [r, g, b, _] = face.skin.color(second, third.min(1.0 - second));
                     // Rounded without a call: they are not negative.
                     let [r, g, b] = [r + 0.5, g + 0.5, b + 0.5];
