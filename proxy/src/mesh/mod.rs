@@ -15,6 +15,7 @@ mod ply;
 mod ply_header;
 mod quadric;
 mod simplify;
+mod skin;
 
 pub use error::{ExportError, MeshFileError};
 pub use file::{parse, parse_model, read, read_model, write};
@@ -24,6 +25,7 @@ pub use model::{Material, Model, ModelNode, Part, Wrap, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::to_ply;
+pub use skin::Skin;
 
 use glam::{DMat4, DVec3};
 

@@ -1,6 +1,6 @@
 //! A textured model: a mesh and how it looks.
 
-use super::Mesh;
+use super::{Mesh, Skin};
 use image::RgbaImage;
 use std::ops::Range;
 
@@ -80,44 +80,6 @@ pub enum Wrap {
     Clamp,
 }
 
-impl Wrap {
-    /// The columns (or rows) `i` and `i` + 1, whole numbers, of a texture of that many.
-    fn texels(self, i: f64, count: u32) -> [u32; 2] {
-        // Whole numbers divide faster.
-        if !(i.abs() < 1e9 && (1..1 << 29).contains(&count)) {
-            return [self.texel(i, count), self.texel(i + 1.0, count)];
-        }
-        let (i, n) = (i as i32, count as i32);
-        let following = |at: i32, period: i32| if at + 1 == period { 0 } else { at + 1 };
-        let pair = match self {
-            Self::Clamp => [i.clamp(0, n - 1), (i + 1).clamp(0, n - 1)],
-            Self::Repeat => {
-                let at = i.rem_euclid(n);
-                [at, following(at, n)]
-            }
-            Self::Mirror => {
-                let at = i.rem_euclid(2 * n);
-                [at, following(at, 2 * n)].map(|at| at.min(2 * n - 1 - at))
-            }
-        };
-        pair.map(|at| at as u32)
-    }
-
-    /// The column (or row) of a texture of that many.
-    fn texel(self, i: f64, count: u32) -> u32 {
-        let n = f64::from(count);
-        let within = match self {
-            Self::Repeat => i.rem_euclid(n),
-            Self::Clamp => i,
-            Self::Mirror => {
-                let twice = i.rem_euclid(2.0 * n);
-                twice.min(2.0 * n - 1.0 - twice)
-            }
-        };
-        within.clamp(0.0, n - 1.0) as u32
-    }
-}
-
 impl Model {
     /// The part that a triangle belongs to. A model whose parts do not cover its triangles has
     /// none for some.
@@ -131,15 +93,11 @@ impl Model {
 
     /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the texture
     /// bilinear at its finest level, the product of all that colours it. `shares` are the
-    /// corners' barycentric weights, and sum to 1.
+    /// corners' barycentric weights, and sum to 1. See [`Skin`] for many places.
     pub fn color(&self, triangle_idx: u32, shares: [f64; 3]) -> [f64; 3] {
-        self.color_with(self.material_of(triangle_idx), triangle_idx, shares)
-    }
-
-    /// The material of a triangle, if it has one.
-    pub fn material_of(&self, triangle_idx: u32) -> Option<&Material> {
-        let part = self.part_of(triangle_idx)?;
-        self.materials.get(part.material_idx as usize)
+        let skin = Skin::new(self, self.part_of(triangle_idx), triangle_idx);
+        let [r, g, b, _] = skin.color(shares[1], shares[2]).map(f64::from);
+        [r, g, b]
     }
 
     /// Adds white triangles as a node of its own; their indices.
@@ -161,71 +119,6 @@ impl Model {
         self.materials.push(Material::default());
         triangles
     }
-
-    /// [`Self::color`], for who has the triangle's material at hand.
-    pub fn color_with(
-        &self,
-        material: Option<&Material>,
-        triangle_idx: u32,
-        shares: [f64; 3],
-    ) -> [f64; 3] {
-        let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
-        let mut color = [0.0; 3];
-        let mut uv = [0.0; 2];
-        for (share, corner) in shares.iter().zip(corners) {
-            for (sum, x) in color.iter_mut().zip(self.colors[corner]) {
-                *sum += share * f64::from(x);
-            }
-            for (sum, x) in uv.iter_mut().zip(self.uvs[corner]) {
-                *sum += share * f64::from(x);
-            }
-        }
-        let Some(material) = material else {
-            return color;
-        };
-        let texture = material
-            .texture_idx
-            .and_then(|i| self.textures.get(i as usize));
-        let texel = texture.map_or([255.0; 3], |t| sample(t, uv, material.wrap));
-        [0, 1, 2].map(|k| color[k] * f64::from(material.base_color[k]) * texel[k] / 255.0)
-    }
-}
-
-/// The greatest whole number that is not greater: without a call where processors have no
-/// instruction for it.
-fn floor(x: f64) -> f64 {
-    if !(x.abs() < 1e9) {
-        return x.floor();
-    }
-    let whole = f64::from(x as i32);
-    if whole > x { whole - 1.0 } else { whole }
-}
-
-/// A texture's colour, bilinear between the pixels' centres.
-fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
-    let (width, height) = texture.dimensions();
-    if width == 0 || height == 0 {
-        return [255.0; 3];
-    }
-    let x = uv[0] * f64::from(width) - 0.5;
-    let y = uv[1] * f64::from(height) - 0.5;
-    let (left, top) = (floor(x), floor(y));
-    let (right_share, bottom_share) = (x - left, y - top);
-    let columns = wrap[0].texels(left, width);
-    let rows = wrap[1].texels(top, height);
-    let mut color = [0.0; 3];
-    for (dx, dy, share) in [
-        (0, 0, (1.0 - right_share) * (1.0 - bottom_share)),
-        (1, 0, right_share * (1.0 - bottom_share)),
-        (0, 1, (1.0 - right_share) * bottom_share),
-        (1, 1, right_share * bottom_share),
-    ] {
-        let texel = texture.get_pixel(columns[dx], rows[dy]).0;
-        for k in 0..3 {
-            color[k] += share * f64::from(texel[k]);
-        }
-    }
-    color
 }
 
 /// The sRGB code, 0 to 1, of linear light; what is beyond is clipped.
@@ -249,48 +142,6 @@ pub fn linear_from_srgb(code: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn textures_go_on_beyond_their_sides_as_they_should() {
-        let texels = |wrap: Wrap| [-2.0, -1.0, 0.0, 2.0, 3.0, 4.0].map(|i| wrap.texel(i, 3));
-        assert_eq!(texels(Wrap::Repeat), [1, 2, 0, 2, 0, 1]);
-        assert_eq!(texels(Wrap::Mirror), [1, 0, 0, 2, 2, 1]);
-        assert_eq!(texels(Wrap::Clamp), [0, 0, 0, 2, 2, 2]);
-        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
-            assert!(wrap.texel(1e300, 3) < 3 && wrap.texel(-1e300, 3) < 3);
-            for i in -12..12 {
-                let i = f64::from(i);
-                for n in 1..5 {
-                    assert_eq!(
-                        wrap.texels(i, n),
-                        [wrap.texel(i, n), wrap.texel(i + 1.0, n)]
-                    );
-                }
-            }
-        }
-        let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
-        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
-        assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
-    }
-
-    #[test]
-    fn whole_numbers_below_are_found() {
-        for x in [
-            0.0,
-            0.3,
-            -0.3,
-            2.0,
-            -2.0,
-            -1e-300,
-            7.9e8,
-            -7.9e8 - 0.5,
-            3e9,
-            -1e300,
-        ] {
-            assert_eq!(floor(x), x.floor());
-        }
-        assert!(floor(f64::NAN).is_nan() && floor(f64::INFINITY) == f64::INFINITY);
-    }
 
     #[test]
     fn codes_and_light_are_inverse() {

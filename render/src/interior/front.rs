@@ -6,10 +6,13 @@
 //! plane before any triangle is met. Of what is passed over nothing would be seen, so pictures are
 //! the same.
 
+use super::corners::Corners;
 use super::{Pinhole, Raster, Runs, Window};
+use crate::cpu::lanes::vectorised;
 use glam::{DVec2, DVec3};
 use proxy::mesh::Model;
 use rayon::prelude::*;
+use std::sync::atomic::AtomicU64;
 
 /// Of squares of pixels, and of squares of those, the least inverse depth behind which nothing is
 /// seen.
@@ -63,7 +66,7 @@ pub(super) fn meet(
     parts: &[(Runs<'_>, Window)],
     camera: &Pinhole,
     floor: &[f32],
-    raster: &Raster,
+    raster: &mut Raster,
     hidden: &mut Hidden,
 ) -> Met {
     // 1. By their boxes' distance.
@@ -91,14 +94,16 @@ pub(super) fn meet(
     }
     while !rest.is_empty() {
         let (part, others) = rest.split_at(count.min(rest.len()));
-        let draw = |run: &Queued<'_>| {
-            if is_known && hidden.hides(&run.corners, camera) {
+        let (known, raster_now) = (&*hidden, &*raster);
+        let draw = |corners: &mut Corners, run: &Queued<'_>| {
+            if is_known && known.hides(&run.corners, camera) {
                 return (0, 0);
             }
-            let touching = raster.draw_list(model, run.list, camera, run.window, None);
+            let touching = raster_now.draw_list(model, run.list, camera, run.window, None, corners);
             (run.list.len(), touching)
         };
-        let drawn = part.par_iter().with_min_len(2).map(draw);
+        let drawn = part.par_iter().with_min_len(2);
+        let drawn = drawn.map_init(Corners::new, draw);
         let drawn = drawn.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         (tried, touching) = (tried + drawn.0, touching + drawn.1);
         (rest, count) = (others, 2 * count);
@@ -113,9 +118,22 @@ pub(super) fn meet(
     }
 }
 
+/// Lessens what squares have by a row of pixels, the greater each of what it sees and of the floor.
+#[inline(always)]
+fn least_of_row(squares: &mut [f32], keys: &mut [AtomicU64], floor: Option<&[f32]>) {
+    for (i, (square, keys)) in squares.iter_mut().zip(keys.chunks_mut(SIDE)).enumerate() {
+        let floor = floor.map(|floor| &floor[i * SIDE..i * SIDE + keys.len()]);
+        for (k, key) in keys.iter_mut().enumerate() {
+            let met = f32::from_bits((*key.get_mut() >> 32) as u32);
+            let s = floor.map_or(met, |floor| floor[k].max(met));
+            *square = square.min(s);
+        }
+    }
+}
+
 impl Hidden {
     /// Of what was met so far.
-    fn find(&mut self, raster: &Raster, camera: &Pinhole, floor: &[f32]) {
+    fn find(&mut self, raster: &mut Raster, camera: &Pinhole, floor: &[f32]) {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let across = width.div_ceil(SIDE);
         let down = height.div_ceil(SIDE);
@@ -126,22 +144,20 @@ impl Hidden {
         finest.across = across;
         finest.least.clear();
         finest.least.resize(across * down, f32::INFINITY);
-        let row = |(row, squares): (usize, &mut [f32])| {
-            for y in row * SIDE..((row + 1) * SIDE).min(height) {
-                for (i, square) in squares.iter_mut().enumerate() {
-                    for x in i * SIDE..((i + 1) * SIDE).min(width) {
-                        let pixel = y * width + x;
-                        let met = raster.inverse_depth(pixel);
-                        let s = floor.get(pixel).map_or(met, |floor| floor.max(met));
-                        *square = square.min(s);
+        let row = |((row, squares), keys): ((usize, &mut [f32]), &mut [AtomicU64])| {
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (i, keys) in keys.chunks_exact_mut(width).enumerate() {
+                        let start = (row * SIDE + i) * width;
+                        let floor = floor.get(start..start + width);
+                        least_of_row(squares, keys, floor);
                     }
-                }
-            }
+                },
+            );
         };
-        finest
-            .least
-            .par_chunks_mut(across)
-            .enumerate()
+        let rows = finest.least.par_chunks_mut(across).enumerate();
+        rows.zip(raster.keys_mut().par_chunks_mut(SIDE * width))
             .for_each(row);
         // 2. Squares of squares.
         let (mut level, mut across, mut down) = (0, across, down);

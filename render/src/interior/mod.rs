@@ -6,6 +6,7 @@
 //! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
 
 mod captured;
+mod corners;
 mod fill;
 mod floor_map;
 mod front;
@@ -16,6 +17,7 @@ mod photographed;
 mod pinhole;
 mod raster;
 mod reference;
+mod shade;
 mod target;
 mod texture;
 mod tour;

@@ -142,7 +142,7 @@ impl Painter {
         self.drawn = None;
         self.raster.clear(camera);
         if let Some(floor) = floor {
-            let (raster, hidden) = (&self.raster, &mut self.hidden);
+            let (raster, hidden) = (&mut self.raster, &mut self.hidden);
             return meet(model, parts, camera, floor, raster, hidden);
         }
         let draw = |(runs, window): &(Runs<'_>, Window)| {

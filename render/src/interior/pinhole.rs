@@ -76,11 +76,13 @@ impl Pinhole {
     }
 
     /// A point of the world relative to the camera.
+    #[inline]
     pub fn point(&self, point_in_world: DVec3) -> DVec3 {
         self.rotation * (point_in_world - self.center)
     }
 
     /// The ray through a pixel's centre, z = 1, in the camera's frame.
+    #[inline]
     pub fn ray(&self, x: u32, y: u32) -> DVec3 {
         DVec3::new(self.columns[x as usize], self.rows[y as usize], 1.0)
     }

@@ -10,10 +10,12 @@
 //! greatest is the same in whatever order and on however many threads triangles come. Colours are
 //! found afterwards, once a pixel.
 
-use super::{Pinhole, Target, Window};
-use glam::DVec3;
+use super::corners::{Corner, Corners, IN_FRONT};
+use super::{Pinhole, Window};
+use crate::cpu::lanes::vectorised;
+use glam::{DVec2, DVec3};
 use proxy::interior::clip;
-use proxy::mesh::{Material, Model};
+use proxy::mesh::Model;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -86,9 +88,8 @@ const WIDE: u32 = 8;
 const ALONG_ROW: f64 = 1e-9;
 /// How far beyond a triangle's corners its pixels are asked for, in pixels: rounding.
 const ROOM: f64 = 1e-3;
-/// Corners nearer to the plane of the eye than this, in shares of their distance, are not
-/// projected.
-const IN_FRONT: f64 = 1e-6;
+/// Columns that are looked at together.
+const TOGETHER: usize = 4;
 
 impl Raster {
     /// Empties it, as large as a camera's image.
@@ -115,11 +116,14 @@ impl Raster {
         beyond: Option<&Beyond>,
     ) -> usize {
         assert_eq!(self.width, camera.width, "cleared for the camera");
-        let list = |list: &&[u32]| self.draw_list(model, list, camera, window, beyond);
-        lists.par_iter().with_min_len(GRAIN).map(list).sum()
+        let list = |corners: &mut Corners, list: &&[u32]| {
+            self.draw_list(model, list, camera, window, beyond, corners)
+        };
+        let lists = lists.par_iter().with_min_len(GRAIN);
+        lists.map_init(Corners::new, list).sum()
     }
 
-    /// One list of [`Self::draw`]'s.
+    /// One list of [`Self::draw`]'s, with corners of the same model and camera at hand.
     pub(super) fn draw_list(
         &self,
         model: &Model,
@@ -127,15 +131,26 @@ impl Raster {
         camera: &Pinhole,
         window: &Window,
         beyond: Option<&Beyond>,
+        corners: &mut Corners,
     ) -> usize {
-        let draw = |i: &u32| {
-            let corners = model.mesh.corners(*i as usize).map(|p| camera.point(p));
-            let ready = Ready::new(corners, camera);
-            usize::from(ready.is_some_and(|t| self.fill(&t, *i, camera, window, beyond)))
-        };
-        list.iter().map(draw).sum()
+        // Loops, not chains of calls: those would be compiled without vector instructions.
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut seen = 0;
+                for i in list {
+                    let corners = corners.of(model, camera, *i);
+                    if let Some(triangle) = Ready::new(&corners, camera) {
+                        let is_seen = self.fill(&triangle, *i, camera, window, beyond);
+                        seen += usize::from(is_seen);
+                    }
+                }
+                seen
+            },
+        )
     }
 
+    #[inline(always)]
     fn fill(
         &self,
         triangle: &Ready,
@@ -147,17 +162,18 @@ impl Raster {
         let mut is_seen = false;
         let [a, b, c] = triangle.edges;
         // On an edge itself a pixel is inside of one of the two triangles that share it.
-        let owns = [a, b, c].map(|e| e.x > 0.0 || (e.x == 0.0 && e.y > 0.0));
+        let owns = [owns(a), owns(b), owns(c)];
+        let depth = triangle.inverse_depth;
         for y in triangle.rows[0]..triangle.rows[1] {
             let dy = camera.rows[y as usize];
-            let rest = [a, b, c].map(|e| e.y * dy + e.z);
-            let depth = triangle.inverse_depth;
+            let rest = [a.y * dy + a.z, b.y * dy + b.z, c.y * dy + c.z];
             let depth_rest = depth.y * dy + depth.z;
             let open = window.row(y);
             let mut from = open.start.max(triangle.columns[0]);
             let mut to = open.end.min(triangle.columns[1]);
             if to.saturating_sub(from) > WIDE {
-                for (edge, rest) in [a, b, c].iter().zip(rest) {
+                for i in 0..3 {
+                    let (edge, rest) = (triangle.edges[i], rest[i]);
                     // Along the row nothing but rounding would tell where it crosses.
                     let size = (edge.y * dy).abs() + edge.z.abs();
                     if edge.x.abs() > ALONG_ROW * size {
@@ -165,39 +181,50 @@ impl Raster {
                     }
                 }
             }
-            let mut inside = false;
-            for x in from..to {
-                let dx = camera.columns[x as usize];
-                let is_in = |e: f64, owns: bool| e > 0.0 || (e == 0.0 && owns);
-                let hit = is_in(a.x * dx + rest[0], owns[0])
-                    && is_in(b.x * dx + rest[1], owns[1])
-                    && is_in(c.x * dx + rest[2], owns[2]);
-                if !hit {
-                    // Convex: once out, always out.
-                    if inside {
-                        break;
+            let start = y as usize * self.width as usize;
+            let (from, to) = (from as usize, to as usize);
+            let mut next = from;
+            while next < to {
+                let first = next;
+                next += TOGETHER;
+                let columns = together(&camera.columns, first);
+                // 1. The inverse depth where a ray meets the triangle, else 0.
+                let mut depths = [0.0_f32; TOGETHER];
+                for k in 0..TOGETHER {
+                    let dx = columns[k];
+                    let [e, f, g] = [a.x * dx + rest[0], b.x * dx + rest[1], c.x * dx + rest[2]];
+                    let is_in = ((e > 0.0) | ((e == 0.0) & owns[0]))
+                        & ((f > 0.0) | ((f == 0.0) & owns[1]))
+                        & ((g > 0.0) | ((g == 0.0) & owns[2]));
+                    // Rounding does not bring what is seen edge on before its corners.
+                    let inverse_depth = depth.x * dx + depth_rest;
+                    let inverse_depth = if inverse_depth > triangle.nearest {
+                        triangle.nearest
+                    } else {
+                        inverse_depth
+                    };
+                    let stored = inverse_depth as f32;
+                    let is_met = is_in & (stored > 0.0) & (stored < f32::INFINITY);
+                    depths[k] = if is_met { stored } else { 0.0 };
+                }
+                // 2. What is nearer than what was there.
+                for k in 0..TOGETHER.min(to - first) {
+                    if depths[k] == 0.0 {
+                        continue;
                     }
-                    continue;
-                }
-                inside = true;
-                let mut inverse_depth = depth.x * dx + depth_rest;
-                // Rounding does not bring what is seen edge on before its corners.
-                if inverse_depth > triangle.nearest {
-                    inverse_depth = triangle.nearest;
-                }
-                let stored = inverse_depth as f32;
-                if !(stored > 0.0 && stored.is_finite()) {
-                    continue;
-                }
-                let ray = || DVec3::new(dx, dy, 1.0);
-                if beyond.is_some_and(|plane| !plane.has(ray(), inverse_depth)) {
-                    continue;
-                }
-                is_seen = true;
-                let key = u64::from(stored.to_bits()) << 32 | u64::from(!idx);
-                let pixel = &self.keys[y as usize * self.width as usize + x as usize];
-                if pixel.load(Relaxed) < key {
-                    pixel.fetch_max(key, Relaxed);
+                    let ray = || DVec3::new(columns[k], dy, 1.0);
+                    if beyond.is_some_and(|plane| {
+                        let inverse_depth = depth.x * columns[k] + depth_rest;
+                        !plane.has(ray(), inverse_depth.min(triangle.nearest))
+                    }) {
+                        continue;
+                    }
+                    is_seen = true;
+                    let key = u64::from(depths[k].to_bits()) << 32 | u64::from(!idx);
+                    let pixel = &self.keys[start + first + k];
+                    if pixel.load(Relaxed) < key {
+                        pixel.fetch_max(key, Relaxed);
+                    }
                 }
             }
         }
@@ -205,64 +232,29 @@ impl Raster {
     }
 
     /// Which triangle a pixel sees, and its inverse depth; pixels are counted row by row.
+    #[inline]
     pub fn at(&self, pixel: usize) -> Option<(u32, f32)> {
         let key = self.keys[pixel].load(Relaxed);
         let bits = (key >> 32) as u32;
         (key != 0).then(|| (!(key as u32), f32::from_bits(bits)))
     }
 
-    /// The inverse depth of what a pixel sees, 0 for nothing.
-    pub(super) fn inverse_depth(&self, pixel: usize) -> f32 {
-        f32::from_bits((self.keys[pixel].load(Relaxed) >> 32) as u32)
+    /// What all pixels see, row by row: bits of the inverse depth, then of the complement of the
+    /// triangle's index; 0 for nothing.
+    pub(super) fn keys_mut(&mut self) -> &mut [AtomicU64] {
+        &mut self.keys
     }
+}
 
-    /// Colours what was drawn, but for pixels that `is_wanted` declines (by pixel, and its inverse
-    /// depth); the others stay as they are. How many were coloured.
-    pub fn shade(
-        &self,
-        model: &Model,
-        camera: &Pinhole,
-        target: &mut Target,
-        is_wanted: impl Fn(usize, f32) -> bool + Sync,
-    ) -> usize {
-        let width = camera.width as usize;
-        let colors = target.color.par_chunks_mut(width);
-        let rows = colors.zip(target.inverse_depth.par_chunks_mut(width));
-        let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
-            let mut last: Option<(u32, [DVec3; 3], Option<&Material>)> = None;
-            let mut count = 0;
-            for (x, (color, depth)) in colors.iter_mut().zip(depths).enumerate() {
-                let pixel = y * width + x;
-                let Some((idx, inverse_depth)) = self.at(pixel) else {
-                    continue;
-                };
-                if !is_wanted(pixel, inverse_depth) {
-                    continue;
-                }
-                let (edges, material) = match last {
-                    Some((same, edges, material)) if same == idx => (edges, material),
-                    _ => {
-                        let corners = model.mesh.corners(idx as usize);
-                        let edges = edges(corners.map(|p| camera.point(p)));
-                        (edges, model.material_of(idx))
-                    }
-                };
-                last = Some((idx, edges, material));
-                let ray = camera.ray(x as u32, y as u32);
-                let [r, g, b] = model.color_with(material, idx, shares(edges, ray));
-                // Rounded without a call: they are not negative.
-                *color = [(r + 0.5) as u8, (g + 0.5) as u8, (b + 0.5) as u8, 255];
-                *depth = inverse_depth;
-                count += 1;
-            }
-            count
-        };
-        rows.enumerate().map(row).sum()
-    }
+/// Whether what is on an edge itself is inside.
+#[inline(always)]
+fn owns(edge: DVec3) -> bool {
+    edge.x > 0.0 || (edge.x == 0.0 && edge.y > 0.0)
 }
 
 /// The columns of from … to where slope·x + rest may be positive, but for rounding, which a
 /// column more allows for.
+#[inline(always)]
 fn narrowed(slope: f64, rest: f64, camera: &Pinhole, from: u32, to: u32) -> (u32, u32) {
     let column = -rest / slope * camera.focal.x + camera.principal.x - 0.5;
     // A cast takes the whole part of what is positive.
@@ -276,30 +268,23 @@ fn narrowed(slope: f64, rest: f64, camera: &Pinhole, from: u32, to: u32) -> (u32
     }
 }
 
-fn edges([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+/// Edges of a triangle as seen from the eye: along a ray each is its opposite corner's weight.
+#[inline(always)]
+pub(super) fn edges([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     [b.cross(c), c.cross(a), a.cross(b)]
-}
-
-/// Barycentric weights along a ray; none negative.
-fn shares(edges: [DVec3; 3], ray: DVec3) -> [f64; 3] {
-    let weights = edges.map(|e| e.dot(ray));
-    let sum: f64 = weights.iter().sum();
-    let sign = if sum < 0.0 { -1.0 } else { 1.0 };
-    let weights = weights.map(|w| (sign * w).max(0.0));
-    let sum: f64 = weights.iter().sum();
-    match sum > 0.0 {
-        true => weights.map(|w| w / sum),
-        false => [1.0, 0.0, 0.0],
-    }
 }
 
 impl Ready {
     /// `None` where no pixel's centre can be inside.
-    fn new(corners: [DVec3; 3], camera: &Pinhole) -> Option<Self> {
-        let (columns, rows) = pixels_around(&corners, camera)?;
-        let depth = corners.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-        let nearest = match depth > 0.0 {
-            true => 1.0 / depth,
+    #[inline(always)]
+    fn new([a, b, c]: &[Corner; 3], camera: &Pinhole) -> Option<Self> {
+        let corners = [a.point, b.point, c.point];
+        let (columns, rows) = match a.is_in_front & b.is_in_front & c.is_in_front {
+            true => spans(&[a.pixel, b.pixel, c.pixel], camera, ROOM),
+            false => pixels_around(&corners, camera),
+        }?;
+        let nearest = match (a.point.z > 0.0) & (b.point.z > 0.0) & (c.point.z > 0.0) {
+            true => a.inverse_depth.max(b.inverse_depth).max(c.inverse_depth),
             false => f64::INFINITY,
         };
         let [a, b, c] = edges(corners);
@@ -309,7 +294,7 @@ impl Ready {
             true => ([-a, -b, -c], -volume),
             false => ([a, b, c], volume),
         };
-        let inverse_depth = (edges[0] + edges[1] + edges[2]) / volume;
+        let inverse_depth = (edges[0] + edges[1] + edges[2]) * (1.0 / volume);
         inverse_depth.is_finite().then_some(Self {
             edges,
             inverse_depth,
@@ -320,12 +305,20 @@ impl Ready {
     }
 }
 
-/// Columns and rows, from … to before, around a triangle.
+/// The rays' x of some columns from a first one on; the last one's again where there are no more.
+#[inline(always)]
+fn together(columns: &[f64], first: usize) -> [f64; TOGETHER] {
+    let here = columns.get(first..first + TOGETHER);
+    let here = here.and_then(|columns| columns.try_into().ok());
+    here.unwrap_or_else(|| {
+        let last = columns.len() - 1;
+        std::array::from_fn(|k| columns[(first + k).min(last)])
+    })
+}
+
+/// Columns and rows, from … to before, around a triangle that is not all in front.
+#[inline(never)]
 fn pixels_around(corners: &[DVec3; 3], camera: &Pinhole) -> Option<([u32; 2], [u32; 2])> {
-    let is_in_front = |p: &DVec3| p.z > IN_FRONT * p.abs().max_element();
-    if corners.iter().all(is_in_front) {
-        return spans(corners, camera, ROOM);
-    }
     if corners.iter().all(|p| p.z <= 0.0) {
         return None;
     }
@@ -352,24 +345,30 @@ fn pixels_around(corners: &[DVec3; 3], camera: &Pinhole) -> Option<([u32; 2], [u
     if !part.iter().all(|p| p.z > IN_FRONT * size) {
         return Some(([0, camera.width], [0, camera.height]));
     }
-    spans(&part, camera, 1.0)
+    let projected = |p: &DVec3| p.truncate() / p.z * camera.focal + camera.principal;
+    let pixels: Vec<DVec2> = part.iter().map(projected).collect();
+    spans(&pixels, camera, 1.0)
 }
 
-fn spans(corners: &[DVec3], camera: &Pinhole, room: f64) -> Option<([u32; 2], [u32; 2])> {
-    let span = |axis: usize, count: u32| {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for p in corners {
-            let at = p[axis] / p.z * camera.focal[axis] + camera.principal[axis];
-            (low, high) = (low.min(at), high.max(at));
-        }
-        // Pixels whose centres are between them. A cast takes the whole part of what is positive,
-        // and keeps within range.
-        let first = (low - room - 0.5).max(0.0);
-        let whole = first as u32;
-        let from = whole.saturating_add(u32::from(f64::from(whole) < first));
-        let to = (high + room + 0.5).max(0.0) as u32;
-        let span = [from, to.min(count)];
-        (span[0] < span[1]).then_some(span)
-    };
-    Some((span(0, camera.width)?, span(1, camera.height)?))
+/// Columns and rows, from … to before, around pixels.
+#[inline(always)]
+fn spans(pixels: &[DVec2], camera: &Pinhole, room: f64) -> Option<([u32; 2], [u32; 2])> {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for at in pixels {
+        (low, high) = (low.min(*at), high.max(*at));
+    }
+    let columns = span(low.x - room, high.x + room, camera.width)?;
+    let rows = span(low.y - room, high.y + room, camera.height)?;
+    Some((columns, rows))
+}
+
+/// Pixels, from … to before, whose middles are between two places, if there are any.
+#[inline(always)]
+fn span(low: f64, high: f64, count: u32) -> Option<[u32; 2]> {
+    // A cast takes the whole part of what is positive, and keeps within range.
+    let first = (low - 0.5).max(0.0);
+    let whole = first as u32;
+    let from = whole.saturating_add(u32::from(f64::from(whole) < first));
+    let to = ((high + 0.5).max(0.0) as u32).min(count);
+    (from < to).then_some([from, to])
 }

@@ -76,6 +76,7 @@ impl Warp {
 
     /// Where a reference pixel falls whose point has that inverse depth; `None` behind the desired
     /// camera.
+    #[inline]
     pub fn at(&self, pixel: DVec2, inverse_depth: f64) -> Option<Warped> {
         let at = self.pixel_from_pixel * pixel.extend(1.0) + inverse_depth * self.shift;
         let is_in_front = at.z > 0.0 && at.is_finite();

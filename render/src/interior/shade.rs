@@ -1,0 +1,151 @@
+//! Colours of the pixels of a [`Raster`], each found once.
+//!
+//! What colours a triangle is made ready once for all its pixels in a band of rows, square by square,
+//! so that few triangles are at hand at a time.
+
+use super::raster::edges;
+use super::{Pinhole, Raster, Target};
+use crate::cpu::lanes::vectorised;
+use glam::DVec3;
+use proxy::mesh::{Model, Part, Skin};
+use rayon::prelude::*;
+
+/// A triangle made ready to be coloured.
+struct Face<'a> {
+    idx: u32,
+    /// The second corner's weight along a ray with z = 1, the third's, and all three's.
+    weights: [DVec3; 3],
+    skin: Skin<'a>,
+}
+
+/// Triangles that are made ready, each in the place that its index says.
+struct Faces<'a> {
+    places: Vec<Option<Face<'a>>>,
+    /// Of the last that was made ready.
+    part: Option<&'a Part>,
+}
+
+/// Rows in a band, and columns in a square.
+const BAND: usize = 16;
+const SQUARE: usize = 32;
+/// Triangles at hand, a power of 2.
+const AT_HAND: usize = 256;
+
+impl Raster {
+    /// Colours what was drawn, but for pixels that `is_wanted` declines (by pixel, and its inverse
+    /// depth); the others stay as they are. How many were coloured.
+    pub fn shade<'m>(
+        &self,
+        model: &'m Model,
+        camera: &Pinhole,
+        target: &mut Target,
+        is_wanted: impl Fn(usize, f32) -> bool + Sync,
+    ) -> usize {
+        let pixels = BAND * camera.width as usize;
+        let colors = target.color.par_chunks_mut(pixels);
+        let bands = colors.zip(target.inverse_depth.par_chunks_mut(pixels));
+        let band = |faces: &mut Faces<'m>, (i, (colors, depths)): (usize, Band<'_>)| {
+            vectorised(
+                #[inline(always)]
+                || self.shade_band(model, camera, faces, i * BAND, colors, depths, &is_wanted),
+            )
+        };
+        let band = bands.enumerate().map_init(Faces::default, band);
+        band.sum()
+    }
+
+    /// Colours rows from a first one on.
+    #[inline(always)]
+    fn shade_band<'a>(
+        &self,
+        model: &'a Model,
+        camera: &Pinhole,
+        faces: &mut Faces<'a>,
+        first: usize,
+        colors: &mut [[u8; 4]],
+        depths: &mut [f32],
+        is_wanted: &impl Fn(usize, f32) -> bool,
+    ) -> usize {
+        let width = camera.width as usize;
+        let mut count = 0;
+        for left in (0..width).step_by(SQUARE) {
+            let columns = left..(left + SQUARE).min(width);
+            for y in 0..colors.len() / width {
+                let dy = camera.rows[first + y];
+                // The triangle of the pixel before, and its weights in this row but for x.
+                let mut last = None;
+                let mut rest = [0.0; 3];
+                for x in columns.clone() {
+                    let (pixel, here) = ((first + y) * width + x, y * width + x);
+                    let Some((idx, inverse_depth)) = self.at(pixel) else {
+                        continue;
+                    };
+                    if !is_wanted(pixel, inverse_depth) {
+                        continue;
+                    }
+                    let face = faces.at(model, camera, idx);
+                    if last != Some(idx) {
+                        last = Some(idx);
+                        for k in 0..3 {
+                            rest[k] = face.weights[k].y * dy + face.weights[k].z;
+                        }
+                    }
+                    let dx = camera.columns[x];
+                    let [second, third, all] = &face.weights;
+                    let scale = 1.0 / (all.x * dx + rest[2]);
+                    let second = ((second.x * dx + rest[0]) * scale).max(0.0);
+                    let third = ((third.x * dx + rest[1]) * scale).max(0.0);
+                    // Rounding does not leave the triangle; nor does what is seen edge on.
+                    let second = second.min(1.0);
+                    let [r, g, b, _] = face.skin.color(second, third.min(1.0 - second));
+                    // Rounded without a call: they are not negative.
+                    let [r, g, b] = [r + 0.5, g + 0.5, b + 0.5];
+                    colors[here] = [r as u8, g as u8, b as u8, 255];
+                    depths[here] = inverse_depth;
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
+}
+
+/// Colours and inverse depths of a band's pixels.
+type Band<'t> = (&'t mut [[u8; 4]], &'t mut [f32]);
+
+impl Default for Faces<'_> {
+    fn default() -> Self {
+        Self {
+            places: (0..AT_HAND).map(|_| None).collect(),
+            part: None,
+        }
+    }
+}
+
+impl<'a> Faces<'a> {
+    /// A triangle, made ready now if it is not at hand.
+    #[inline(always)]
+    fn at(&mut self, model: &'a Model, camera: &Pinhole, idx: u32) -> &Face<'a> {
+        let place = idx as usize % AT_HAND;
+        if !matches!(&self.places[place], Some(face) if face.idx == idx) {
+            let part = self.part.filter(|part| part.triangles.contains(&idx));
+            self.part = part.or_else(|| model.part_of(idx));
+            self.places[place] = Some(Face::new(model, self.part, camera, idx));
+        }
+        self.places[place].as_ref().expect("it was just made ready")
+    }
+}
+
+impl<'a> Face<'a> {
+    #[inline(never)]
+    fn new(model: &'a Model, part: Option<&Part>, camera: &Pinhole, idx: u32) -> Self {
+        let [a, b, c] = model.mesh.triangles[idx as usize];
+        let corner = |i: u32| camera.point(model.mesh.positions[i as usize]);
+        let [a, b, c] = edges([corner(a), corner(b), corner(c)]);
+        Self {
+            idx,
+            weights: [b, c, a + b + c],
+            skin: Skin::new(model, part, idx),
+        }
+    }
+}
