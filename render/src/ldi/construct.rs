@@ -12,7 +12,9 @@ use std::ops::Range;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Conflict {
     /// The one that sees the smaller patch of the surface stays; two of one image both do
-    /// (Rafferty et al. 1998, "Images for accelerating architectural walkthroughs", §4.1).
+    /// (Rafferty et al. 1998, "Images for accelerating architectural walkthroughs", §4.1). Not so
+    /// those that are farther apart than half the larger patch's side: they are of different places
+    /// of a surface that is seen along.
     #[default]
     SmallerPatch,
     /// The first stays; another colour is another surface (Popescu et al. 1998, §3.1).
@@ -87,6 +89,9 @@ const NONE: u32 = u32::MAX;
 const BANDS: usize = 16;
 /// The least cosine that a patch's area is divided by.
 const GRAZING: f64 = 1e-3;
+/// Samples whose depths differ by more sides of the larger patch are of different places: a doorway's
+/// jamb, say, is seen along, and what stayed of it would not cover it.
+const PATCHES: f64 = 0.5;
 /// Measured depths that differ by up to so many standard deviations of their difference may be of
 /// one surface.
 const SAME_SURFACE: f64 = 3.0;
@@ -358,7 +363,15 @@ impl Making {
                 }
                 Conflict::Average => true,
             };
-            let is_near = apart <= self.options.range.max(noise);
+            // On a surface that is seen along, a pixel has several places, each with its own patch.
+            let range = match self.options.conflict {
+                Conflict::SmallerPatch => {
+                    let side = new.area.max(node.area).sqrt();
+                    self.options.range.min(PATCHES * side * s.min(other))
+                }
+                Conflict::RangeThenColor { .. } | Conflict::Average => self.options.range,
+            };
+            let is_near = apart <= range.max(noise);
             if is_other && is_near && found.is_none_or(|(_, d)| apart < d) {
                 found = Some((at as usize, apart));
             }
