@@ -75,6 +75,8 @@ struct Node {
     sample: Sample,
     /// The patch's area.
     area: f64,
+    /// Whether the LDI's camera sees along its surface.
+    is_seen_along: bool,
     /// Which image it is of; 0 is the central one.
     image: u32,
     /// How many samples it is the mean of.
@@ -89,8 +91,10 @@ const NONE: u32 = u32::MAX;
 const BANDS: usize = 16;
 /// The least cosine that a patch's area is divided by.
 const GRAZING: f64 = 1e-3;
-/// Samples whose depths differ by more sides of the larger patch are of different places: a doorway's
-/// jamb, say, is seen along, and what stayed of it would not cover it.
+/// A surface is seen along where the cosine between its normal and the ray is less.
+const ALONG: f64 = 0.5;
+/// Samples of a surface that is seen along whose depths differ by more sides of the larger patch are of
+/// different places: what stayed of a doorway's jamb, say, would not cover it.
 const PATCHES: f64 = 0.5;
 /// Measured depths that differ by up to so many standard deviations of their difference may be of
 /// one surface.
@@ -194,18 +198,23 @@ fn made(
                 return None;
             }
             let (normal, area) = patch(image, pixel, s);
+            let normal = turn * normal;
+            let ray = (at.pixel - ldi_camera.principal) / ldi_camera.focal;
+            let ray = ray.extend(1.0);
+            let cosine = normal.dot(ray).abs() / (normal.length() * ray.length());
             let offset = (256.0 * (at.pixel - corner - 0.5)).floor();
             let sample = Sample {
                 color: image.seen.color[index(image, pixel)],
                 inverse_depth,
                 offset: [offset.x as i8, offset.y as i8],
-                look: Look::new(turn * normal, area.sqrt() * at.inverse_depth),
+                look: Look::new(normal, area.sqrt() * at.inverse_depth),
             };
             // Depth here is there / s plus what no depth changes.
             let change = warp.pixel_from_pixel.row(2).dot(pixel.extend(1.0)).abs() / (s * s);
             let node = Node {
                 sample,
                 area,
+                is_seen_along: cosine < ALONG,
                 image: rank,
                 of: 1,
                 deviation: noise * change,
@@ -363,13 +372,13 @@ impl Making {
                 }
                 Conflict::Average => true,
             };
-            // On a surface that is seen along, a pixel has several places, each with its own patch.
+            // Of a surface that is seen along a pixel has several places, each with its own patch.
             let range = match self.options.conflict {
-                Conflict::SmallerPatch => {
+                Conflict::SmallerPatch if new.is_seen_along || node.is_seen_along => {
                     let side = new.area.max(node.area).sqrt();
                     self.options.range.min(PATCHES * side * s.min(other))
                 }
-                Conflict::RangeThenColor { .. } | Conflict::Average => self.options.range,
+                _ => self.options.range,
             };
             let is_near = apart <= range.max(noise);
             if is_other && is_near && found.is_none_or(|(_, d)| apart < d) {
