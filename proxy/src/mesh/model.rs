@@ -1,6 +1,6 @@
 //! A textured model: a mesh and how it looks.
 
-use super::{Mesh, Skin};
+use super::Mesh;
 use image::RgbaImage;
 use std::ops::Range;
 
@@ -80,6 +80,22 @@ pub enum Wrap {
     Clamp,
 }
 
+impl Wrap {
+    /// The column (or row) of a texture of that many.
+    fn texel(self, i: f64, count: u32) -> u32 {
+        let n = f64::from(count);
+        let within = match self {
+            Self::Repeat => i.rem_euclid(n),
+            Self::Clamp => i,
+            Self::Mirror => {
+                let twice = i.rem_euclid(2.0 * n);
+                twice.min(2.0 * n - 1.0 - twice)
+            }
+        };
+        within.clamp(0.0, n - 1.0) as u32
+    }
+}
+
 impl Model {
     /// The part that a triangle belongs to. A model whose parts do not cover its triangles has
     /// none for some.
@@ -93,11 +109,27 @@ impl Model {
 
     /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the texture
     /// bilinear at its finest level, the product of all that colours it. `shares` are the
-    /// corners' barycentric weights, and sum to 1. See [`Skin`] for many places.
+    /// corners' barycentric weights, and sum to 1. [`Skin`](super::Skin) is the fast twin, in f32, for
+    /// many places of a triangle.
     pub fn color(&self, triangle_idx: u32, shares: [f64; 3]) -> [f64; 3] {
-        let skin = Skin::new(self, self.part_of(triangle_idx), triangle_idx);
-        let [r, g, b, _] = skin.color(shares[1], shares[2]).map(f64::from);
-        [r, g, b]
+        let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
+        let (mut color, mut uv) = ([0.0; 3], [0.0; 2]);
+        for (share, corner) in shares.iter().zip(corners) {
+            for (sum, x) in color.iter_mut().zip(self.colors[corner]) {
+                *sum += share * f64::from(x);
+            }
+            for (sum, x) in uv.iter_mut().zip(self.uvs[corner]) {
+                *sum += share * f64::from(x);
+            }
+        }
+        let part = self.part_of(triangle_idx);
+        let Some(material) = part.and_then(|p| self.materials.get(p.material_idx as usize)) else {
+            return color;
+        };
+        let texture = material.texture_idx;
+        let texture = texture.and_then(|i| self.textures.get(i as usize));
+        let texel = texture.map_or([255.0; 3], |t| sample(t, uv, material.wrap));
+        [0, 1, 2].map(|k| color[k] * f64::from(material.base_color[k]) * texel[k] / 255.0)
     }
 
     /// Adds white triangles as a node of its own; their indices.
@@ -121,6 +153,28 @@ impl Model {
     }
 }
 
+/// A texture's colour, bilinear between the pixels' centres.
+fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
+    let (width, height) = texture.dimensions();
+    if width == 0 || height == 0 {
+        return [255.0; 3];
+    }
+    let [x, y] = [uv[0] * f64::from(width), uv[1] * f64::from(height)].map(|at| at - 0.5);
+    let (left, top) = (x.floor(), y.floor());
+    let (right_share, bottom_share) = (x - left, y - top);
+    let mut color = [0.0; 3];
+    for (dy, down) in [(0.0, 1.0 - bottom_share), (1.0, bottom_share)] {
+        for (dx, across) in [(0.0, 1.0 - right_share), (1.0, right_share)] {
+            let column = wrap[0].texel(left + dx, width);
+            let texel = texture.get_pixel(column, wrap[1].texel(top + dy, height)).0;
+            for k in 0..3 {
+                color[k] += across * down * f64::from(texel[k]);
+            }
+        }
+    }
+    color
+}
+
 /// The sRGB code, 0 to 1, of linear light; what is beyond is clipped.
 pub(super) fn srgb_from_linear(linear: f64) -> f64 {
     let linear = linear.clamp(0.0, 1.0);
@@ -142,6 +196,20 @@ pub fn linear_from_srgb(code: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn textures_go_on_beyond_their_sides_as_they_should() {
+        let texels = |wrap: Wrap| [-2.0, -1.0, 0.0, 2.0, 3.0, 4.0].map(|i| wrap.texel(i, 3));
+        assert_eq!(texels(Wrap::Repeat), [1, 2, 0, 2, 0, 1]);
+        assert_eq!(texels(Wrap::Mirror), [1, 0, 0, 2, 2, 1]);
+        assert_eq!(texels(Wrap::Clamp), [0, 0, 0, 2, 2, 2]);
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            assert!(wrap.texel(1e300, 3) < 3 && wrap.texel(-1e300, 3) < 3);
+        }
+        let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
+        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
+        assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
+    }
 
     #[test]
     fn codes_and_light_are_inverse() {

@@ -110,6 +110,23 @@ fn colours_are_products_of_what_colours_a_place() {
     }
     let color = model.color(1, [1.0, 0.0, 0.0]);
     assert_eq!(color, [127.5, 63.75, 255.0]);
+    // The twin that is made ready once for all places.
+    for idx in 0..model.mesh.triangles.len() as u32 {
+        let skin = mesh::Skin::new(&model, model.part_of(idx), idx);
+        for i in 0..=20 {
+            for j in 0..=20 - i {
+                let [b, c] = [i, j].map(|n| f64::from(n) / 20.0);
+                let expected = model.color(idx, [1.0 - b - c, b, c]);
+                let found = skin.color(b, c);
+                for k in 0..3 {
+                    assert!(
+                        (f64::from(found[k]) - expected[k]).abs() < 1e-3,
+                        "{idx} {b} {c}"
+                    );
+                }
+            }
+        }
+    }
 }
 
 /// The file with its JSON changed.
