@@ -14,9 +14,7 @@ use proxy::mesh::Model;
 #[derive(Debug, Default)]
 pub struct Painter {
     gpu: Option<Box<GpuRaster>>,
-    /// Draws LDIs on the same device, once there were some.
-    warp: Option<Box<GpuWarp>>,
-    warps_by_cpu: bool,
+    warp: Warper,
     loose: Free,
     raster: Raster,
     hidden: Hidden,
@@ -25,6 +23,16 @@ pub struct Painter {
     /// What photos show of it.
     captured: Option<Box<Captured>>,
     notes: Vec<String>,
+}
+
+/// What draws LDIs where a device draws triangles.
+#[derive(Debug, Default)]
+enum Warper {
+    /// None was to be drawn yet.
+    #[default]
+    Untried,
+    Device(Box<GpuWarp>),
+    Cpu,
 }
 
 impl Painter {
@@ -134,7 +142,7 @@ impl Painter {
                     };
                     self.note(format!("{error}; {rest}"));
                     if is_lost {
-                        (self.gpu, self.warp) = (None, None);
+                        (self.gpu, self.warp) = (None, Warper::Cpu);
                     }
                 }
             }
@@ -176,16 +184,19 @@ impl Painter {
     /// What draws LDIs on the graphics device, if there is one.
     fn warp(&mut self) -> Option<&mut GpuWarp> {
         let gpu = self.gpu.as_ref()?;
-        if self.warp.is_none() && !self.warps_by_cpu {
-            match gpu.warp() {
-                Ok(warp) => self.warp = Some(Box::new(warp)),
+        if let Warper::Untried = self.warp {
+            self.warp = match gpu.warp() {
+                Ok(warp) => Warper::Device(Box::new(warp)),
                 Err(error) => {
-                    self.warps_by_cpu = true;
                     self.note(format!("{error}; the CPU draws layered depth images"));
+                    Warper::Cpu
                 }
-            }
+            };
         }
-        self.warp.as_deref_mut()
+        match &mut self.warp {
+            Warper::Device(warp) => Some(warp),
+            _ => None,
+        }
     }
 
     fn note(&mut self, note: String) {

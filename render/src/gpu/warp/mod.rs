@@ -18,8 +18,14 @@ use std::ops::Range;
 
 const SHADER: &str = include_str!("warp.wgsl");
 
-/// The passes in the order in which they run, by their entry points.
-const PASSES: [&str; 5] = ["near", "add", "near_wide", "add_wide", "resolve"];
+/// The passes in the order in which they run: the entry point, and whether splats are the wider ones.
+const PASSES: [(&str, bool); 5] = [
+    ("near", false),
+    ("add", false),
+    ("near", true),
+    ("add", true),
+    ("resolve", false),
+];
 /// Threads of a group; the shader says the same.
 const GROUP: u32 = 64;
 /// Words of a sample, and of a pixel: what it shows, its nearest depths, its sums.
@@ -128,13 +134,17 @@ impl GpuWarp {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pass = |name| {
+        let pass = |(name, is_wide)| {
+            let constants = [("is_wide", f64::from(u8::from(is_wide)))];
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(name),
                 layout: Some(&of_all),
                 module: &module,
                 entry_point: Some(name),
-                compilation_options: Default::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &constants,
+                    ..Default::default()
+                },
                 cache: None,
             })
         };
@@ -254,7 +264,7 @@ impl GpuWarp {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_bind_group(0, &all, &[]);
             let most = self.opened.limits.max_compute_workgroups_per_dimension;
-            for (name, pipeline) in PASSES.iter().zip(&self.passes) {
+            for ((name, _), pipeline) in PASSES.iter().zip(&self.passes) {
                 let groups = match *name {
                     "resolve" => pixels.div_ceil(u64::from(GROUP)) as u32,
                     _ => stretches.len() as u32 / 2,
@@ -393,6 +403,7 @@ fn params(
 mod tests {
     use super::*;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
+    use std::collections::HashSet;
 
     #[test]
     fn the_shader_is_valid_and_has_the_parameters_as_they_are() {
@@ -408,7 +419,8 @@ mod tests {
         };
         assert_eq!(span as usize, size_of::<Params>());
         let names = module.entry_points.iter().map(|entry| entry.name.as_str());
-        assert_eq!(names.collect::<Vec<_>>(), PASSES);
+        let names: HashSet<_> = names.collect();
+        assert_eq!(names, PASSES.iter().map(|(name, _)| *name).collect());
         let groups = module.entry_points.iter().map(|e| e.workgroup_size);
         assert!(groups.into_iter().all(|size| size == [GROUP, 1, 1]));
     }

@@ -2,7 +2,7 @@
 //
 // 1. near: the nearest depth of every pixel, of what splats cover.
 // 2. add: Gaussian weights of all samples within a few per cent of that depth.
-// 3. near_wide, add_wide: the same with wider splats, for pixels that none covers.
+// 3. near, add: the same with wider splats, for pixels that none covers.
 // 4. resolve: the means.
 //
 // Sums are whole numbers, in 64 bits of two words each, so that nothing depends on the order in
@@ -34,6 +34,9 @@ struct Warp {
 // then of each pixel red, green, blue, weight, low and high words. Last, how many samples were drawn.
 @group(0) @binding(4) var<storage, read_write> pixels: array<atomic<u32>>;
 
+// Whether splats are the wider ones.
+override is_wide: bool = false;
+
 const NORMALS: u32 = 1024u;
 const WORDS: u32 = 5u;
 // One, in sums; the least that counts is a millionth of it.
@@ -63,7 +66,10 @@ fn place(i: u32, base: vec3f) -> Drawn {
     let normal = look % NORMALS;
     let side = sizes[2u * NORMALS + look / NORMALS];
     let flat_half = vec2f(sizes[2u * normal], sizes[2u * normal + 1u]) * side;
-    let half = min(max(flat_half * (warp.patches.x * scale), vec2f(warp.patches.y)), vec2f(most));
+    var half = min(max(flat_half * (warp.patches.x * scale), vec2f(warp.patches.y)), vec2f(most));
+    if is_wide {
+        half = min(max(half * warp.wide.x, vec2f(warp.wide.y)), vec2f(most));
+    }
     let size = vec2f(warp.size.xy);
     let is_seen = there.z > 0.0 && all(at > vec2f(-most)) && all(at < size + most);
     return Drawn(at, s * scale, half, samples[WORDS * i + 3u], is_seen);
@@ -94,10 +100,6 @@ fn gaussian(t: vec2f) -> vec2f {
     return eight * eight;
 }
 
-fn wide_half(half: vec2f) -> vec2f {
-    return min(max(half * warp.wide.x, vec2f(warp.wide.y)), vec2f(warp.patches.z));
-}
-
 fn nearest_at(pixel: u32) -> f32 {
     return bitcast<f32>(atomicLoad(&pixels[2u * pixel_count() + pixel]));
 }
@@ -114,8 +116,8 @@ fn more(word: u32, value: u32) {
     }
 }
 
-fn add_at(pixel: vec2u, drawn: Drawn, half: vec2f) {
-    let deviation = warp.wide.z * half;
+fn add_at(pixel: vec2u, drawn: Drawn) {
+    let deviation = warp.wide.z * drawn.half;
     let d = vec2f(pixel) + 0.5 - drawn.at;
     let weights = gaussian(d * d * (0.5 / (deviation * deviation)));
     let exact = weights.x * weights.y;
@@ -161,13 +163,17 @@ fn near(
         if !drawn.is_seen {
             continue;
         }
-        atomicAdd(&drawn_here, 1u);
+        if !is_wide {
+            atomicAdd(&drawn_here, 1u);
+        }
         let box = pixels_around(drawn.at, drawn.half);
         for (var y = box.first.y; y < box.end.y; y++) {
             for (var x = box.first.x; x < box.end.x; x++) {
-                if is_within(vec2u(x, y), drawn.at, drawn.half) {
-                    let word = 2u * pixel_count() + y * warp.size.x + x;
+                let pixel = y * warp.size.x + x;
+                let is_open = !is_wide || nearest_at(pixel) == 0.0;
+                if is_open && is_within(vec2u(x, y), drawn.at, drawn.half) {
                     // Positive numbers are in the order of their bits.
+                    let word = select(2u, 3u, is_wide) * pixel_count() + pixel;
                     atomicMax(&pixels[word], bitcast<u32>(drawn.inverse_depth));
                 }
             }
@@ -191,67 +197,17 @@ fn add(
         if !drawn.is_seen {
             continue;
         }
-        let reach = warp.wide.w * drawn.half;
+        let reach = select(warp.wide.w, 1.0, is_wide) * drawn.half;
         let box = pixels_around(drawn.at, reach);
         for (var y = box.first.y; y < box.end.y; y++) {
             for (var x = box.first.x; x < box.end.x; x++) {
-                let farthest = nearest_at(y * warp.size.x + x) * warp.patches.w;
+                let pixel = y * warp.size.x + x;
+                // Only pixels without a nearest have a widest.
+                let nearest = select(nearest_at(pixel), widest_at(pixel), is_wide);
+                let farthest = nearest * warp.patches.w;
                 let is_same = drawn.inverse_depth >= farthest && farthest > 0.0;
                 if is_same && is_within(vec2u(x, y), drawn.at, reach) {
-                    add_at(vec2u(x, y), drawn, drawn.half);
-                }
-            }
-        }
-    }
-}
-
-@compute @workgroup_size(64)
-fn near_wide(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) own: u32,
-) {
-    let all = stretch(group, groups);
-    for (var i = all.first + own; i < all.end; i += 64u) {
-        let drawn = place(i, all.base);
-        if !drawn.is_seen {
-            continue;
-        }
-        let half = wide_half(drawn.half);
-        let box = pixels_around(drawn.at, half);
-        for (var y = box.first.y; y < box.end.y; y++) {
-            for (var x = box.first.x; x < box.end.x; x++) {
-                let pixel = y * warp.size.x + x;
-                if nearest_at(pixel) == 0.0 && is_within(vec2u(x, y), drawn.at, half) {
-                    let word = 3u * pixel_count() + pixel;
-                    atomicMax(&pixels[word], bitcast<u32>(drawn.inverse_depth));
-                }
-            }
-        }
-    }
-}
-
-@compute @workgroup_size(64)
-fn add_wide(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) own: u32,
-) {
-    let all = stretch(group, groups);
-    for (var i = all.first + own; i < all.end; i += 64u) {
-        let drawn = place(i, all.base);
-        if !drawn.is_seen {
-            continue;
-        }
-        let half = wide_half(drawn.half);
-        let box = pixels_around(drawn.at, half);
-        for (var y = box.first.y; y < box.end.y; y++) {
-            for (var x = box.first.x; x < box.end.x; x++) {
-                // Only pixels without a nearest have a widest.
-                let farthest = widest_at(y * warp.size.x + x) * warp.patches.w;
-                let is_same = drawn.inverse_depth >= farthest && farthest > 0.0;
-                if is_same && is_within(vec2u(x, y), drawn.at, half) {
-                    add_at(vec2u(x, y), drawn, half);
+                    add_at(vec2u(x, y), drawn);
                 }
             }
         }

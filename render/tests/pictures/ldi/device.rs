@@ -153,16 +153,7 @@ fn nothing_and_nonsense_are_drawn_as_the_cpu_does() {
     // From where no pixel's middle lies on a patch's rim.
     let eye = DVec3::new(0.0123, 0.0345, -1.0);
     let camera = Pinhole::new(&view(eye, DVec3::Z, [40, 30])).unwrap();
-    let options = FreeOptions {
-        tolerance: f32::NAN,
-        deviation: f32::NAN,
-        grow: f32::INFINITY,
-        least: -1.0,
-        wide: f32::NAN,
-        least_wide: 1e9,
-        most: f32::NAN,
-        fill: u32::MAX,
-    };
+    let options = nonsense();
     for ldi in [&ldi, &none] {
         for open in [
             Window::whole(40, 30),

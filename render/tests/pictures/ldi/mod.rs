@@ -51,6 +51,20 @@ fn set(rooms: usize, seed: u32, size: u32, views: usize, step: usize) -> Set {
     }
 }
 
+/// Options that no one would ask for.
+fn nonsense() -> FreeOptions {
+    FreeOptions {
+        tolerance: f32::NAN,
+        deviation: f32::NAN,
+        grow: f32::INFINITY,
+        least: -1.0,
+        wide: f32::NAN,
+        least_wide: 1e9,
+        most: f32::NAN,
+        fill: u32::MAX,
+    }
+}
+
 fn ldi_of(side: &[Reference]) -> Layered {
     let images: Vec<&Reference> = side.iter().collect();
     construct(&images, &ConstructOptions::default())

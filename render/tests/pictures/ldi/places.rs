@@ -135,16 +135,7 @@ fn whatever_the_place_there_is_a_picture() {
             &mut target,
         );
     }
-    let options = FreeOptions {
-        tolerance: f32::NAN,
-        deviation: f32::NAN,
-        grow: f32::INFINITY,
-        least: -1.0,
-        wide: f32::NAN,
-        least_wide: 1e9,
-        most: f32::NAN,
-        fill: u32::MAX,
-    };
+    let options = nonsense();
     let mut target = Target::new(40, 30);
     let open = Window::whole(40, 30);
     free(
