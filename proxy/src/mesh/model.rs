@@ -82,7 +82,7 @@ pub enum Wrap {
 
 impl Wrap {
     /// The column (or row) of a texture of that many.
-    fn texel(self, i: f64, count: u32) -> u32 {
+    pub(super) fn texel(self, i: f64, count: u32) -> u32 {
         let n = f64::from(count);
         let within = match self {
             Self::Repeat => i.rem_euclid(n),

@@ -168,14 +168,7 @@ mod tests {
                 assert!(wrap.around(far, 3).texels.iter().all(|texel| *texel < 3));
             }
             for n in 1..5 {
-                let texel = |i: i32| {
-                    let n = n as i32;
-                    match wrap {
-                        Wrap::Repeat => i.rem_euclid(n),
-                        Wrap::Clamp => i.clamp(0, n - 1),
-                        Wrap::Mirror => i.rem_euclid(2 * n).min(2 * n - 1 - i.rem_euclid(2 * n)),
-                    }
-                };
+                let texel = |i: i32| wrap.texel(f64::from(i), n);
                 for i in -12..12 {
                     let pair = [texel(i), texel(i + 1)].map(|texel| texel as f32);
                     let between = at(wrap, f64::from(i) + 0.25, n);
