@@ -16,7 +16,8 @@ use proxy::interior::{Contents, Interior, SemicircleOptions, SemicircleView, rea
 use proxy::mesh::{Model, read_model};
 use render::DeviceChoice;
 use render::interior::{
-    FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Tour, Walk, WalkOptions, Window,
+    CellGeometry, DrawOptions, FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Tour, Walk,
+    WalkOptions, Window,
 };
 use std::path::PathBuf;
 use std::time::Instant;
@@ -76,12 +77,13 @@ fn main() {
         let (model, _) = read_model(file).expect("a model");
         let (interior, _) = read_rooms(outlines, "house.glb").expect("its rooms");
         let all: Vec<u32> = (0..model.mesh.triangles.len() as u32).collect();
+        let all = CellGeometry::of(&model, &all);
         let truth = |view: &View| {
             let camera = Pinhole::new(view).expect("a pinhole");
             let mut raster = Raster::default();
             raster.clear(&camera);
             let window = Window::whole(SIZE[0], SIZE[1]);
-            raster.draw(&model, &[&all], &camera, &window, None);
+            raster.draw(&[(all.all(), window)], &camera, &DrawOptions::default());
             let mut target = Target::new(SIZE[0], SIZE[1]);
             raster.shade(&model, &camera, &mut target, |_, _| true);
             target.picture()

@@ -25,7 +25,7 @@ pub use model::{Material, Model, ModelNode, Part, Wrap, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::to_ply;
-pub use skin::Skin;
+pub use skin::{MOST as MOST_PLACES, Places, Skin};
 
 use glam::{DMat4, DVec3};
 

@@ -1,4 +1,5 @@
-//! How one triangle of a model is coloured, made ready for many of its pixels.
+//! How triangles of a model are coloured: each made ready for many of its pixels, and many pixels
+//! coloured together.
 
 use super::{Model, Part, Wrap};
 use image::RgbaImage;
@@ -13,6 +14,30 @@ pub struct Skin<'a> {
     uvs: [[f64; 2]; 3],
     texture: Option<(&'a RgbaImage, [Wrap; 2])>,
 }
+
+/// A place of a triangle, ready to be coloured.
+struct Place {
+    /// Without the texture; the last number is of no use.
+    color: [f32; 4],
+    /// The texture's four pixels around it.
+    texels: [u32; 4],
+    /// The second column's and the second row's.
+    shares: [f32; 2],
+}
+
+/// Places of triangles that are coloured together, at most [`MOST`], number by number.
+#[derive(Clone, Debug)]
+pub struct Places {
+    count: usize,
+    colors: [[f32; MOST]; 3],
+    texels: [[u32; MOST]; 4],
+    shares: [[f32; MOST]; 2],
+}
+
+/// The most places that are coloured together.
+pub const MOST: usize = 32;
+/// What leaves a colour as it is.
+const WHITE: u32 = u32::MAX;
 
 /// The two columns (or rows) of a texture around a place, and the second's share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,28 +83,98 @@ impl<'a> Skin<'a> {
         }
     }
 
-    /// Red, green and blue at a place of the triangle, sRGB codes 0 to 255, then nothing: the
-    /// texture bilinear at its finest level, the product of all that colours it. `second` and
-    /// `third` are those corners' barycentric weights, where all three sum to 1.
+    /// A place of the triangle: `second` and `third` are those corners' barycentric weights, where all
+    /// three sum to 1.
     #[inline(always)]
-    pub fn color(&self, second: f64, third: f64) -> [f32; 4] {
+    fn place(&self, second: f64, third: f64) -> Place {
         let [first, b, c] = &self.colors;
         let (share_b, share_c) = (second as f32, third as f32);
         let mut color = [0.0; 4];
         for k in 0..4 {
             color[k] = first[k] + share_b * b[k] + share_c * c[k];
         }
-        let Some((texture, wrap)) = self.texture else {
-            return color;
+        let mut place = Place {
+            color,
+            texels: [WHITE; 4],
+            shares: [0.0; 2],
         };
-        let [first, b, c] = &self.uvs;
-        let u = first[0] + second * b[0] + third * c[0];
-        let v = first[1] + second * b[1] + third * c[1];
-        let texel = sample(texture, [u, v], wrap);
-        for k in 0..4 {
-            color[k] *= texel[k] * (1.0 / 255.0);
+        if let Some((texture, wrap)) = self.texture {
+            let [first, b, c] = &self.uvs;
+            let u = first[0] + second * b[0] + third * c[0];
+            let v = first[1] + second * b[1] + third * c[1];
+            (place.texels, place.shares) = around(texture, [u, v], wrap);
         }
-        color
+        place
+    }
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            colors: [[0.0; MOST]; 3],
+            texels: [[WHITE; MOST]; 4],
+            shares: [[0.0; MOST]; 2],
+        }
+    }
+}
+
+impl Places {
+    /// Forgets all.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// How many there are.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Adds a place of a triangle: `second` and `third` are those corners' barycentric weights, where
+    /// all three sum to 1. Beyond [`MOST`] it takes the last one's place.
+    #[inline(always)]
+    pub fn add(&mut self, skin: &Skin<'_>, second: f64, third: f64) {
+        let place = skin.place(second, third);
+        let i = self.count.min(MOST - 1);
+        for k in 0..3 {
+            self.colors[k][i] = place.color[k];
+        }
+        for k in 0..4 {
+            self.texels[k][i] = place.texels[k];
+        }
+        for k in 0..2 {
+            self.shares[k][i] = place.shares[k];
+        }
+        self.count = i + 1;
+    }
+
+    /// Red, green and blue of each place, in the order in which they were added: sRGB codes, 0 to 255;
+    /// the texture bilinear at its finest level, the product of all that colours it.
+    #[inline(always)]
+    pub fn colors(&self) -> [[f32; MOST]; 3] {
+        let mut colors = self.colors;
+        let [across, down] = &self.shares;
+        let [a, b, c, d] = &self.texels;
+        // Loops over all, as of fixed length they are compiled to vector instructions.
+        for (channel, color) in colors.iter_mut().enumerate() {
+            let code = |texel: u32| (texel >> (8 * channel) & 255) as i32 as f32;
+            for i in 0..MOST {
+                let [a, b, c, d] = [code(a[i]), code(b[i]), code(c[i]), code(d[i])];
+                let above = a + across[i] * (b - a);
+                let below = c + across[i] * (d - c);
+                let texel = above + down[i] * (below - above);
+                color[i] *= texel * (1.0 / 255.0);
+            }
+        }
+        colors
     }
 }
 
@@ -117,9 +212,10 @@ impl Wrap {
     }
 }
 
-/// A texture's colour, bilinear between the pixels' centres.
+/// The four pixels of a texture around a place, row by row, and the second column's and the second
+/// row's shares.
 #[inline(always)]
-fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
+fn around(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> ([u32; 4], [f32; 2]) {
     let (width, height) = texture.dimensions();
     let across = wrap[0].around(uv[0], width);
     let down = wrap[1].around(uv[1], height);
@@ -127,24 +223,14 @@ fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
     let [above, below] = down.texels;
     let [above, below] = [above * width as usize, below * width as usize];
     let [left, right] = across.texels;
-    let above = mixed(&texels[above + left], &texels[above + right], across.share);
-    let below = mixed(&texels[below + left], &texels[below + right], across.share);
-    let mut color = [0.0; 4];
-    for k in 0..4 {
-        color[k] = above[k] + down.share * (below[k] - above[k]);
-    }
-    color
-}
-
-/// Two texels' mean, so much of the second.
-#[inline(always)]
-fn mixed(a: &[u8; 4], b: &[u8; 4], share: f32) -> [f32; 4] {
-    let mut mix = [0.0; 4];
-    for k in 0..4 {
-        let (a, b) = (f32::from(a[k]), f32::from(b[k]));
-        mix[k] = a + share * (b - a);
-    }
-    mix
+    let texel = |i: usize| u32::from_le_bytes(texels[i]);
+    let texels = [
+        texel(above + left),
+        texel(above + right),
+        texel(below + left),
+        texel(below + right),
+    ];
+    (texels, [across.share, down.share])
 }
 
 #[cfg(test)]
@@ -181,7 +267,19 @@ mod tests {
             }
         }
         let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
-        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
-        assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
+        let skin = Skin {
+            colors: [[255.0; 4], [0.0; 4], [0.0; 4]],
+            uvs: [[0.0, 0.3], [1.0, 0.0], [0.0; 2]],
+            texture: Some((&texture, [Wrap::Clamp; 2])),
+        };
+        let mut places = Places::default();
+        for u in [0.25, 0.5, 0.75] {
+            places.add(&skin, u, 0.0);
+        }
+        let found = &places.colors()[0][..places.len()];
+        assert_eq!(found.len(), 3);
+        for (found, expected) in found.iter().zip([0.0, 50.0, 100.0]) {
+            assert!((found - expected).abs() < 1e-4, "{found} for {expected}");
+        }
     }
 }

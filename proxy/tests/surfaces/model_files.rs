@@ -117,10 +117,12 @@ fn colours_are_products_of_what_colours_a_place() {
             for j in 0..=20 - i {
                 let [b, c] = [i, j].map(|n| f64::from(n) / 20.0);
                 let expected = model.color(idx, [1.0 - b - c, b, c]);
-                let found = skin.color(b, c);
+                let mut places = mesh::Places::default();
+                places.add(&skin, b, c);
+                let found = places.colors();
                 for k in 0..3 {
                     assert!(
-                        (f64::from(found[k]) - expected[k]).abs() < 1e-3,
+                        (f64::from(found[k][0]) - expected[k]).abs() < 1e-3,
                         "{idx} {b} {c}"
                     );
                 }

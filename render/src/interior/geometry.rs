@@ -1,7 +1,8 @@
 //! What cells hold, in runs that are passed over where they are out of sight.
 //!
 //! A run is a leaf of a tree that halves space: small, so that little of it is in sight where all
-//! of it is not.
+//! of it is not. It has its triangles' corners at hand, each once: wherever a model keeps them, they are
+//! read one after the other.
 
 use glam::DVec3;
 use proxy::interior::{CellId, Contents, Region, Visibility};
@@ -11,10 +12,16 @@ use rayon::prelude::*;
 /// Triangles that are near one another, in the model's order, with the box and the ball around
 /// them.
 #[derive(Clone, Debug, PartialEq)]
-struct Run {
-    triangles: Vec<u32>,
-    low: DVec3,
-    high: DVec3,
+pub(super) struct Run {
+    /// At most [`RUN`].
+    pub(super) triangles: Vec<u32>,
+    /// Of each triangle, which of the run's points its corners are.
+    pub(super) corners: Vec<[u16; 3]>,
+    /// In the world, each once.
+    pub(super) points: Vec<DVec3>,
+    /// The points' least and greatest coordinates.
+    pub(super) low: DVec3,
+    pub(super) high: DVec3,
     center: DVec3,
     radius: f64,
 }
@@ -26,21 +33,17 @@ pub struct CellGeometry {
     elsewhere: Vec<Run>,
 }
 
-/// Lists of triangles to draw.
+/// Runs of triangles to draw.
 #[derive(Clone, Debug, Default)]
 pub struct Runs<'a> {
     /// A triangle may be in several.
-    pub lists: Vec<&'a [u32]>,
-    /// Around each list's triangles: centre and radius.
-    balls: Vec<(DVec3, f64)>,
-    /// The least and the greatest coordinates of each list's corners.
-    boxes: Vec<[DVec3; 2]>,
+    pub(super) runs: Vec<&'a Run>,
     /// How many triangles the cells have that were asked for, those passed over included.
     pub asked: usize,
 }
 
 /// Triangles in a run, at most.
-const RUN: usize = 96;
+pub(super) const RUN: usize = 96;
 /// More triangles than this are halved on two threads.
 const ALONE: usize = 4096;
 /// Rounding, in shares of the distance.
@@ -61,10 +64,25 @@ impl CellGeometry {
         let mut all: Vec<u32> = lists.flatten().copied().collect();
         all.sort_unstable();
         all.dedup();
+        Self::of(model, &all)
+    }
+
+    /// Some triangles, as if there were no cells.
+    ///
+    /// # Panics
+    /// If the model does not have one of them.
+    pub fn of(model: &Model, triangles: &[u32]) -> Self {
         Self {
             cells: Vec::new(),
-            elsewhere: runs(model, &all),
+            elsewhere: runs(model, triangles),
         }
+    }
+
+    /// All that there is.
+    pub fn all(&self) -> Runs<'_> {
+        let runs: Vec<&Run> = self.cells.iter().flatten().chain(&self.elsewhere).collect();
+        let asked = runs.iter().map(|run| run.triangles.len()).sum();
+        Runs { runs, asked }
     }
 
     /// All triangles of some cells that lie where those are seen, from an eye, and those of no cell
@@ -94,28 +112,20 @@ impl<'a> Runs<'a> {
                 sides.all(|side| side.dot(offset) >= -reach)
             };
             if regions.iter().any(touches) {
-                self.lists.push(&run.triangles);
-                self.balls.push((run.center, run.radius));
-                self.boxes.push([run.low, run.high]);
+                self.runs.push(run);
             }
         }
     }
 
-    /// Each list with the ball around it.
+    /// Each run's triangles, and the centre and radius of the ball around them.
     pub(crate) fn balls(&self) -> impl Iterator<Item = (&'a [u32], DVec3, f64)> + '_ {
-        let lists = self.lists.iter().zip(&self.balls);
-        lists.map(|(list, (center, radius))| (*list, *center, *radius))
+        let ball = |run: &&'a Run| (&run.triangles[..], run.center, run.radius);
+        self.runs.iter().map(ball)
     }
 
-    /// Each list with the box around it.
-    pub(super) fn boxes(&self) -> impl Iterator<Item = (&'a [u32], [DVec3; 2])> + '_ {
-        let lists = self.lists.iter().zip(&self.boxes);
-        lists.map(|(list, corners)| (*list, *corners))
-    }
-
-    /// How many triangles are to be drawn; one in several lists counts for each.
+    /// How many triangles are to be drawn; one in several runs counts for each.
     pub fn count(&self) -> usize {
-        self.lists.iter().map(|list| list.len()).sum()
+        self.runs.iter().map(|run| run.triangles.len()).sum()
     }
 }
 
@@ -165,15 +175,23 @@ fn spanned(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
 }
 
 fn run(model: &Model, triangles: Vec<u32>) -> Run {
-    let corners = || {
-        triangles
-            .iter()
-            .flat_map(|i| model.mesh.corners(*i as usize))
-    };
-    let (low, high) = spanned(corners());
+    // 1. Each corner once, in the model's order.
+    let of = |i: &u32| model.mesh.triangles[*i as usize];
+    let mut idxs: Vec<u32> = triangles.iter().flat_map(of).collect();
+    idxs.sort_unstable();
+    idxs.dedup();
+    let place = |idx: u32| idxs.partition_point(|other| *other < idx) as u16;
+    let corners = triangles.iter().map(|i| of(i).map(place)).collect();
+    let point = |idx: &u32| model.mesh.positions[*idx as usize];
+    let points: Vec<DVec3> = idxs.iter().map(point).collect();
+    // 2. What is around them.
+    let (low, high) = spanned(points.iter().copied());
     let center = low.midpoint(high);
-    let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
+    let distances = points.iter().map(|point| point.distance(center));
+    let radius = distances.fold(0.0, f64::max);
     Run {
+        corners,
+        points,
         low,
         high,
         center,

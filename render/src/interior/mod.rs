@@ -6,21 +6,22 @@
 //! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
 
 mod captured;
-mod corners;
 mod fill;
 mod floor_map;
-mod front;
 mod geometry;
 mod library;
 mod painter;
 mod photographed;
 mod pinhole;
+mod projected;
 mod raster;
 mod reference;
 mod shade;
+mod squares;
 mod target;
 mod texture;
 mod tour;
+mod triangle;
 mod walk;
 mod warp;
 mod window;
@@ -32,7 +33,7 @@ pub use library::{LdiSource, Library, LibraryOptions, PortalLdi};
 pub use painter::Painter;
 pub use photographed::DepthMaps;
 pub use pinhole::{Pinhole, PinholeError};
-pub use raster::{Beyond, Raster};
+pub use raster::{Beyond, DrawOptions, Met, Raster};
 pub use reference::{CAPTURED_REFERENCE_SIZE, REFERENCE_SIZE, Reference};
 pub use target::Target;
 pub use texture::texture;

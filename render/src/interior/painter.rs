@@ -1,8 +1,7 @@
 //! One door to those that draw triangles and layered depth images: the CPU, a graphics device, and the lumigraph
 //! where photos show them.
 
-use super::front::{Hidden, Met, meet};
-use super::{Captured, Pinhole, Raster, Runs, Target, Window};
+use super::{Captured, DrawOptions, Met, Pinhole, Raster, Runs, Target, Window};
 use crate::RenderError;
 use crate::engine::DeviceChoice;
 use crate::gpu::{DeviceLimits, GpuRaster, GpuWarp};
@@ -17,7 +16,6 @@ pub struct Painter {
     warp: Warper,
     loose: Free,
     raster: Raster,
-    hidden: Hidden,
     /// What the device drew of this frame; none where the CPU draws it.
     drawn: Option<Target>,
     /// What photos show of it.
@@ -122,14 +120,13 @@ impl Painter {
         camera: &Pinhole,
         floor: Option<&[f32]>,
     ) -> Met {
-        let tried = parts.iter().map(|(runs, _)| runs.count()).sum();
         if let Some(gpu) = &mut self.gpu {
             let mut drawn = self.drawn.take().unwrap_or_default();
             match gpu.draw(model, parts, camera, &mut drawn) {
                 Ok(()) => {
                     self.drawn = Some(drawn);
                     return Met {
-                        tried,
+                        tried: parts.iter().map(|(runs, _)| runs.count()).sum(),
                         touching: None,
                     };
                 }
@@ -148,18 +145,12 @@ impl Painter {
             }
         }
         self.drawn = None;
-        self.raster.clear(camera);
-        if let Some(floor) = floor {
-            let (raster, hidden) = (&mut self.raster, &mut self.hidden);
-            return meet(model, parts, camera, floor, raster, hidden);
-        }
-        let draw = |(runs, window): &(Runs<'_>, Window)| {
-            self.raster.draw(model, &runs.lists, camera, window, None)
+        self.raster.clear_to(camera, floor.unwrap_or_default());
+        let options = DrawOptions {
+            all: floor.is_none(),
+            ..DrawOptions::default()
         };
-        Met {
-            tried,
-            touching: Some(parts.iter().map(draw).sum()),
-        }
+        self.raster.draw(parts, camera, &options)
     }
 
     /// Draws what is left of an LDI, in a window, in any order: see [`free`].

@@ -1,7 +1,7 @@
 //! Images of what lies beyond a portal, made before it.
 
 use super::walk::all_cells;
-use super::{Beyond, Captured, CellGeometry, Pinhole, Raster, Target, Window};
+use super::{Beyond, Captured, CellGeometry, DrawOptions, Pinhole, Raster, Target, Window};
 use crate::RenderError;
 use calibrate::{Lens, View};
 use glam::{DVec2, DVec3};
@@ -56,7 +56,7 @@ impl Reference {
         place: &SemicircleView,
         size: [u32; 2],
     ) -> Self {
-        let met = Self::met(interior, model, geometry, place, size, false);
+        let met = Self::met(interior, geometry, place, size, false);
         let Some((_, raster, mut image)) = met else {
             return Self::nothing(place);
         };
@@ -77,7 +77,7 @@ impl Reference {
         size: [u32; 2],
         captured: &mut Captured,
     ) -> Result<Self, RenderError> {
-        let met = Self::met(interior, model, geometry, place, size, true);
+        let met = Self::met(interior, geometry, place, size, true);
         let Some((view, raster, mut image)) = met else {
             return Ok(Self::nothing(place));
         };
@@ -99,7 +99,6 @@ impl Reference {
     /// `None` for a place that is none.
     fn met(
         interior: &Interior,
-        model: &Model,
         geometry: &CellGeometry,
         place: &SemicircleView,
         [width, height]: [u32; 2],
@@ -121,17 +120,21 @@ impl Reference {
         };
         let runs = geometry.seen(eye, &visibility, &region);
         let beyond = plane_of(&camera, portal, Some(place.into));
-        let mut raster = Raster::default();
-        raster.clear(&camera);
-        for piece in portal.polygon.convex_pieces() {
+        let pieces = portal.polygon.convex_pieces().into_iter().map(|piece| {
             let mut edges: Vec<DVec3> = piece.iter().map(|p| *p - eye).collect();
             // Counter-clockwise as the eye sees it.
             if portal.polygon.height(eye) < 0.0 {
                 edges.reverse();
             }
-            let window = Window::of_cone(&edges, &camera);
-            raster.draw(model, &runs.lists, &camera, &window, Some(&beyond));
-        }
+            (runs.clone(), Window::of_cone(&edges, &camera))
+        });
+        let options = DrawOptions {
+            beyond: Some(&beyond),
+            ..DrawOptions::default()
+        };
+        let mut raster = Raster::default();
+        raster.clear(&camera);
+        raster.draw(&pieces.collect::<Vec<_>>(), &camera, &options);
         let image = Self {
             place: place.clone(),
             camera,

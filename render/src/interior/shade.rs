@@ -3,11 +3,11 @@
 //! What colours a triangle is made ready once for all its pixels in a band of rows, square by square,
 //! so that few triangles are at hand at a time.
 
-use super::raster::edges;
+use super::triangle::edges;
 use super::{Pinhole, Raster, Target};
 use crate::cpu::lanes::vectorised;
 use glam::DVec3;
-use proxy::mesh::{Model, Part, Skin};
+use proxy::mesh::{MOST_PLACES, Model, Part, Places, Skin};
 use rayon::prelude::*;
 
 /// A triangle made ready to be coloured.
@@ -27,7 +27,7 @@ struct Faces<'a> {
 
 /// Rows in a band, and columns in a square.
 const BAND: usize = 16;
-const SQUARE: usize = 32;
+const SQUARE: usize = MOST_PLACES;
 /// Triangles at hand, a power of 2.
 const AT_HAND: usize = 256;
 
@@ -68,6 +68,8 @@ impl Raster {
     ) -> usize {
         let width = camera.width as usize;
         let mut count = 0;
+        let mut places = Places::default();
+        let mut wanted = [0; SQUARE];
         for left in (0..width).step_by(SQUARE) {
             let columns = left..(left + SQUARE).min(width);
             for y in 0..colors.len() / width {
@@ -75,6 +77,7 @@ impl Raster {
                 // The triangle of the pixel before, and its weights in this row but for x.
                 let mut last = None;
                 let mut rest = [0.0; 3];
+                places.clear();
                 for x in columns.clone() {
                     let (pixel, here) = ((first + y) * width + x, y * width + x);
                     let Some((idx, inverse_depth)) = self.at(pixel) else {
@@ -97,13 +100,20 @@ impl Raster {
                     let third = ((third.x * dx + rest[1]) * scale).max(0.0);
                     // Rounding does not leave the triangle; nor does what is seen edge on.
                     let second = second.min(1.0);
-                    let [r, g, b, _] = face.skin.color(second, third.min(1.0 - second));
-                    // Rounded without a call: they are not negative.
-                    let [r, g, b] = [r + 0.5, g + 0.5, b + 0.5];
-                    colors[here] = [r as u8, g as u8, b as u8, 255];
+                    wanted[places.len()] = here;
+                    places.add(&face.skin, second, third.min(1.0 - second));
                     depths[here] = inverse_depth;
-                    count += 1;
                 }
+                if places.is_empty() {
+                    continue;
+                }
+                let codes = places.colors();
+                for (i, here) in wanted[..places.len()].iter().enumerate() {
+                    // Rounded without a call: they are not negative.
+                    let [r, g, b] = [0, 1, 2].map(|k| (codes[k][i] + 0.5) as u8);
+                    colors[*here] = [r, g, b, 255];
+                }
+                count += places.len();
             }
         }
         count
