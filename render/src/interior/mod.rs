@@ -5,6 +5,7 @@
 //! warping in architectural walkthroughs" and "Images for accelerating architectural
 //! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
 
+mod background;
 mod captured;
 mod corners;
 mod fill;
@@ -12,12 +13,15 @@ mod floor_map;
 mod front;
 mod geometry;
 mod library;
+mod neighbourhood;
 mod painter;
 mod photographed;
 mod pinhole;
 mod raster;
+mod recipe;
 mod reference;
 mod shade;
+mod shelf;
 mod target;
 mod texture;
 mod tour;
@@ -29,6 +33,7 @@ pub use captured::Captured;
 pub use fill::PortalFill;
 pub use geometry::{CellGeometry, Runs};
 pub use library::{LdiSource, Library, LibraryOptions, PortalLdi};
+pub use neighbourhood::Shown;
 pub use painter::Painter;
 pub use photographed::DepthMaps;
 pub use pinhole::{Pinhole, PinholeError};
