@@ -39,20 +39,22 @@ const BAND: f64 = 0.3;
 /// Those of a side's places that have an LDI of so many views, from left to right. Neighbours share the view
 /// that is as far from one as from the other.
 pub(super) fn places(side: &Range<usize>, count: usize) -> Vec<usize> {
-    let stride = count.saturating_sub(1).max(1);
-    let reach = count / 2;
+    let count = count.max(1);
+    let stride = (count - 1).max(1);
+    // Of views to the left of a place, and to its right.
+    let [to_left, to_right] = [count / 2, count - 1 - count / 2];
     let mut places: Vec<usize> = side.clone().collect();
     places.retain(|place| place.abs_diff(middle(side)).is_multiple_of(stride));
     // Where views are left over at the ends.
     if places
         .first()
-        .is_some_and(|first| first - side.start > reach)
+        .is_some_and(|first| first - side.start > to_left)
     {
         places.insert(0, side.start);
     }
     if places
         .last()
-        .is_some_and(|last| side.end - 1 - last > reach)
+        .is_some_and(|last| side.end - 1 - last > to_right)
     {
         places.push(side.end - 1);
     }
