@@ -1,14 +1,15 @@
 //! Walks through interiors: `cargo bench --bench walk [-- --house FILE.glb --outlines ROOMS.json]`;
 //! see README.md.
 //!
-//! 1. A house of Brooks House's size (Rafferty et al. 1998): CPU time of each frame of a tour, by
-//!    what portals are filled with.
-//! 2. How far what portals show is from the truth, off their axis.
+//! 1. A tour of a house of Brooks House's size (Rafferty et al. 1998) at 15 frames a second, frames drawn once
+//!    each as they come: which are late, with LDIs of all views and of the nearest, made ahead or not.
+//! 2. CPU time of each of its frames, by what portals are filled with.
+//! 3. How far what portals show is from the truth, off their axis.
 
 use calibrate::{Camera, Lens, Rigid3, View};
 use clap::Parser;
 use cpu_time::ProcessTime;
-use datasets::house::{self, HouseOptions};
+use datasets::house::{self, House, HouseOptions};
 use glam::DVec2;
 use image::RgbaImage;
 use lumigraph::bench::before_doorways;
@@ -19,8 +20,9 @@ use render::interior::{
     CellGeometry, DrawOptions, FrameCost, Painter, Pinhole, PortalFill, Raster, Target, Tour, Walk,
     WalkOptions, Window,
 };
+use render::path::PathFrame;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Measures walks through interiors.
 #[derive(Parser)]
@@ -49,6 +51,10 @@ struct Args {
 }
 
 const SIZE: [u32; 2] = [640, 512];
+/// Frames a second.
+const FPS: f64 = 15.0;
+/// Views that LDIs are made of where those nearest to the viewer are taken.
+const NEAREST: usize = 3;
 const ANGLES: [f64; 5] = [0.0, 15.0, 30.0, 45.0, 60.0];
 
 fn lens() -> Lens {
@@ -98,7 +104,7 @@ fn timed(walk: &mut Walk<'_>, view: &View, fill: PortalFill) -> ([f64; 2], Frame
         let (cpu, wall) = (ProcessTime::now(), Instant::now());
         let cost = walk.draw(view, fill).expect("a pinhole");
         let times = [cpu.elapsed(), wall.elapsed()].map(|t| 1e3 * t.as_secs_f64());
-        if cost.references_made == 0 {
+        if cost.references_made + cost.ldis_made == 0 {
             return (times, cost);
         }
     }
@@ -127,12 +133,17 @@ fn tours(args: &Args) {
         &house.model,
         &camera,
         args.frames,
-        15.0,
+        FPS,
     )
     .expect("a tour")
     .path;
+    let device = match args.gpu {
+        true => DeviceChoice::Gpu,
+        false => DeviceChoice::Cpu,
+    };
+    paced(device, &house, &contents, &path.frames);
     println!(
-        "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
+        "\n{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10} {:>9} {:>8} {:>7} {:>9} {:>9}",
         "portals",
         "median",
         "95 %",
@@ -148,18 +159,16 @@ fn tours(args: &Args) {
         "images s",
         "wall, med"
     );
-    let device = match args.gpu {
-        true => DeviceChoice::Gpu,
-        false => DeviceChoice::Cpu,
-    };
     let mut culling: Vec<f64> = Vec::new();
-    let whole = ("culling", PortalFill::Geometry, true);
-    let others = PortalFill::ALL.map(|fill| (fill.name(), fill, false));
-    for (name, fill, whole_cells) in [whole].into_iter().chain(others) {
-        let options = WalkOptions {
+    let whole = ("culling", PortalFill::Geometry, true, None);
+    let others = PortalFill::ALL.map(|fill| (fill.name(), fill, false, None));
+    let nearest = ("ldi near", PortalFill::Ldi, false, Some(NEAREST));
+    for (name, fill, whole_cells, ldi_views) in [whole].into_iter().chain(others).chain([nearest]) {
+        let mut options = WalkOptions {
             whole_cells,
             ..WalkOptions::default()
         };
+        options.library.ldi_views = ldi_views;
         let painter = Painter::open(device, &house.model);
         let (interior, model) = (&house.interior, &house.model);
         let mut walk = Walk::with(painter, interior, &contents, model, options);
@@ -204,6 +213,61 @@ fn tours(args: &Args) {
             walk.library().residency().loads,
             images_s,
             spread(&wall)[0],
+        );
+    }
+}
+
+/// Frames as they come, at their rate: how long what is asked for takes, images and LDIs included.
+fn paced(device: DeviceChoice, house: &House, contents: &Contents, frames: &[PathFrame]) {
+    println!(
+        "\nat {FPS} frames a second: wall ms of a frame with all it needs, and what it waited for"
+    );
+    println!(
+        "{:<10} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9} {:>10}",
+        "portals",
+        "median",
+        "95 %",
+        "worst",
+        "late",
+        "LDIs",
+        "ahead",
+        "waits",
+        "waited ms",
+        "stall ms",
+        "CPU s, all"
+    );
+    let modes = [("ldi", None, false), ("ldi near", Some(NEAREST), false)];
+    for (name, views, is_ahead) in modes.into_iter().chain([("ahead", Some(NEAREST), true)]) {
+        let mut options = WalkOptions::default();
+        options.library.ldi_views = views;
+        let start = ProcessTime::now();
+        let (walls, costs): (Vec<f64>, Vec<FrameCost>) = std::thread::scope(|scope| {
+            let painter = Painter::open(device, &house.model);
+            let mut walk = Walk::with(painter, &house.interior, contents, &house.model, options);
+            if is_ahead {
+                walk.make_ahead(scope).expect("a thread");
+            }
+            let draw = |frame: &PathFrame| {
+                let start = Instant::now();
+                let cost = walk.draw(&frame.view, PortalFill::Ldi).expect("a pinhole");
+                let took = start.elapsed();
+                let left = Duration::from_secs_f64(1.0 / FPS).saturating_sub(took);
+                std::thread::sleep(left);
+                (1e3 * took.as_secs_f64(), cost)
+            };
+            frames.iter().map(draw).unzip()
+        });
+        let [median, most, worst] = spread(&walls);
+        let late = walls.iter().filter(|wall| **wall > 1e3 / FPS).count();
+        let sum = |of: &dyn Fn(&FrameCost) -> f64| costs.iter().map(of).sum::<f64>();
+        println!(
+            "{name:<10} {median:>8.1} {most:>8.1} {worst:>8.1} {late:>8} {:>8} {:>8} {:>8} {:>9.0} {:>9.0} {:>10.1}",
+            sum(&|c| c.ldis_made as f64),
+            sum(&|c| c.ldis_ahead as f64),
+            sum(&|c| f64::from(u8::from(!c.waited.is_zero()))),
+            sum(&|c| 1e3 * c.waited.as_secs_f64()),
+            sum(&|c| 1e3 * c.references.as_secs_f64()),
+            start.elapsed().as_secs_f64(),
         );
     }
 }

@@ -46,6 +46,10 @@ pub(super) struct Args {
     /// What the portals of an interior show: geometry, texture, warp1, warp2 or ldi
     #[arg(long, value_name = "KIND", default_value = "geometry")]
     portals: String,
+    /// Make an interior's LDIs of views of the N views nearest to where one is, and the middle one, ahead of need,
+    /// by a thread of low priority [default: all views make one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=999))]
+    ldi_views: Option<u16>,
     /// What is behind where nothing is shown: #RRGGBB, or transparent, shown as squares
     #[arg(long, value_name = "COLOR", default_value = "#1c1c20", value_parser = background)]
     background: Background,
@@ -83,6 +87,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let mut walk = WalkOptions::default();
     walk.library.budget = args.draw.cpu_memory;
+    walk.library.ldi_views = args.ldi_views.map(usize::from);
     let given = &args.scene.scene;
     let options = ViewOptions {
         title: format!("{} – lumigraph", given.display()),

@@ -79,6 +79,11 @@ pub(super) struct Args {
     /// were taken (views where none sees the portal), or views that photos are blended into
     #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
     ldi_from: LdiFrom,
+    /// Make LDIs of views of the N views nearest to the viewer, and the middle one, ahead of need as one walks on,
+    /// by a thread of low priority; frames go from one to the next by where they are drawn from, so they
+    /// are the same in whatever order [default: all views make one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=999))]
+    ldi_views: Option<u16>,
     /// Draw samples as squares of so many pixels, not as large as their footprints
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
@@ -180,6 +185,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         ..defaults
     };
     options.library.semicircles.views = args.reference_views;
+    options.library.ldi_views = args.ldi_views.map(usize::from);
     options.library.budget = args.cpu_memory;
     options.library.ldi_of = match args.ldi_from {
         LdiFrom::Views => LdiSource::Views,
@@ -219,29 +225,53 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let painter = opened.painter(device, args.cpu_memory)?;
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
-    let mut walk = Walk::with(painter, interior, contents, model, options);
+    std::thread::scope(|scope| {
+        let mut walk = Walk::with(painter, interior, contents, model, options);
+        walk.make_ahead(scope)?;
+        let walks = walk_all(args, &mut walk, &fills, &frames, &inputs)?;
+        if let [walked] = &walks[..] {
+            args.film.finish(&walked.files, fps)?;
+        }
+        for note in walk.painter().notes() {
+            say!("note: {note}");
+        }
+        report(args, &opened, &walk, &walks, frames.len())
+    })
+}
+
+/// Draws all frames, by each kind of portals.
+fn walk_all(
+    args: &Args,
+    walk: &mut Walk<'_>,
+    fills: &[PortalFill],
+    frames: &[Named],
+    inputs: &[PathBuf],
+) -> anyhow::Result<Vec<Walked>> {
     let mut walks = Vec::new();
-    for fill in &fills {
+    for fill in fills {
         let folder = match fills.len() {
             1 => args.output.clone(),
             _ => args.output.join(fill.name()),
         };
         walk.begin();
-        walks.push(draw(
-            &mut walk, *fill, &frames, &folder, &args.film, &inputs,
-        )?);
+        walks.push(draw(walk, *fill, frames, &folder, &args.film, inputs)?);
     }
-    if let [walked] = &walks[..] {
-        args.film.finish(&walked.files, fps)?;
-    }
-    for note in walk.painter().notes() {
-        say!("note: {note}");
-    }
+    Ok(walks)
+}
+
+/// What the walks took.
+fn report(
+    args: &Args,
+    opened: &Opened,
+    walk: &Walk<'_>,
+    walks: &[Walked],
+    frame_count: usize,
+) -> anyhow::Result<()> {
+    let (interior, model) = (&opened.interior, &opened.model);
     let device = walk.painter().description();
     let references = walk.library().residency();
     let photos = walk.painter().captured();
     let decoded = photos.map(|captured| captured.lumigraph().photos.residency());
-    // 4. What it took.
     let times: Vec<Vec<f64>> = walks.iter().map(Walked::times_ms).collect();
     let lines = walks.iter().zip(&times);
     let lines: Vec<Line<'_>> = lines
@@ -278,15 +308,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         text += &titles.map(|title| format!(" {title:>8}")).concat();
     }
     text += "\n";
-    for walk in &walks {
+    for walk in walks {
         text += &walk.line();
     }
     let drawn = walks.iter().map(|w| w.frames.len()).max();
-    let before = frames.len() - drawn.unwrap_or(0);
+    let before = frame_count - drawn.unwrap_or(0);
     print(&format!(
         "{text}{}: {} frames{}, drawn by {device}\n",
         args.output.display(),
-        frames.len(),
+        frame_count,
         match before {
             0 => String::new(),
             _ => format!(", {before} of them from before"),

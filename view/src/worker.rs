@@ -272,21 +272,21 @@ impl<'s> Desk<'s> {
             }
             None => Painter::open(self.options.device, &house.model),
         };
-        let mut walk = Walk::with(
-            painter,
-            &house.interior,
-            &house.contents,
-            &house.model,
-            options,
-        );
-        let mut notes = 0;
-        self.serve(|tell, request, reduction| {
-            let drawn = draw_house(house, &mut walk, request, reduction);
-            for note in walk.painter().notes().iter().skip(notes) {
-                tell(News::Trouble((*note).to_owned()));
+        let (interior, contents, model) = (&house.interior, &house.contents, &house.model);
+        std::thread::scope(|scope| {
+            let mut walk = Walk::with(painter, interior, contents, model, options);
+            if let Err(error) = walk.make_ahead(scope) {
+                (self.tell)(News::Trouble(format!("{error}; nothing is made ahead")));
             }
-            notes = walk.painter().notes().len();
-            drawn.map_err(|error| error.to_string())
+            let mut notes = 0;
+            self.serve(|tell, request, reduction| {
+                let drawn = draw_house(house, &mut walk, request, reduction);
+                for note in walk.painter().notes().iter().skip(notes) {
+                    tell(News::Trouble((*note).to_owned()));
+                }
+                notes = walk.painter().notes().len();
+                drawn.map_err(|error| error.to_string())
+            })
         })
     }
 

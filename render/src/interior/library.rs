@@ -1,9 +1,12 @@
 //! The reference images of an interior and the LDIs of them, made when they are first asked for.
 
+use super::neighbourhood::{self, Shown};
 use super::photographed::photographed;
+use super::recipe::{Made, Recipe};
+use super::shelf::Shelf;
 use super::{Captured, CellGeometry, REFERENCE_SIZE, Reference};
 use crate::RenderError;
-use crate::ldi::{ClipTree, ConstructOptions, Layered, construct, construct_of_photos};
+use crate::ldi::{ClipTree, ConstructOptions, Layered, construct_of_photos};
 use crate::residency::Residency;
 use glam::DVec3;
 use proxy::interior::{
@@ -33,6 +36,11 @@ pub struct LibraryOptions {
     pub semicircles: SemicircleOptions,
     /// What LDIs are made of.
     pub ldi_of: LdiSource,
+    /// How many views, those nearest to the viewer, an LDI of views is made of beside the semicircle's
+    /// middle one, 1 or more: a side then has several LDIs, and between two of them both are shown, mixed. With
+    /// `None` all views of a semicircle make one. Pictures depend on where the viewer is, never on where
+    /// from or when. LDIs of photos are of all photos all the same.
+    pub ldi_views: Option<usize>,
     /// How an LDI is made of them.
     pub ldi: ConstructOptions,
     /// The most bytes that they may take between frames; `None` for no limit. A frame has all
@@ -46,6 +54,7 @@ impl Default for LibraryOptions {
             size: REFERENCE_SIZE,
             semicircles: SemicircleOptions::default(),
             ldi_of: LdiSource::default(),
+            ldi_views: None,
             ldi: ConstructOptions::default(),
             budget: None,
         }
@@ -61,7 +70,21 @@ pub struct PortalLdi {
     pub tree: ClipTree,
 }
 
-/// Of some sides, in order; nothing for one whose images make none.
+impl PortalLdi {
+    /// Made ready to be drawn.
+    pub(super) fn new(ldi: Layered) -> Self {
+        Self {
+            tree: ClipTree::new(&ldi),
+            ldi,
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.ldi.bytes() + self.tree.bytes()
+    }
+}
+
+/// Of some places, in order; nothing for one whose images make none.
 type Ldis = Vec<Arc<Option<PortalLdi>>>;
 
 /// The places of all reference images, and those images and LDIs that are in memory.
@@ -71,22 +94,9 @@ pub struct Library {
     places: Vec<SemicircleView>,
     /// Of each portal and direction, one after the other: which places, from left to right.
     sides: Vec<Range<usize>>,
-    /// By place.
-    images: Vec<Option<Kept<Reference>>>,
-    /// By side; nothing for images that make none.
-    ldis: Vec<Option<Kept<Option<PortalLdi>>>>,
-    /// Counts frames.
-    turn: u64,
-    residency: Residency,
-}
-
-/// What is in memory.
-#[derive(Clone, Debug)]
-struct Kept<T> {
-    what: Arc<T>,
-    bytes: u64,
-    /// When it was last used.
-    used: u64,
+    shelf: Shelf,
+    /// The most bytes that an LDI took.
+    largest_ldi: u64,
 }
 
 impl Library {
@@ -107,15 +117,10 @@ impl Library {
                 size: options.size.map(|n| n.clamp(1, 4096)),
                 ..*options
             },
-            images: vec![None; places.len()],
-            ldis: vec![None; sides.len()],
+            shelf: Shelf::new(places.len(), options.budget),
+            largest_ldi: 0,
             places,
             sides,
-            turn: 0,
-            residency: Residency {
-                budget: options.budget,
-                ..Residency::default()
-            },
         }
     }
 
@@ -131,7 +136,7 @@ impl Library {
 
     /// What the images take and took; `loads` counts those that were made.
     pub fn residency(&self) -> Residency {
-        self.residency
+        self.shelf.residency
     }
 
     /// The places nearest to an eye by their angle before a portal, the nearest first; of two at
@@ -155,18 +160,47 @@ impl Library {
         places
     }
 
-    /// The portal and direction of that cell's, which has an LDI of its own; `None` where there are no
-    /// places.
-    pub fn side(&self, portal: PortalId, from: CellId, into: CellId) -> Option<usize> {
+    /// The LDIs that show what is beyond a portal to an eye; `None` where there are no places.
+    pub fn shown(
+        &self,
+        interior: &Interior,
+        portal: PortalId,
+        from: CellId,
+        into: CellId,
+        eye: DVec3,
+    ) -> Option<Shown> {
+        let side = self.sides[self.side(portal, from, into)?].clone();
+        Some(match self.options.ldi_views {
+            None => Shown::alone(neighbourhood::middle(&side)),
+            Some(count) => {
+                let eye = angle_before(interior, interior.portal(portal), Some(from), eye);
+                let places = neighbourhood::places(&side, count);
+                neighbourhood::shown(&places, |place| self.places[place].angle, eye)
+            }
+        })
+    }
+
+    /// The places of LDIs beside the one of a place.
+    pub(super) fn beside(&self, place: usize) -> Vec<usize> {
+        let count = self.options.ldi_views.unwrap_or(usize::MAX);
+        let places = neighbourhood::places(&self.side_of(place), count);
+        let at = places.partition_point(|i| *i < place);
+        let [left, right] = [at.checked_sub(1), Some(at + 1)];
+        let beside = [left, right].into_iter().flatten();
+        beside.filter_map(|i| places.get(i).copied()).collect()
+    }
+
+    fn side(&self, portal: PortalId, from: CellId, into: CellId) -> Option<usize> {
         self.sides.iter().position(|range| {
             let place = &self.places[range.start];
             (place.portal, place.from, place.into) == (portal, Some(from), into)
         })
     }
 
-    /// How many LDIs there may be.
-    pub fn side_count(&self) -> usize {
-        self.sides.len()
+    /// The places of the side that a place is of.
+    fn side_of(&self, place: usize) -> Range<usize> {
+        let side = self.sides.partition_point(|range| range.end <= place);
+        self.sides[side].clone()
     }
 
     /// The images of a frame's places, in their order, and how many were made for it. Others go,
@@ -183,105 +217,142 @@ impl Library {
         geometry: &CellGeometry,
         mut captured: Option<&mut Captured>,
     ) -> Result<(Vec<Arc<Reference>>, usize), RenderError> {
-        self.turn += 1;
+        self.shelf.begin();
         // 1. What stays is no candidate for leaving.
-        let missing = touch(&mut self.images, places, self.turn);
+        let missing = self.shelf.touch_images(places);
         let bytes = Reference::bytes(self.options.size);
-        self.make_room(missing.len() as u64 * bytes);
+        self.shelf.make_room(missing.len() as u64 * bytes);
         // 2. What is missing.
         for &place in &missing {
             let captured = captured.as_deref_mut();
-            let made = self.make(place, interior, model, geometry, captured)?;
-            self.images[place] = Some(Kept {
-                what: Arc::new(made),
-                bytes,
-                used: self.turn,
-            });
-            self.residency.change(bytes, 0);
-            self.residency.loads += 1;
+            self.add_image(place, interior, model, geometry, captured)?;
         }
-        Ok((found(&self.images, places), missing.len()))
+        Ok((self.shelf.images_of(places), missing.len()))
     }
 
-    /// The LDIs of a frame's sides, in their order, and how many reference images were made for
-    /// them; nothing for a side whose images make none. Others go as for [`Self::images`].
+    /// Makes an image, for which there is room.
+    pub(super) fn add_image(
+        &mut self,
+        place: usize,
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        captured: Option<&mut Captured>,
+    ) -> Result<(), RenderError> {
+        let (view, size) = (&self.places[place], self.options.size);
+        let made = image(interior, model, geometry, view, size, captured)?;
+        let bytes = Reference::bytes(size);
+        self.shelf.keep_image(place, Arc::new(made), bytes);
+        self.shelf.residency.loads += 1;
+        Ok(())
+    }
+
+    /// The LDIs of a frame by their places, in their order, and how many reference images were
+    /// made for them; nothing for a place whose images make none. Others go as for [`Self::images`].
     ///
     /// # Errors
     /// The photos' engine's.
     pub fn ldis(
         &mut self,
-        sides: &[usize],
+        places: &[usize],
         interior: &Interior,
         model: &Model,
         geometry: &CellGeometry,
         mut captured: Option<&mut Captured>,
     ) -> Result<(Ldis, usize), RenderError> {
-        self.turn += 1;
-        let mut made = 0;
-        for side in touch(&mut self.ldis, sides, self.turn) {
+        self.shelf.begin();
+        let mut images = 0;
+        for place in self.shelf.touch_ldis(places) {
             let of_photos = match (self.options.ldi_of, captured.as_deref_mut()) {
-                (LdiSource::Photos, Some(photos)) => self.of_photos(side, interior, photos)?,
+                (LdiSource::Photos, Some(photos)) => self.of_photos(place, interior, photos)?,
                 _ => None,
             };
-            let (layered, images) = match of_photos {
-                Some((layered, images)) => (Some(layered), images),
-                None => self.of_views(side, interior, model, geometry, captured.as_deref_mut())?,
-            };
-            made += images;
-            let ldi = layered.map(|ldi| PortalLdi {
-                tree: ClipTree::new(&ldi),
-                ldi,
-            });
-            let bytes = ldi.as_ref().map_or(0, |l| l.ldi.bytes() + l.tree.bytes());
-            self.make_room(bytes);
-            self.ldis[side] = Some(Kept {
-                what: Arc::new(ldi),
-                bytes,
-                used: self.turn,
-            });
-            self.residency.change(bytes, 0);
+            if let Some((layered, photos)) = of_photos {
+                images += photos;
+                self.shelf.residency.loads += photos as u64;
+                let ldi = Some(PortalLdi::new(layered));
+                self.keep(place, ldi);
+                continue;
+            }
+            let made = self.recipe(place).make(|view, size| {
+                let captured = captured.as_deref_mut();
+                image(interior, model, geometry, view, size, captured)
+            })?;
+            images += made.images.len();
+            self.take(made, true);
         }
-        self.residency.loads += made as u64;
-        Ok((found(&self.ldis, sides), made))
+        Ok((self.shelf.ldis_of(places), images))
     }
 
-    /// The LDI of a side's images, and how many were made for it: they are of no more use once it
-    /// is made.
-    fn of_views(
-        &self,
-        side: usize,
-        interior: &Interior,
-        model: &Model,
-        geometry: &CellGeometry,
-        mut captured: Option<&mut Captured>,
-    ) -> Result<(Option<Layered>, usize), RenderError> {
-        let mut made = 0;
-        let images: Vec<Arc<Reference>> = self.sides[side]
-            .clone()
-            .map(|place| match &self.images[place] {
-                Some(kept) => Ok(kept.what.clone()),
-                None => {
-                    made += 1;
-                    let captured = captured.as_deref_mut();
-                    let image = self.make(place, interior, model, geometry, captured)?;
-                    Ok(Arc::new(image))
+    /// Whether the LDI of a place is in memory.
+    pub(super) fn has_ldi(&self, place: usize) -> bool {
+        self.shelf.ldis[place].is_some()
+    }
+
+    /// What an LDI of views is made of.
+    fn recipe(&self, place: usize) -> Recipe {
+        let side = self.side_of(place);
+        let count = self.options.ldi_views.unwrap_or(side.len());
+        let views = neighbourhood::views(&side, place, count);
+        Recipe {
+            place,
+            center: neighbourhood::middle(&side),
+            images: views.iter().map(|i| self.shelf.image(*i)).collect(),
+            views: views
+                .into_iter()
+                .map(|i| (i, self.places[i].clone()))
+                .collect(),
+            size: self.options.size,
+            options: self.options.ldi,
+        }
+    }
+
+    /// Takes in an LDI of views and the images that were made for it: those serve the LDIs beside it,
+    /// too, but are of no more use where all of a side's make one. What no frame needs yet only goes where
+    /// there is room.
+    pub(super) fn take(&mut self, made: Made, is_needed: bool) {
+        self.shelf.residency.loads += made.images.len() as u64;
+        let bytes = Reference::bytes(self.options.size);
+        let ldi_bytes = made.ldi.as_ref().map_or(0, PortalLdi::bytes);
+        self.largest_ldi = self.largest_ldi.max(ldi_bytes);
+        if is_needed || self.shelf.make_room(ldi_bytes) {
+            self.keep(made.place, made.ldi);
+        }
+        if self.options.ldi_views.is_some() {
+            for (place, image) in made.images {
+                if self.shelf.make_room(bytes) {
+                    self.shelf.keep_image(place, image, bytes);
                 }
-            })
-            .collect::<Result<_, RenderError>>()?;
-        let images: Vec<&Reference> = images.iter().map(|image| &**image).collect();
-        let constructed = construct(&images, &self.options.ldi);
-        Ok((constructed.ok().map(|made| made.ldi), made))
+            }
+        }
     }
 
-    /// The LDI of the photos that see through a side's portal, and how many they are; nothing where
-    /// none does.
+    fn keep(&mut self, place: usize, ldi: Option<PortalLdi>) {
+        let bytes = ldi.as_ref().map_or(0, PortalLdi::bytes);
+        self.shelf.make_room(bytes);
+        self.shelf.keep_ldi(place, ldi, bytes);
+    }
+
+    /// Of LDIs that frames may need soon, the sooner the earlier, marks those that are there, and tells what
+    /// the first that is not is made of; nothing where all are, or where there is no room for it.
+    pub(super) fn ahead(&mut self, places: &[usize]) -> Option<Recipe> {
+        let missing = self.shelf.touch_ldis(places);
+        let recipe = self.recipe(*missing.first()?);
+        let views: Vec<usize> = recipe.views.iter().map(|(i, _)| *i).collect();
+        let images = self.shelf.touch_images(&views).len() as u64;
+        let bytes = images * Reference::bytes(self.options.size) + self.largest_ldi;
+        self.shelf.make_room(bytes).then_some(recipe)
+    }
+
+    /// The LDI of the photos that see through the portal of a place, in the camera of the middle of its
+    /// semicircle, and how many they are; nothing where none does.
     fn of_photos(
         &self,
-        side: usize,
+        place: usize,
         interior: &Interior,
         captured: &mut Captured,
     ) -> Result<Option<(Layered, usize)>, RenderError> {
-        let places = &self.places[self.sides[side].clone()];
+        let places = &self.places[self.side_of(place)];
         let Some(photos) = photographed(interior, places, self.options.size, captured)? else {
             return Ok(None);
         };
@@ -290,56 +361,19 @@ impl Library {
         let made = construct_of_photos(place, &photos.camera, &images, photos.noise, options);
         Ok(made.ok().map(|made| (made.ldi, images.len())))
     }
-
-    fn make(
-        &self,
-        place: usize,
-        interior: &Interior,
-        model: &Model,
-        geometry: &CellGeometry,
-        captured: Option<&mut Captured>,
-    ) -> Result<Reference, RenderError> {
-        let (place, size) = (&self.places[place], self.options.size);
-        match captured {
-            Some(captured) => {
-                Reference::of_photos(interior, model, geometry, place, size, captured)
-            }
-            None => Ok(Reference::new(interior, model, geometry, place, size)),
-        }
-    }
-
-    fn make_room(&mut self, bytes: u64) {
-        while !self.residency.allows(self.residency.held + bytes) {
-            let images = self.images.iter().enumerate();
-            let images = images.filter_map(|(i, kept)| Some((kept.as_ref()?.used, 0, i)));
-            let ldis = self.ldis.iter().enumerate();
-            let ldis = ldis.filter_map(|(i, kept)| Some((kept.as_ref()?.used, 1, i)));
-            let others = images.chain(ldis).filter(|(used, ..)| *used < self.turn);
-            let freed = match others.min() {
-                Some((_, 0, image)) => self.images[image].take().map(|kept| kept.bytes),
-                Some((.., ldi)) => self.ldis[ldi].take().map(|kept| kept.bytes),
-                None => return,
-            };
-            self.residency.change(0, freed.unwrap_or(0));
-            self.residency.evictions += 1;
-        }
-    }
 }
 
-/// Marks what is used in a turn; which of it is not there, each once.
-fn touch<T>(kept: &mut [Option<Kept<T>>], wanted: &[usize], turn: u64) -> Vec<usize> {
-    let mut missing = Vec::new();
-    for &i in wanted {
-        match &mut kept[i] {
-            Some(kept) => kept.used = turn,
-            None if !missing.contains(&i) => missing.push(i),
-            None => {}
-        }
+/// What a place sees, coloured from photos where they are given.
+fn image(
+    interior: &Interior,
+    model: &Model,
+    geometry: &CellGeometry,
+    place: &SemicircleView,
+    size: [u32; 2],
+    captured: Option<&mut Captured>,
+) -> Result<Reference, RenderError> {
+    match captured {
+        Some(captured) => Reference::of_photos(interior, model, geometry, place, size, captured),
+        None => Ok(Reference::new(interior, model, geometry, place, size)),
     }
-    missing
-}
-
-fn found<T>(kept: &[Option<Kept<T>>], wanted: &[usize]) -> Vec<Arc<T>> {
-    let what = |i: &usize| kept[*i].as_ref().map(|kept| kept.what.clone());
-    wanted.iter().filter_map(what).collect()
 }

@@ -5,18 +5,22 @@
 //! warping in architectural walkthroughs" and "Images for accelerating architectural
 //! walkthroughs"). [`Walk`] draws frames; the rest is what it is made of.
 
+mod background;
 mod captured;
 mod fill;
 mod floor_map;
 mod geometry;
 mod library;
+mod neighbourhood;
 mod painter;
 mod photographed;
 mod pinhole;
 mod projected;
 mod raster;
+mod recipe;
 mod reference;
 mod shade;
+mod shelf;
 mod squares;
 mod target;
 mod texture;
@@ -30,6 +34,7 @@ pub use captured::Captured;
 pub use fill::PortalFill;
 pub use geometry::{CellGeometry, Runs};
 pub use library::{LdiSource, Library, LibraryOptions, PortalLdi};
+pub use neighbourhood::Shown;
 pub use painter::Painter;
 pub use photographed::DepthMaps;
 pub use pinhole::{Pinhole, PinholeError};

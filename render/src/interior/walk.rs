@@ -8,22 +8,27 @@
 //!    whatever surface there is. Only what is shown is coloured. Where geometry is mixed in, a
 //!    pixel that the images leave open fades away with its geometry, so that nothing pops.
 
+mod ahead;
 mod asked;
 mod compose;
 mod filled;
 
+use super::background::Background;
+use super::recipe::Made;
 use super::{
-    CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill, Splat,
-    Target,
+    Captured, CellGeometry, LdiSource, Library, LibraryOptions, Painter, Pinhole, PinholeError,
+    PortalFill, Splat, Target,
 };
 use crate::RenderError;
 use crate::ldi::FreeOptions;
 use asked::Asked;
 use calibrate::View;
 use filled::Filled;
+use glam::DVec3;
 use proxy::interior::{CellId, Contents, Interior, Pass, Region, Visibility, VisibleCell, visible};
 use proxy::mesh::Model;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What can be chosen about a walk.
@@ -92,8 +97,14 @@ pub struct FrameCost {
     pub holes: usize,
     /// Reference images made for this frame.
     pub references_made: usize,
-    /// Making them.
+    /// Layered depth images made for this frame.
+    pub ldis_made: usize,
+    /// Those that had been made ahead of need, and came in with this frame.
+    pub ldis_ahead: usize,
+    /// Making images and LDIs, and waiting for one.
     pub references: Duration,
+    /// Of that, waiting for an LDI that was being made ahead of need.
+    pub waited: Duration,
     /// Finding what is visible.
     pub visibility: Duration,
     /// Meeting triangles.
@@ -120,6 +131,9 @@ pub enum WalkError {
     /// The photos' engine's.
     #[error(transparent)]
     Photos(#[from] RenderError),
+    /// What a panic said of a layered depth image that was being made ahead of need.
+    #[error("a layered depth image could not be made ahead: {0}")]
+    Ahead(String),
 }
 
 /// A walker through an interior, and what is kept between frames.
@@ -128,15 +142,20 @@ pub struct Walk<'a> {
     interior: &'a Interior,
     contents: &'a Contents,
     model: &'a Model,
-    geometry: CellGeometry,
+    geometry: Arc<CellGeometry>,
     library: Library,
     options: WalkOptions,
     painter: Painter,
+    background: Option<Background<'a, Option<Made>>>,
+    /// Where the last frame was drawn from that looked ahead; no picture depends on it.
+    last_eye: Option<DVec3>,
     filled: Target,
+    /// What is mixed into that.
+    mixed_in: Target,
     /// By pixel: one more than the place in the frame's list of fills; 0 for none.
     owners: Vec<u16>,
     picture: Target,
-    /// By place of the library, then by side: whether the walk needed its image or LDI.
+    /// By place of the library, of images, then of LDIs: whether the walk needed it.
     is_used: Vec<bool>,
 }
 
@@ -158,22 +177,32 @@ impl<'a> Walk<'a> {
         interior: &'a Interior,
         contents: &'a Contents,
         model: &'a Model,
-        options: WalkOptions,
+        mut options: WalkOptions,
     ) -> Self {
+        let captured = painter.captured();
+        if options.library.ldi_of == LdiSource::Photos
+            && captured.is_some_and(Captured::has_depth_maps)
+        {
+            // Photos were taken wherever they were: one LDI has them all.
+            options.library.ldi_views = None;
+        }
         let library = Library::new(interior, &options.library);
         Self {
             interior,
             contents,
             model,
-            geometry: match painter.captured() {
+            geometry: Arc::new(match captured {
                 Some(_) => CellGeometry::without_cells(model, contents),
                 None => CellGeometry::new(model, contents),
-            },
-            is_used: vec![false; library.len() + library.side_count()],
+            }),
+            is_used: vec![false; 2 * library.len()],
             library,
             options,
             painter,
+            background: None,
+            last_eye: None,
             filled: Target::default(),
+            mixed_in: Target::default(),
             owners: Vec::new(),
             picture: Target::default(),
         }
@@ -198,6 +227,7 @@ impl<'a> Walk<'a> {
     /// which images were used.
     pub fn begin(&mut self) {
         self.picture = Target::default();
+        self.last_eye = None;
         self.is_used.fill(false);
     }
 
@@ -241,8 +271,10 @@ impl<'a> Walk<'a> {
         cost.visibility = start.elapsed();
         // 2. Fills.
         let start = Instant::now();
-        let images = self.images(fill, &fills, eye)?;
-        cost.references_made = images.made;
+        let images = self.images(fill, &fills, eye, &mut cost)?;
+        if fill == PortalFill::Ldi {
+            self.ask_ahead(&fills, eye)?;
+        }
         cost.references = start.elapsed();
         let start = Instant::now();
         self.fill(fill, &fills, &images, &camera, &mut cost);
@@ -290,16 +322,20 @@ impl<'a> Walk<'a> {
             return Vec::new();
         };
         let width = camera.width as usize;
-        let mut floor = vec![0.0; self.owners.len()];
+        let (owners, filled) = (&self.owners, &self.filled);
+        let mut floor = vec![0.0; owners.len()];
         let row = |(y, floor): (usize, &mut [f32])| {
             let start = y * width;
             for (x, floor) in floor.iter_mut().enumerate() {
                 let pixel = start + x;
-                let owner = usize::from(self.owners[pixel]);
-                if owner == 0 || owner > last + 1 || self.filled.color[pixel][3] == 0 {
+                let owner = usize::from(owners[pixel]);
+                if owner == 0 || owner > last + 1 {
                     continue;
                 }
                 let f = &fills[owner - 1];
+                if f.leaves_open(filled.color[pixel][3]) {
+                    continue;
+                }
                 let plane = f.plane.inverse_depth(camera.ray(x as u32, y as u32));
                 if f.share >= 1.0 && f.plane.is_ahead() && plane > 0.0 && plane.is_finite() {
                     *floor = plane as f32;

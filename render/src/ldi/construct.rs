@@ -109,7 +109,19 @@ pub fn construct(
     images: &[&Reference],
     options: &ConstructOptions,
 ) -> Result<Constructed, LdiError> {
-    let center = images.len() / 2;
+    construct_around(images, images.len() / 2, options)
+}
+
+/// As [`construct`], where the central image is any of them: near the ends of a semicircle it is not the
+/// middle of those nearest to it.
+///
+/// # Errors
+/// No such image; a camera that is none.
+pub fn construct_around(
+    images: &[&Reference],
+    center: usize,
+    options: &ConstructOptions,
+) -> Result<Constructed, LdiError> {
     let central = *images.get(center).ok_or(LdiError::NoImages)?;
     let mut order: Vec<usize> = (0..images.len()).collect();
     order.sort_by_key(|i| (i.abs_diff(center), *i));

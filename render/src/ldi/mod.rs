@@ -23,7 +23,9 @@ mod splat;
 mod stats;
 
 pub use clip::{ClipTree, Clipped};
-pub use construct::{Conflict, ConstructOptions, Constructed, construct, construct_of_photos};
+pub use construct::{
+    Conflict, ConstructOptions, Constructed, construct, construct_around, construct_of_photos,
+};
 pub use file::{LdiFileError, parse, read, write};
 pub use fragments::Pieces;
 pub use free::{Free, FreeCost, FreeOptions, free};

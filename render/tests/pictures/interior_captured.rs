@@ -73,6 +73,15 @@ fn capture(rooms: usize, around: u32) -> Capture {
 impl Capture {
     /// A walk drawn from the photos; those that `is_lost` says cannot be decoded.
     fn walk(&self, is_lost: impl Fn(usize) -> bool + Send + Sync + 'static) -> Walk<'_> {
+        self.walk_by(is_lost, None)
+    }
+
+    /// The same, by LDIs of so many views where not of all.
+    fn walk_by(
+        &self,
+        is_lost: impl Fn(usize) -> bool + Send + Sync + 'static,
+        ldi_views: Option<usize>,
+    ) -> Walk<'_> {
         let source = |(i, (view, _)): (usize, &(View, RgbaImage))| SourceView {
             name: format!("{i}.jpg"),
             view: view.clone(),
@@ -107,6 +116,7 @@ impl Capture {
         let mut options = WalkOptions::default();
         options.library.size = [96; 2];
         options.library.semicircles.views = 5;
+        options.library.ldi_views = ldi_views;
         let (house, painter) = (&self.house, Painter::of_photos(captured));
         Walk::with(
             painter,
@@ -251,4 +261,30 @@ fn photos_that_cannot_be_decoded_are_left_out() {
     let failed = none.draw(&desired, PortalFill::Geometry);
     let is_photo = matches!(failed, Err(WalkError::Photos(RenderError::Photo(_))));
     assert!(is_photo, "{failed:?}");
+}
+
+#[test]
+fn ldis_of_the_nearest_views_are_made_of_photos_too_ahead_or_not() {
+    let capture = capture(2, 4);
+    let views: Vec<View> = (1..9)
+        .map(|seed| {
+            let (eye, target) = viewpoint(&capture.house.interior, seed);
+            view(eye, target, [64, 48])
+        })
+        .collect();
+    let draw = |walk: &mut Walk<'_>| -> Vec<_> {
+        let draw = |view: &View| {
+            let cost = walk.draw(view, PortalFill::Ldi).unwrap();
+            (walk.picture().clone(), cost.filled)
+        };
+        // Again, as what was made ahead comes in with later frames.
+        [&views, &views].into_iter().flatten().map(draw).collect()
+    };
+    let alone = draw(&mut capture.walk_by(|_| false, Some(2)));
+    assert!(alone.iter().any(|(_, filled)| *filled > 0));
+    std::thread::scope(|scope| {
+        let mut walk = capture.walk_by(|_| false, Some(2));
+        walk.make_ahead(scope).unwrap();
+        assert!(draw(&mut walk) == alone);
+    });
 }

@@ -168,7 +168,12 @@ impl Taken {
         };
         let (interior, model) = (&self.house.interior, &self.house.model);
         let mut library = Library::new(interior, &options);
-        let made = library.ldis(&self.free, interior, model, &self.geometry, captured);
+        let middles: Vec<usize> = self
+            .free
+            .iter()
+            .map(|side| side * VIEWS + VIEWS / 2)
+            .collect();
+        let made = library.ldis(&middles, interior, model, &self.geometry, captured);
         let (ldis, of) = made.unwrap();
         Made {
             ldis,

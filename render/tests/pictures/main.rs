@@ -14,6 +14,7 @@ mod interior_captured;
 mod interior_geometry;
 mod interior_gpu;
 mod interior_kept;
+mod interior_neighbourhood;
 mod interior_photos;
 mod interior_tour;
 mod interior_walk;

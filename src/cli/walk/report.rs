@@ -46,6 +46,12 @@ struct FrameReport<'a> {
     shade_ms: f64,
     references_ms: f64,
     references_made: usize,
+    /// By this frame itself.
+    ldis_made: usize,
+    /// Ahead of need, come in with this frame.
+    ldis_ahead: usize,
+    /// Of `references_ms`, for an LDI that was being made ahead of need.
+    waited_ms: f64,
     visible_cells: usize,
     portals: usize,
     filled: usize,
@@ -146,6 +152,9 @@ impl Walked {
             shade_ms: ms(c.shade),
             references_ms: ms(c.references),
             references_made: c.references_made,
+            ldis_made: c.ldis_made,
+            ldis_ahead: c.ldis_ahead,
+            waited_ms: ms(c.waited),
             visible_cells: c.visible_cells,
             portals: c.portals,
             filled: c.filled,

@@ -32,7 +32,9 @@ impl Walk<'_> {
         let is_wanted = |pixel: usize, inverse_depth: f32| match fill_of(pixel) {
             None => true,
             Some(f) => {
-                f.share < 1.0 || filled.color[pixel][3] == 0 || is_before(pixel, f, inverse_depth)
+                f.share < 1.0
+                    || f.leaves_open(filled.color[pixel][3])
+                    || is_before(pixel, f, inverse_depth)
             }
         };
         self.painter
@@ -66,8 +68,13 @@ impl Walk<'_> {
                         image = last.color[pixel];
                     }
                 }
+                let covers = filled.color[pixel][3];
                 if f.share < 1.0 {
                     *color = mixed(*color, image, f.share);
+                } else if covers > 0 && own.is_some() && f.leaves_open(covers) {
+                    // A hole of one of two LDIs shows what is behind as far as the other leaves it open.
+                    let opaque = [image[0], image[1], image[2], u8::MAX];
+                    *color = mixed(*color, opaque, f64::from(covers) / 255.0);
                 } else if own.is_none() || filled.color[pixel][3] > 0 {
                     *color = image;
                 }
@@ -82,7 +89,7 @@ impl Walk<'_> {
 }
 
 /// Colours with coverage mixed, `share` of the second.
-fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
+pub(super) fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
     let weights = [(1.0 - share) * f64::from(a[3]), share * f64::from(b[3])];
     let alpha = weights[0] + weights[1];
     if alpha < 0.5 {

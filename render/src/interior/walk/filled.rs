@@ -1,14 +1,16 @@
 //! Portals filled with images.
 
-use super::{FrameCost, Walk};
-use crate::RenderError;
+use super::compose::mixed;
+use super::{FrameCost, Walk, WalkError};
 use crate::interior::reference::plane_of;
 use crate::interior::{
-    Beyond, Captured, LdiSource, Pinhole, PortalFill, PortalLdi, Reference, Window, texture, warp,
+    Beyond, Captured, LdiSource, Painter, Pinhole, PortalFill, PortalLdi, Reference, Shown, Target,
+    Window, texture, warp,
 };
-use crate::ldi::Clipped;
+use crate::ldi::{Clipped, FreeOptions};
 use glam::DVec3;
 use proxy::interior::{CellId, Pass, Portal};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Where geometry is alone, in shares of where it begins to be mixed in.
@@ -22,15 +24,8 @@ const ENTERED: f64 = 0.25;
 pub(super) enum Images {
     /// Reference images, the nearest first.
     References(Vec<Arc<Reference>>),
-    /// Nothing where there are no images, or they make none.
-    Ldi(Arc<Option<PortalLdi>>),
-}
-
-/// What a frame's portals are filled with.
-pub(super) struct Needed {
-    pub(super) of_fills: Vec<Images>,
-    /// Reference images made for it.
-    pub(super) made: usize,
+    /// One or two; nothing where there are no images, or they make none.
+    Ldis(Vec<Arc<Option<PortalLdi>>>),
 }
 
 /// A portal that is filled with images in this frame.
@@ -41,6 +36,17 @@ pub(super) struct Filled<'p> {
     pub(super) window: Window,
     /// Of the image; the rest is geometry.
     pub(super) share: f64,
+    /// The LDIs that it is filled with, if it is.
+    pub(super) shown: Option<Shown>,
+}
+
+impl Filled<'_> {
+    /// Whether what is behind shows where the image has that alpha: where it has nothing, or one of two
+    /// LDIs has not.
+    pub(super) fn leaves_open(&self, alpha: u8) -> bool {
+        let is_mixed = self.shown.is_some_and(|shown| shown.other.is_some());
+        alpha == 0 || (is_mixed && alpha < u8::MAX)
+    }
 }
 
 impl Walk<'_> {
@@ -68,7 +74,15 @@ impl Walk<'_> {
         let filled = |&(pass, into): &(&'p Pass, CellId)| {
             let portal = self.interior.portal(pass.portal);
             let share = entered * self.share_of_image(portal, eye, near);
+            let shown = || match fill {
+                PortalFill::Ldi => {
+                    let (id, from) = (pass.portal, pass.from);
+                    self.library.shown(self.interior, id, from, into, eye)
+                }
+                _ => None,
+            };
             (share > 0.0).then(|| Filled {
+                shown: shown(),
                 pass,
                 into,
                 plane: plane_of(camera, portal, Some(into)),
@@ -86,27 +100,12 @@ impl Walk<'_> {
         fill: PortalFill,
         fills: &[Filled<'_>],
         eye: DVec3,
-    ) -> Result<Needed, RenderError> {
-        let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
+        cost: &mut FrameCost,
+    ) -> Result<Vec<Images>, WalkError> {
         if fill == PortalFill::Ldi {
-            let side = |f: &Filled<'_>| self.library.side(f.pass.portal, f.pass.from, f.into);
-            let sides: Vec<Option<usize>> = fills.iter().map(side).collect();
-            let all: Vec<usize> = sides.iter().flatten().copied().collect();
-            for &side in &all {
-                self.is_used[self.library.len() + side] = true;
-            }
-            let photos = self.painter.captured_mut();
-            let (ldis, made) = self.library.ldis(&all, interior, model, geometry, photos)?;
-            let mut ldis = ldis.into_iter();
-            let ldi = |side: &Option<usize>| {
-                Images::Ldi(side.and_then(|_| ldis.next()).unwrap_or_default())
-            };
-            let of_fills = sides.iter().map(ldi);
-            return Ok(Needed {
-                of_fills: of_fills.collect(),
-                made,
-            });
+            return self.ldis(fills, cost);
         }
+        let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
         let nearest = |f: &Filled<'_>| {
             let (id, from) = (f.pass.portal, f.pass.from);
             let count = fill.references();
@@ -119,18 +118,40 @@ impl Walk<'_> {
         let (images, made) = self
             .library
             .images(&all, interior, model, geometry, photos)?;
+        cost.references_made = made;
         let mut images = images.into_iter();
         let of_fills = needed
             .iter()
             .map(|needed| Images::References(images.by_ref().take(needed.len()).collect()));
-        Ok(Needed {
-            of_fills: of_fills.collect(),
-            made,
-        })
+        Ok(of_fills.collect())
+    }
+
+    /// The LDIs that portals are filled with.
+    fn ldis(
+        &mut self,
+        fills: &[Filled<'_>],
+        cost: &mut FrameCost,
+    ) -> Result<Vec<Images>, WalkError> {
+        let places = |f: &Filled<'_>| f.shown.into_iter().flat_map(Shown::places);
+        let all: Vec<usize> = fills.iter().flat_map(places).collect();
+        self.take_ahead(&all, cost)?;
+        for &place in &all {
+            self.is_used[self.library.len() + place] = true;
+            cost.ldis_made += usize::from(!self.library.has_ldi(place));
+        }
+        let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
+        let photos = self.painter.captured_mut();
+        let (ldis, made) = self.library.ldis(&all, interior, model, geometry, photos)?;
+        cost.references_made = made;
+        let mut ldis = ldis.into_iter();
+        let of_fills = fills
+            .iter()
+            .map(|f| Images::Ldis(ldis.by_ref().take(places(f).count()).collect()));
+        Ok(of_fills.collect())
     }
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
-    fn share_of_image(&self, portal: &Portal, eye: DVec3, near: f64) -> f64 {
+    pub(super) fn share_of_image(&self, portal: &Portal, eye: DVec3, near: f64) -> f64 {
         let far = near * portal.semicircle_radius(self.interior.up);
         let near = ALONE * far;
         let distance = portal.polygon.distance(eye);
@@ -161,14 +182,14 @@ impl Walk<'_> {
         &mut self,
         fill: PortalFill,
         fills: &[Filled<'_>],
-        images: &Needed,
+        images: &[Images],
         camera: &Pinhole,
         cost: &mut FrameCost,
     ) {
         self.filled.clear(camera.width, camera.height);
         self.owners.clear();
         self.owners.resize(self.filled.color.len(), 0);
-        for (k, (f, images)) in fills.iter().zip(&images.of_fills).enumerate() {
+        for (k, (f, images)) in fills.iter().zip(images).enumerate() {
             for y in 0..camera.height {
                 let open = f.window.row(y);
                 let first = y as usize * camera.width as usize;
@@ -188,24 +209,69 @@ impl Walk<'_> {
                         };
                     }
                 }
-                Images::Ldi(portal) => {
-                    let Some(portal) = portal.as_ref() else {
+                Images::Ldis(portals) => {
+                    let mut portals = portals.iter().filter_map(|portal| portal.as_ref().as_ref());
+                    let painter = &mut self.painter;
+                    let (options, is_whole) = (&self.options.ldi, self.options.whole_ldis);
+                    let mut draw = |portal, into: &mut Target| {
+                        draw_ldi(painter, portal, f, camera, options, is_whole, into, cost);
+                    };
+                    let Some(first) = portals.next() else {
                         continue;
                     };
-                    let (ldi, options) = (&portal.ldi, &self.options.ldi);
-                    let reach = f64::from(options.reach());
-                    let columns = match self.options.whole_ldis {
-                        true => Clipped::whole(ldi),
-                        false => portal.tree.columns(ldi, camera, &f.window, reach),
-                    };
-                    let drawn = (ldi, &columns);
-                    let took = self.painter.free(drawn, camera, &f.window, options, into);
-                    cost.samples += took.drawn;
-                    if took.pixels > 0 {
-                        cost.samples_clipped += ldi.len() - took.samples;
+                    draw(first, into);
+                    if let (Some(other), Some((_, share))) =
+                        (portals.next(), f.shown.and_then(|shown| shown.other))
+                    {
+                        self.mixed_in.clear(camera.width, camera.height);
+                        draw(other, &mut self.mixed_in);
+                        mix(&f.window, into, &self.mixed_in, share);
                     }
                 }
             }
         }
     }
+}
+
+/// Draws an LDI where one sees through its portal.
+fn draw_ldi(
+    painter: &mut Painter,
+    portal: &PortalLdi,
+    f: &Filled<'_>,
+    camera: &Pinhole,
+    options: &FreeOptions,
+    is_whole: bool,
+    into: &mut Target,
+    cost: &mut FrameCost,
+) {
+    let ldi = &portal.ldi;
+    let reach = f64::from(options.reach());
+    let columns = match is_whole {
+        true => Clipped::whole(ldi),
+        false => portal.tree.columns(ldi, camera, &f.window, reach),
+    };
+    let took = painter.free((ldi, &columns), camera, &f.window, options, into);
+    cost.samples += took.drawn;
+    if took.pixels > 0 {
+        cost.samples_clipped += ldi.len() - took.samples;
+    }
+}
+
+/// Mixes another picture into one, in a window: colours with coverage, and the depths of what is there.
+fn mix(window: &Window, into: &mut Target, other: &Target, share: f64) {
+    let width = into.width.max(1) as usize;
+    let colors = into.color.par_chunks_mut(width);
+    let rows = colors.zip(into.inverse_depth.par_chunks_mut(width));
+    rows.enumerate().for_each(|(y, (colors, depths))| {
+        let open = window.row(y as u32);
+        for x in open.start as usize..(open.end as usize).min(width) {
+            let pixel = y * width + x;
+            colors[x] = mixed(colors[x], other.color[pixel], share);
+            let (a, b) = (depths[x], other.inverse_depth[pixel]);
+            depths[x] = match (a > 0.0, b > 0.0) {
+                (true, true) => a + share as f32 * (b - a),
+                _ => a.max(b),
+            };
+        }
+    });
 }
