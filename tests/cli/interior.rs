@@ -360,6 +360,41 @@ fn a_walk_becomes_a_film() {
 }
 
 #[test]
+fn layered_images_of_the_nearest_views_are_the_same_in_parts() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --portals ldi --size 48x36 --reference-size 24x24";
+    let nearest = format!("{walk} --ldi-views 3");
+    let report = lumigraph(here, &format!("{nearest} --frames 8 --json -o whole")).ok();
+    let report = report.json();
+    let frames = report["walks"][0]["frames"].as_array().unwrap();
+    let count = |what: &str| -> u64 { frames.iter().filter_map(|f| f[what].as_u64()).sum() };
+    assert!(count("ldis_made") + count("ldis_ahead") > 0, "{report}");
+    assert!(frames.iter().all(|f| f["waited_ms"].is_number()));
+    for part in ["5..8/8", "0..5/8"] {
+        lumigraph(
+            here,
+            &format!("{nearest} --frames {part} --threads 1 -o parts"),
+        )
+        .ok();
+    }
+    let read = |file: &Path| std::fs::read(here.join(file)).unwrap();
+    let frames = names(&here.join("whole")).into_iter();
+    let frames: Vec<String> = frames.filter(|name| name.ends_with(".png")).collect();
+    assert_eq!(frames.len(), 8);
+    for name in &frames {
+        let [whole, part] = ["whole", "parts"].map(|folder| read(&Path::new(folder).join(name)));
+        assert!(whole == part, "{name}");
+    }
+    // Frames with LDIs of other views are not mixed in.
+    lumigraph(here, &format!("{nearest} --frames 8 -o film --resume")).ok();
+    let error = lumigraph(here, &format!("{walk} --frames 8 -o film --resume")).error(1);
+    assert!(error.contains("another command line"), "{error}");
+    let ran = lumigraph(here, &format!("{walk} --ldi-views 0 -o x"));
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+}
+
+#[test]
 fn a_captures_rooms_are_drawn_from_its_photos() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
