@@ -87,7 +87,8 @@ pub struct FrameCost {
     pub triangles_in_cells: usize,
     /// Those of them in runs that are in sight.
     pub triangles_tried: usize,
-    /// Those of them that touch a pixel's centre; a graphics device does not tell.
+    /// Those of them that touch a pixel's centre where nothing was known to hide them; a graphics device
+    /// does not tell.
     pub triangles_met: Option<usize>,
     /// Samples of images that were drawn, or pixels of textures.
     pub samples: usize,
