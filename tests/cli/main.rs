@@ -30,3 +30,4 @@ mod uncalibrated;
 mod undistort;
 #[cfg(feature = "window")]
 mod view;
+mod walk;

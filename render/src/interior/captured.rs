@@ -91,11 +91,6 @@ impl Captured {
         self.depth_maps.as_ref()
     }
 
-    /// Whether photos have depth maps.
-    pub(super) fn has_depth_maps(&self) -> bool {
-        self.depth_maps.is_some()
-    }
-
     /// What is drawn from.
     pub fn lumigraph(&self) -> &Lumigraph {
         &self.lumigraph

@@ -150,10 +150,9 @@ impl Library {
         eye: DVec3,
         count: usize,
     ) -> Vec<usize> {
-        let side = self.side(portal, from, into);
-        let range = side.map_or(0..0, |side| self.sides[side].clone());
+        let side = self.side(portal, from, into).unwrap_or_default();
         let eye_angle = angle_before(interior, interior.portal(portal), Some(from), eye);
-        let mut places: Vec<usize> = range.collect();
+        let mut places: Vec<usize> = side.collect();
         let off = |i: &usize| (self.places[*i].angle - eye_angle).abs();
         places.sort_by(|a, b| off(a).total_cmp(&off(b)));
         places.truncate(count);
@@ -169,7 +168,7 @@ impl Library {
         into: CellId,
         eye: DVec3,
     ) -> Option<Shown> {
-        let side = self.sides[self.side(portal, from, into)?].clone();
+        let side = self.side(portal, from, into)?;
         Some(match self.options.ldi_views {
             None => Shown::alone(neighbourhood::middle(&side)),
             Some(count) => {
@@ -190,11 +189,14 @@ impl Library {
         beside.filter_map(|i| places.get(i).copied()).collect()
     }
 
-    fn side(&self, portal: PortalId, from: CellId, into: CellId) -> Option<usize> {
-        self.sides.iter().position(|range| {
+    /// The places before a portal, on that cell's side.
+    fn side(&self, portal: PortalId, from: CellId, into: CellId) -> Option<Range<usize>> {
+        let mut sides = self.sides.iter();
+        let side = sides.find(|range| {
             let place = &self.places[range.start];
             (place.portal, place.from, place.into) == (portal, Some(from), into)
-        })
+        });
+        side.cloned()
     }
 
     /// The places of the side that a place is of.

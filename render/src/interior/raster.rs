@@ -12,7 +12,7 @@
 use super::geometry::{RUN, Run};
 use super::projected::Projected;
 use super::squares::Squares;
-use super::triangle::{Around, Band, Ready};
+use super::triangle::{Around, Band, Ready, spans};
 use super::{Pinhole, Runs, Window};
 use crate::cpu::lanes::vectorised;
 use glam::{DVec2, DVec3};
@@ -258,9 +258,9 @@ impl<'a> Queued<'a> {
             rows: [0, camera.height],
             ..Self::aside(run, window)
         };
-        let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let mut pixels = [DVec2::ZERO; 8];
         let mut nearest = f64::INFINITY;
-        for corner in 0..8 {
+        for (corner, pixel) in pixels.iter_mut().enumerate() {
             let side = |k: usize| match corner >> k & 1 {
                 0 => run.low[k],
                 _ => run.high[k],
@@ -270,15 +270,13 @@ impl<'a> Queued<'a> {
             if !(depth > 0.0) {
                 return Some(queued);
             }
-            let at = point.truncate() / point.z * camera.focal + camera.principal;
-            (least, most) = (least.min(at), most.max(at));
+            *pixel = point.truncate() / point.z * camera.focal + camera.principal;
             nearest = nearest.min(depth);
         }
-        if !(least.is_finite() && most.is_finite()) {
+        if !pixels.iter().all(|pixel| pixel.is_finite()) {
             return Some(queued);
         }
-        queued.columns = around(least.x, most.x, camera.width)?;
-        queued.rows = around(least.y, most.y, camera.height)?;
+        (queued.columns, queued.rows) = spans(&pixels, camera, ROOM)?;
         queued.nearest = (1.0 / nearest) as f32;
         Some(queued)
     }
@@ -307,12 +305,4 @@ impl<'a> Queued<'a> {
         let [low, high] = self.touching.each_ref().map(|bits| bits.load(Relaxed));
         u128::from(high) << 64 | u128::from(low)
     }
-}
-
-/// Pixels from … to before that are between two places or next to them, if there are any.
-fn around(least: f64, most: f64, count: u32) -> Option<[u32; 2]> {
-    let from = (least - ROOM).max(0.0) as u32;
-    // A cast keeps within range.
-    let to = ((most + ROOM + 1.0).max(0.0) as u32).min(count);
-    (from < to).then_some([from, to])
 }

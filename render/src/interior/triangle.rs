@@ -386,8 +386,8 @@ fn pixels_around(corners: &[DVec3; 3], camera: &Pinhole) -> Option<([u32; 2], [u
     spans(&pixels, camera, 1.0)
 }
 
-/// Columns and rows, from … to before, around pixels.
-fn spans(pixels: &[DVec2], camera: &Pinhole, room: f64) -> Option<([u32; 2], [u32; 2])> {
+/// Columns and rows, from … to before, of pixels whose middles are around some places, or so far beyond.
+pub(super) fn spans(pixels: &[DVec2], camera: &Pinhole, room: f64) -> Option<([u32; 2], [u32; 2])> {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for at in pixels {
         (low, high) = (low.min(*at), high.max(*at));

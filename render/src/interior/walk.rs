@@ -16,8 +16,8 @@ mod filled;
 use super::background::Background;
 use super::recipe::Made;
 use super::{
-    Captured, CellGeometry, LdiSource, Library, LibraryOptions, Painter, Pinhole, PinholeError,
-    PortalFill, Splat, Target,
+    CellGeometry, LdiSource, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
+    Splat, Target,
 };
 use crate::RenderError;
 use crate::ldi::FreeOptions;
@@ -182,7 +182,7 @@ impl<'a> Walk<'a> {
     ) -> Self {
         let captured = painter.captured();
         if options.library.ldi_of == LdiSource::Photos
-            && captured.is_some_and(Captured::has_depth_maps)
+            && captured.is_some_and(|captured| captured.depth_maps().is_some())
         {
             // Photos were taken wherever they were: one LDI has them all.
             options.library.ldi_views = None;

@@ -1,0 +1,183 @@
+//! Walks through a house, frame by frame and as films.
+
+use crate::interior::{names, with_house};
+use crate::run::lumigraph;
+use serde_json::Value;
+use std::path::Path;
+
+#[test]
+fn a_house_is_walked_through() {
+    let folder = with_house();
+    let here = folder.path();
+    let line =
+        "walk house --portals all --frames 6 --size 64x48 --reference-size 32x32 --json -o out";
+    let ran = lumigraph(here, line).ok();
+    let report = ran.json();
+    let walks = report["walks"].as_array().unwrap();
+    let kinds: Vec<&str> = walks
+        .iter()
+        .map(|w| w["portals"].as_str().unwrap())
+        .collect();
+    assert_eq!(kinds, ["geometry", "texture", "warp1", "warp2", "ldi"]);
+    let mut skipped = 0;
+    for walk in walks {
+        let frames = walk["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), 6);
+        for frame in frames {
+            let picture = image::open(here.join(frame["file"].as_str().unwrap())).unwrap();
+            assert_eq!((picture.width(), picture.height()), (64, 48));
+            assert!(frame["cell"].is_string() && frame["ms"].as_f64().unwrap() > 0.0);
+            skipped += frame["triangles_skipped"].as_u64().unwrap();
+        }
+        let used = walk["references_used"].as_u64().unwrap();
+        assert_eq!(used > 0, walk["portals"] != "geometry");
+    }
+    assert!(skipped > 0);
+    // Images are made once for all kinds.
+    let made = |walk: &Value| walk["references_made"].as_u64().unwrap();
+    let [texture, warp1, warp2] = [1, 2, 3].map(|i| &walks[i]);
+    assert!(made(texture) > 0 && made(warp1) == 0);
+    assert_eq!(made(texture), texture["references_used"].as_u64().unwrap());
+    let of_images: u64 = walks[..4].iter().map(made).sum();
+    assert_eq!(of_images, warp2["references_used"].as_u64().unwrap());
+    // Of each LDI's 13 those that are there serve it, too.
+    let ldi = &walks[4];
+    assert!(made(ldi) > 0 && made(ldi) < 13 * ldi["references_used"].as_u64().unwrap());
+    assert_eq!(of_images + made(ldi), made(&report));
+    assert_eq!(report["device"], "CPU");
+    let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
+    assert_eq!(svg.matches("<polyline").count(), 5);
+    // Its path once more, byte for byte, on one thread; one kind needs no folder of its own.
+    // Nor does a budget for images show.
+    let again = "--threads 1 walk house/interior.json --path out/path.json --portals warp2 \
+                 --reference-size 32x32 --cpu-memory 1 -o again";
+    let ran = lumigraph(here, again).ok();
+    assert!(ran.stdout.contains("again: 6 frames"), "{}", ran.stdout);
+    let read = |file: &str| std::fs::read(here.join(file)).unwrap();
+    for i in 0..6 {
+        let there = read(&format!("out/warp2/frame_{i:04}.png"));
+        assert!(read(&format!("again/frame_{i:04}.png")) == there);
+    }
+    // A model without triangles, and cells without portals.
+    let nothing = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{}]}"#;
+    let padded = format!("{nothing:<64}");
+    let mut glb = b"glTF".to_vec();
+    for word in [2_u32, 12 + 8 + 64, 64] {
+        glb.extend(word.to_le_bytes());
+    }
+    glb.extend(b"JSON");
+    glb.extend(padded.as_bytes());
+    std::fs::create_dir(here.join("empty")).unwrap();
+    std::fs::write(here.join("empty/house.glb"), glb).unwrap();
+    let interior = r#"{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [{"name": "a", "box": {"min": [0, 0, 0], "max": [4, 3, 4]}}], "portals": []}"#;
+    std::fs::write(here.join("empty/interior.json"), interior).unwrap();
+    let ran = lumigraph(
+        here,
+        "walk empty --frames 2 --size 16x16 --portals warp1 -o none",
+    );
+    assert!(
+        ran.code == 0 || ran.stderr.contains("error: "),
+        "{}",
+        ran.stderr
+    );
+    assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+    // Wherever there is no graphics device there are pictures, and a note.
+    let by_device = "walk house --path out/path.json --device gpu -o device";
+    let ran = lumigraph(here, by_device).ok();
+    let noted = ran.stderr.contains("note: graphics device: ");
+    assert_eq!(noted, ran.stdout.contains("drawn by CPU"), "{}", ran.stdout);
+    assert_eq!(names(&here.join("device")).len(), 7);
+    // What is wrong is said.
+    let scenes = r#"{"version": 1, "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [{"name": "a", "scene": "../a"}], "portals": []}"#;
+    std::fs::write(here.join("interior.json"), scenes).unwrap();
+    let ran = lumigraph(here, "walk interior.json -o out");
+    assert!(ran.error(1).contains("it names no model"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_walk_becomes_a_film() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --size 47x36 --background #204060";
+    let whole = format!("{walk} --frames 6 -o whole --video films/tour.mp4");
+    lumigraph(here, &whole).ok();
+    assert_eq!(names(&here.join("films")), ["tour.mp4"]);
+    let frame = |folder: &str, i: usize| {
+        let file = here.join(folder).join(format!("frame_{i:04}.png"));
+        std::fs::read(&file).unwrap()
+    };
+    let picture = image::load_from_memory(&frame("whole", 0)).unwrap();
+    assert!(picture.to_rgba8().pixels().all(|p| p.0[3] == 255));
+    // In parts, and after an interruption, the bytes are the same.
+    for part in ["0..2/6", "2..6/6"] {
+        lumigraph(here, &format!("{walk} --frames {part} -o parts --resume")).ok();
+    }
+    std::fs::remove_file(here.join("parts/frame_0003.png")).unwrap();
+    let again = format!("{walk} --frames 6 -o parts --resume");
+    let said = lumigraph(here, &again).ok().stdout;
+    assert!(said.contains("6 frames, 5 of them from before"), "{said}");
+    for i in 0..6 {
+        assert!(frame("whole", i) == frame("parts", i), "frame {i}");
+    }
+    // Frames of something else are not mixed in.
+    let house = here.join("house/interior.json");
+    let mut text = std::fs::read_to_string(&house).unwrap();
+    text.push('\n');
+    std::fs::write(&house, text).unwrap();
+    let error = lumigraph(here, &again).error(1);
+    assert!(
+        error.contains("made of other files: house/interior.json has"),
+        "{error}"
+    );
+    for (more, said) in [
+        ("--video f.mp4 --portals geometry,ldi", "one kind"),
+        ("--persist --frames 1..2", "--persist"),
+        ("--persist --resume", "cannot be used with"),
+        ("--frames 1..9/6", "the path has 6 frames"),
+        ("--fps 3", "--video"),
+    ] {
+        let ran = lumigraph(here, &format!("{walk} -o x {more}"));
+        assert!(
+            ran.code == 2 && ran.stderr.contains(said),
+            "{more}: {}",
+            ran.stderr
+        );
+    }
+}
+
+#[test]
+fn layered_images_of_the_nearest_views_are_the_same_in_parts() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --portals ldi --size 48x36 --reference-size 24x24";
+    let nearest = format!("{walk} --ldi-views 3");
+    let report = lumigraph(here, &format!("{nearest} --frames 8 --json -o whole")).ok();
+    let report = report.json();
+    let frames = report["walks"][0]["frames"].as_array().unwrap();
+    let count = |what: &str| -> u64 { frames.iter().filter_map(|f| f[what].as_u64()).sum() };
+    assert!(count("ldis_made") + count("ldis_ahead") > 0, "{report}");
+    assert!(frames.iter().all(|f| f["waited_ms"].is_number()));
+    for part in ["5..8/8", "0..5/8"] {
+        lumigraph(
+            here,
+            &format!("{nearest} --frames {part} --threads 1 -o parts"),
+        )
+        .ok();
+    }
+    let read = |file: &Path| std::fs::read(here.join(file)).unwrap();
+    let frames = names(&here.join("whole")).into_iter();
+    let frames: Vec<String> = frames.filter(|name| name.ends_with(".png")).collect();
+    assert_eq!(frames.len(), 8);
+    for name in &frames {
+        let [whole, part] = ["whole", "parts"].map(|folder| read(&Path::new(folder).join(name)));
+        assert!(whole == part, "{name}");
+    }
+    // Frames with LDIs of other views are not mixed in.
+    lumigraph(here, &format!("{nearest} --frames 8 -o film --resume")).ok();
+    let error = lumigraph(here, &format!("{walk} --frames 8 -o film --resume")).error(1);
+    assert!(error.contains("another command line"), "{error}");
+    let ran = lumigraph(here, &format!("{walk} --ldi-views 0 -o x"));
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+}
