@@ -6,15 +6,24 @@
 //! between the ray and the sphere, less what sphere and point subtend, plus β times the least
 //! excess of footprint. What is found is therefore *all* that lies within a difference, and a few
 //! more; `near.rs` has how an exact field comes of it.
+//!
+//! Neighbours are in groups of eight, eight such groups in one of the next level, and so on: the eight of a
+//! group are asked together ([`Group`]), and where a group is follows from its number.
 
+mod group;
+
+use crate::cpu::lanes::vectorised;
 use crate::frame::{FrameSource, ProxyPoint};
 use crate::planted::{Fault, is_planted};
 use calibrate::{Lens, Pixel};
 use glam::DVec3;
+use group::{Bounds, Group, Query};
 use std::f64::consts::PI;
 
-/// Views of a leaf, at most.
-const LEAF: usize = 6;
+/// Views of a group, and groups of the one above.
+const GROUP: usize = 8;
+/// Levels that so many views have, at most: indices have 32 bits.
+const LEVELS: usize = 11;
 /// More views than this are worth a thread.
 const ALONE: usize = 1024;
 /// With fewer views than this, asking each is faster.
@@ -46,50 +55,6 @@ impl Ball {
     }
 }
 
-/// Of one view, or of all within a node.
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    /// In the desired camera's frame.
-    center: DVec3,
-    radius: f64,
-    /// What they look along.
-    axis: DVec3,
-    /// Cosine and sine of the angle from it within which all that they see lies; `None` where it
-    /// is all around.
-    spread: Option<[f64; 2]>,
-    footprint_ratio: f64,
-    /// How far from the viewer the farthest may be.
-    far: f64,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    bounds: Bounds,
-    /// Its views' places in the order.
-    start: u32,
-    end: u32,
-    /// How far behind it its other half is; its first half follows it. Zero for leaves.
-    second: u32,
-}
-
-/// The source views that take part in a frame.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ViewTree {
-    nodes: Vec<Node>,
-    /// The views in the order of the nodes, and their indices.
-    views: Vec<(Bounds, u32)>,
-}
-
-/// What is asked of the tree.
-struct Query<'a> {
-    ball: &'a Ball,
-    measure: Measure,
-    most: f64,
-    /// From the viewer to the ball's middle, and one over it.
-    here: f64,
-    by_here: f64,
-}
-
 /// What differences are made of.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measure {
@@ -97,43 +62,54 @@ pub(crate) struct Measure {
     pub by_length: bool,
 }
 
+/// The source views that take part in a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewTree {
+    /// The views' indices, group by group.
+    views: Vec<u32>,
+    /// Of the views, of groups of them, of groups of those, up to a single one; of the views alone where
+    /// asking each is faster.
+    levels: Vec<Vec<Group>>,
+}
+
 impl ViewTree {
     /// With a hierarchy where that is faster than asking each view, and `may_skip`.
     pub(crate) fn new(sources: &[FrameSource], may_skip: bool) -> Self {
-        let mut last: Option<(Lens, [f64; 2], f64)> = None;
-        let mut views: Vec<(Bounds, u32)> = Vec::with_capacity(sources.len());
-        for (i, source) in sources.iter().enumerate() {
-            if !source.takes_part() {
-                continue;
-            }
+        let taking_part = sources.iter().zip(0..).filter(|(s, _)| s.takes_part());
+        let mut order: Vec<(DVec3, u32)> = taking_part.map(|(s, i)| (s.center, i)).collect();
+        let has_levels = may_skip && order.len() >= FEWEST;
+        if has_levels {
+            arrange(&mut order);
+        }
+        let views: Vec<u32> = order.into_iter().map(|(_, i)| i).collect();
+        // The views.
+        let mut last: Option<(Lens, [f64; 2], Option<[f64; 2]>)> = None;
+        let mut of_view = |i: u32| {
+            let source = &sources[i as usize];
             // Most photos share their lens.
             let spread = match last {
                 Some((lens, size, spread)) if lens == source.lens && size == source.size => spread,
-                _ => widest(&source.lens, source.size),
+                _ => cosine_and_sine(widest(&source.lens, source.size)),
             };
             last = Some((source.lens, source.size, spread));
-            let bounds = Bounds {
+            Bounds {
                 center: source.center,
                 radius: 0.0,
                 axis: source.rotation.row(2),
-                spread: cosine_and_sine(spread),
+                spread,
                 footprint_ratio: source.footprint_ratio,
                 far: source.center.length(),
-            };
-            views.push((bounds, i as u32));
+            }
+        };
+        let bounds: Vec<Bounds> = views.iter().map(|i| of_view(*i)).collect();
+        let mut levels = vec![in_groups(&bounds)];
+        // What is above them.
+        let mut below = bounds;
+        while has_levels && below.len() > GROUP {
+            below = below.chunks(GROUP).map(Bounds::around).collect();
+            levels.push(in_groups(&below));
         }
-        let mut nodes = Vec::new();
-        if may_skip && views.len() >= FEWEST {
-            let mut order: Vec<(DVec3, u32)> = views
-                .iter()
-                .zip(0..)
-                .map(|(view, i)| (view.0.center, i))
-                .collect();
-            arrange(&mut order);
-            views = order.iter().map(|(_, i)| views[*i as usize]).collect();
-            add_nodes(&views, 0, &mut nodes);
-        }
-        Self { nodes, views }
+        Self { views, levels }
     }
 
     /// Whether so many views take part that a list of all of them costs more than finding those
@@ -143,50 +119,71 @@ impl ViewTree {
     }
 
     /// The views, by index, that may differ by `most` or less somewhere in a ball and may have
-    /// something in their images that is in sight of it. All that do are among them.
+    /// something in their images that is in sight of it. All that do are among them; in order.
     pub(crate) fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
-        let here = ball.center.length();
-        let query = &Query {
-            ball,
-            measure,
-            most,
-            here,
-            by_here: 1.0 / here,
-        };
-        let near = |views: &[(Bounds, u32)], found: &mut Vec<u32>| {
-            let near = views.iter().filter(|v| v.0.may_matter(query));
-            found.extend(near.map(|(_, i)| *i));
-        };
-        if self.nodes.is_empty() {
-            near(&self.views, found);
-            return;
-        }
-        let drops_one = is_planted(Fault::DroppedView);
-        let mut stack = Vec::with_capacity(32);
-        stack.push(0_u32);
-        while let Some(index) = stack.pop() {
-            let node = &self.nodes[index as usize];
-            if !node.bounds.may_matter(query) {
-                continue;
-            }
-            if node.second == 0 {
-                near(&self.views[node.start as usize..node.end as usize], found);
-            } else {
-                stack.push(index + node.second);
-                stack.push(index + 1);
-            }
-        }
+        let query = Query::new(ball, measure, most);
+        vectorised(
+            #[inline(always)]
+            || match self.levels.len() {
+                1 => self.ask_each(&query, found),
+                _ => self.descend(&query, found),
+            },
+        );
         found.sort_unstable();
-        if drops_one {
+        if self.levels.len() > 1 && is_planted(Fault::DroppedView) {
             found.pop();
         }
     }
+
+    #[inline(always)]
+    fn ask_each(&self, query: &Query, found: &mut Vec<u32>) {
+        for (group, first) in self.levels[0].iter().zip((0..).step_by(GROUP)) {
+            self.add(first, group.may_matter(query), found);
+        }
+    }
+
+    #[inline(always)]
+    fn descend(&self, query: &Query, found: &mut Vec<u32>) {
+        // Groups that are yet to be asked, by level and number; of each level at most seven beside the one
+        // that is gone into.
+        let mut open = [(0_u32, 0_u32); GROUP * LEVELS + 1];
+        let mut count = 1;
+        open[0] = (self.levels.len() as u32 - 1, 0);
+        while count > 0 {
+            count -= 1;
+            let (level, group) = (open[count].0 as usize, open[count].1 as usize);
+            let may = self.levels[level][group].may_matter(query);
+            if level == 0 {
+                self.add(GROUP * group, may, found);
+                continue;
+            }
+            let first = GROUP * group;
+            // The last group may have less than eight. No branch here: which go on nobody can foretell.
+            let groups = (self.levels[level - 1].len() - first).min(GROUP);
+            for (lane, may) in may[..groups].iter().enumerate() {
+                open[count] = (level as u32 - 1, (first + lane) as u32);
+                count += usize::from(*may);
+            }
+        }
+    }
+
+    /// Adds the views of a group that may matter.
+    #[inline(always)]
+    fn add(&self, first: usize, may: [bool; GROUP], found: &mut Vec<u32>) {
+        let views = self.views[first..].iter().zip(may);
+        found.extend(views.filter_map(|(view, may)| may.then_some(*view)));
+    }
 }
 
-/// Sorts views such that halves are apart, and halves of halves, as [`add_nodes`] takes them.
+fn in_groups(bounds: &[Bounds]) -> Vec<Group> {
+    bounds.chunks(GROUP).map(Group::new).collect()
+}
+
+/// Sorts views such that each group of eight, eight such groups, and so on are near one another: parts are
+/// halved across their longest side, the first half having as many as a power of two.
 fn arrange(views: &mut [(DVec3, u32)]) {
-    if views.len() <= LEAF {
+    if views.len() <= GROUP {
         return;
     }
     let (least, most) = views.iter().fold(
@@ -201,7 +198,7 @@ fn arrange(views: &mut [(DVec3, u32)]) {
     } else {
         2
     };
-    let middle = views.len() / 2;
+    let middle = views.len().next_power_of_two() / 2;
     views.select_nth_unstable_by(middle, |a, b| {
         a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
     });
@@ -212,47 +209,6 @@ fn arrange(views: &mut [(DVec3, u32)]) {
         arrange(first);
         arrange(second);
     }
-}
-
-/// Adds the node of some views, of which the first is at `start` in the order, and then all below
-/// it.
-fn add_nodes(views: &[(Bounds, u32)], start: usize, nodes: &mut Vec<Node>) {
-    let index = nodes.len();
-    let leaf = views.len() <= LEAF;
-    let of_each = views.iter().map(|v| v.0);
-    let bounds = match leaf {
-        true => of_each.reduce(Bounds::join),
-        // Until its halves are known.
-        false => None,
-    };
-    nodes.push(Node {
-        bounds: bounds.unwrap_or(views[0].0),
-        start: start as u32,
-        end: (start + views.len()) as u32,
-        second: 0,
-    });
-    if leaf {
-        return;
-    }
-    let middle = views.len() / 2;
-    let (first, rest) = views.split_at(middle);
-    let second;
-    if middle > ALONE {
-        let of_rest = || {
-            let mut nodes = Vec::new();
-            add_nodes(rest, start + middle, &mut nodes);
-            nodes
-        };
-        let (rest, ()) = rayon::join(of_rest, || add_nodes(first, start, nodes));
-        second = nodes.len();
-        nodes.extend(rest);
-    } else {
-        add_nodes(first, start, nodes);
-        second = nodes.len();
-        add_nodes(rest, start + middle, nodes);
-    }
-    nodes[index].second = (second - index) as u32;
-    nodes[index].bounds = nodes[index + 1].bounds.join(nodes[second].bounds);
 }
 
 /// The angle from the axis within which all of a photo lies; more than π where its lens does
@@ -275,132 +231,6 @@ fn widest(lens: &Lens, [width, height]: [f64; 2]) -> f64 {
     widest * MARGIN
 }
 
-/// The angle between two vectors.
-fn angle(a: DVec3, b: DVec3) -> f64 {
-    a.cross(b).length().atan2(a.dot(b))
-}
-
-/// At least asin x, of 0…1.
-fn more_than_asin(x: f64) -> f64 {
-    // x over asin x falls steadily.
-    x * if x < 0.25 {
-        1.011
-    } else if x < 0.5 {
-        1.048
-    } else {
-        1.571
-    }
-}
-
-/// At most the angle of which one has the sine and the sign of the cosine.
-fn less_than_angle(sine: f64, cosine: f64) -> f64 {
-    if cosine > 0.0 { sine } else { 1.0 }
-}
-
 fn cosine_and_sine(angle: f64) -> Option<[f64; 2]> {
     (angle < PI).then(|| [angle.cos() - SLACK, angle.sin()])
-}
-
-impl Bounds {
-    /// Of both together.
-    fn join(self, other: Self) -> Self {
-        let away = other.center - self.center;
-        let distance = away.length();
-        let radius = (0.5 * (distance + self.radius + other.radius))
-            .max(self.radius)
-            .max(other.radius);
-        let center = if distance > 0.0 {
-            self.center + away * ((radius - self.radius) / distance).clamp(0.0, 1.0)
-        } else {
-            self.center
-        };
-        let radius = [self, other]
-            .map(|half| half.center.distance(center) + half.radius)
-            .into_iter()
-            .fold(0.0, f64::max);
-        let axis = (self.axis + other.axis).normalize_or(DVec3::Z);
-        let spread = [self, other].map(|half| {
-            let own = half.spread.map_or(PI, |[cos, sin]| sin.atan2(cos));
-            angle(axis, half.axis) + own
-        });
-        Self {
-            center,
-            radius,
-            axis,
-            spread: cosine_and_sine(spread[0].max(spread[1])),
-            footprint_ratio: self.footprint_ratio.min(other.footprint_ratio),
-            far: center.length() + radius,
-        }
-    }
-
-    fn may_matter(&self, query: &Query<'_>) -> bool {
-        let away = query.ball.center - self.center;
-        let distance = away.length();
-        let slack = SLACK * (query.here + self.far);
-        self.may_differ_by_so_little(query, away, distance, self.radius + slack)
-            && self.may_see(away, distance, self.radius + slack + query.ball.sight)
-    }
-
-    /// Whether any of them can have in its image what is `away` and within a reach: not where it is
-    /// farther from what they look along than they see, and it subtends.
-    fn may_see(&self, away: DVec3, distance: f64, reach: f64) -> bool {
-        let Some([cos, sin]) = self.spread.filter(|_| reach < distance) else {
-            return true;
-        };
-        // The cosine and sine of what it subtends, and of the sum of both angles, which is beyond
-        // π where its sine is negative; all by the distance.
-        let sharp = ((distance - reach) * (distance + reach)).sqrt();
-        let (sum_cos, sum_sin) = (cos * sharp - sin * reach, sin * sharp + cos * reach);
-        sum_sin <= 0.0 || self.axis.dot(away) >= sum_cos - SLACK * distance
-    }
-
-    /// Whether any of them, within `own` of their middle, can differ by as little as is asked for
-    /// within the ball's radius.
-    fn may_differ_by_so_little(
-        &self,
-        query: &Query<'_>,
-        away: DVec3,
-        distance: f64,
-        own: f64,
-    ) -> bool {
-        let (ball, measure) = (query.ball, query.measure);
-        let near = distance - own - ball.radius;
-        let least_here = query.here - ball.radius;
-        if !(near > 0.0 && least_here > 0.0) {
-            return true;
-        }
-        let across = ball.center.cross(away).length_squared();
-        let along = ball.center.dot(away);
-        // Most are too far aside, and for a point that takes no division: the angle is more than
-        // its sine, and what they subtend less than 1.011 of its sine.
-        let aside = query.here * (distance * (query.most + SLACK) + 1.011 * own);
-        if ball.radius == 0.0
-            && along > 0.0
-            && own < 0.25 * distance
-            && across > (aside * aside) * (1.0 + SLACK)
-        {
-            return false;
-        }
-        // How little any of them can differ from the ball's middle, and by how much less from
-        // elsewhere in it: the gradients of both the angle between viewer and view and the
-        // logarithm of the ratio of their distances are as long as their distance over the
-        // product of the two.
-        let vary = if ball.radius > 0.0 {
-            ball.radius * self.far / (near * least_here) + SLACK
-        } else {
-            SLACK
-        };
-        let by_distance = 1.0 / distance;
-        let sine = ball.center.cross(away).length() * (query.by_here * by_distance);
-        let between =
-            less_than_angle(sine, ball.center.dot(away)) - more_than_asin(own * by_distance) - vary;
-        let coarser = if measure.by_length {
-            near - query.here - ball.radius
-        } else {
-            self.footprint_ratio * ((distance - own) * query.by_here) * (1.0 - vary) - 1.0
-        };
-        let least = between.max(0.0) + measure.beta * (coarser - SLACK).max(0.0);
-        // What is no number is kept.
-        !(least > query.most)
-    }
 }

@@ -50,7 +50,10 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         .collect();
     epipoles.sort_by(Epipole::order);
     let of_cell = |epipoles: &[Epipole]| {
-        let strong = epipoles.iter().filter(|e| !is_behind_two(frame, e));
+        let mut nearer = Vec::new();
+        let strong = epipoles
+            .iter()
+            .filter(|e| !is_behind_two(frame, e, &mut nearer));
         let few = strong.take(EPIPOLES_PER_CELL);
         few.map(|e| (e.own.source_idx, e.at)).collect::<Vec<_>>()
     };
@@ -88,21 +91,30 @@ fn candidate_at(frame: &Frame<'_>, source_idx: usize, point: &ProxyPoint) -> Opt
 }
 
 /// Whether two source views count more at an epipole than its own: they differ less and see the
-/// point no less.
-fn is_behind_two(frame: &Frame<'_>, epipole: &Epipole) -> bool {
+/// point no less. `known` are views that are asked first: those that did at an epipole nearby, and in the end
+/// those that do here.
+fn is_behind_two(frame: &Frame<'_>, epipole: &Epipole, known: &mut Vec<u32>) -> bool {
     let Epipole { own, point, .. } = epipole;
     if own.diff <= SAME_RAY {
         return false;
     }
+    let counts_more = |i: &u32| {
+        let other = candidate_at(frame, *i as usize, point);
+        other.is_some_and(|c| {
+            c.diff < own.diff && c.fov >= own.fov && c.fov * c.mask >= own.fov * own.mask
+        })
+    };
+    if known.iter().filter(|i| counts_more(i)).nth(1).is_some() {
+        return true;
+    }
     let mut nearer = Vec::new();
     frame.views_within(Ball::around(point, 0.0).as_ref(), own.diff, &mut nearer);
-    let counts_more = |c: &Candidate| {
-        c.diff < own.diff && c.fov >= own.fov && c.fov * c.mask >= own.fov * own.mask
-    };
-    let candidates = nearer
-        .iter()
-        .map(|&i| candidate_at(frame, i as usize, point));
-    candidates.flatten().filter(counts_more).nth(1).is_some()
+    let two: Vec<u32> = nearer.into_iter().filter(counts_more).take(2).collect();
+    let is_behind = two.len() == 2;
+    if is_behind {
+        *known = two;
+    }
+    is_behind
 }
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.

@@ -1,0 +1,215 @@
+//! Eight source views, or parts of the hierarchy, that are asked together.
+
+use super::{Ball, GROUP, Measure, SLACK};
+use glam::DVec3;
+use std::array::from_fn;
+
+/// Of one view, or of all within a part of the hierarchy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// In the desired camera's frame.
+    pub(super) center: DVec3,
+    pub(super) radius: f64,
+    /// What they look along.
+    pub(super) axis: DVec3,
+    /// Cosine and sine of the angle from it within which all that they see lies; `None` where it
+    /// is all around.
+    pub(super) spread: Option<[f64; 2]>,
+    pub(super) footprint_ratio: f64,
+    /// How far from the viewer the farthest may be.
+    pub(super) far: f64,
+}
+
+impl Bounds {
+    /// Of all together; of one at least.
+    pub(super) fn around(all: &[Self]) -> Self {
+        // 1. Their sphere, around the middle of their box.
+        let (least, most) = all.iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(least, most), one| {
+                let radius = DVec3::splat(one.radius);
+                (
+                    least.min(one.center - radius),
+                    most.max(one.center + radius),
+                )
+            },
+        );
+        let center = 0.5 * (least + most);
+        let reach = all.iter().map(|b| b.center.distance(center) + b.radius);
+        let radius = reach.fold(0.0, f64::max);
+        // 2. Their cone: an angle from the common axis is at most that of their own axis and what they see
+        // from that.
+        let axis = all.iter().map(|b| b.axis).sum::<DVec3>();
+        let axis = axis.normalize_or(DVec3::Z);
+        let mut spread = Some([1.0, 0.0]);
+        for one in all {
+            let from_axis = one.spread.and_then(|[own_cos, own_sin]| {
+                let (cos, sin) = (axis.dot(one.axis), axis.cross(one.axis).length());
+                let sum = [cos * own_cos - sin * own_sin, sin * own_cos + cos * own_sin];
+                // Beyond π the sine of the sum is negative.
+                (sum[1] >= 0.0).then_some([sum[0] - 2.0 * SLACK, sum[1]])
+            });
+            spread = match (spread, from_axis) {
+                (Some(widest), Some(own)) if own[0] >= widest[0] => Some(widest),
+                (Some(_), own) => own,
+                (None, _) => None,
+            };
+        }
+        let ratios = all.iter().map(|b| b.footprint_ratio);
+        Self {
+            center,
+            radius,
+            axis,
+            spread,
+            footprint_ratio: ratios.fold(f64::INFINITY, f64::min),
+            far: center.length() + radius,
+        }
+    }
+}
+
+/// A number of each.
+type Each = [f64; GROUP];
+
+#[inline(always)]
+fn each(f: impl Fn(usize) -> f64) -> Each {
+    let mut all = [0.0; GROUP];
+    for i in 0..GROUP {
+        all[i] = f(i);
+    }
+    all
+}
+
+/// The bounds of eight, side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    center: [Each; 3],
+    radius: Each,
+    axis: [Each; 3],
+    spread: [Each; 2],
+    footprint_ratio: Each,
+    far: Each,
+}
+
+/// What is asked.
+pub(super) struct Query {
+    ball: Ball,
+    measure: Measure,
+    most: f64,
+    /// From the viewer to the ball's middle, and one over it.
+    here: f64,
+    by_here: f64,
+}
+
+impl Query {
+    pub(super) fn new(ball: &Ball, measure: Measure, most: f64) -> Self {
+        let here = ball.center.length();
+        Self {
+            ball: *ball,
+            measure,
+            most,
+            here,
+            by_here: 1.0 / here,
+        }
+    }
+}
+
+impl Group {
+    /// Of one to eight; in place of those that are missing the last.
+    pub(super) fn new(bounds: &[Bounds]) -> Self {
+        let all: [Bounds; GROUP] = from_fn(|i| bounds[i.min(bounds.len() - 1)]);
+        // All around: half a turn.
+        let spread = all.map(|b| b.spread.unwrap_or([-1.0, 0.0]));
+        Self {
+            center: [0, 1, 2].map(|axis| all.map(|b| b.center[axis])),
+            radius: all.map(|b| b.radius),
+            axis: [0, 1, 2].map(|axis| all.map(|b| b.axis[axis])),
+            spread: [0, 1].map(|k| spread.map(|s| s[k])),
+            footprint_ratio: all.map(|b| b.footprint_ratio),
+            far: all.map(|b| b.far),
+        }
+    }
+
+    /// Which of them can differ by as little as is asked for and may see something.
+    #[inline(always)]
+    pub(super) fn may_matter(&self, query: &Query) -> [bool; GROUP] {
+        let (ball, here, by_here) = (&query.ball, query.here, query.by_here);
+        let [cx, cy, cz] = ball.center.to_array();
+        let away = [0, 1, 2].map(|k| each(|i| ball.center[k] - self.center[k][i]));
+        let [x, y, z] = &away;
+        let distance = each(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt());
+        let own = each(|i| self.radius[i] + SLACK * (here + self.far[i]));
+
+        // 1. How little they can differ from the viewer: the angle at the ball's middle less what they
+        // subtend. From elsewhere in the ball it differs by how much: the gradients of both the angle between viewer
+        // and view and the logarithm of the ratio of their distances are as long as their distance over the
+        // product of the two.
+        let near = each(|i| distance[i] - own[i] - ball.radius);
+        let least_here = here - ball.radius;
+        let vary = match ball.radius > 0.0 {
+            true => each(|i| ball.radius * self.far[i] / (near[i] * least_here) + SLACK),
+            false => [SLACK; GROUP],
+        };
+        let across = [
+            each(|i| cy * z[i] - cz * y[i]),
+            each(|i| cz * x[i] - cx * z[i]),
+            each(|i| cx * y[i] - cy * x[i]),
+        ];
+        let [p, q, r] = &across;
+        let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
+        let along = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
+        let by_distance = each(|i| 1.0 / distance[i]);
+        // At most the angle: its sine, or one where that is obtuse.
+        let angle = each(|i| match along[i] > 0.0 {
+            true => across[i] * (by_here * by_distance[i]),
+            false => 1.0,
+        });
+        let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - vary[i]);
+        let measure = query.measure;
+        let coarser = match measure.by_length {
+            true => each(|i| near[i] - here - ball.radius),
+            false => each(|i| {
+                self.footprint_ratio[i] * ((distance[i] - own[i]) * by_here) * (1.0 - vary[i]) - 1.0
+            }),
+        };
+        let least =
+            each(|i| at_least_0(between[i]) + measure.beta * at_least_0(coarser[i] - SLACK));
+
+        // 2. Where the ball lies: not in sight of what it is farther from the axis than they see, and it
+        // subtends. The cosine and sine of what it subtends, and of the sum of both angles, all by the distance;
+        // the sum is beyond π where its sine is negative.
+        let reach = each(|i| own[i] + ball.sight);
+        let sharp =
+            each(|i| at_least_0((distance[i] - reach[i]) * (distance[i] + reach[i])).sqrt());
+        let [cos, sin] = &self.spread;
+        let sum_cos = each(|i| cos[i] * sharp[i] - sin[i] * reach[i]);
+        let sum_sin = each(|i| sin[i] * sharp[i] + cos[i] * reach[i]);
+        let [ax, ay, az] = &self.axis;
+        let before = each(|i| ax[i] * x[i] + ay[i] * y[i] + az[i] * z[i]);
+
+        // 3. What is no number is kept.
+        let mut may = [false; GROUP];
+        for i in 0..GROUP {
+            let is_around = !(near[i] > 0.0) | !(least_here > 0.0);
+            let is_little = is_around | !(least[i] > query.most);
+            let is_far = (reach[i] < distance[i])
+                & (sum_sin[i] > 0.0)
+                & (before[i] < sum_cos[i] - SLACK * distance[i]);
+            may[i] = is_little & !is_far;
+        }
+        may
+    }
+}
+
+/// Zero where it is less, or no number.
+#[inline(always)]
+fn at_least_0(x: f64) -> f64 {
+    if x > 0.0 { x } else { 0.0 }
+}
+
+/// At least asin x, of 0…1.
+#[inline(always)]
+fn more_than_asin(x: f64) -> f64 {
+    // x over asin x falls steadily.
+    let steep = if x < 0.5 { 1.048 } else { 1.571 };
+    x * if x < 0.25 { 1.011 } else { steep }
+}
