@@ -119,8 +119,18 @@ impl FieldOptions {
     }
 
     /// The threshold t among views that all see the whole of what matters (a = 1), from
-    /// their differences, which it sorts. More views can only lower it.
+    /// their differences, of which it sorts those that matter. More views can only lower it.
     pub(crate) fn threshold_of_seen(&self, diffs: &mut [f64]) -> f64 {
+        // The one after the last that may contribute caps it.
+        let last = MAX_CONTRIBUTORS.max(self.k);
+        let diffs = match diffs.len() > last + 1 {
+            true => {
+                let (below, ..) = diffs.select_nth_unstable_by(last, f64::total_cmp);
+                let count = below.len() + 1;
+                &mut diffs[..count]
+            }
+            false => diffs,
+        };
         diffs.sort_unstable_by(f64::total_cmp);
         match self.blend {
             Blend::Paper => diffs.get(self.k - 1).copied().unwrap_or(f64::INFINITY),

@@ -49,8 +49,11 @@ enum Sees {
 struct Listed {
     source_idx: usize,
     sees: Sees,
-    /// By corner: its difference there.
+    /// By corner: its difference there; infinite while it is not known.
     diffs: [f64; 3],
+    /// Of those that are not known, which may be within what the corner was asked for: it has told of all
+    /// that are and have it in their images, and maybe of no others.
+    unsure: [bool; 3],
 }
 
 impl List {
@@ -73,6 +76,11 @@ impl List {
         let mut listed = triangle.known();
         let mut bounds = triangle.bounds(&listed);
         if (0..3).any(|c| bounds[c] > corners[c].near.within) {
+            // What was not known may matter.
+            listed.iter_mut().for_each(|view| triangle.measure(view));
+            bounds = triangle.bounds(&listed);
+        }
+        if (0..3).any(|c| bounds[c] > corners[c].near.within) {
             triangle.add(triangle.others_within(bounds), &mut listed);
             bounds = triangle.bounds(&listed);
         }
@@ -87,6 +95,7 @@ impl List {
                         source_idx,
                         sees: Sees::Part,
                         diffs: triangle.points.map(|p| frame.difference(source_idx, &p)),
+                        unsure: [false; 3],
                     };
                     listed.insert(at, view);
                 }
@@ -94,9 +103,14 @@ impl List {
         }
 
         // 3. A view that differs by more at every corner cannot contribute anywhere.
-        listed.retain(|view| {
-            somewhere.binary_search(&view.source_idx).is_ok()
-                || view.sees != Sees::Nothing && (0..3).any(|c| view.diffs[c] <= bounds[c])
+        listed.retain_mut(|view| {
+            let stays = somewhere.binary_search(&view.source_idx).is_ok()
+                || view.sees != Sees::Nothing
+                    && (0..3).any(|c| triangle.difference(view, c) <= bounds[c]);
+            if stays {
+                triangle.measure(view);
+            }
+            stays
         });
         let bordered = listed.iter().any(|view| view.sees == Sees::Part);
         if !bordered && !weights_turn_over(corners) {
@@ -207,16 +221,14 @@ impl Triangle<'_> {
                 next[c] += usize::from(is_known);
                 is_known.then(|| nears[c].of_views[next[c] - 1])
             });
-            let at = self.at_corners(i as usize, known);
             let Some(crowds) = &mut crowds else {
-                listed.push(self.listed(i as usize, at));
+                listed.push(self.listed(i as usize, known));
                 continue;
             };
-            let alike = crowds
-                .entry(at.map(|(diff, _)| diff.to_bits()))
-                .or_insert(0);
+            let mut view = self.listed(i as usize, known);
+            self.measure(&mut view);
+            let alike = crowds.entry(view.diffs.map(f64::to_bits)).or_insert(0);
             if *alike <= MAX_CONTRIBUTORS {
-                let view = self.listed(i as usize, at);
                 *alike += usize::from(view.sees == Sees::All);
                 listed.push(view);
             }
@@ -230,29 +242,46 @@ impl Triangle<'_> {
         for i in others.into_iter().map(|i| i as usize) {
             let before = listed[..known].binary_search_by_key(&i, |view| view.source_idx);
             if before.is_err() {
-                listed.push(self.listed(i, self.at_corners(i, [None; 3])));
+                let mut view = self.listed(i, [None; 3]);
+                self.measure(&mut view);
+                listed.push(view);
             }
         }
         listed.sort_unstable_by_key(|view| view.source_idx);
     }
 
-    /// A source view's difference and pixel at the corners, where they are not known yet.
-    fn at_corners(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> [AtCorner; 3] {
-        [0, 1, 2].map(|c| {
-            let point = &self.points[c];
-            known[c].unwrap_or_else(|| {
-                let diff = self.frame.difference(source_idx, point);
-                (diff, self.frame.project(source_idx, point))
-            })
-        })
-    }
-
     /// How a source view sees the triangle; with what is known of it at the corners.
-    fn listed(&self, source_idx: usize, at: [AtCorner; 3]) -> Listed {
+    fn listed(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> Listed {
+        let frame = self.frame;
+        let pixels = [0, 1, 2].map(|c| {
+            let project = || frame.project(source_idx, &self.points[c]);
+            known[c].map_or_else(project, |(_, pixel)| pixel)
+        });
+        let is_in_image = |pixel: Pixel| frame.fov_blend(source_idx, pixel) >= 0.0;
         Listed {
             source_idx,
-            sees: self.how_it_is_seen(source_idx, at.map(|a| a.1)),
-            diffs: at.map(|a| a.0),
+            sees: self.how_it_is_seen(source_idx, pixels),
+            diffs: known.map(|at| at.map_or(f64::INFINITY, |(diff, _)| diff)),
+            unsure: [0, 1, 2].map(|c| known[c].is_none() && !pixels[c].is_some_and(is_in_image)),
+        }
+    }
+
+    /// A view's difference at a corner, if it can be what the corner was asked for; else more than that.
+    fn difference(&self, view: &mut Listed, c: usize) -> f64 {
+        if view.unsure[c] {
+            view.unsure[c] = false;
+            view.diffs[c] = self.frame.difference(view.source_idx, &self.points[c]);
+        }
+        view.diffs[c]
+    }
+
+    /// Finds what is not known of a view's differences.
+    fn measure(&self, view: &mut Listed) {
+        view.unsure = [false; 3];
+        for c in 0..3 {
+            if view.diffs[c] == f64::INFINITY {
+                view.diffs[c] = self.frame.difference(view.source_idx, &self.points[c]);
+            }
         }
     }
 
