@@ -14,9 +14,10 @@ use std::time::Instant;
 
 /// Make an interior's layered depth images as files, so that no walk has to wait for them
 ///
-/// They lie in the interior's folder, in ldi/: one for each side of each portal, with --ldi-views several.
-/// `walk` and `view` read those that were made with the same options, of files as they are now, and make the
-/// rest; the pictures are the same. Run again, it makes what is missing; after a change, all of them.
+/// They lie in the interior's folder, in ldi/: one for each side of each portal, several with
+/// --ldi-views. `walk` and `view` read those that were made with the same options, of files as
+/// they are now, and make the rest; the pictures are the same. Run again, it makes what is
+/// missing; after a change, all of them.
 ///
 ///     lumigraph ldis house
 ///     lumigraph ldis house --ldi-views 3

@@ -20,9 +20,9 @@ pub(super) struct ReferenceArgs {
     /// were taken (views where none sees the portal), or views that photos are blended into
     #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
     ldi_from: LdiFrom,
-    /// Make LDIs of views of the N views nearest to the viewer, and the middle one; walks make them ahead of need
-    /// as one goes on, by a thread of low priority; frames go from one to the next by where they are drawn from, so they
-    /// are the same in whatever order [default: all views make one]
+    /// Make LDIs of views of the N views nearest to the viewer, and the middle one; a walk makes what has no file
+    /// ahead of need, by a thread of low priority; frames go from one to the next by where they are drawn from, so
+    /// they are the same in whatever order [default: all views make one]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=999))]
     ldi_views: Option<u16>,
     /// Draw the model's own colours, not the photos of a capture's rooms

@@ -223,10 +223,17 @@ fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
         let (_, [made, read], notes) = walked(here, more);
         assert!(made > 0 && read == 0 && notes.contains(said), "{notes}");
     }
-    // A photo, and a camera of the calibration.
+    // A photo, and a camera of the calibration by its last bit.
     let photo = names(&here.join("hall/images")).remove(0);
     let photo = here.join("hall/images").join(photo);
     std::fs::write(&photo, std::fs::read(&photo).unwrap()).unwrap();
     let notes = walked(here, "").2;
     assert!(notes.contains("of other files: ../hall/images/"), "{notes}");
+    let cameras = here.join("hall/sparse/0/cameras.bin");
+    let mut bytes = std::fs::read(&cameras).unwrap();
+    let last_number = bytes.len() - 8;
+    bytes[last_number] ^= 1;
+    std::fs::write(&cameras, bytes).unwrap();
+    let notes = walked(here, "").2;
+    assert!(notes.contains("other options: calibration was "), "{notes}");
 }

@@ -14,6 +14,7 @@ use proxy::mesh::Model;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::SystemTime;
 
 mod files;
 mod options;
@@ -65,8 +66,8 @@ pub struct Library {
     /// Of each portal and direction, one after the other: which places, from left to right.
     sides: Vec<Range<usize>>,
     shelf: Shelf,
-    /// Of each place, the file that its LDI is in, if there is one.
-    files: Vec<Option<PathBuf>>,
+    /// Of each place, the file that its LDI is in, if there is one, and when it was written.
+    files: Vec<Option<(PathBuf, SystemTime)>>,
     /// The most bytes that an LDI took.
     largest_ldi: u64,
 }

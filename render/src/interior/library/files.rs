@@ -5,8 +5,10 @@ use crate::RenderError;
 use crate::interior::neighbourhood;
 use crate::ldi::{LdiFileError, read_before};
 use proxy::interior::Interior;
+use std::fs::Metadata;
 use std::io::ErrorKind;
 use std::path::Path;
+use std::time::SystemTime;
 
 /// Longer names of portals and cells are cut off there.
 const LONGEST: usize = 32;
@@ -42,22 +44,25 @@ impl Library {
     }
 
     /// From now on LDIs that have a file in this folder are read, not made. Which there are is looked up here,
-    /// once; they must be those that would be made.
+    /// once; they must be those that would be made. What is written there later is of no use.
     pub fn use_files(&mut self, folder: &Path, interior: &Interior) {
         for place in self.ldi_places() {
             let file = folder.join(self.file_name(place, interior));
-            self.files[place] = file.is_file().then_some(file);
+            self.files[place] = written(&file).map(|when| (file, when));
         }
     }
 
-    /// The LDI of a place out of its file; nothing where there is none, or none any more.
+    /// The LDI of a place out of its file; nothing where there is none, or not the same any more.
     ///
     /// # Errors
     /// A file that cannot be read, or holds something else.
     pub fn read(&self, place: usize) -> Result<Option<PortalLdi>, RenderError> {
-        let Some(file) = &self.files[place] else {
+        let Some((file, when)) = &self.files[place] else {
             return Ok(None);
         };
+        if written(file) != Some(*when) {
+            return Ok(None);
+        }
         let center = neighbourhood::middle(&self.side_of(place));
         match read_before(file, &self.places[center]) {
             Ok(ldi) => Ok(Some(PortalLdi::new(ldi))),
@@ -67,6 +72,12 @@ impl Library {
             Err(error) => Err(RenderError::LdiFile(error.to_string())),
         }
     }
+}
+
+/// When a file was written; nothing where there is none.
+fn written(file: &Path) -> Option<SystemTime> {
+    let found = file.metadata().ok().filter(Metadata::is_file)?;
+    found.modified().ok()
 }
 
 /// A name as every file system takes it.
