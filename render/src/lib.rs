@@ -82,4 +82,7 @@ pub enum RenderError {
     /// The graphics device is gone for good, as after a reset of its driver.
     #[error("graphics device: it was lost ({0})")]
     DeviceLost(String),
+    /// The file of a layered depth image cannot be used.
+    #[error("{0} (`lumigraph ldis` makes it again; where it is removed, the walk does)")]
+    LdiFile(String),
 }

@@ -13,6 +13,7 @@ use proxy::{MeshKind, Proxy, Solid};
 use render::interior::{Captured, Painter};
 use render::{DeviceChoice, Engine, FieldOptions, Method};
 use std::collections::BTreeSet;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -104,6 +105,18 @@ pub(super) struct Photos {
     pub(super) exposure: ExposureUsed,
 }
 
+/// The hash of Fowler, Noll and Vo, 1a: the same on every machine.
+struct Fnv(u64);
+
+impl Write for Fnv {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        for byte in text.bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        Ok(())
+    }
+}
+
 /// Cells across the image's longer side of the blending field's grid.
 const GRID: u32 = 32;
 
@@ -150,6 +163,24 @@ impl Photos {
     /// The scene's files; see [`files_of`].
     fn files(&self) -> Vec<PathBuf> {
         files_of(&self.scene)
+    }
+
+    /// A number that other cameras, sparse points, gains or scales of depth would most likely not have:
+    /// calibrations come in files of many kinds.
+    pub(super) fn fingerprint(&self) -> String {
+        let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+        let known = &self.scene.reconstruction;
+        let images = known.images.values();
+        let images = images.map(|i| (&i.name, i.camera_id, i.camera_from_world));
+        let photos = self.scene.photos.iter();
+        let photos = photos.map(|p| (&p.name, p.gain, p.depth_scale, p.depth_bounds));
+        let points = known.points.values().map(|point| point.position);
+        // Writing to it fails never.
+        let _ = write!(hash, "{:?}", known.cameras);
+        images.for_each(|image| _ = write!(hash, "{image:?}"));
+        photos.for_each(|photo| _ = write!(hash, "{photo:?}"));
+        points.for_each(|point| _ = write!(hash, "{point:?}"));
+        format!("{:016x}", hash.0)
     }
 
     /// What draws the model's surface from them, with so many bytes for decoded photos. What is

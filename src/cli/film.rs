@@ -3,15 +3,14 @@
 use super::Usage;
 use super::options::positive;
 use super::output::write_file;
+use super::stamp::{Stamp, changes, stamps};
 use anyhow::{Context, bail};
 use image::{Rgba, RgbaImage};
 use lumigraph::scene::{Photo, Scene};
 use render::score::on_black;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 /// Which frames: so many of a derived path, or a part of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,28 +144,6 @@ struct Plan {
     inputs: Vec<Stamp>,
 }
 
-/// A file as it was.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Stamp {
-    file: PathBuf,
-    bytes: u64,
-    /// Nanoseconds after 1970 at which it was last written.
-    modified_ns: u64,
-}
-
-impl Stamp {
-    /// `None` of what is no file, as the name of a derived path.
-    fn of(file: &Path) -> Option<Self> {
-        let found = std::fs::metadata(file).ok().filter(|m| m.is_file())?;
-        let modified = found.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
-        Some(Self {
-            file: file.to_owned(),
-            bytes: found.len(),
-            modified_ns: u64::try_from(modified.as_nanos()).ok()?,
-        })
-    }
-}
-
 /// The files of a scene that decide what its pictures are.
 pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
     let of_photo = |p: &Photo| {
@@ -183,48 +160,13 @@ pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
     own.chain(scene.photos.iter().flat_map(of_photo)).collect()
 }
 
-/// More files than these are not named.
-const NAMED: usize = 3;
-
-/// What became of files, for people; empty of files as they were.
-fn changes(before: &[Stamp], now: &[Stamp]) -> String {
-    let by_file = |all: &[Stamp]| -> BTreeMap<PathBuf, Stamp> {
-        all.iter().map(|s| (s.file.clone(), s.clone())).collect()
-    };
-    let (was, is) = (by_file(before), by_file(now));
-    let gone = before.iter().filter(|s| !is.contains_key(&s.file));
-    let gone = gone.map(|s| format!("{} is gone", s.file.display()));
-    let other = now.iter().filter_map(|s| match was.get(&s.file) {
-        None => Some(format!("{} is new", s.file.display())),
-        Some(was) if was.bytes != s.bytes => Some(format!(
-            "{} has {} bytes, not {}",
-            s.file.display(),
-            s.bytes,
-            was.bytes
-        )),
-        Some(was) if was != s => Some(format!("{} was written since", s.file.display())),
-        Some(_) => None,
-    });
-    let all: Vec<String> = gone.chain(other).collect();
-    let named = all
-        .iter()
-        .take(NAMED)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
-    match all.len().saturating_sub(NAMED) {
-        0 => named,
-        more => format!("{named}, and {more} more"),
-    }
-}
-
 /// Where a run with `--resume` says what it makes.
 const PLAN: &str = "resume.json";
 
 impl Plan {
     /// This run's, without what decides no pixel.
     fn own(inputs: &[PathBuf]) -> Self {
-        const ALONE: [&str; 2] = ["--resume", "--json"];
+        const ALONE: [&str; 3] = ["--resume", "--json", "--no-ldi-files"];
         const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
         let mut arguments = Vec::new();
         // `--fps=30` is `--fps 30`.
@@ -246,12 +188,10 @@ impl Plan {
                 arguments.push(argument);
             }
         }
-        let mut stamps: Vec<Stamp> = inputs.iter().filter_map(|file| Stamp::of(file)).collect();
-        stamps.sort_by(|a, b| a.file.cmp(&b.file));
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             arguments,
-            inputs: stamps,
+            inputs: stamps(inputs, Path::to_owned),
         }
     }
 }
@@ -367,24 +307,6 @@ mod tests {
         ] {
             assert!(frame_choice(bad).is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn what_became_of_files_is_said() {
-        let stamp = |name: &str, bytes: u64, modified_ns: u64| Stamp {
-            file: PathBuf::from(name),
-            bytes,
-            modified_ns,
-        };
-        let before = ["a", "b", "c", "d"].map(|name| stamp(name, 5, 7));
-        assert_eq!(changes(&before, &before), "");
-        let now = [stamp("b", 5, 8), stamp("c", 6, 9), stamp("d", 5, 7)];
-        let expected = "a is gone, b was written since, c has 6 bytes, not 5";
-        assert_eq!(changes(&before, &now), expected);
-        assert_eq!(
-            changes(&[], &before),
-            "a is new, b is new, c is new, and 1 more"
-        );
     }
 
     #[test]

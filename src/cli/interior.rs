@@ -1,6 +1,7 @@
 //! `lumigraph interior`
 
 use super::Usage;
+use super::made;
 use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
@@ -281,7 +282,7 @@ pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
     Ok((path, interior))
 }
 
-/// Whether a folder holds an interior, one model and perhaps a floor plan, and nothing else.
+/// Whether a folder holds an interior, one model and perhaps a floor plan and LDIs, and nothing else.
 fn is_ours(folder: &Path) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return false;
@@ -295,7 +296,8 @@ fn is_ours(folder: &Path) -> bool {
     let is_model =
         |name: &std::ffi::OsString| Path::new(name).extension().is_some_and(|e| e == "glb");
     let is_known = |name: &std::ffi::OsString| {
-        name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG || is_model(name)
+        let is_file = name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG || is_model(name);
+        is_file || (name == made::FOLDER && made::is_ours(&folder.join(name)))
     };
     let models = names.iter().filter(|name| is_model(name)).count();
     names.iter().any(|name| name == INTERIOR) && models <= 1 && names.iter().all(is_known)

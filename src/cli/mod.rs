@@ -15,7 +15,9 @@ mod import;
 mod info;
 mod info_of_file;
 mod interior;
+mod ldis;
 mod ledger;
+mod made;
 mod npz;
 mod options;
 mod output;
@@ -23,9 +25,11 @@ mod path;
 mod plan;
 mod plot;
 mod proxy;
+mod references;
 mod render;
 mod report;
 mod session;
+mod stamp;
 mod surface;
 mod time;
 mod uncalibrated;
@@ -66,6 +70,7 @@ enum Command {
     Path(path::Args),
     Interior(interior::Args),
     Plan(plan::Args),
+    Ldis(ldis::Args),
     Walk(walk::Args),
     #[cfg(feature = "window")]
     View(view::Args),
@@ -121,6 +126,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Path(args) => path::run(&args),
         Command::Interior(args) => interior::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Ldis(args) => ldis::run(&args),
         Command::Walk(args) => walk::run(&args),
         #[cfg(feature = "window")]
         Command::View(args) => view::run(&args),

@@ -1,9 +1,10 @@
 //! `lumigraph view`
 
 use super::Usage;
-use super::captured::Opened;
+use super::captured::{Opened, Photos};
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
+use super::made::Made;
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text};
@@ -11,7 +12,7 @@ use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
 use render::DeviceChoice;
-use render::interior::{PortalFill, WalkOptions};
+use render::interior::{CAPTURED_REFERENCE_SIZE, LibraryOptions, Painter, PortalFill, WalkOptions};
 use render::path::read_keyframes;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -114,7 +115,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if !given.exists() {
         args.scene.open()?;
     }
-    let load = Load::of(args);
+    let load = Load::of(args, walk.library);
     // Threads of its own: pictures must not wait until a piece of the fitting is done.
     let threads = rayon::current_num_threads();
     let pool = rayon::ThreadPoolBuilder::new()
@@ -146,10 +147,11 @@ struct Load {
     at: AtArgs,
     device: DeviceChoice,
     budget: Option<u64>,
+    library: LibraryOptions,
 }
 
 impl Load {
-    fn of(args: &Args) -> Self {
+    fn of(args: &Args, library: LibraryOptions) -> Self {
         Self {
             scene: args.scene.clone(),
             hold_out: args.hold_out.clone(),
@@ -159,6 +161,7 @@ impl Load {
             at: args.at.clone(),
             device: args.draw.device(),
             budget: args.draw.cpu_memory,
+            library,
         }
     }
 
@@ -179,13 +182,33 @@ impl Load {
         teller.doing("reading the model");
         let warn = |text| teller.say(Progress::Note(text));
         let opened = Opened::new(given, Some(&self.exposure), warn)?;
+        let (file, files) = (opened.file.clone(), opened.files());
+        // The folder of LDIs that were made as they would be here.
+        let ldis = |painter: &Painter, photos: Option<&Photos>| {
+            let mut options = self.library;
+            if photos.is_some() {
+                options.size = CAPTURED_REFERENCE_SIZE;
+            }
+            let made = Made::new(&file, &files, &options, painter, photos)?;
+            made.usable(&file, |text| teller.say(Progress::Note(text)))
+        };
         let mut house = House::new(opened.interior, opened.contents, opened.model);
-        if let Some(photos) = opened.photos {
-            teller.doing("measuring what photos see");
-            let (device, budget) = (self.device, self.budget);
-            house = house.with_photos(|interior, contents, model| {
-                photos.painter(device, budget, interior, contents, model)
-            })?;
+        let mut folder = None;
+        match &opened.photos {
+            Some(photos) => {
+                teller.doing("measuring what photos see");
+                let (device, budget) = (self.device, self.budget);
+                house = house.with_photos(|interior, contents, model| {
+                    let painter = photos.painter(device, budget, interior, contents, model)?;
+                    folder = ldis(&painter, Some(photos))?;
+                    anyhow::Ok(painter)
+                })?;
+            }
+            // Images of a model are the CPU's.
+            None => folder = ldis(&Painter::cpu(), None)?,
+        }
+        if let Some(folder) = folder {
+            house = house.with_ldis(folder);
         }
         teller.show(Content::Interior(Arc::new(house)));
         Ok(())

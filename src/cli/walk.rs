@@ -4,12 +4,13 @@ mod report;
 
 use super::Usage;
 use super::captured::{Opened, Photos};
-use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::options::{bytes, resized, size};
+use super::made::Made;
+use super::options::{resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
 use super::plot::{Line, plot};
+use super::references::ReferenceArgs;
 use super::session::progress;
 use anyhow::{Context, bail};
 use calibrate::{Camera, Lens, View};
@@ -18,10 +19,8 @@ use cpu_time::ProcessTime;
 use glam::DVec2;
 use lumigraph::scene::{Truth, picture_files};
 use proxy::interior::{CellId, Interior};
-use render::interior::{
-    CAPTURED_REFERENCE_SIZE, LdiSource, PortalFill, Splat, Tour, Walk, WalkOptions,
-};
-use render::{DeviceChoice, path};
+use render::interior::{Painter, PortalFill, Splat, Tour, Walk, WalkOptions};
+use render::path;
 use report::{Drawn, Scored, Walked, ms};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -69,21 +68,11 @@ pub(super) struct Args {
     /// Size of the frames in pixels [default: the path's own; of a tour 640x512]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
-    /// Size of the reference images before portals [default: 256x256; of a capture's rooms 512x512]
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    reference_size: Option<(u32, u32)>,
-    /// Reference images before each side of a portal: an odd number
-    #[arg(long, value_name = "N", default_value_t = 13)]
-    reference_views: usize,
-    /// What LDIs of a capture's rooms are made of: its photos with depth maps themselves, wherever they
-    /// were taken (views where none sees the portal), or views that photos are blended into
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
-    ldi_from: LdiFrom,
-    /// Make LDIs of views of the N views nearest to the viewer, and the middle one, ahead of need as one walks on,
-    /// by a thread of low priority; frames go from one to the next by where they are drawn from, so they
-    /// are the same in whatever order [default: all views make one]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=999))]
-    ldi_views: Option<u16>,
+    #[command(flatten)]
+    references: ReferenceArgs,
+    /// Make all LDIs, though there are files of them (`lumigraph ldis`). The same bytes, later
+    #[arg(long)]
+    no_ldi_files: bool,
     /// Draw samples as squares of so many pixels, not as large as their footprints
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
@@ -94,18 +83,6 @@ pub(super) struct Args {
     /// Keep the last frame's colours where no image shows anything
     #[arg(long, conflicts_with = "resume")]
     persist: bool,
-    /// Draw the model's own colours, not the photos of a capture's rooms
-    #[arg(long)]
-    no_photos: bool,
-    #[command(flatten)]
-    exposure: ExposureArgs,
-    /// What draws geometry; auto is the graphics processor if there is one, else the CPU
-    #[arg(long, value_enum, default_value = "auto")]
-    device: Device,
-    /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames, and decoded photos,
-    /// too; those not used for longest are made again when they are needed [default: no limit]
-    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
-    cpu_memory: Option<u64>,
     /// Leave nothing out, or nothing of what is named, though no picture needs it: cells as a whole,
     /// columns of LDIs that are out of sight. The same bytes, later
     #[arg(long, value_enum, value_name = "WHAT", num_args = 0.., require_equals = true,
@@ -129,19 +106,6 @@ enum NoSkip {
     Columns,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum LdiFrom {
-    Views,
-    Photos,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Device {
-    Auto,
-    Gpu,
-    Cpu,
-}
-
 /// The tour's own size, that of Rafferty et al. 1998.
 const SIZE: (u32, u32) = (640, 512);
 const FPS: f64 = 15.0;
@@ -152,11 +116,7 @@ const FOCAL: f64 = 0.7;
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // 1. What to do.
     let fills = fills(&args.portals)?;
-    if args.reference_views.is_multiple_of(2) || args.reference_views > 999 {
-        let found = args.reference_views;
-        let text = format!("--reference-views is {found}; expected an odd number up to 999");
-        return Err(Usage(text).into());
-    }
+    args.references.check()?;
     if let Some(near) = args.near.filter(|near| !(*near >= 0.0 && near.is_finite())) {
         let text = format!("--near is {near}; expected 0 or more");
         return Err(Usage(text).into());
@@ -169,10 +129,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = "--video makes a film of one kind of --portals";
         return Err(Usage(text.to_owned()).into());
     }
-    if args.reference_size.is_some_and(|(w, h)| w.max(h) > 4096) {
-        let text = "--reference-size: expected sides of up to 4096".to_owned();
-        return Err(Usage(text).into());
-    }
     let keeps = |what| args.no_skip.iter().any(|n| *n == NoSkip::All || *n == what);
     let defaults = WalkOptions::default();
     let mut options = WalkOptions {
@@ -184,29 +140,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         persist: args.persist,
         ..defaults
     };
-    options.library.semicircles.views = args.reference_views;
-    options.library.ldi_views = args.ldi_views.map(usize::from);
-    options.library.budget = args.cpu_memory;
-    options.library.ldi_of = match args.ldi_from {
-        LdiFrom::Views => LdiSource::Views,
-        LdiFrom::Photos => LdiSource::Photos,
-    };
-    let device = match args.device {
-        Device::Auto => DeviceChoice::Auto,
-        Device::Gpu => DeviceChoice::Gpu,
-        Device::Cpu => DeviceChoice::Cpu,
-    };
     // 2. What there is.
     let warn = |text| say!("warning: {text}");
-    let use_photos = !args.no_photos || args.held_out;
-    let exposure = use_photos.then_some(&args.exposure);
+    let references = &args.references;
+    let use_photos = !references.no_photos || args.held_out;
+    let exposure = use_photos.then_some(&references.exposure);
     let mut opened = Opened::new(&args.interior, exposure, warn)?;
     let named = || args.interior.display().to_string();
-    options.library.size = match (args.reference_size, &opened.photos) {
-        (Some(size), _) => size.into(),
-        (None, Some(_)) if !args.no_photos => CAPTURED_REFERENCE_SIZE,
-        _ => options.library.size,
-    };
+    options.library = references.options(opened.photos.is_some());
     let (frames, fps) = match args.held_out {
         true => (
             held_out(opened.photos.as_ref(), args.size).with_context(named)?,
@@ -217,17 +158,24 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut inputs = opened.files();
     inputs.extend(args.path.clone());
     // 3. The walks: one walker, so that images are made once for all kinds.
-    if args.no_photos {
+    if references.no_photos {
         opened.photos = None;
     }
     if let Some(photos) = &opened.photos {
         say!("exposure: {}", photos.exposure.text());
     }
-    let painter = opened.painter(device, args.cpu_memory)?;
+    let painter = opened.painter(references.device(), references.cpu_memory)?;
+    let ldis = match fills.contains(&PortalFill::Ldi) && !args.no_ldi_files {
+        true => ldi_files(&opened, &options, &painter)?,
+        false => None,
+    };
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     std::thread::scope(|scope| {
         let mut walk = Walk::with(painter, interior, contents, model, options);
         walk.make_ahead(scope)?;
+        if let Some(folder) = &ldis {
+            walk.use_ldi_files(folder);
+        }
         let walks = walk_all(args, &mut walk, &fills, &frames, &inputs)?;
         if let [walked] = &walks[..] {
             args.film.finish(&walked.files, fps)?;
@@ -237,6 +185,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
         report(args, &opened, &walk, &walks, frames.len())
     })
+}
+
+/// The folder of LDIs that `lumigraph ldis` made as this walk would, if it did.
+fn ldi_files(
+    opened: &Opened,
+    options: &WalkOptions,
+    painter: &Painter,
+) -> anyhow::Result<Option<PathBuf>> {
+    let (files, photos) = (opened.files(), opened.photos.as_ref());
+    let made = Made::new(&opened.file, &files, &options.library, painter, photos)?;
+    made.usable(&opened.file, |text| say!("note: {text}"))
 }
 
 /// Draws all frames, by each kind of portals.
@@ -446,11 +405,13 @@ fn draw(
         let mut scored = None;
         if let Some(truth) = &frame.truth {
             // Once more, when all that it needs is there.
-            let made = cost.references_made;
+            let first = cost;
             let start = ProcessTime::now();
             cost = walk.draw(&frame.view, fill).with_context(named)?;
             let cpu_ms = ms(start.elapsed());
-            cost.references_made += made;
+            cost.references_made += first.references_made;
+            cost.ldis_made += first.ldis_made;
+            cost.ldis_read += first.ldis_read;
             let score = truth.score(&walk.picture().picture())?;
             scored = Some(Scored { score, cpu_ms });
         }

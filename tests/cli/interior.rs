@@ -211,7 +211,7 @@ fn photos_of_another_house_do_so_too() {
     same_from_model_and_photos(folder.path(), &model, survey);
 }
 
-const HALVES: &str = r#"{"version": 1, "rooms": [
+pub(crate) const HALVES: &str = r#"{"version": 1, "rooms": [
     {"name": "front", "min": [-9, -9, -99], "max": [9, 9, -2]},
     {"name": "back", "min": [-9, -9, -2], "max": [9, 9, 99]}],
     "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,

@@ -57,7 +57,7 @@ pub(crate) fn run(folder: &Path, words: &[&str], variables: &[(&str, &str)]) -> 
     } else {
         words[0]
     };
-    if matches!(name, "render" | "evaluate" | "walk") && !words.contains(&"--device") {
+    if matches!(name, "render" | "evaluate" | "walk" | "ldis") && !words.contains(&"--device") {
         command.args(["--device", "cpu"]);
     }
     let Output {

@@ -8,6 +8,7 @@ use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
 use render::interior::{Painter, Tour};
 use render::{Lumigraph, Moment, SourceView};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the window shows.
@@ -34,6 +35,8 @@ pub struct House {
     cameras: Vec<Stop>,
     /// What draws it from photos, where some show it; taken by the first that draws.
     photos: Mutex<Option<Painter>>,
+    /// The folder of its layered depth images, where some were made as files.
+    ldis: Option<PathBuf>,
 }
 
 impl House {
@@ -47,7 +50,19 @@ impl House {
             obstacles,
             cameras: Vec::new(),
             photos: Mutex::new(None),
+            ldis: None,
         }
+    }
+
+    /// The same, with layered depth images in a folder: those that a walk with the window's options would make.
+    pub fn with_ldis(mut self, folder: PathBuf) -> Self {
+        self.ldis = Some(folder);
+        self
+    }
+
+    /// The folder of its layered depth images.
+    pub(crate) fn ldis(&self) -> Option<&Path> {
+        self.ldis.as_deref()
     }
 
     /// The same, drawn from photos. `make` gives what draws it, and may add to the model and its

@@ -278,6 +278,9 @@ impl<'s> Desk<'s> {
             if let Err(error) = walk.make_ahead(scope) {
                 (self.tell)(News::Trouble(format!("{error}; nothing is made ahead")));
             }
+            if let Some(folder) = house.ldis() {
+                walk.use_ldi_files(folder);
+            }
             let mut notes = 0;
             self.serve(|tell, request, reduction| {
                 let drawn = draw_house(house, &mut walk, request, reduction);

@@ -4,62 +4,22 @@ use super::neighbourhood::{self, Shown};
 use super::photographed::photographed;
 use super::recipe::{Made, Recipe};
 use super::shelf::Shelf;
-use super::{Captured, CellGeometry, REFERENCE_SIZE, Reference};
+use super::{Captured, CellGeometry, Reference};
 use crate::RenderError;
-use crate::ldi::{ClipTree, ConstructOptions, Layered, construct_of_photos};
+use crate::ldi::{ClipTree, Layered, construct_of_photos};
 use crate::residency::Residency;
 use glam::DVec3;
-use proxy::interior::{
-    CellId, Interior, PortalId, SemicircleOptions, SemicircleView, angle_before, semicircles,
-};
+use proxy::interior::{CellId, Interior, PortalId, SemicircleView, angle_before, semicircles};
 use proxy::mesh::Model;
 use std::ops::Range;
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::SystemTime;
 
-/// What LDIs are made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LdiSource {
-    /// Images drawn at the places of semicircles.
-    Views,
-    /// Photos with depth maps, wherever they were taken; images where none sees the portal, or there
-    /// are no photos.
-    #[default]
-    Photos,
-}
+mod files;
+mod options;
 
-/// How reference images are made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LibraryOptions {
-    /// Width and height in pixels, 1 to 4096.
-    pub size: [u32; 2],
-    /// Where they are made.
-    pub semicircles: SemicircleOptions,
-    /// What LDIs are made of.
-    pub ldi_of: LdiSource,
-    /// How many views, those nearest to the viewer, an LDI of views is made of beside the semicircle's
-    /// middle one, 1 or more: a side then has several LDIs, and between two of them both are shown, mixed. With
-    /// `None` all views of a semicircle make one. Pictures depend on where the viewer is, never on where
-    /// from or when. LDIs of photos are of all photos all the same.
-    pub ldi_views: Option<usize>,
-    /// How an LDI is made of them.
-    pub ldi: ConstructOptions,
-    /// The most bytes that they may take between frames; `None` for no limit. A frame has all
-    /// that it needs, even if they are more. No picture depends on it.
-    pub budget: Option<u64>,
-}
-
-impl Default for LibraryOptions {
-    fn default() -> Self {
-        Self {
-            size: REFERENCE_SIZE,
-            semicircles: SemicircleOptions::default(),
-            ldi_of: LdiSource::default(),
-            ldi_views: None,
-            ldi: ConstructOptions::default(),
-            budget: None,
-        }
-    }
-}
+pub use options::{LdiSource, LibraryOptions};
 
 /// A portal's LDI, from one side.
 #[derive(Clone, Debug)]
@@ -87,6 +47,17 @@ impl PortalLdi {
 /// Of some places, in order; nothing for one whose images make none.
 type Ldis = Vec<Arc<Option<PortalLdi>>>;
 
+/// What LDIs took that were not in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LdiCost {
+    /// LDIs made.
+    pub made: usize,
+    /// Reference images made for them.
+    pub images: usize,
+    /// LDIs read from files.
+    pub read: usize,
+}
+
 /// The places of all reference images, and those images and LDIs that are in memory.
 #[derive(Debug)]
 pub struct Library {
@@ -95,6 +66,8 @@ pub struct Library {
     /// Of each portal and direction, one after the other: which places, from left to right.
     sides: Vec<Range<usize>>,
     shelf: Shelf,
+    /// Of each place, the file that its LDI is in, if there is one, and when it was written.
+    files: Vec<Option<(PathBuf, SystemTime)>>,
     /// The most bytes that an LDI took.
     largest_ldi: u64,
 }
@@ -118,6 +91,7 @@ impl Library {
                 ..*options
             },
             shelf: Shelf::new(places.len(), options.budget),
+            files: vec![None; places.len()],
             largest_ldi: 0,
             places,
             sides,
@@ -249,11 +223,12 @@ impl Library {
         Ok(())
     }
 
-    /// The LDIs of a frame by their places, in their order, and how many reference images were
-    /// made for them; nothing for a place whose images make none. Others go as for [`Self::images`].
+    /// The LDIs of a frame by their places, in their order, and what they took; nothing for a place
+    /// whose images make none. Those that have files are read, the rest are made. Others go as for
+    /// [`Self::images`].
     ///
     /// # Errors
-    /// The photos' engine's.
+    /// The photos' engine's; a file that holds no such LDI.
     pub fn ldis(
         &mut self,
         places: &[usize],
@@ -261,29 +236,66 @@ impl Library {
         model: &Model,
         geometry: &CellGeometry,
         mut captured: Option<&mut Captured>,
-    ) -> Result<(Ldis, usize), RenderError> {
+    ) -> Result<(Ldis, LdiCost), RenderError> {
         self.shelf.begin();
-        let mut images = 0;
+        let mut cost = LdiCost::default();
         for place in self.shelf.touch_ldis(places) {
-            let of_photos = match (self.options.ldi_of, captured.as_deref_mut()) {
-                (LdiSource::Photos, Some(photos)) => self.of_photos(place, interior, photos)?,
-                _ => None,
-            };
-            if let Some((layered, photos)) = of_photos {
-                images += photos;
-                self.shelf.residency.loads += photos as u64;
-                let ldi = Some(PortalLdi::new(layered));
-                self.keep(place, ldi);
+            if let Some(ldi) = self.read(place)? {
+                self.keep(place, Some(ldi));
+                cost.read += 1;
                 continue;
             }
-            let made = self.recipe(place).make(|view, size| {
-                let captured = captured.as_deref_mut();
-                image(interior, model, geometry, view, size, captured)
-            })?;
-            images += made.images.len();
-            self.take(made, true);
+            let captured = captured.as_deref_mut();
+            cost.images += self.make(place, interior, model, geometry, captured)?;
+            cost.made += 1;
         }
-        Ok((self.shelf.ldis_of(places), images))
+        Ok((self.shelf.ldis_of(places), cost))
+    }
+
+    /// Makes the LDI of a place whatever is in files, and lets go what is of other sides; nothing where
+    /// its images make none.
+    ///
+    /// # Errors
+    /// The photos' engine's.
+    pub(super) fn make_alone(
+        &mut self,
+        place: usize,
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        captured: Option<&mut Captured>,
+    ) -> Result<Arc<Option<PortalLdi>>, RenderError> {
+        self.shelf.begin();
+        self.shelf.keep_only(&self.side_of(place));
+        self.make(place, interior, model, geometry, captured)?;
+        Ok(self.shelf.ldis_of(&[place]).pop().unwrap_or_default())
+    }
+
+    /// Makes the LDI of a place; how many reference images were made for it.
+    fn make(
+        &mut self,
+        place: usize,
+        interior: &Interior,
+        model: &Model,
+        geometry: &CellGeometry,
+        mut captured: Option<&mut Captured>,
+    ) -> Result<usize, RenderError> {
+        let of_photos = match (self.options.ldi_of, captured.as_deref_mut()) {
+            (LdiSource::Photos, Some(photos)) => self.of_photos(place, interior, photos)?,
+            _ => None,
+        };
+        if let Some((layered, photos)) = of_photos {
+            self.shelf.residency.loads += photos as u64;
+            self.keep(place, Some(PortalLdi::new(layered)));
+            return Ok(photos);
+        }
+        let made = self.recipe(place).make(|view, size| {
+            let captured = captured.as_deref_mut();
+            image(interior, model, geometry, view, size, captured)
+        })?;
+        let images = made.images.len();
+        self.take(made, true);
+        Ok(images)
     }
 
     /// Whether the LDI of a place is in memory.
@@ -336,10 +348,11 @@ impl Library {
     }
 
     /// Of LDIs that frames may need soon, the sooner the earlier, marks those that are there, and tells what
-    /// the first that is not is made of; nothing where all are, or where there is no room for it.
+    /// the first that is neither there nor in a file is made of; nothing where there is none, or no room for
+    /// it.
     pub(super) fn ahead(&mut self, places: &[usize]) -> Option<Recipe> {
-        let missing = self.shelf.touch_ldis(places);
-        let recipe = self.recipe(*missing.first()?);
+        let mut missing = self.shelf.touch_ldis(places).into_iter();
+        let recipe = self.recipe(missing.find(|place| self.files[*place].is_none())?);
         let views: Vec<usize> = recipe.views.iter().map(|(i, _)| *i).collect();
         let images = self.shelf.touch_images(&views).len() as u64;
         let bytes = images * Reference::bytes(self.options.size) + self.largest_ldi;

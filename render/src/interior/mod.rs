@@ -33,7 +33,7 @@ mod window;
 pub use captured::Captured;
 pub use fill::PortalFill;
 pub use geometry::{CellGeometry, Runs};
-pub use library::{LdiSource, Library, LibraryOptions, PortalLdi};
+pub use library::{LdiCost, LdiSource, Library, LibraryOptions, PortalLdi};
 pub use neighbourhood::Shown;
 pub use painter::Painter;
 pub use photographed::DepthMaps;

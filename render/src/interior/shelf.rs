@@ -2,6 +2,7 @@
 
 use super::{PortalLdi, Reference};
 use crate::residency::Residency;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Images and LDIs, each by its place, within a budget.
@@ -79,6 +80,15 @@ impl Shelf {
     pub(super) fn keep_ldi(&mut self, place: usize, ldi: Option<PortalLdi>, bytes: u64) {
         let (come, go) = put(&mut self.ldis[place], Arc::new(ldi), bytes, self.turn);
         self.residency.change(come, go);
+    }
+
+    /// Lets go what is of other places than these.
+    pub(super) fn keep_only(&mut self, places: &Range<usize>) {
+        for i in (0..self.images.len()).filter(|i| !places.contains(i)) {
+            let image = self.images[i].take().map_or(0, |kept| kept.bytes);
+            let ldi = self.ldis[i].take().map_or(0, |kept| kept.bytes);
+            self.residency.change(0, image + ldi);
+        }
     }
 
     /// Lets go what was used longest ago until so many bytes have room; whether they have. What this

@@ -11,13 +11,14 @@
 mod ahead;
 mod asked;
 mod compose;
+mod files;
 mod filled;
 
 use super::background::Background;
 use super::recipe::Made;
 use super::{
-    CellGeometry, LdiSource, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill,
-    Splat, Target,
+    CellGeometry, Library, LibraryOptions, Painter, Pinhole, PinholeError, PortalFill, Splat,
+    Target,
 };
 use crate::RenderError;
 use crate::ldi::FreeOptions;
@@ -100,9 +101,11 @@ pub struct FrameCost {
     pub references_made: usize,
     /// Layered depth images made for this frame.
     pub ldis_made: usize,
+    /// Those read from files for this frame.
+    pub ldis_read: usize,
     /// Those that had been made ahead of need, and came in with this frame.
     pub ldis_ahead: usize,
-    /// Making images and LDIs, and waiting for one.
+    /// Making images and LDIs, reading LDIs, and waiting for one.
     pub references: Duration,
     /// Of that, waiting for an LDI that was being made ahead of need.
     pub waited: Duration,
@@ -181,12 +184,7 @@ impl<'a> Walk<'a> {
         mut options: WalkOptions,
     ) -> Self {
         let captured = painter.captured();
-        if options.library.ldi_of == LdiSource::Photos
-            && captured.is_some_and(|captured| captured.depth_maps().is_some())
-        {
-            // Photos were taken wherever they were: one LDI has them all.
-            options.library.ldi_views = None;
-        }
+        options.library = options.library.with_photos(captured);
         let library = Library::new(interior, &options.library);
         Self {
             interior,

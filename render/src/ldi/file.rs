@@ -19,6 +19,7 @@ use super::{Layered, LdiError, Look, Sample};
 use bytemuck::{Pod, Zeroable};
 use calibrate::Rigid3;
 use glam::{DQuat, DVec2, DVec3};
+use proxy::interior::SemicircleView;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +68,16 @@ pub enum LdiFileError {
         found: u32,
         /// The sum of the counts before.
         expected: u64,
+    },
+    /// It is of another portal, or of its other side.
+    #[error("{}: an LDI of {found}, expected {expected}; make it again", .path.display())]
+    Side {
+        /// Of the file.
+        path: PathBuf,
+        /// What it is of.
+        found: String,
+        /// What it was to be of.
+        expected: String,
     },
     /// What it holds is no LDI.
     #[error("{}: {source}; make it again", .path.display())]
@@ -125,6 +136,24 @@ pub fn read(path: &Path) -> Result<Layered, LdiFileError> {
         source,
     };
     parse(path, &std::fs::read(path).map_err(io)?)
+}
+
+/// Reads an LDI whose camera stands at a place before a portal.
+///
+/// # Errors
+/// As [`read`]; an LDI of another place.
+pub fn read_before(path: &Path, place: &SemicircleView) -> Result<Layered, LdiFileError> {
+    let ldi = read(path)?;
+    let (found, expected) = (ldi.view.camera_from_world, place.camera_from_world);
+    if ldi.portal == place.portal.0 && found == expected {
+        return Ok(ldi);
+    }
+    let named = |portal: u32, pose: Rigid3| format!("portal {portal} from {:.3}", pose.center());
+    Err(LdiFileError::Side {
+        path: path.to_owned(),
+        found: named(ldi.portal, found),
+        expected: named(place.portal.0, expected),
+    })
 }
 
 /// Reads an LDI from a file's content; `path` is for errors.

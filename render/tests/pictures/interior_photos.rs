@@ -174,10 +174,10 @@ impl Taken {
             .map(|side| side * VIEWS + VIEWS / 2)
             .collect();
         let made = library.ldis(&middles, interior, model, &self.geometry, captured);
-        let (ldis, of) = made.unwrap();
+        let (ldis, took) = made.unwrap();
         Made {
             ldis,
-            of,
+            of: took.images,
             notes: String::new(),
         }
     }

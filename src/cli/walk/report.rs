@@ -48,6 +48,8 @@ struct FrameReport<'a> {
     references_made: usize,
     /// By this frame itself.
     ldis_made: usize,
+    /// From files, for this frame.
+    ldis_read: usize,
     /// Ahead of need, come in with this frame.
     ldis_ahead: usize,
     /// Of `references_ms`, for an LDI that was being made ahead of need.
@@ -153,6 +155,7 @@ impl Walked {
             references_ms: ms(c.references),
             references_made: c.references_made,
             ldis_made: c.ldis_made,
+            ldis_read: c.ldis_read,
             ldis_ahead: c.ldis_ahead,
             waited_ms: ms(c.waited),
             visible_cells: c.visible_cells,
@@ -174,6 +177,8 @@ impl Walked {
             "worst_ms": worst,
             "references_used": self.references,
             "references_made": self.frames.iter().map(|f| f.cost.references_made).sum::<usize>(),
+            "ldis_made": self.frames.iter().map(|f| f.cost.ldis_made).sum::<usize>(),
+            "ldis_read": self.frames.iter().map(|f| f.cost.ldis_read).sum::<usize>(),
             "mean": self.scored(),
             "frames": frames,
         })

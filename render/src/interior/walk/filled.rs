@@ -137,12 +137,13 @@ impl Walk<'_> {
         self.take_ahead(&all, cost)?;
         for &place in &all {
             self.is_used[self.library.len() + place] = true;
-            cost.ldis_made += usize::from(!self.library.has_ldi(place));
         }
         let (interior, model, geometry) = (self.interior, self.model, &self.geometry);
         let photos = self.painter.captured_mut();
-        let (ldis, made) = self.library.ldis(&all, interior, model, geometry, photos)?;
-        cost.references_made = made;
+        let (ldis, took) = self.library.ldis(&all, interior, model, geometry, photos)?;
+        cost.references_made = took.images;
+        cost.ldis_made = took.made;
+        cost.ldis_read = took.read;
         let mut ldis = ldis.into_iter();
         let of_fills = fills
             .iter()

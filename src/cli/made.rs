@@ -1,0 +1,207 @@
+//! What the LDIs in an interior's folder were made of, and whether that is what there is now.
+
+use super::captured::Photos;
+use super::output::write_file;
+use super::stamp::{Stamp, changes, stamps};
+use anyhow::Context;
+use lumigraph::scene::relative;
+use render::interior::{LdiSource, LibraryOptions, Painter};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::ffi::OsStr;
+use std::fs::read_dir;
+use std::path::{Path, PathBuf};
+
+/// The folder beside an interior's file.
+pub(super) const FOLDER: &str = "ldi";
+/// In it, what they were made of.
+const FILE: &str = "made.json";
+
+/// What decides the samples of all LDIs of an interior.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Made {
+    version: u32,
+    /// The program's.
+    program: String,
+    options: Map<String, Value>,
+    /// By path from the interior's folder.
+    inputs: Vec<Stamp>,
+}
+
+/// What an interior's folder has of LDIs.
+pub(super) enum Found {
+    /// Nothing that was begun.
+    None,
+    /// Those that would be made now, or some of them.
+    Same,
+    /// Others; how they differ, for people.
+    Other(String),
+}
+
+impl Made {
+    /// Of the interior with that file, which the other files decide; `options` are those that its painter's walk
+    /// has ([`LibraryOptions::with_photos`]), and `photos` what it draws from, if anything.
+    pub(super) fn new(
+        file: &Path,
+        files: &[PathBuf],
+        options: &LibraryOptions,
+        painter: &Painter,
+        photos: Option<&Photos>,
+    ) -> anyhow::Result<Self> {
+        let mut all = Map::new();
+        let mut put = |name: &str, value: Value| all.insert(name.to_owned(), value);
+        let options = options.with_photos(painter.captured());
+        put("size", json!(options.size));
+        put("views", json!(options.semicircles.views));
+        put("span", json!(options.semicircles.span));
+        put("ldi_views", json!(options.ldi_views));
+        put("range", json!(options.ldi.range));
+        put("conflict", json!(format!("{:?}", options.ldi.conflict)));
+        put("center_in_front", json!(options.ldi.center_in_front));
+        put("margin", json!(options.ldi.margin));
+        if let Some(photos) = photos {
+            let of = match options.ldi_of {
+                LdiSource::Views => "views",
+                LdiSource::Photos => "photos",
+            };
+            put("ldi_from", json!(of));
+            put("device", json!(painter.description()));
+            put("exposure", photos.exposure.json()["how"].take());
+            put("calibration", json!(photos.fingerprint()));
+            // Photos that have no room are drawn coarser.
+            put("cpu_memory", json!(options.budget));
+        }
+        let folder = folder_of(file);
+        let name = |file: &Path| PathBuf::from(relative(folder, file));
+        Ok(Self {
+            version: 1,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            options: all,
+            inputs: stamps(files, name),
+        })
+    }
+
+    /// What a folder has.
+    pub(super) fn find(&self, folder: &Path) -> anyhow::Result<Found> {
+        let file = folder.join(FILE);
+        let bytes = match std::fs::read(&file) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Found::None),
+            Err(error) => {
+                return Err(error).with_context(|| format!("{}: cannot read", file.display()));
+            }
+        };
+        let Ok(before) = serde_json::from_slice::<Self>(&bytes) else {
+            let text = format!("has a {FILE} that this program does not know");
+            return Ok(Found::Other(text));
+        };
+        let others = before.others(self);
+        if !others.is_empty() {
+            return Ok(Found::Other(format!(
+                "was made with other options: {others}"
+            )));
+        }
+        let changes = changes(&before.inputs, &self.inputs);
+        Ok(match changes.is_empty() {
+            true => Found::Same,
+            false => Found::Other(format!("was made of other files: {changes}")),
+        })
+    }
+
+    /// Options that are not those of before, for people.
+    fn others(&self, now: &Self) -> String {
+        let named = |made: &Self| {
+            let mut all = made.options.clone();
+            all.insert("program".to_owned(), json!(made.program));
+            all.insert("version".to_owned(), json!(made.version));
+            all
+        };
+        let (was, is) = (named(self), named(now));
+        let none = Value::Null;
+        let of = |all: &Map<String, Value>, name: &str| match all.get(name).unwrap_or(&none) {
+            Value::Null => "none".to_owned(),
+            Value::String(text) => text.clone(),
+            value => value.to_string(),
+        };
+        let gone = was.keys().filter(|name| !is.contains_key(*name));
+        let names = is.keys().chain(gone).map(String::as_str);
+        let pairs = names.map(|name| (name, of(&was, name), of(&is, name)));
+        let others = pairs.filter(|(_, was, is)| was != is);
+        let others = others.map(|(name, was, is)| format!("{name} was {was}, is {is}"));
+        others.collect::<Vec<String>>().join(", ")
+    }
+
+    /// The folder of LDIs that a walk can read, if there is one; `say` is told why those that are there
+    /// cannot be.
+    pub(super) fn usable(
+        &self,
+        file: &Path,
+        say: impl FnOnce(String),
+    ) -> anyhow::Result<Option<PathBuf>> {
+        let folder = folder_of(file).join(FOLDER);
+        Ok(match self.find(&folder)? {
+            Found::None => None,
+            Found::Same => Some(folder),
+            Found::Other(how) => {
+                let folder = folder.display();
+                say(format!(
+                    "{folder} {how}; make it again with `lumigraph ldis`"
+                ));
+                None
+            }
+        })
+    }
+
+    /// Begins a folder, or goes on with it: what is there of other LDIs is removed, and `say` told so.
+    pub(super) fn begin(&self, folder: &Path, say: impl FnOnce(String)) -> anyhow::Result<()> {
+        let why = match self.find(folder)? {
+            Found::Same => return Ok(()),
+            Found::Other(how) => how,
+            Found::None => format!("has LDIs and no {FILE}"),
+        };
+        let old: Vec<PathBuf> = match folder.is_dir() {
+            true => entries(folder)?.into_iter().filter(|f| is_ldi(f)).collect(),
+            false => Vec::new(),
+        };
+        if !old.is_empty() {
+            say(format!("{} {why}; it is made anew", folder.display()));
+        }
+        for file in old {
+            let failed = || format!("{}: cannot be removed", file.display());
+            std::fs::remove_file(&file).with_context(failed)?;
+        }
+        // Before any LDI: what lies there without it is of something else.
+        write_file(
+            &folder.join(FILE),
+            &serde_json::to_vec_pretty(self).context(FILE)?,
+        )
+    }
+}
+
+/// The folder that an interior's file is in.
+pub(super) fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Whether a folder holds LDIs, and nothing else.
+pub(super) fn is_ours(folder: &Path) -> bool {
+    let is_own = |file: &PathBuf| {
+        let name = file.file_name().and_then(OsStr::to_str);
+        is_ldi(file) || name.is_some_and(|name| name == FILE || name == "made.json.tmp")
+    };
+    entries(folder).is_ok_and(|files| files.iter().all(is_own))
+}
+
+fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let all = read_dir(folder).and_then(|all| all.map(|e| e.map(|e| e.path())).collect());
+    all.with_context(|| format!("{}: cannot read", folder.display()))
+}
+
+/// An LDI's file, or one that was not written to its end.
+fn is_ldi(file: &Path) -> bool {
+    let name = file.file_name().and_then(OsStr::to_str).unwrap_or_default();
+    name.ends_with(".ldi") || name.ends_with(".ldi.part")
+}

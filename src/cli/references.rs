@@ -1,0 +1,99 @@
+//! How images and LDIs before an interior's portals are made, for all that make them.
+
+use super::Usage;
+use super::exposure::ExposureArgs;
+use super::options::{bytes, size};
+use clap::ValueEnum;
+use render::DeviceChoice;
+use render::interior::{CAPTURED_REFERENCE_SIZE, LdiSource, LibraryOptions};
+
+/// What decides what images and LDIs before portals show.
+#[derive(clap::Args)]
+pub(super) struct ReferenceArgs {
+    /// Size of the reference images before portals [default: 256x256; of a capture's rooms 512x512]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    reference_size: Option<(u32, u32)>,
+    /// Reference images before each side of a portal: an odd number
+    #[arg(long, value_name = "N", default_value_t = 13)]
+    reference_views: usize,
+    /// What LDIs of a capture's rooms are made of: its photos with depth maps themselves, wherever they
+    /// were taken (views where none sees the portal), or views that photos are blended into
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
+    ldi_from: LdiFrom,
+    /// Make LDIs of views of the N views nearest to the viewer, and the middle one; a walk makes what has no file
+    /// ahead of need, by a thread of low priority; frames go from one to the next by where they are drawn from, so
+    /// they are the same in whatever order [default: all views make one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=999))]
+    ldi_views: Option<u16>,
+    /// Draw the model's own colours, not the photos of a capture's rooms
+    #[arg(long)]
+    pub(super) no_photos: bool,
+    #[command(flatten)]
+    pub(super) exposure: ExposureArgs,
+    /// What draws geometry, and a capture's photos; auto is the graphics processor if there is one, else the
+    /// CPU
+    #[arg(long, value_enum, default_value = "auto")]
+    device: Device,
+    /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames, and decoded photos,
+    /// too; those not used for longest are made again when they are needed [default: no limit]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
+    pub(super) cpu_memory: Option<u64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LdiFrom {
+    Views,
+    Photos,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Device {
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+impl ReferenceArgs {
+    /// Refuses what makes no sense whatever the interior.
+    pub(super) fn check(&self) -> Result<(), Usage> {
+        let views = self.reference_views;
+        if views.is_multiple_of(2) || views > 999 {
+            return Err(Usage(format!(
+                "--reference-views is {views}; expected an odd number up to 999"
+            )));
+        }
+        if self.reference_size.is_some_and(|(w, h)| w.max(h) > 4096) {
+            let text = "--reference-size: expected sides of up to 4096";
+            return Err(Usage(text.to_owned()));
+        }
+        Ok(())
+    }
+
+    pub(super) fn device(&self) -> DeviceChoice {
+        match self.device {
+            Device::Auto => DeviceChoice::Auto,
+            Device::Gpu => DeviceChoice::Gpu,
+            Device::Cpu => DeviceChoice::Cpu,
+        }
+    }
+
+    /// As a library of images takes them, of rooms that photos show or of others.
+    pub(super) fn options(&self, has_photos: bool) -> LibraryOptions {
+        let mut options = LibraryOptions {
+            ldi_views: self.ldi_views.map(usize::from),
+            budget: self.cpu_memory,
+            ldi_of: match self.ldi_from {
+                LdiFrom::Views => LdiSource::Views,
+                LdiFrom::Photos => LdiSource::Photos,
+            },
+            ..LibraryOptions::default()
+        };
+        options.semicircles.views = self.reference_views;
+        options.size = match self.reference_size {
+            Some(size) => size.into(),
+            None if has_photos && !self.no_photos => CAPTURED_REFERENCE_SIZE,
+            None => options.size,
+        };
+        options
+    }
+}

@@ -1,0 +1,239 @@
+//! LDIs made as files, and walks that read them.
+
+use crate::interior::{names, with_house};
+use crate::run::{files, lumigraph};
+use serde_json::Value;
+use std::path::Path;
+
+const WALK: &str = "walk house --portals ldi --frames 8 --size 48x36 --reference-size 24x24 --json";
+const MAKE: &str = "ldis house --reference-size 24x24";
+
+/// Walks, and returns the frames' bytes, how many LDIs were made and read, and what was said.
+fn walked(here: &Path, more: &str) -> (Vec<Vec<u8>>, [u64; 2], String) {
+    let out = here.join("out");
+    let _ = std::fs::remove_dir_all(&out);
+    let ran = lumigraph(here, &format!("{WALK}{more} -o out")).ok();
+    let report: Value = ran.json();
+    let walk = &report["walks"][0];
+    let frames = walk["frames"].as_array().unwrap();
+    let sum = |what: &str| -> u64 { frames.iter().filter_map(|f| f[what].as_u64()).sum() };
+    assert_eq!(sum("ldis_read"), walk["ldis_read"].as_u64().unwrap());
+    let pictures = names(&out).into_iter().filter(|n| n.ends_with(".png"));
+    let pictures = pictures.map(|name| std::fs::read(out.join(name)).unwrap());
+    let made = sum("ldis_made") + sum("ldis_ahead");
+    (pictures.collect(), [made, sum("ldis_read")], ran.stderr)
+}
+
+fn ldis(folder: &Path) -> Vec<String> {
+    let all = names(folder).into_iter();
+    all.filter(|name| name.ends_with(".ldi")).collect()
+}
+
+#[test]
+fn walks_read_the_layered_images_that_were_made_for_them() {
+    let folder = with_house();
+    let here = folder.path();
+    for more in ["", " --ldi-views 3"] {
+        let (pictures, [made, read], _) = walked(here, &format!("{more} --no-ldi-files"));
+        assert!(pictures.len() == 8 && made > 0 && read == 0);
+        let ran = lumigraph(here, &format!("{MAKE}{more} --json")).ok();
+        let report = ran.json();
+        let all = ldis(&here.join("house/ldi"));
+        assert_eq!(report["files"], all.len());
+        assert_eq!(
+            (&report["made"], &report["none"]),
+            (&report["files"], &0.into())
+        );
+        assert_eq!(
+            ran.stderr.contains("note: "),
+            !more.is_empty(),
+            "{}",
+            ran.stderr
+        );
+        let size = |name: &String| here.join("house/ldi").join(name).metadata().unwrap().len();
+        assert_eq!(report["bytes"], all.iter().map(size).sum::<u64>());
+        // Read, nothing made, by any threads, from another folder, with little memory.
+        for other in ["", " --threads 1", " --cpu-memory 1"] {
+            let (again, [made, read], said) = walked(here, &format!("{more}{other}"));
+            assert!(again == pictures && made == 0 && read > 0, "{more}{other}");
+            assert!(!said.contains("note: "), "{said}");
+        }
+        let inside = WALK.replace("walk house", "walk interior.json");
+        let ran = lumigraph(&here.join("house"), &format!("{inside}{more} -o ../out")).ok();
+        assert_eq!(ran.json()["walks"][0]["ldis_made"], 0, "{}", ran.stderr);
+        // Again, byte for byte, on one thread.
+        let before = files(&here.join("house/ldi"));
+        let said = lumigraph(here, &format!("{MAKE}{more}")).ok().stdout;
+        let expected = format!("house/ldi: {0} LDIs, {0} of them from before, ", all.len());
+        assert!(said.starts_with(&expected), "{said}");
+        std::fs::remove_dir_all(here.join("house/ldi")).unwrap();
+        lumigraph(here, &format!("--threads 1 {MAKE}{more}")).ok();
+        assert!(files(&here.join("house/ldi")) == before);
+    }
+    // An interior made anew takes them with it, but nothing else that lies there.
+    let again = "interior house/house.glb -o found";
+    lumigraph(here, again).ok();
+    lumigraph(here, "ldis found --reference-size 24x24").ok();
+    let mine = here.join("found/ldi/mine.txt");
+    std::fs::write(&mine, "").unwrap();
+    let error = lumigraph(here, again).error(1);
+    assert!(error.contains("found: the folder is not empty"), "{error}");
+    std::fs::remove_file(mine).unwrap();
+    lumigraph(here, again).ok();
+    assert!(!here.join("found/ldi").exists());
+}
+
+#[test]
+fn what_is_missing_or_broken_is_made_again() {
+    let folder = with_house();
+    let here = folder.path();
+    let (pictures, ..) = walked(here, "");
+    lumigraph(here, MAKE).ok();
+    let own = here.join("house/ldi");
+    let before = files(&own);
+    let all = ldis(&own);
+    // 1. Interrupted, with another's file beside.
+    std::fs::remove_file(own.join(&all[0])).unwrap();
+    std::fs::write(own.join("mine.txt"), "").unwrap();
+    let (again, [made, read], _) = walked(here, "");
+    assert!(again == pictures && made <= 1 && read > 0);
+    let said = lumigraph(here, &format!("{MAKE} --json")).ok().json();
+    assert_eq!(
+        (&said["made"], &said["files"]),
+        (&1.into(), &all.len().into())
+    );
+    // 2. Broken.
+    let whole = std::fs::read(own.join(&all[0])).unwrap();
+    for name in &all {
+        std::fs::write(own.join(name), &whole[..99]).unwrap();
+    }
+    let error = lumigraph(here, &format!("{WALK} -o out")).error(1);
+    assert!(
+        error.contains("house/ldi/0") && error.contains("99 bytes"),
+        "{error}"
+    );
+    assert!(error.contains("`lumigraph ldis` makes it again"), "{error}");
+    // Of something else, under another's name.
+    for name in &all[1..] {
+        std::fs::write(own.join(name), &whole).unwrap();
+    }
+    let ran = lumigraph(here, &format!("{MAKE} --json")).ok();
+    assert_eq!(ran.json()["made"], all.len());
+    assert!(ran.stderr.contains("expected portal "), "{}", ran.stderr);
+    std::fs::remove_file(own.join("mine.txt")).unwrap();
+    assert!(files(&own) == before);
+    assert!(walked(here, "").0 == pictures);
+}
+
+#[test]
+fn layered_images_of_other_files_or_options_are_not_used() {
+    let folder = with_house();
+    let here = folder.path();
+    let own = here.join("house/ldi");
+    lumigraph(here, MAKE).ok();
+    let unused = |more: &str, said: &str| {
+        let (pictures, [made, read], notes) = walked(here, more);
+        assert!(made > 0 && read == 0, "{more}");
+        assert!(notes.contains(said), "{notes}");
+        let without = walked(here, &format!("{more} --no-ldi-files"));
+        assert!(pictures == without.0 && !without.2.contains("note: "));
+    };
+    // 1. Options.
+    let (views, size) = (" --ldi-views 3", " --reference-views 5");
+    unused(
+        views,
+        "made with other options: ldi_views was none, is 3; make it again",
+    );
+    unused(
+        size,
+        "note: house/ldi was made with other options: views was 13, is 5;",
+    );
+    // 2. Files: written again, longer, the same to the byte.
+    for file in ["house.glb", "interior.json"] {
+        let path = here.join("house").join(file);
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes).unwrap();
+        unused(
+            "",
+            &format!("was made of other files: {file} was written since; make it again"),
+        );
+        let ran = lumigraph(here, MAKE).ok();
+        let said =
+            format!("house/ldi was made of other files: {file} was written since; it is made anew");
+        assert!(ran.stderr.contains(&said), "{}", ran.stderr);
+        assert!(walked(here, "").1[0] == 0);
+    }
+    // 3. What was interrupted after a change, and what nobody knows.
+    std::fs::write(own.join("mine.txt"), "").unwrap();
+    std::fs::write(own.join("of-old.ldi"), "").unwrap();
+    std::fs::write(own.join("half.ldi.part"), "").unwrap();
+    std::fs::write(own.join("made.json"), "{}").unwrap();
+    unused(
+        "",
+        "house/ldi has a made.json that this program does not know; make it again",
+    );
+    let ran = lumigraph(here, MAKE).ok();
+    assert!(ran.stderr.contains("it is made anew"), "{}", ran.stderr);
+    let left = names(&own);
+    assert!(left.contains(&"mine.txt".to_owned()) && left.len() == ldis(&own).len() + 2);
+    assert!(walked(here, "").1[0] == 0);
+    std::fs::remove_file(own.join("made.json")).unwrap();
+    // Nothing is said of what was never begun.
+    let (_, [made, read], notes) = walked(here, "");
+    assert!(
+        made > 0 && read == 0 && !notes.contains("note: "),
+        "{notes}"
+    );
+    let ran = lumigraph(here, MAKE).ok();
+    assert!(
+        ran.stderr.contains("has LDIs and no made.json"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(lumigraph(here, "ldis house --reference-views 4").code, 2);
+    assert!(
+        lumigraph(here, "ldis nowhere")
+            .error(1)
+            .contains("nowhere: ")
+    );
+}
+
+#[test]
+fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::write(here.join("halves.json"), crate::interior::HALVES).unwrap();
+    lumigraph(here, "interior hall --rooms halves.json -o house").ok();
+    for more in ["", " --ldi-from views --ldi-views 5", " --no-photos"] {
+        let (pictures, [made, _], _) = walked(here, more);
+        assert!(made > 0, "{more}");
+        lumigraph(here, &format!("{MAKE}{more}")).ok();
+        let (again, [made, read], said) = walked(here, more);
+        assert!(again == pictures && made == 0 && read > 0, "{more}: {said}");
+    }
+    lumigraph(here, MAKE).ok();
+    assert_eq!(walked(here, "").1[0], 0);
+    for (more, said) in [
+        (" --no-exposure", "exposure was "),
+        (" --cpu-memory 1MB", "cpu_memory was none, is 1000000"),
+        (" --ldi-from views", "ldi_from was photos, is views"),
+        (" --no-photos", "calibration was "),
+    ] {
+        let (_, [made, read], notes) = walked(here, more);
+        assert!(made > 0 && read == 0 && notes.contains(said), "{notes}");
+    }
+    // A photo, and a camera of the calibration by its last bit.
+    let photo = names(&here.join("hall/images")).remove(0);
+    let photo = here.join("hall/images").join(photo);
+    std::fs::write(&photo, std::fs::read(&photo).unwrap()).unwrap();
+    let notes = walked(here, "").2;
+    assert!(notes.contains("of other files: ../hall/images/"), "{notes}");
+    let cameras = here.join("hall/sparse/0/cameras.bin");
+    let mut bytes = std::fs::read(&cameras).unwrap();
+    let last_number = bytes.len() - 8;
+    bytes[last_number] ^= 1;
+    std::fs::write(&cameras, bytes).unwrap();
+    let notes = walked(here, "").2;
+    assert!(notes.contains("other options: calibration was "), "{notes}");
+}
