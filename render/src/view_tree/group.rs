@@ -133,9 +133,11 @@ impl Group {
     #[inline(always)]
     pub(super) fn may_matter(&self, query: &Query) -> [bool; GROUP] {
         let (ball, here, by_here) = (&query.ball, query.here, query.by_here);
+        // One after the other: arrays of arrays go to memory and back.
         let [cx, cy, cz] = ball.center.to_array();
-        let away = [0, 1, 2].map(|k| each(|i| ball.center[k] - self.center[k][i]));
-        let [x, y, z] = &away;
+        let x = each(|i| cx - self.center[0][i]);
+        let y = each(|i| cy - self.center[1][i]);
+        let z = each(|i| cz - self.center[2][i]);
         let distance = each(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt());
         let own = each(|i| self.radius[i] + SLACK * (here + self.far[i]));
 
@@ -149,20 +151,15 @@ impl Group {
             true => each(|i| ball.radius * self.far[i] / (near[i] * least_here) + SLACK),
             false => [SLACK; GROUP],
         };
-        let across = [
-            each(|i| cy * z[i] - cz * y[i]),
-            each(|i| cz * x[i] - cx * z[i]),
-            each(|i| cx * y[i] - cy * x[i]),
-        ];
-        let [p, q, r] = &across;
+        let p = each(|i| cy * z[i] - cz * y[i]);
+        let q = each(|i| cz * x[i] - cx * z[i]);
+        let r = each(|i| cx * y[i] - cy * x[i]);
         let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
         let along = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
         let by_distance = each(|i| 1.0 / distance[i]);
         // At most the angle: its sine, or one where that is obtuse.
-        let angle = each(|i| match along[i] > 0.0 {
-            true => across[i] * (by_here * by_distance[i]),
-            false => 1.0,
-        });
+        let sine = each(|i| across[i] * (by_here * by_distance[i]));
+        let angle = each(|i| if along[i] > 0.0 { sine[i] } else { 1.0 });
         let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - vary[i]);
         let measure = query.measure;
         let coarser = match measure.by_length {
