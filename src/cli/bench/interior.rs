@@ -1,7 +1,9 @@
 //! An interior measured: what portals show, against the model drawn whole, of a capture from its
 //! photos.
 
-use super::measure::{Effort, Measured, Pictures, Skip, Subject, Times, in_turn, skip, timed};
+use super::measured::{Effort, Measured, Pictures, Skip, Subject};
+use super::skips::skip;
+use super::times::{Times, in_turn, timed};
 use anyhow::Context;
 use calibrate::{Lens, View};
 use glam::DVec2;

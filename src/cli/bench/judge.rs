@@ -1,6 +1,6 @@
 //! Whether the default is worth its time.
 
-use super::measure::Measured;
+use super::measured::Measured;
 use lumigraph::bench::{Cost, front};
 
 /// Times that differ by less say nothing.

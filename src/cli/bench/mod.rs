@@ -3,11 +3,15 @@
 mod interior;
 mod judge;
 mod measure;
+mod measured;
 mod report;
 mod scaling;
 mod scatter;
 mod settings;
+mod skips;
 mod stress;
+mod times;
+mod variants;
 
 use super::Usage;
 use super::captured::Opened;
@@ -20,7 +24,7 @@ use datasets::house::{HouseOptions, house};
 use indicatif::ProgressBar;
 use judge::judge;
 use lumigraph::scene::Scene;
-use measure::{Effort, Pictures, Subject};
+use measured::{Effort, Pictures, Subject};
 use proxy::interior::Contents;
 use render::interior::Painter;
 use report::{Thumbnails, page, thumbnails};

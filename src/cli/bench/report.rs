@@ -1,7 +1,7 @@
 //! One page with everything: no scripts, nothing fetched from anywhere.
 
 use super::judge::{Verdict, judge};
-use super::measure::{Measured, Pictures, Subject};
+use super::measured::{Measured, Pictures, Subject};
 use super::scaling::Scaling;
 use super::scatter::{Axis, Dot, escape, round, scatter};
 use anyhow::Context;

@@ -1,7 +1,7 @@
 //! How time grows with photos, pixels, faces and threads.
 
-use super::measure::{Times, timed};
 use super::scatter::{Axis, Dot, escape, round, scatter};
+use super::times::{Times, timed};
 use indicatif::ProgressBar;
 use lumigraph::bench::made_up::{Surroundings, desired, lumigraph};
 use lumigraph::bench::{Exponent, fit_exponent};
