@@ -6,6 +6,7 @@ use super::output::{print, print_json, say};
 use super::references::ReferenceArgs;
 use super::session::progress;
 use anyhow::Context;
+use render::RenderError;
 use render::interior::{Painter, Walk, WalkOptions};
 use render::ldi::write;
 use serde::Serialize;
@@ -107,10 +108,13 @@ fn make(walk: &mut Walk<'_>, opened: &Opened, folder: PathBuf) -> anyhow::Result
         let file = report.folder.join(name);
         let is_there = match walk.library().read(place) {
             Ok(found) => found.is_some(),
-            Err(error) => {
-                say!("note: {error}; it is made again");
+            Err(RenderError::LdiFile(why)) => {
+                // What is asked for is done.
+                let why = why.strip_suffix("; make it again").unwrap_or(&why);
+                say!("note: {why}; it is made again");
                 false
             }
+            Err(error) => return Err(error.into()),
         };
         let is_there = is_there || write_one(walk, place, &file, &mut report)?;
         match is_there {
