@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub(super) const FOLDER: &str = "ldi";
 /// In it, what they were made of.
 const FILE: &str = "made.json";
+/// Of that file, and of how LDIs are made: raised when either changes, as those of before are not those of now.
+const VERSION: u32 = 1;
 
 /// What decides the samples of all LDIs of an interior.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -74,7 +76,7 @@ impl Made {
         let folder = folder_of(file);
         let name = |file: &Path| PathBuf::from(relative(folder, file));
         Ok(Self {
-            version: 1,
+            version: VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
             options: all,
             inputs: stamps(files, name),
