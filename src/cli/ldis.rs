@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Make an interior's layered depth images as files, so that no walk has to wait for them
+/// Make an interior's layered depth images as files, so that walks need not
 ///
 /// They lie in the interior's folder, in ldi/: one for each side of each portal, several with
 /// --ldi-views. `walk` and `view` read those that were made with the same options, of files as

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
 use std::fs::read_dir;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The folder beside an interior's file.
@@ -31,7 +32,7 @@ pub(super) struct Made {
 }
 
 /// What an interior's folder has of LDIs.
-pub(super) enum Found {
+enum Found {
     /// Nothing that was begun.
     None,
     /// Those that would be made now, or some of them.
@@ -84,11 +85,11 @@ impl Made {
     }
 
     /// What a folder has.
-    pub(super) fn find(&self, folder: &Path) -> anyhow::Result<Found> {
+    fn find(&self, folder: &Path) -> anyhow::Result<Found> {
         let file = folder.join(FILE);
         let bytes = match std::fs::read(&file) {
             Ok(bytes) => bytes,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Found::None),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::None),
             Err(error) => {
                 return Err(error).with_context(|| format!("{}: cannot read", file.display()));
             }
@@ -133,27 +134,6 @@ impl Made {
         others.collect::<Vec<String>>().join(", ")
     }
 
-    /// The folder of LDIs that a walk can read, if there is one; `say` is told why those that are there
-    /// cannot be.
-    pub(super) fn usable(
-        &self,
-        file: &Path,
-        say: impl FnOnce(String),
-    ) -> anyhow::Result<Option<PathBuf>> {
-        let folder = folder_of(file).join(FOLDER);
-        Ok(match self.find(&folder)? {
-            Found::None => None,
-            Found::Same => Some(folder),
-            Found::Other(how) => {
-                let folder = folder.display();
-                say(format!(
-                    "{folder} {how}; make it again with `lumigraph ldis`"
-                ));
-                None
-            }
-        })
-    }
-
     /// Begins a folder, or goes on with it: what is there of other LDIs is removed, and `say` told so.
     pub(super) fn begin(&self, folder: &Path, say: impl FnOnce(String)) -> anyhow::Result<()> {
         let why = match self.find(folder)? {
@@ -180,6 +160,31 @@ impl Made {
     }
 }
 
+/// The folder of LDIs that a walk can read, if there is one; `say` is told why those that are there
+/// cannot be. `made` tells what the walk would make, which takes a while, and is asked where some were made.
+pub(super) fn usable(
+    file: &Path,
+    made: impl FnOnce() -> anyhow::Result<Made>,
+    say: impl FnOnce(String),
+) -> anyhow::Result<Option<PathBuf>> {
+    let folder = folder_of(file).join(FOLDER);
+    let there = std::fs::metadata(folder.join(FILE));
+    if there.is_err_and(|error| error.kind() == ErrorKind::NotFound) {
+        return Ok(None);
+    }
+    Ok(match made()?.find(&folder)? {
+        Found::None => None,
+        Found::Same => Some(folder),
+        Found::Other(how) => {
+            let folder = folder.display();
+            say(format!(
+                "{folder} {how}; make it again with `lumigraph ldis`"
+            ));
+            None
+        }
+    })
+}
+
 /// The folder that an interior's file is in.
 pub(super) fn folder_of(file: &Path) -> &Path {
     match file.parent() {
@@ -192,7 +197,7 @@ pub(super) fn folder_of(file: &Path) -> &Path {
 pub(super) fn is_ours(folder: &Path) -> bool {
     let is_own = |file: &PathBuf| {
         let name = file.file_name().and_then(OsStr::to_str);
-        is_ldi(file) || name.is_some_and(|name| name == FILE || name == "made.json.tmp")
+        is_ldi(file) || name.is_some_and(|name| name.strip_suffix(".tmp").unwrap_or(name) == FILE)
     };
     entries(folder).is_ok_and(|files| files.iter().all(is_own))
 }

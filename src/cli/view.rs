@@ -4,7 +4,7 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
-use super::made::Made;
+use super::made::{self, Made};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text};
@@ -189,8 +189,8 @@ impl Load {
             if photos.is_some() {
                 options.size = CAPTURED_REFERENCE_SIZE;
             }
-            let made = Made::new(&file, &files, &options, painter, photos)?;
-            made.usable(&file, |text| teller.say(Progress::Note(text)))
+            let made = || Made::new(&file, &files, &options, painter, photos);
+            made::usable(&file, made, |text| teller.say(Progress::Note(text)))
         };
         let mut house = House::new(opened.interior, opened.contents, opened.model);
         let mut folder = None;

@@ -5,7 +5,7 @@ mod report;
 use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::made::Made;
+use super::made::{self, Made};
 use super::options::{resized, size};
 use super::output::{make_parent, print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
@@ -193,9 +193,11 @@ fn ldi_files(
     options: &WalkOptions,
     painter: &Painter,
 ) -> anyhow::Result<Option<PathBuf>> {
-    let (files, photos) = (opened.files(), opened.photos.as_ref());
-    let made = Made::new(&opened.file, &files, &options.library, painter, photos)?;
-    made.usable(&opened.file, |text| say!("note: {text}"))
+    let made = || {
+        let (files, photos) = (opened.files(), opened.photos.as_ref());
+        Made::new(&opened.file, &files, &options.library, painter, photos)
+    };
+    made::usable(&opened.file, made, |text| say!("note: {text}"))
 }
 
 /// Draws all frames, by each kind of portals.

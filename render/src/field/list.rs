@@ -56,6 +56,18 @@ struct Listed {
     unsure: [bool; 3],
 }
 
+impl Listed {
+    /// Whose differences are not known.
+    fn unknown(source_idx: usize, sees: Sees) -> Self {
+        Self {
+            source_idx,
+            sees,
+            diffs: [f64::INFINITY; 3],
+            unsure: [true; 3],
+        }
+    }
+}
+
 impl List {
     pub(super) fn of(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.point) else {
@@ -90,15 +102,7 @@ impl List {
         for &source_idx in &somewhere {
             match listed.binary_search_by_key(&source_idx, |l| l.source_idx) {
                 Ok(at) => listed[at].sees = Sees::Part,
-                Err(at) => {
-                    let view = Listed {
-                        source_idx,
-                        sees: Sees::Part,
-                        diffs: triangle.points.map(|p| frame.difference(source_idx, &p)),
-                        unsure: [false; 3],
-                    };
-                    listed.insert(at, view);
-                }
+                Err(at) => listed.insert(at, Listed::unknown(source_idx, Sees::Part)),
             }
         }
 
@@ -225,8 +229,7 @@ impl Triangle<'_> {
                 listed.push(self.listed(i as usize, known));
                 continue;
             };
-            let mut view = self.listed(i as usize, known);
-            self.measure(&mut view);
+            let view = self.measured(i as usize, known);
             let alike = crowds.entry(view.diffs.map(f64::to_bits)).or_insert(0);
             if *alike <= MAX_CONTRIBUTORS {
                 *alike += usize::from(view.sees == Sees::All);
@@ -242,9 +245,7 @@ impl Triangle<'_> {
         for i in others.into_iter().map(|i| i as usize) {
             let before = listed[..known].binary_search_by_key(&i, |view| view.source_idx);
             if before.is_err() {
-                let mut view = self.listed(i, [None; 3]);
-                self.measure(&mut view);
-                listed.push(view);
+                listed.push(self.measured(i, [None; 3]));
             }
         }
         listed.sort_unstable_by_key(|view| view.source_idx);
@@ -264,6 +265,13 @@ impl Triangle<'_> {
             diffs: known.map(|at| at.map_or(f64::INFINITY, |(diff, _)| diff)),
             unsure: [0, 1, 2].map(|c| known[c].is_none() && !pixels[c].is_some_and(is_in_image)),
         }
+    }
+
+    /// The same with all of its differences.
+    fn measured(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> Listed {
+        let mut view = self.listed(source_idx, known);
+        self.measure(&mut view);
+        view
     }
 
     /// A view's difference at a corner, if it can be what the corner was asked for; else more than that.
