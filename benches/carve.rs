@@ -15,11 +15,11 @@ fn main() {
         let sparse = room.points(points, 0.005, &mut room::Random(7));
         let lines: usize = sparse.iter().map(|p| p.seen_by.len()).sum();
         let (wall, cpu) = (Instant::now(), ProcessTime::now());
-        let mesh = carve::surface(&room.views, &sparse, &carve::Options::default())
+        let surface = carve::surface(&room.views, &sparse, &carve::Options::default())
             .expect("a room can be carved");
         println!(
             "{points:<11}{photos:<8}{lines:>14}{:>10}{:>9.1}{:>9.1}{:>10}",
-            mesh.triangles.len(),
+            surface.mesh.triangles.len(),
             wall.elapsed().as_secs_f64(),
             cpu.elapsed().as_secs_f64(),
             peak_mb().map_or("?".into(), |mb| mb.to_string()),

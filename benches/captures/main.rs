@@ -57,8 +57,8 @@ fn column(name: &str) -> Result<Column, String> {
     known.ok_or_else(|| format!("no kind of proxy; there are: {}", names()))
 }
 
-fn every_column() -> [Column; 10] {
-    let mut all = [Column(None); 10];
+fn every_column() -> [Column; 11] {
+    let mut all = [Column(None); 11];
     for (column, kind) in all.iter_mut().zip(Kind::ALL) {
         column.0 = Some(kind);
     }

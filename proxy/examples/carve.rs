@@ -87,7 +87,7 @@ fn one(capture: &Path, options: &carve::Options, smooth: f64) {
         .map(|v: Vec<(usize, SparsePoint)>| v.into_iter().map(|(_, p)| p).collect::<Vec<_>>());
 
     let start = Instant::now();
-    let mut mesh = carve::surface(&sources, &used, options).unwrap();
+    let mut mesh = carve::surface(&sources, &used, options).unwrap().mesh;
     let took = start.elapsed();
     smoothen(&mut mesh, smooth);
     let solid = Solid::new(MeshKind::Carved, mesh);

@@ -88,6 +88,8 @@ enum StoredSurface {
     Tunnel,
     Hull,
     Carved,
+    #[serde(rename = "carved-dense")]
+    CarvedDense,
     Depth,
     Mesh,
 }
@@ -148,6 +150,7 @@ impl Stored {
                 MeshKind::Tunnel => StoredSurface::Tunnel,
                 MeshKind::Hull => StoredSurface::Hull,
                 MeshKind::Carved => StoredSurface::Carved,
+                MeshKind::CarvedDense => StoredSurface::CarvedDense,
                 MeshKind::Depth => StoredSurface::Depth,
                 MeshKind::Mesh => StoredSurface::Mesh,
             },
@@ -193,6 +196,7 @@ impl Stored {
             StoredSurface::Tunnel => MeshKind::Tunnel,
             StoredSurface::Hull => MeshKind::Hull,
             StoredSurface::Carved => MeshKind::Carved,
+            StoredSurface::CarvedDense => MeshKind::CarvedDense,
             StoredSurface::Depth => MeshKind::Depth,
             StoredSurface::Mesh => MeshKind::Mesh,
         };

@@ -112,6 +112,7 @@ fn about(fit: Fit) -> &'static str {
              every view"
         }
         Fit::Carved => "A closed mesh of the sparse points, free space carved away",
+        Fit::CarvedDense => "The same of the points that photos agree on between them, too",
         Fit::Depth => "The photos' depth maps, fused",
         Fit::Dense => "The sparse points, and those that photos agree on between them",
     }

@@ -16,8 +16,8 @@ use std::time::Instant;
 /// Which surface.
 #[derive(Args, Clone)]
 pub(super) struct ProxyArgs {
-    /// plane, dominant-plane, view-plane, tunnel, hull, points, carved, depth, dense, auto, or
-    /// a file: a proxy's (.json, .ply, .glb) or a mesh (.gltf, .obj) [default: the scene's own, else
+    /// plane, dominant-plane, view-plane, tunnel, hull, points, carved, depth, dense, carved-dense,
+    /// auto, or a file: a proxy's (.json, .ply, .glb) or a mesh (.gltf, .obj) [default: the scene's own, else
     /// auto]
     #[arg(long, value_name = "KIND|FILE")]
     pub(super) proxy: Option<String>,

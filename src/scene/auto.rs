@@ -61,7 +61,7 @@ impl Scene {
         let mut leader: Option<Scores> = None;
         let mut best: Option<(Kind, bool)> = None;
         for kind in candidates {
-            if kind == Kind::Dense && rest.len() > MOST_COMPARED {
+            if matches!(kind, Kind::Dense | Kind::CarvedDense) && rest.len() > MOST_COMPARED {
                 let score = Err(format!("{} photos take long to compare", rest.len()));
                 trials.push(Trial::of(kind, true, score));
                 continue;
@@ -94,6 +94,7 @@ impl Scene {
         let (kind, occludes) = best.unwrap_or((Kind::Plane, true));
         let mut fitted = match kind {
             Kind::Dense => bench.dense()?,
+            Kind::CarvedDense => bench.carved_dense()?,
             Kind::Points => bench.points()?,
             _ => self.fit(kind, without)?,
         };
@@ -115,7 +116,8 @@ impl Scene {
             | Kind::Tunnel
             | Kind::Points
             | Kind::Carved
-            | Kind::Dense => self.reconstruction.points.len() >= 3,
+            | Kind::Dense
+            | Kind::CarvedDense => self.reconstruction.points.len() >= 3,
             Kind::Hull => self.has_silhouettes(),
             Kind::Depth => self.photos.iter().any(|p| p.depth_map.is_some()),
         }

@@ -1,11 +1,12 @@
 //! Fitting a scene's proxy.
 
 use super::auto::Trial;
+use super::carved_points::CarvedPoints;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
 use glam::DVec3;
 use image::RgbaImage;
-use proxy::dense::{DenseOptions, DensePoints, Matching};
+use proxy::dense::{DenseOptions, Matching};
 use proxy::depth;
 use proxy::hull::{self, Silhouette};
 use proxy::{
@@ -36,13 +37,16 @@ pub enum Kind {
     Carved,
     /// Depth maps, fused.
     Depth,
-    /// The sparse points, and those that photos agree on between them.
+    /// The sparse points, and those that photos agree on between them, as far as they lie on
+    /// [`Self::CarvedDense`].
     Dense,
+    /// A closed mesh of these points.
+    CarvedDense,
 }
 
 impl Kind {
     /// All of them, what is fitted fastest first.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Plane,
         Self::DominantPlane,
         Self::ViewPlane,
@@ -52,6 +56,7 @@ impl Kind {
         Self::Hull,
         Self::Depth,
         Self::Dense,
+        Self::CarvedDense,
     ];
 
     /// As the command line spells it.
@@ -66,6 +71,7 @@ impl Kind {
             Self::Carved => "carved",
             Self::Depth => "depth",
             Self::Dense => "dense",
+            Self::CarvedDense => "carved-dense",
         }
     }
 
@@ -126,13 +132,15 @@ impl Scene {
             Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
             Kind::Carved => {
                 let (views, points) = sparse()?;
-                let mesh = carve::surface(&views, &points, &carve::Options::default());
+                let surface = carve::surface(&views, &points, &carve::Options::default());
                 let how = format!("carved out of {} points", points.len());
-                Ok(Fitted::mesh(MeshKind::Carved, mesh.map_err(unfit)?, how))
+                let mesh = surface.map_err(unfit)?.mesh;
+                Ok(Fitted::mesh(MeshKind::Carved, mesh, how))
             }
             Kind::Hull => self.fit_hull(without),
             Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without),
+            Kind::CarvedDense => self.dense_surface(kind, without)?.surface(),
         }
     }
 
@@ -246,18 +254,22 @@ impl Scene {
     }
 
     fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        self.needs_points(Kind::Dense)?;
+        let surface = self.dense_surface(Kind::Dense, without)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
-        let (_, sparse) = self.sparse(without)?;
-        let points = self.matching(without)?.points(&sparse, None);
         let within = self.cutout(without, None)?.map(|cutout| cutout.hull);
-        let dense = DensePoints {
-            names,
-            points,
-            within,
-        };
-        Ok(Fitted::dense(dense, sparse.len()))
+        Ok(surface.dense(names, within))
+    }
+
+    fn dense_surface(
+        &self,
+        kind: Kind,
+        without: &BTreeSet<String>,
+    ) -> Result<CarvedPoints, SceneError> {
+        self.needs_points(kind)?;
+        let (views, sparse) = self.sparse(without)?;
+        let points = self.matching(without)?.points(&sparse, None);
+        Ok(CarvedPoints::new(&views, points, sparse.len()))
     }
 
     /// The photos but those of the given names, ready to be compared.
@@ -275,7 +287,7 @@ impl Scene {
 }
 
 impl Fitted {
-    fn new(proxy: Proxy, how: impl Into<String>) -> Self {
+    pub(super) fn new(proxy: Proxy, how: impl Into<String>) -> Self {
         Self {
             proxy,
             how: how.into(),
@@ -287,16 +299,6 @@ impl Fitted {
     /// The sparse points, within a hull if there is one.
     pub(super) fn points(within: Option<Arc<Solid>>) -> Self {
         Self::new(Proxy::Points { within }, "made for every view")
-    }
-
-    /// Of points, so many of which are the sparse ones.
-    pub(super) fn dense(dense: DensePoints, sparse: usize) -> Self {
-        let how = format!(
-            "{} points, {} of them found between the sparse ones",
-            dense.points.len(),
-            dense.points.len() - sparse
-        );
-        Self::new(Proxy::Dense(Arc::new(dense)), how)
     }
 
     fn tunnel(tunnel: &Tunnel) -> Self {
@@ -326,7 +328,7 @@ impl Fitted {
         self
     }
 
-    fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {
+    pub(super) fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {
         Self::new(Proxy::Mesh(Arc::new(Solid::new(kind, mesh))), how)
     }
 }

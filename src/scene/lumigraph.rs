@@ -1,5 +1,6 @@
 //! From a scene to what the engine draws from.
 
+use super::carved_points::on_surface;
 use super::{Photo, Scene, SceneError};
 use calibrate::{Image, ImageId, View};
 use proxy::{DensePoints, Proxy, SparsePoint};
@@ -112,8 +113,10 @@ impl Scene {
         });
         let points = match &proxy {
             Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),
-            Proxy::ViewPlane | Proxy::Points { .. } => {
-                self.sparse_points(without, &names_of(&sources))
+            Proxy::ViewPlane => self.sparse_points(without, &names_of(&sources)),
+            Proxy::Points { .. } => {
+                let views: Vec<View> = sources.iter().map(|s| s.view.clone()).collect();
+                on_surface(&views, self.sparse_points(without, &names_of(&sources)))
             }
             Proxy::Dense(dense) => renamed(dense, &names_of(&sources)),
         };

@@ -9,6 +9,7 @@
 mod auto;
 mod beside;
 mod calibration;
+mod carved_points;
 mod cutout;
 mod error;
 mod exposure;

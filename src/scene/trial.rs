@@ -1,5 +1,6 @@
 //! Photos that judge proxies: each is drawn small from all the others and compared.
 
+use super::carved_points::{CarvedPoints, on_surface};
 use super::cutout::Cutout;
 use super::fit::{Fitted, Kind, unfit};
 use super::{Scene, SceneError};
@@ -39,6 +40,8 @@ pub(super) struct Trials<'a> {
     /// Whose proxy changes with what is on trial.
     lumigraph: Lumigraph,
     matching: Option<Matching>,
+    /// Of dense points, without each judge.
+    dense: BTreeMap<usize, CarvedPoints>,
     /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
     cutout: Option<Option<Cutout>>,
     /// And without the judges of each fold.
@@ -84,8 +87,7 @@ impl<'a> Trials<'a> {
         without: &'a BTreeSet<String>,
         count: usize,
     ) -> Result<Self, SceneError> {
-        let lumigraph =
-            scene.reduced_lumigraph(without, Proxy::Points { within: None }, PHOTO_SIDE)?;
+        let lumigraph = scene.reduced_lumigraph(without, Proxy::ViewPlane, PHOTO_SIDE)?;
         let names: Vec<String> = lumigraph.sources.iter().map(|s| s.name.clone()).collect();
         let spread = (0..count).map(|i| (2 * i + 1) * names.len() / (2 * count));
         let judge = |source_idx: usize| {
@@ -112,6 +114,7 @@ impl<'a> Trials<'a> {
             judges,
             lumigraph,
             matching: None,
+            dense: BTreeMap::new(),
             cutout: None,
             bounds: BTreeMap::new(),
         })
@@ -129,7 +132,10 @@ impl<'a> Trials<'a> {
         leader: Option<&Scores>,
     ) -> Result<(Scores, Option<Scores>), SceneError> {
         let count = self.judges.len();
-        let of_points = matches!(kind, Kind::Points | Kind::ViewPlane | Kind::Dense);
+        let of_points = matches!(
+            kind,
+            Kind::Points | Kind::ViewPlane | Kind::Dense | Kind::CarvedDense
+        );
         let folds = if of_points { count } else { self.folds() };
         let mut plain = Scores(vec![None; count]);
         let mut occluding = plain.clone();
@@ -163,15 +169,46 @@ impl<'a> Trials<'a> {
 
     /// The dense points of all photos, which are half known where they were on trial.
     pub(super) fn dense(&mut self) -> Result<Fitted, SceneError> {
+        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        Ok(self.dense_of_all()?.dense(self.names.clone(), within))
+    }
+
+    /// The surface carved out of them.
+    pub(super) fn carved_dense(&mut self) -> Result<Fitted, SceneError> {
+        self.dense_of_all()?.surface()
+    }
+
+    fn dense_of_all(&mut self) -> Result<CarvedPoints, SceneError> {
         let sparse = self.scene.sparse_points(self.without, &self.names);
         let points = self.matching()?.points(&sparse, None);
-        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
-        let dense = DensePoints {
-            names: self.names.clone(),
-            points,
-            within,
-        };
-        Ok(Fitted::dense(dense, sparse.len()))
+        Ok(CarvedPoints::new(&self.views(None), points, sparse.len()))
+    }
+
+    /// Dense points without a judge.
+    fn dense_without(&mut self, judge: usize) -> Result<&CarvedPoints, SceneError> {
+        if !self.dense.contains_key(&judge) {
+            let Judge {
+                source_idx, name, ..
+            } = &self.judges[judge];
+            let (gone, mut fewer) = (*source_idx, self.without.clone());
+            fewer.insert(name.clone());
+            let sparse = self.scene.sparse_points(&fewer, &self.names);
+            let points = self.matching()?.points(&sparse, Some(gone));
+            let surface = CarvedPoints::new(&self.views(Some(gone)), points, sparse.len());
+            self.dense.insert(judge, surface);
+        }
+        Ok(&self.dense[&judge])
+    }
+
+    /// The photos' views. That of one which was never taken is where another is: a camera's place
+    /// is known to be free.
+    fn views(&self, gone: Option<usize>) -> Vec<View> {
+        let sources = &self.lumigraph.sources;
+        let mut views: Vec<View> = sources.iter().map(|s| s.view.clone()).collect();
+        if let Some(gone) = gone {
+            views[gone] = views[usize::from(gone == 0)].clone();
+        }
+        views
     }
 
     /// The sparse points of all photos.
@@ -223,17 +260,23 @@ impl<'a> Trials<'a> {
         };
         let sparse = || self.scene.sparse_points(&fewer, &self.names);
         let (proxy, points) = match kind {
-            Kind::Points => (Proxy::Points { within }, sparse()),
+            Kind::Points => {
+                let gone = self.judges[judges[0]].source_idx;
+                let points = on_surface(&self.views(Some(gone)), sparse());
+                (Proxy::Points { within }, points)
+            }
             Kind::ViewPlane => (Proxy::ViewPlane, sparse()),
             Kind::Dense => {
-                let gone = self.judges[judges[0]].source_idx;
-                let sparse = sparse();
-                let points = self.matching()?.points(&sparse, Some(gone));
+                let points = self.dense_without(judges[0])?.points.clone();
                 let dense = DensePoints {
                     within,
                     ..DensePoints::default()
                 };
                 (Proxy::Dense(Arc::new(dense)), points)
+            }
+            Kind::CarvedDense => {
+                let solid = self.dense_without(judges[0])?.solid()?;
+                (Proxy::Mesh(Arc::new(solid)), Vec::new())
             }
             // A box may happen to suit a few photos of anything.
             Kind::Tunnel => (self.scene.fit_hallway(&fewer)?.proxy, Vec::new()),

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 11] = [
     "plane",
     "dominant-plane",
     "view-plane",
@@ -19,6 +19,7 @@ const KINDS: [&str; 10] = [
     "hull",
     "depth",
     "dense",
+    "carved-dense",
     "auto",
 ];
 const SIZE: (u32, u32) = (48, 36);
@@ -175,6 +176,7 @@ fn five_points_and_fewer() {
         "tunnel",
         "carved",
         "dense",
+        "carved-dense",
     ];
     // Nor do the cameras' axes meet.
     let all = [&of_points[..], &["plane", "auto"]].concat();
@@ -217,7 +219,7 @@ fn outliers_far_away() {
 #[test]
 fn points_behind_the_cameras() {
     let points: Vec<DVec3> = ordinary(40).iter().map(|p| -*p).collect();
-    only_these_fail(&in_a_row(7), &points, &["plane", "carved"]);
+    only_these_fail(&in_a_row(7), &points, &["plane", "carved", "carved-dense"]);
 }
 
 #[test]
@@ -234,5 +236,9 @@ fn cameras_at_one_place() {
 #[test]
 fn points_in_the_cameras() {
     let cameras = in_a_row(7);
-    only_these_fail(&cameras, &cameras, &["plane", "tunnel", "carved"]);
+    only_these_fail(
+        &cameras,
+        &cameras,
+        &["plane", "tunnel", "carved", "carved-dense"],
+    );
 }

@@ -42,6 +42,7 @@ fn a_scene_keeps_any_kind_and_draws_from_it() {
         ("view-plane", "proxy.json"),
         ("carved", "proxy.ply"),
         ("dense", "proxy.json"),
+        ("carved-dense", "proxy.ply"),
     ] {
         let ran = lumigraph(folder.path(), &format!("proxy scene {kind}")).ok();
         assert!(ran.stdout.contains(file), "{kind}: {}", ran.stdout);

@@ -44,6 +44,9 @@ pub struct Options {
     pub behind: f64,
     /// What the least surface-like facet costs, in lines of sight.
     pub quality: f64,
+    /// Only so many points, the first, say where the shell is: points found by comparing photos
+    /// stray more, and a few below the ground hide it.
+    pub shell_points: usize,
 }
 
 impl Default for Options {
@@ -53,6 +56,7 @@ impl Default for Options {
             softness: 0.5,
             behind: 0.0,
             quality: 1.0,
+            shell_points: usize::MAX,
         }
     }
 }
@@ -112,13 +116,21 @@ pub enum CarveError {
     },
 }
 
+/// What was carved.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Closed, its triangles counter-clockwise where they are looked at from free space. Its
+    /// vertices are the points that lie on it, and the shell's.
+    pub mesh: Mesh,
+    /// By point: whether it is one of the mesh's vertices. What is not is contradicted by lines of
+    /// sight: it floats in free space, or was left in solid.
+    pub on_surface: Vec<bool>,
+}
+
 /// Points at most: each makes about seven tetrahedra, whose facets have 32-bit names.
 const MOST_POINTS: usize = 100_000_000;
 
 /// The surface between the space that the photos look through and what they see.
-///
-/// Closed, its triangles counter-clockwise where they are looked at from free space. Its
-/// vertices are sparse points where they lie on it, and the shell's.
 ///
 /// # Errors
 /// See [`CarveError`].
@@ -126,7 +138,7 @@ pub fn surface(
     sources: &[View],
     points: &[SparsePoint],
     options: &Options,
-) -> Result<Mesh, CarveError> {
+) -> Result<Surface, CarveError> {
     // 1. The points that photos see, on the lattice, with the shell around them.
     let scene = Scene::new(sources, points, options)?;
     // 2. Tetrahedra. The shell spans space whatever the points do.
@@ -135,7 +147,14 @@ pub fn surface(
     let graph = energy(&delaunay, &scene, options);
     // 4. The cheapest labelling, and the facets between free and solid.
     let is_free = flow::source_side(graph);
-    Ok(boundary(&delaunay, &is_free, &scene.positions))
+    let (mut mesh, index) = boundary(&delaunay, &is_free, &scene.positions);
+    // 5. A view beyond the cameras may stand in what nothing carved, and look out of the shell.
+    mesh.append(&scene.beyond);
+    let is_on = |site: &Option<u32>| site.is_some_and(|site| index[site as usize] != u32::MAX);
+    Ok(Surface {
+        mesh,
+        on_surface: scene.site_of.iter().map(is_on).collect(),
+    })
 }
 
 /// What is carved, on the lattice.
@@ -143,8 +162,12 @@ struct Scene {
     sites: Vec<Site>,
     /// Of the sites, in the world.
     positions: Vec<DVec3>,
+    /// A dome beyond all sites.
+    beyond: Mesh,
     /// How many sites come from points; the others are the shell's.
     points: usize,
+    /// By given point; none of those that are not used.
+    site_of: Vec<Option<u32>>,
     sightings: Vec<Sighting>,
     /// The cameras' centres, in lattice steps.
     cameras: Vec<DVec3>,
@@ -160,35 +183,39 @@ impl Scene {
     ) -> Result<Self, CarveError> {
         check(sources, points)?;
         // 1. Only what lies in front of the photos that see it.
-        let usable = |point: &SparsePoint| {
+        let usable = |(i, point): (usize, &SparsePoint)| {
             let position = point.position;
             let sees = |&&i: &&u32| sources[i as usize].project(position).is_some();
             let mut seen_by: Vec<u32> = point.seen_by.iter().filter(sees).copied().collect();
             seen_by.sort_unstable();
             seen_by.dedup();
-            (position.is_finite() && !seen_by.is_empty()).then_some((position, seen_by))
+            (position.is_finite() && !seen_by.is_empty()).then_some((position, seen_by, i))
         };
-        let mut used: Vec<(DVec3, Vec<u32>)> = points.iter().filter_map(usable).collect();
+        let mut used: Vec<(DVec3, Vec<u32>, usize)> =
+            points.iter().enumerate().filter_map(usable).collect();
         if used.is_empty() {
             return Err(CarveError::NoPoints {
                 given: points.len(),
             });
         }
 
-        let around = Surroundings::of(sources, used.iter().map(|(p, _)| *p));
-        for (position, _) in &mut used {
+        let around = Surroundings::of(sources, {
+            let of_shell = |(_, _, i): &&(DVec3, Vec<u32>, usize)| *i < options.shell_points;
+            used.iter().filter(of_shell).map(|(p, ..)| *p)
+        });
+        for (position, ..) in &mut used {
             *position = around.within(*position);
         }
         // A camera on the surface would be neither here nor there.
         let clear = clearance(sources, TOO_NEAR * around.radius);
-        used.retain(|(position, _)| clear(*position));
+        used.retain(|(position, ..)| clear(*position));
 
         // 2. Snapped. Along a curve through space what is near in the world is near in memory.
         let lattice = Lattice::around(around.center, around.radius);
         let mut snapped: Vec<(u64, Site, usize)> = used
             .iter()
             .enumerate()
-            .map(|(i, (position, _))| {
+            .map(|(i, (position, ..))| {
                 let site = lattice.snap(*position);
                 (hilbert(site), site, i)
             })
@@ -197,6 +224,7 @@ impl Scene {
         let lines = MOST_LINES / used.len().max(1);
         let lines = lines.clamp(FEWEST_LINES_PER_POINT, options.lines_per_point.max(1));
         let (mut sites, mut positions, mut sightings) = (Vec::new(), Vec::new(), Vec::new());
+        let mut site_of = vec![None; points.len()];
         for same in snapped.chunk_by(|a, b| a.1 == b.1) {
             let mut cameras: Vec<u32> = same
                 .iter()
@@ -208,6 +236,9 @@ impl Scene {
                 vertex: sites.len() as u32,
                 cameras: spread(cameras, lines),
             });
+            for (_, _, i) in same {
+                site_of[used[*i].2] = Some(sites.len() as u32);
+            }
             sites.push(same[0].1);
             positions.push(used[same[0].2].0);
         }
@@ -222,7 +253,9 @@ impl Scene {
         Ok(Self {
             sites,
             positions,
+            beyond: around.beyond(),
             points,
+            site_of,
             sightings,
             cameras: centers.iter().map(|c| lattice.steps(*c)).collect(),
             camera_sites: centers.iter().map(|c| lattice.snap(*c)).collect(),
@@ -339,8 +372,9 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
     }
 }
 
-/// The facets between free and solid, counter-clockwise from the free side.
-fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh {
+/// The facets between free and solid, counter-clockwise from the free side, and by site which of
+/// their vertices it is: `u32::MAX` for none.
+fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> (Mesh, Vec<u32>) {
     let mut mesh = Mesh::default();
     let mut index = vec![u32::MAX; positions.len()];
     for t in (0..delaunay.finite).filter(|&t| is_free[t]) {
@@ -360,5 +394,5 @@ fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> Mesh 
             }));
         }
     }
-    mesh
+    (mesh, index)
 }

@@ -14,6 +14,8 @@ const DOME: f64 = 10.0;
 const NEARLY_ALL: f64 = 0.95;
 /// Points are brought within this share of the dome's radius: its flat facets lie within.
 const WITHIN: f64 = 0.8;
+/// What is beyond even that, as a multiple of its radius.
+const BEYOND: f64 = 1.1;
 /// How often an icosahedron's sides are split in half: 10 242 vertices, 2° apart.
 const SPLITS: u32 = 5;
 
@@ -102,6 +104,16 @@ impl Surroundings {
             .and_then(sinks)
             .map_or(0.0, |q| q.dot(direction));
         self.center + direction / inverse.max(1.0 / self.radius)
+    }
+
+    /// A dome beyond the shell, counter-clockwise from within.
+    pub(crate) fn beyond(&self) -> Mesh {
+        let (directions, triangles) = icosphere(3);
+        let place = |d: DVec3| self.center + BEYOND * self.radius * d;
+        Mesh {
+            positions: directions.into_iter().map(place).collect(),
+            triangles,
+        }
     }
 
     /// Vertices spread over the shell, about 9° apart.

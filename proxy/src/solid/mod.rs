@@ -19,6 +19,8 @@ pub enum MeshKind {
     Hull,
     /// The sparse points' tetrahedra, free space carved away.
     Carved,
+    /// The same of dense points.
+    CarvedDense,
     /// Depth maps, fused.
     Depth,
     /// A file from elsewhere.
@@ -27,10 +29,11 @@ pub enum MeshKind {
 
 impl MeshKind {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Tunnel,
         Self::Hull,
         Self::Carved,
+        Self::CarvedDense,
         Self::Depth,
         Self::Mesh,
     ];
@@ -41,6 +44,7 @@ impl MeshKind {
             Self::Tunnel => "tunnel",
             Self::Hull => "hull",
             Self::Carved => "carved",
+            Self::CarvedDense => "carved-dense",
             Self::Depth => "depth",
             Self::Mesh => "mesh",
         }
@@ -56,7 +60,7 @@ impl MeshKind {
     /// solid nothing else can be seen from free space; and a desired view that strays into
     /// what no line of sight carved looks out of it instead of at its near wall.
     pub fn has_front_sides_only(self) -> bool {
-        self == Self::Carved
+        matches!(self, Self::Carved | Self::CarvedDense)
     }
 }
 

@@ -6,13 +6,14 @@ use crate::room;
 use calibrate::{Pixel, Rigid3, View, colmap};
 use glam::DVec3;
 use proxy::carve::{self, CarveError, Options};
-use proxy::{Mesh, SparsePoint, shell};
+use proxy::{Mesh, MeshKind, Solid, SparsePoint, shell};
 use room::{Random, Room};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 fn carved(views: &[View], points: &[SparsePoint]) -> Mesh {
-    carve::surface(views, points, &Options::default()).unwrap()
+    let surface = carve::surface(views, points, &Options::default());
+    surface.unwrap().mesh
 }
 
 /// Each side of a triangle is the other way round in another: no holes, one orientation.
@@ -104,6 +105,24 @@ fn a_room_of_exact_points_is_that_room() {
 }
 
 #[test]
+fn a_view_from_what_nothing_carved_looks_out_of_the_shell() {
+    let room = Room::new(16);
+    let solid = Solid::new(
+        MeshKind::Carved,
+        carved(&room.views, &room.points(500, 0.0, &mut Random(3))),
+    );
+    let far = solid.mesh().positions.iter().map(|p| p.length());
+    let far = far.fold(0.0, f64::max);
+    for direction in [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, 2.0, -3.0)] {
+        let direction = direction.normalize();
+        let center = 0.5 * far * direction;
+        for ray in [direction, -direction, direction.any_orthogonal_vector()] {
+            assert!(solid.first_hit(center, ray).is_some(), "{center} {ray}");
+        }
+    }
+}
+
+#[test]
 fn noise_and_mismatches_do_little_harm() {
     let room = Room::new(16);
     let mut random = Random(2);
@@ -115,7 +134,17 @@ fn noise_and_mismatches_do_little_harm() {
         points[i].position = center.lerp(points[i].position, along);
         points[i].seen_by.truncate(2);
     }
-    let mesh = carved(&room.views, &points);
+    let surface = carve::surface(&room.views, &points, &Options::default()).unwrap();
+    // What is anywhere is not on the surface, most of the rest is.
+    let share_on = |is_anywhere: bool| {
+        let which = (0..points.len()).filter(|i| (i % 20 == 0) == is_anywhere);
+        let on: Vec<bool> = which.map(|i| surface.on_surface[i]).collect();
+        on.iter().filter(|on| **on).count() as f64 / on.len() as f64
+    };
+    let (anywhere, rest) = (share_on(true), share_on(false));
+    println!("on the surface: {anywhere:.3} of what is anywhere, {rest:.3} of the rest");
+    assert!(anywhere < 0.3 && rest > 0.8, "{anywhere} {rest}");
+    let mesh = surface.mesh;
     assert_closed(&mesh);
     assert_covers(&mesh, &room.views, 6);
     let (mean, most, complete) = errors(&room, &mesh, 0.1);
