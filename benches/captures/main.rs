@@ -129,6 +129,8 @@ fn print(args: &Args, rows: &[Row]) {
 /// One capture, all columns.
 fn measure(capture: &Path, args: &Args) -> Result<Row, SceneError> {
     let mut scene = open(capture, args.mattes.as_deref())?;
+    // As the command line does.
+    scene.drop_weak();
     let held_out = scene.held_out_by_default()?;
     // As `evaluate` does.
     if scene.folder.is_none() || !scene.exposure_is_without(&held_out) {

@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let message = "is a folder, but this format is a file; give its name with -o";
         return Err(Usage(format!("{} {message}", output.display())).into());
     }
-    let scene = args.scene.open()?;
+    let scene = args.scene.open_whole()?;
     let whole = &scene.reconstruction;
     if !is_file {
         check_colmap(whole)?;

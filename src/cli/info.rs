@@ -43,14 +43,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(model) = bare_model(&args.scene.scene) {
         return info_of_file::of_model(&model, args.json);
     }
-    let scene = args.scene.open()?;
+    let scene = args.scene.open_whole()?;
     let info = gather(&scene)?;
     if args.json {
         return print_json(&info);
     }
     print(&text(&scene, &info))?;
     for group in scene.reconstruction.weakly_tied(TRUSTED_TIE) {
-        say!("warning: {}; --drop-weak leaves out", tie_text(&group));
+        say!(
+            "note: {}; what draws leaves them out, unless --keep-weak",
+            tie_text(&group)
+        );
     }
     Ok(())
 }

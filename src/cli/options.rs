@@ -21,21 +21,25 @@ pub(super) struct SceneArgs {
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     pub(super) strict: bool,
-    /// Leave out photos that share too few points with the rest to be placed surely
+    /// Use photos, too, that share too few points with the rest to be placed surely
     #[arg(long)]
-    pub(super) drop_weak: bool,
+    pub(super) keep_weak: bool,
 }
 
 impl SceneArgs {
     /// Opens it, and says which photos are not used.
     pub(super) fn open(&self) -> anyhow::Result<Scene> {
-        let (mut scene, warnings) = Scene::open(&self.scene, self.strict)?;
-        print_warnings(&warnings);
-        if self.drop_weak {
-            for group in scene.drop_weak() {
-                say!("note: left out: {}", tie_text(&group));
-            }
+        let mut scene = self.open_whole()?;
+        if !self.keep_weak {
+            drop_weak(&mut scene);
         }
+        Ok(scene)
+    }
+
+    /// As [`Self::open`], with photos whose places are unsure.
+    pub(super) fn open_whole(&self) -> anyhow::Result<Scene> {
+        let (scene, warnings) = Scene::open(&self.scene, self.strict)?;
+        print_warnings(&warnings);
         Ok(scene)
     }
 }
@@ -55,6 +59,14 @@ pub(super) fn beside_counts(scene: &Scene) -> [(&'static str, usize); 4] {
 pub(super) fn beside_text(scene: &Scene) -> String {
     let counts = beside_counts(scene).into_iter().filter(|(_, n)| *n > 0);
     counts.map(|(what, n)| format!(", {n} {what}")).collect()
+}
+
+/// Leaves out photos whose places are unsure, and says which.
+pub(super) fn drop_weak(scene: &mut Scene) {
+    for group in scene.drop_weak() {
+        let tie = tie_text(&group);
+        say!("note: left out, as they may be misplaced: {tie}; --keep-weak uses them");
+    }
 }
 
 /// How little ties a group of photos to the rest.

@@ -230,9 +230,10 @@ fn measure_one(
     let device = args.device.choice();
     let scene = |folder: &Path| {
         let start = Instant::now();
-        let (scene, warnings) = Scene::open(folder, false)?;
+        let (mut scene, warnings) = Scene::open(folder, false)?;
         let read_ms = 1e3 * start.elapsed().as_secs_f64();
         super::options::print_warnings(&warnings);
+        super::options::drop_weak(&mut scene);
         measure::measure(scene, read_ms, name, effort, device, bar)
     };
     match given {
