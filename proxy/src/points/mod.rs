@@ -1,16 +1,18 @@
 //! The sparse points as a surface of their own, made anew for each desired view.
 //!
-//! The points that the source views most like the desired one observe are triangulated
-//! over the directions around the desired centre. Inside a triangle inverse distance is
+//! The points that the source views most like the desired one observe, by part of its picture, are
+//! triangulated over the directions around the desired centre. Inside a triangle inverse distance is
 //! linear, so each is flat. A ring of anchors beyond the image's corners, and one behind the
 //! viewer, make the surface complete. It is the proxy that asks least of a capture: no closed mesh, no agreement
 //! between far views.
 
+mod alike;
 mod chart;
 mod clean;
 mod nearest;
 
 use crate::Facets;
+use alike::Alike;
 use calibrate::{Pixel, View};
 use chart::{Chart, distinct};
 use clean::{drop_hidden, drop_spikes, fade};
@@ -26,13 +28,6 @@ pub struct SparsePoint {
     pub seen_by: Vec<u32>,
 }
 
-/// How many of the source views most like the desired one give their points.
-const VIEWS: usize = 6;
-/// Radians added to the angle at a point before views are compared: below it, angles are
-/// as good as equal, and the number of shared points decides.
-const EASY_ANGLE: f64 = 0.1;
-/// Radians that a ratio of distances by the factor e is worth beside an angle.
-const RATIO_WEIGHT: f64 = 0.3;
 /// Anchors around the image, and how many points decide where each lies.
 const ANCHORS: usize = 32;
 const ANCHORED_TO: usize = 8;
@@ -41,13 +36,6 @@ const ANCHORED_TO: usize = 8;
 const MARGIN: f64 = 1.1;
 /// The widest ring; what lies behind it is not seen.
 const WIDEST: f64 = 2.8;
-
-/// Likenesses that differ by less, relatively, are the same.
-const TIED: f64 = 1e-9;
-
-/// A view counts fully from so much more likeness on, relatively, than the first that does
-/// not count.
-const FADE: f64 = 0.1;
 
 /// A point as the desired view sees it: a unit vector in its frame, and 1/distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,8 +55,8 @@ impl Node {
     }
 }
 
-/// The surface through the points that the `sources` most like `desired` observe; `None`
-/// where fewer than three are in sight.
+/// The surface through the points that the `sources` most like `desired` observe, by part of its
+/// picture; `None` where fewer than three are in sight.
 ///
 /// Outliers go in two steps: points of which half the neighbours lie clearly nearer are
 /// taken to be hidden by them, and points that stick out of all their neighbours go too.
@@ -90,13 +78,12 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         points.iter().filter_map(|p| Some((seen(p)?, p))).collect();
 
     // 2. Those that the views most like this one observe.
-    let chosen = views_most_like(center, sources, &in_sight);
+    let alike = Alike::new(center, reach, sources, &in_sight);
     let mut nodes: Vec<Node> = in_sight
         .iter()
-        .map(|(node, p)| {
-            let weights = p.seen_by.iter().map(|&i| chosen[i as usize]);
-            let weight = weights.fold(0.0, f64::max);
-            Node { weight, ..*node }
+        .map(|(node, point)| Node {
+            weight: alike.weight(node, point),
+            ..*node
         })
         .filter(|node| node.weight > 0.0)
         .collect();
@@ -139,36 +126,6 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         nodes.iter().map(|n| n.inverse_distance).collect(),
         triangles,
     ))
-}
-
-/// Which source views are most like one at `center`: those that share many points with it
-/// and see them from about the same direction and distance. Each has a weight, 0…1, that falls to
-/// zero before another takes its place.
-fn views_most_like(center: DVec3, sources: &[View], in_sight: &[(Node, &SparsePoint)]) -> Vec<f64> {
-    let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
-    let mut likeness = vec![0.0; sources.len()];
-    for (node, point) in in_sight {
-        let here = point.position - center;
-        for &i in &point.seen_by {
-            let there = point.position - centers[i as usize];
-            let angle = there.cross(here).length().atan2(there.dot(here));
-            let ratio = (there.length() * node.inverse_distance).ln().abs();
-            likeness[i as usize] += 1.0 / (EASY_ANGLE + angle + RATIO_WEIGHT * ratio);
-        }
-    }
-    let mut order: Vec<usize> = (0..sources.len()).filter(|&i| likeness[i] > 0.0).collect();
-    order.sort_by(|&i, &j| likeness[j].total_cmp(&likeness[i]).then(i.cmp(&j)));
-    // Views of one place are alike to the last digits: none of them takes another's place.
-    let last = order.get(VIEWS - 1).map_or(0.0, |&i| likeness[i]);
-    let count = order.partition_point(|&i| likeness[i] > (1.0 - TIED) * last);
-    let count = count.max(VIEWS.min(order.len()));
-    let least = order.get(count).map_or(0.0, |&i| likeness[i]);
-    order.truncate(count);
-    let mut chosen = vec![0.0; sources.len()];
-    for i in order {
-        chosen[i] = ((likeness[i] - least) / (FADE * likeness[i])).min(1.0);
-    }
-    chosen
 }
 
 /// The angle from the axis within which all of the image lies, and a margin.

@@ -158,6 +158,53 @@ fn only_the_views_most_alike_give_their_points() {
     assert!((depth - 5.0).abs() < 1e-9, "{depth}");
 }
 
+#[test]
+fn a_side_of_the_picture_has_the_views_most_alike_there() {
+    // Seven views beside the desired one see most of it, and one more the left.
+    let mut points = surface(|x, _| if x > -1.5 { 5.0 } else { 5.4 });
+    let mut sources: Vec<View> = (0..7)
+        .map(|i| view(DVec3::X * 0.1 * f64::from(i)))
+        .collect();
+    sources.push(view(DVec3::X * -0.1));
+    for point in &mut points {
+        let is_right = point.position.x > -1.5;
+        point.seen_by = if is_right { (0..7).collect() } else { vec![7] };
+    }
+    let desired = view(DVec3::ZERO);
+    let facets = facets(&desired, &sources, &points).unwrap();
+    for (x, expected) in [(20.0, 5.4), (130.0, 5.0)] {
+        let depth = depth(&facets, &desired, x, 60.0).unwrap();
+        assert!((depth - expected).abs() < 0.03, "{x}: {depth}");
+    }
+}
+
+/// A thousand points in a corner, say of a plant, do not outvote the rest of the picture.
+#[test]
+fn parts_of_the_picture_are_shared_and_not_points() {
+    let mut points = surface(|_, _| 5.0);
+    let mut sources: Vec<View> = (0..6)
+        .map(|i| view(DVec3::X * 0.1 * f64::from(i)))
+        .collect();
+    sources.extend((0..6).map(|i| view(DVec3::X * (1.0 + 0.1 * f64::from(i)))));
+    for point in &mut points {
+        point.seen_by = (0..6).collect();
+    }
+    let plant = |i: i32| SparsePoint {
+        position: DVec3::new(
+            0.3 + 0.001 * f64::from(i % 40),
+            0.3 + 0.001 * f64::from(i / 40),
+            5.0,
+        ),
+        seen_by: (6..12).collect(),
+    };
+    points.extend((0..1600).map(plant));
+    let desired = view(DVec3::ZERO);
+    let facets = facets(&desired, &sources, &points).unwrap();
+    // The wall's points are there: were they not, there would be no facets all over it.
+    let wall = points.iter().filter(|p| p.seen_by[0] == 0).count();
+    assert!(facets.triangles.len() > wall, "{}", facets.triangles.len());
+}
+
 /// As from a tripod, or in a burst: which of them is the seventh is a matter of rounding.
 #[test]
 fn any_number_of_views_of_one_place_give_their_points() {
