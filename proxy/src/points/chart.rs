@@ -73,21 +73,6 @@ impl Chart {
         self.nodes.iter().copied().filter(|n| n.weight > 0.0)
     }
 
-    /// Each node left by its index, with the least and the greatest inverse distance of those around
-    /// it.
-    pub(super) fn around(&self) -> impl Iterator<Item = (usize, Node, [f64; 2])> {
-        self.triangulation.vertices().map(|vertex| {
-            let around = vertex
-                .out_edges()
-                .map(|edge| self.nodes[edge.to().data().index as usize].inverse_distance);
-            let range = around.fold([f64::MAX, 0.0], |[least, most]: [f64; 2], s| {
-                [least.min(s), most.max(s)]
-            });
-            let index = vertex.data().index as usize;
-            (index, self.nodes[index], range)
-        })
-    }
-
     /// Changes the nodes left, one after the other; those that have no weight any more are gone.
     pub(super) fn change(&mut self, nodes: impl IntoIterator<Item = (usize, Node)>) {
         for (index, node) in nodes {

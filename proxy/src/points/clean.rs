@@ -1,20 +1,28 @@
 //! Points that spoil a desired view's surface.
+//!
+//! All that is asked of neighbours is asked in shares that fall with their weights, to nothing:
+//! many points may come into sight at once that hardly count yet.
 
 use super::Node;
 use super::chart::Chart;
-use super::nearest::Nearest;
+use super::nearest::{Nearest, Neighbour};
+use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
-/// A point sticks out when its inverse distance is beyond that of all its neighbours by
-/// this factor; it is gone at the second.
+/// What the shares of a point's neighbours add up to, as far as there are enough of them.
+const NEIGHBOURS: f64 = 8.0;
+/// A point sticks out of its neighbours when its inverse distance is beyond theirs by this factor; by
+/// the second of all but so large a share of them it is gone.
 const SPIKE: [f64; 2] = [1.08, 1.12];
-/// Spikes hide behind spikes: the second round finds those.
-const ROUNDS: usize = 2;
-/// A point is taken to be hidden when so large a share of its nearest so many neighbours is nearer
-/// by about this factor: from the first number on in part, at the second altogether.
-const NEIGHBOURS: usize = 12;
+const ALONE: f64 = 0.02;
+/// A point is taken to be hidden when so large a share of its neighbours is nearer by about this factor:
+/// from the first number on in part, at the second altogether.
 const HIDING: [f64; 2] = [0.28, 0.48];
 const NEARER: [f64; 2] = [1.15, 1.25];
+/// How much a slope between neighbours must be worth, beside how they are spread.
+const FLAT: f64 = 0.05;
+/// As far as a slope goes beyond what it is of.
+const BEYOND: f64 = 2.0;
 
 /// 0 up to the first number, 1 from the second on, smooth between.
 fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
@@ -22,74 +30,90 @@ fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// Takes out those that stick out of all their neighbours in the triangulation.
-pub(super) fn drop_spikes(chart: &mut Chart) {
-    for _ in 0..ROUNDS {
-        let of = |(index, node, [least, most]): (usize, Node, [f64; 2])| {
-            let own = node.inverse_distance;
-            let left = 1.0 - smoothstep(SPIKE, (own / most).max(least / own));
-            (index, weighted(node, left))
-        };
-        let changed: Vec<(usize, Node)> = chart.around().map(of).collect();
-        chart.change(changed);
-    }
+/// Takes out those that stick out of all their neighbours, and those that lie behind what is around
+/// them: points of another side of a building, say, that only views from there observe.
+pub(super) fn drop_odd(chart: &mut Chart) {
+    let is_any = |_: &Node| true;
+    change(chart, is_any, |node, near| Node {
+        weight: node.weight * evenness(&node, near),
+        ..node
+    });
 }
 
-/// Takes out those that lie behind what is around them: points of another side of a building, say,
-/// that only views from there observe.
-pub(super) fn drop_hidden(chart: &mut Chart) {
-    let left: Vec<Node> = chart.left().collect();
-    let nearest = Nearest::new(&left);
-    let of = |(index, node): (usize, Node)| {
-        let (mut nearer, mut all) = (0.0, 0.0);
-        for (share, other) in nearest.around(&node, NEIGHBOURS) {
-            nearer += share * smoothstep(NEARER, other.inverse_distance / node.inverse_distance);
-            all += share;
-        }
-        let left = if all > 0.0 {
-            1.0 - smoothstep(HIDING, nearer / all)
-        } else {
-            1.0
-        };
-        (index, weighted(node, left))
-    };
-    let changed: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
-    chart.change(changed);
+/// How much a point, 0…1, is where its neighbours let it be.
+fn evenness(node: &Node, near: &[Neighbour<'_>]) -> f64 {
+    let own = node.inverse_distance;
+    let (mut all, mut as_near, mut as_far, mut hiding) = (0.0, 0.0, 0.0, 0.0);
+    for Neighbour { node, share, .. } in near {
+        let ratio = node.inverse_distance / own;
+        all += share;
+        as_near += share * (1.0 - smoothstep(SPIKE, 1.0 / ratio));
+        as_far += share * (1.0 - smoothstep(SPIKE, ratio));
+        hiding += share * smoothstep(NEARER, ratio);
+    }
+    if !(all > 0.0) {
+        return 1.0;
+    }
+    let [as_near, as_far] = [as_near, as_far].map(|like| (like / (ALONE * all)).min(1.0));
+    as_near * as_far * (1.0 - smoothstep(HIDING, hiding / all))
 }
 
 /// Brings what is there only in part to where the surface would about be without it.
 pub(super) fn fade(chart: &mut Chart) {
+    let is_in_part = |node: &Node| node.weight < 1.0;
+    change(chart, is_in_part, |node, near| {
+        let without = without(near).unwrap_or(node.inverse_distance);
+        let inverse_distance = without + node.weight * (node.inverse_distance - without);
+        Node {
+            inverse_distance,
+            ..node
+        }
+    });
+}
+
+/// The inverse distance at a place of the plane that fits its neighbours best.
+fn without(near: &[Neighbour<'_>]) -> Option<f64> {
+    // 1. Their mean.
+    let (mut all, mut mean, mut middle) = (0.0, 0.0, DVec2::ZERO);
+    for near in near {
+        all += near.share;
+        mean += near.share * near.node.inverse_distance;
+        middle += near.share * near.offset;
+    }
+    if !(all > 0.0) {
+        return None;
+    }
+    (mean, middle) = (mean / all, middle / all);
+    // 2. The slope, less where they are about in line.
+    let (mut spread, mut slope) = (DMat2::ZERO, DVec2::ZERO);
+    for near in near {
+        let off = near.offset - middle;
+        spread += near.share * DMat2::from_cols(off.x * off, off.y * off);
+        slope += near.share * (near.node.inverse_distance - mean) * off;
+    }
+    let flat = FLAT * (spread.x_axis.x + spread.y_axis.y);
+    if !(flat > 0.0) {
+        return Some(mean);
+    }
+    let slope = (spread + DMat2::from_diagonal(DVec2::splat(flat))).inverse() * slope;
+    let here = mean - slope.dot(middle);
+    Some(here.clamp(mean / BEYOND, mean * BEYOND))
+}
+
+/// Changes some nodes, all at once, each by those around it.
+fn change(
+    chart: &mut Chart,
+    is_asked: impl Fn(&Node) -> bool,
+    changed: impl Fn(Node, &[Neighbour<'_>]) -> Node + Sync,
+) {
     let left: Vec<Node> = chart.left().collect();
     let nearest = Nearest::new(&left);
     let of = |(index, node): (usize, Node)| {
-        if node.weight >= 1.0 {
-            return (index, node);
-        }
-        let (mut sum, mut all) = (0.0, 0.0);
-        for (share, other) in nearest.around(&node, NEIGHBOURS) {
-            sum += share * other.inverse_distance;
-            all += share;
-        }
-        let without = if all > 0.0 {
-            sum / all
-        } else {
-            node.inverse_distance
-        };
-        let inverse_distance = without + node.weight * (node.inverse_distance - without);
-        let faded = Node {
-            inverse_distance,
-            ..node
-        };
-        (index, faded)
+        let near = nearest.around(node.chart(), NEIGHBOURS);
+        (index, changed(node, &near))
     };
-    let changed: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
-    chart.change(changed);
-}
-
-/// A node with a part of its weight.
-fn weighted(node: Node, left: f64) -> Node {
-    Node {
-        weight: node.weight * left,
-        ..node
-    }
+    let mut nodes = chart.indexed();
+    nodes.retain(|(_, node)| is_asked(node));
+    let nodes: Vec<(usize, Node)> = nodes.into_par_iter().map(of).collect();
+    chart.change(nodes);
 }

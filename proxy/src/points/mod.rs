@@ -15,7 +15,7 @@ use crate::Facets;
 use alike::Alike;
 use calibrate::{Pixel, View};
 use chart::{Chart, distinct};
-use clean::{drop_hidden, drop_spikes, fade};
+use clean::{drop_odd, fade};
 use glam::{DVec2, DVec3};
 use nearest::Nearest;
 
@@ -28,9 +28,9 @@ pub struct SparsePoint {
     pub seen_by: Vec<u32>,
 }
 
-/// Anchors around the image, and how many points decide where each lies.
+/// Anchors around the image, and how many points decide where each lies, as their shares add up.
 const ANCHORS: usize = 32;
-const ANCHORED_TO: usize = 8;
+const ANCHORED_TO: f64 = 4.5;
 /// The ring's angle from the axis over that of the image's farthest corner; beyond it no
 /// point counts.
 const MARGIN: f64 = 1.1;
@@ -58,8 +58,8 @@ impl Node {
 /// The surface through the points that the `sources` most like `desired` observe, by part of its
 /// picture; `None` where fewer than three are in sight.
 ///
-/// Outliers go in two steps: points of which half the neighbours lie clearly nearer are
-/// taken to be hidden by them, and points that stick out of all their neighbours go too.
+/// Outliers go: points of which half the neighbours lie clearly nearer are taken to be hidden by
+/// them, and points that stick out of all their neighbours go, too.
 pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Option<Facets> {
     // 1. The points in sight.
     let reach = reach(desired);
@@ -89,8 +89,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         .collect();
     nodes = distinct(nodes);
     let mut chart = Chart::new(nodes)?;
-    drop_spikes(&mut chart);
-    drop_hidden(&mut chart);
+    drop_odd(&mut chart);
     fade(&mut chart);
     let left: Vec<Node> = chart.left().collect();
     if left.len() < 3 {
@@ -107,7 +106,14 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
             inverse_distance: 0.0,
             weight: 1.0,
         };
-        anchor.inverse_distance = nearest.inverse_distance(anchor.chart(), ANCHORED_TO);
+        // By the inverse squares of their distances.
+        let (mut sum, mut shares) = (0.0, 0.0);
+        for near in nearest.around(anchor.chart(), ANCHORED_TO) {
+            let share = near.share / near.offset.length_squared();
+            sum += share * near.node.inverse_distance;
+            shares += share;
+        }
+        anchor.inverse_distance = sum / shares;
         chart.insert(anchor)?;
     }
 

@@ -11,6 +11,16 @@ pub(super) struct Nearest<'a> {
     tree: Option<ImmutableKdTree<f64, 2>>,
 }
 
+/// A node near a place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbour<'a> {
+    pub(super) node: &'a Node,
+    /// From the place, in the chart.
+    pub(super) offset: DVec2,
+    /// Its weight times what falls from 1 at the place to 0 where neighbours end.
+    pub(super) share: f64,
+}
+
 impl<'a> Nearest<'a> {
     pub(super) fn new(nodes: &'a [Node]) -> Self {
         let at: Vec<[f64; 2]> = nodes.iter().map(|n| n.chart().to_array()).collect();
@@ -18,10 +28,34 @@ impl<'a> Nearest<'a> {
         Self { nodes, tree }
     }
 
-    /// The `count` nodes nearest to a place, each with its squared distance; fewer where
-    /// there are fewer.
-    pub(super) fn of(&self, at: DVec2, count: usize) -> Vec<(f64, &'a Node)> {
-        let wanted = NonZero::new(count.min(self.nodes.len()));
+    /// Nodes around a place, but for what is at the place itself: as far off as their shares add up to
+    /// so much, or all. However many nodes there are that have hardly any weight, they change hardly
+    /// anything.
+    pub(super) fn around(&self, at: DVec2, shares: f64) -> Vec<Neighbour<'a>> {
+        // Shares of nodes that are all there, evenly spread, add up to half their number.
+        let mut asked = 2 * shares.ceil() as usize + 2;
+        let (near, end) = loop {
+            let near = self.of(at, asked);
+            let are_all = near.len() < asked;
+            let end = end(&near, are_all, shares);
+            if let Some(end) = end {
+                break (near, end);
+            }
+            asked *= 2;
+        };
+        let neighbour = |(squared, node): (f64, &'a Node)| Neighbour {
+            node,
+            offset: node.chart() - at,
+            share: node.weight * (1.0 - squared / end),
+        };
+        let all = near.into_iter().map(neighbour);
+        all.filter(|near| near.share > 0.0).collect()
+    }
+
+    /// The `count` nodes nearest to a place, but for what is at the place itself, each with its squared
+    /// distance; fewer where there are fewer.
+    fn of(&self, at: DVec2, count: usize) -> Vec<(f64, &'a Node)> {
+        let wanted = NonZero::new((count + 1).min(self.nodes.len()));
         let (Some(tree), Some(wanted)) = (&self.tree, wanted) else {
             return Vec::new();
         };
@@ -29,38 +63,28 @@ impl<'a> Nearest<'a> {
             .query(&at.to_array())
             .nearest_n::<SquaredEuclidean<f64>>(wanted)
             .execute();
-        found
+        let nodes = found
             .iter()
-            .map(|item| (item.distance, &self.nodes[item.item as usize]))
-            .collect()
+            .map(|item| (item.distance, &self.nodes[item.item as usize]));
+        nodes.filter(|(d, _)| *d > 0.0).take(count).collect()
     }
+}
 
-    /// The `count` nodes nearest to a node but itself, each with its weight times a share that
-    /// falls to zero where the next one lies, so that nothing jumps when another comes nearer.
-    pub(super) fn around(
-        &self,
-        node: &Node,
-        count: usize,
-    ) -> impl Iterator<Item = (f64, &'a Node)> {
-        // The nearest is the node itself, and the farthest only says where shares end.
-        let near = self.of(node.chart(), count + 2);
-        let end = near.iter().map(|(squared, _)| *squared).fold(0.0, f64::max);
-        let own = *node;
-        near.into_iter().filter_map(move |(squared, other)| {
-            let share = 1.0 - squared / end;
-            (*other != own && share > 0.0).then_some((share * other.weight, other))
-        })
+/// The squared distance D² for which the sum of w (1 - d²/D²), over nodes of weight w nearer than D,
+/// is so much: of the nearest nodes, or all, sorted by their squared distances d². Infinite where all are
+/// not enough, `None` where more must be known.
+fn end(near: &[(f64, &Node)], are_all: bool, shares: f64) -> Option<f64> {
+    let beyond = are_all.then_some(f64::INFINITY);
+    let (mut weights, mut moments) = (0.0, 0.0);
+    for (i, (squared, node)) in near.iter().enumerate() {
+        weights += node.weight;
+        moments += node.weight * squared;
+        // Of these and no more, if the next is farther.
+        let end = moments / (weights - shares);
+        let next = near.get(i + 1).map(|(squared, _)| *squared).or(beyond)?;
+        if weights > shares && end <= next {
+            return Some(end);
+        }
     }
-
-    /// The mean inverse distance of the `count` nodes nearest to a place, by the inverse
-    /// squares of their distances there.
-    pub(super) fn inverse_distance(&self, at: DVec2, count: usize) -> f64 {
-        let near = self.of(at, count);
-        let share = |squared: f64| 1.0 / squared.max(f64::MIN_POSITIVE.sqrt());
-        let sum: f64 = near.iter().map(|(squared, _)| share(*squared)).sum();
-        let weighted = near
-            .iter()
-            .map(|(squared, node)| share(*squared) * node.inverse_distance);
-        weighted.sum::<f64>() / sum
-    }
+    beyond
 }

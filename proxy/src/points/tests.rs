@@ -283,6 +283,46 @@ fn change(a: &View, b: &View, sources: &[View], points: &[SparsePoint]) -> f64 {
 }
 
 #[test]
+fn points_that_hardly_count_change_hardly_anything() {
+    // A wall with a step and a lone point before it; then many points at once of all depths, that begin
+    // to come into sight.
+    let at = |x: f64, y: f64, inverse_distance: f64, weight: f64| Node {
+        direction: DVec3::new(x, y, 1.0).normalize(),
+        inverse_distance,
+        weight,
+    };
+    let wall = (0..400).map(|i| {
+        let (x, y) = (f64::from(i % 20), f64::from(i / 20));
+        let shift = 0.3 * (1.7 * x + 2.9 * y).sin();
+        let s = if x < 11.0 { 0.2 } else { 0.23 + 0.002 * y };
+        at(0.05 * (x + shift) - 0.5, 0.05 * (y - shift) - 0.5, s, 1.0)
+    });
+    let mut wall: Vec<Node> = wall.collect();
+    wall.push(at(0.211, 0.137, 0.4, 1.0));
+    let crowd = (0..3000).map(|i| {
+        let [x, y, s] = [0.618, 0.755, 0.57].map(|step| (step * f64::from(i)).fract());
+        at(x - 0.5, y - 0.5, 0.1 + 0.5 * s, 1e-9)
+    });
+    let with: Vec<Node> = wall.iter().copied().chain(crowd).collect();
+    let count = wall.len();
+    let [alone, with] = [wall, with].map(|nodes| {
+        let mut chart = Chart::new(nodes).unwrap();
+        drop_odd(&mut chart);
+        fade(&mut chart);
+        chart.into_triangles().0
+    });
+    for (alone, with) in alone.iter().zip(&with) {
+        let change = (alone.weight - with.weight).abs();
+        assert!(change < 1e-4, "{alone:?} becomes {with:?}");
+    }
+    // Those that begin lie on what is there.
+    for node in with[count..].iter().filter(|node| node.weight > 0.0) {
+        let s = node.inverse_distance;
+        assert!((0.19..0.28).contains(&s), "{node:?}");
+    }
+}
+
+#[test]
 fn points_fade_in_and_out() {
     // Eleven views in a row that all see a plane, and each alone a few points before it.
     let sources: Vec<View> = (0..11)
