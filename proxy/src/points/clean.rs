@@ -33,10 +33,13 @@ fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
 /// Takes out those that stick out of all their neighbours, and those that lie behind what is around
 /// them: points of another side of a building, say, that only views from there observe.
 pub(super) fn drop_odd(chart: &mut Chart) {
-    let is_any = |_: &Node| true;
-    change(chart, is_any, |node, near| Node {
-        weight: node.weight * evenness(&node, near),
-        ..node
+    change(chart, |node, nearest| {
+        // Among those that count as much: what counts little is not measured by what counts more.
+        let near = nearest.around(node.chart(), node.weight, NEIGHBOURS);
+        Node {
+            weight: node.weight * evenness(&node, &near),
+            ..node
+        }
     });
 }
 
@@ -60,9 +63,12 @@ fn evenness(node: &Node, near: &[Neighbour<'_>]) -> f64 {
 
 /// Brings what is there only in part to where the surface would about be without it.
 pub(super) fn fade(chart: &mut Chart) {
-    let is_in_part = |node: &Node| node.weight < 1.0;
-    change(chart, is_in_part, |node, near| {
-        let without = without(near).unwrap_or(node.inverse_distance);
+    change(chart, |node, nearest| {
+        if node.weight >= 1.0 {
+            return node;
+        }
+        let near = nearest.around(node.chart(), 1.0, NEIGHBOURS);
+        let without = without(&near).unwrap_or(node.inverse_distance);
         let inverse_distance = without + node.weight * (node.inverse_distance - without);
         Node {
             inverse_distance,
@@ -100,20 +106,11 @@ fn without(near: &[Neighbour<'_>]) -> Option<f64> {
     Some(here.clamp(mean / BEYOND, mean * BEYOND))
 }
 
-/// Changes some nodes, all at once, each by those around it.
-fn change(
-    chart: &mut Chart,
-    is_asked: impl Fn(&Node) -> bool,
-    changed: impl Fn(Node, &[Neighbour<'_>]) -> Node + Sync,
-) {
+/// Changes all nodes at once.
+fn change(chart: &mut Chart, changed: impl Fn(Node, &Nearest<'_>) -> Node + Sync) {
     let left: Vec<Node> = chart.left().collect();
     let nearest = Nearest::new(&left);
-    let of = |(index, node): (usize, Node)| {
-        let near = nearest.around(node.chart(), NEIGHBOURS);
-        (index, changed(node, &near))
-    };
-    let mut nodes = chart.indexed();
-    nodes.retain(|(_, node)| is_asked(node));
-    let nodes: Vec<(usize, Node)> = nodes.into_par_iter().map(of).collect();
+    let of = |(index, node): (usize, Node)| (index, changed(node, &nearest));
+    let nodes: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
     chart.change(nodes);
 }

@@ -108,7 +108,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         };
         // By the inverse squares of their distances.
         let (mut sum, mut shares) = (0.0, 0.0);
-        for near in nearest.around(anchor.chart(), ANCHORED_TO) {
+        for near in nearest.around(anchor.chart(), 1.0, ANCHORED_TO) {
             let share = near.share / near.offset.length_squared();
             sum += share * near.node.inverse_distance;
             shares += share;

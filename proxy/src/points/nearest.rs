@@ -17,7 +17,7 @@ pub(super) struct Neighbour<'a> {
     pub(super) node: &'a Node,
     /// From the place, in the chart.
     pub(super) offset: DVec2,
-    /// Its weight times what falls from 1 at the place to 0 where neighbours end.
+    /// How much it is there, times what falls from 1 at the place to 0 where neighbours end.
     pub(super) share: f64,
 }
 
@@ -29,16 +29,17 @@ impl<'a> Nearest<'a> {
     }
 
     /// Nodes around a place, but for what is at the place itself: as far off as their shares add up to
-    /// so much, or all. However many nodes there are that have hardly any weight, they change hardly
-    /// anything.
-    pub(super) fn around(&self, at: DVec2, shares: f64) -> Vec<Neighbour<'a>> {
+    /// so much, or all. A node of such a weight, or more, is there; of others a part is. However many there
+    /// are that have hardly any of it, they change hardly anything.
+    pub(super) fn around(&self, at: DVec2, weight: f64, shares: f64) -> Vec<Neighbour<'a>> {
+        let part = |node: &Node| (node.weight / weight).min(1.0);
         // Shares of nodes that are all there, evenly spread, add up to half their number.
         let mut asked = 2 * shares.ceil() as usize + 2;
         let (near, end) = loop {
             let near = self.of(at, asked);
             let are_all = near.len() < asked;
-            let end = end(&near, are_all, shares);
-            if let Some(end) = end {
+            let parts = near.iter().map(|(squared, node)| (*squared, part(node)));
+            if let Some(end) = end(parts, are_all, shares) {
                 break (near, end);
             }
             asked *= 2;
@@ -46,7 +47,7 @@ impl<'a> Nearest<'a> {
         let neighbour = |(squared, node): (f64, &'a Node)| Neighbour {
             node,
             offset: node.chart() - at,
-            share: node.weight * (1.0 - squared / end),
+            share: part(node) * (1.0 - squared / end),
         };
         let all = near.into_iter().map(neighbour);
         all.filter(|near| near.share > 0.0).collect()
@@ -70,19 +71,20 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// The squared distance D² for which the sum of w (1 - d²/D²), over nodes of weight w nearer than D,
-/// is so much: of the nearest nodes, or all, sorted by their squared distances d². Infinite where all are
-/// not enough, `None` where more must be known.
-fn end(near: &[(f64, &Node)], are_all: bool, shares: f64) -> Option<f64> {
+/// The squared distance D² for which the sum of w (1 - d²/D²), over parts w nearer than D, is so much: of
+/// the nearest, or all, sorted by their squared distances d². Infinite where all are not enough, `None`
+/// where more must be known.
+fn end(near: impl Iterator<Item = (f64, f64)>, are_all: bool, shares: f64) -> Option<f64> {
+    let mut near = near.peekable();
     let beyond = are_all.then_some(f64::INFINITY);
-    let (mut weights, mut moments) = (0.0, 0.0);
-    for (i, (squared, node)) in near.iter().enumerate() {
-        weights += node.weight;
-        moments += node.weight * squared;
+    let (mut parts, mut moments) = (0.0, 0.0);
+    while let Some((squared, part)) = near.next() {
+        parts += part;
+        moments += part * squared;
         // Of these and no more, if the next is farther.
-        let end = moments / (weights - shares);
-        let next = near.get(i + 1).map(|(squared, _)| *squared).or(beyond)?;
-        if weights > shares && end <= next {
+        let end = moments / (parts - shares);
+        let next = near.peek().map(|(squared, _)| *squared).or(beyond)?;
+        if parts > shares && end <= next {
             return Some(end);
         }
     }
