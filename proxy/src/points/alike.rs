@@ -23,7 +23,7 @@ const CELLS: usize = 16;
 /// picture: a lone one decides about much.
 const RIM: f64 = 0.1;
 /// What points are worth at a corner of the picture though they are at the opposite one.
-const ELSEWHERE: f64 = 0.1;
+const ELSEWHERE: f64 = 0.05;
 
 /// A source view of all that are most like the desired one has a weight, 0…1, at each corner of
 /// its picture; between them weights are bilinear. One corner may show what the views most like the
