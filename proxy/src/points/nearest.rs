@@ -21,6 +21,9 @@ pub(super) struct Neighbour<'a> {
     pub(super) share: f64,
 }
 
+/// More nodes than this are not asked, however little they count together.
+const MOST: usize = 512;
+
 impl<'a> Nearest<'a> {
     pub(super) fn new(nodes: &'a [Node]) -> Self {
         let at: Vec<[f64; 2]> = nodes.iter().map(|n| n.chart().to_array()).collect();
@@ -29,8 +32,8 @@ impl<'a> Nearest<'a> {
     }
 
     /// Nodes around a place, but for what is at the place itself: as far off as their shares add up to
-    /// so much, or all. A node of such a weight, or more, is there; of others a part is. However many there
-    /// are that have hardly any of it, they change hardly anything.
+    /// so much, or all, or [`MOST`]. A node of such a weight, or more, is there; of others a part is. However
+    /// many there are that have hardly any of it, they change hardly anything.
     pub(super) fn around(&self, at: DVec2, weight: f64, shares: f64) -> Vec<Neighbour<'a>> {
         let part = |node: &Node| (node.weight / weight).min(1.0);
         // Shares of nodes that are all there, evenly spread, add up to half their number.
@@ -42,7 +45,11 @@ impl<'a> Nearest<'a> {
             if let Some(end) = end(parts, are_all, shares) {
                 break (near, end);
             }
-            asked *= 2;
+            if asked >= MOST {
+                let end = near.last().map_or(f64::INFINITY, |(squared, _)| *squared);
+                break (near, end);
+            }
+            asked = (2 * asked).min(MOST);
         };
         let neighbour = |(squared, node): (f64, &'a Node)| Neighbour {
             node,
