@@ -300,10 +300,12 @@ fn points_that_hardly_count_change_hardly_anything() {
     let mut wall: Vec<Node> = wall.collect();
     wall.push(at(0.211, 0.137, 0.4, 1.0));
     let crowd = (0..3000).map(|i| {
-        let [x, y, s] = [0.618, 0.755, 0.57].map(|step| (step * f64::from(i)).fract());
+        let [x, y, s] =
+            [0.61803399, 0.75487767, 0.56984029].map(|step| (step * f64::from(i)).fract());
         at(x - 0.5, y - 0.5, 0.1 + 0.5 * s, 1e-9)
     });
     let with: Vec<Node> = wall.iter().copied().chain(crowd).collect();
+    let with = distinct(with);
     let count = wall.len();
     let [alone, with] = [wall, with].map(|nodes| {
         let mut chart = Chart::new(nodes).unwrap();
