@@ -6,15 +6,10 @@
 //! smoothly as the view does.
 
 use crate::Plane;
-use crate::points::SparsePoint;
+use crate::points::{EASY_ANGLE, SparsePoint, unlikeness};
 use calibrate::{Pixel, View};
 use glam::{DMat3, DVec3};
 
-/// Radians added to the angle at a point between a source view and the desired one: below
-/// it, angles are as good as equal.
-const EASY_ANGLE: f64 = 0.1;
-/// Radians that a ratio of distances by the factor e is worth beside an angle.
-const RATIO_WEIGHT: f64 = 0.3;
 /// Within this share of the image's shorter side points fade out towards the border.
 const FADE: f64 = 0.1;
 /// What a point in front counts outside the image, relative to one inside: enough where
@@ -136,8 +131,7 @@ fn seen(desired: &View, centers: &[DVec3], point: &SparsePoint) -> Option<Seen> 
     // 2. Observed from about the same direction and distance.
     let unlike = |&i: &u32| {
         let there = point.position - *centers.get(i as usize)?;
-        let angle = there.cross(here).length().atan2(there.dot(here));
-        let unlike = angle + RATIO_WEIGHT * (there.length() / distance).ln().abs();
+        let unlike = unlikeness(here, there);
         unlike.is_finite().then_some(unlike)
     };
     let unlike = point.seen_by.iter().filter_map(unlike).reduce(f64::min)?;

@@ -6,9 +6,9 @@ use glam::{DVec2, DVec3};
 
 /// How many of the source views most like the desired one give their points.
 const VIEWS: usize = 6;
-/// Radians added to the angle at a point before views are compared: below it, angles are
-/// as good as equal, and the number of shared points decides.
-const EASY_ANGLE: f64 = 0.1;
+/// Added to how unlike views are before they are compared: below it, they are as good as equal, and
+/// the number of shared points decides.
+pub(crate) const EASY_ANGLE: f64 = 0.1;
 /// Radians that a ratio of distances by the factor e is worth beside an angle.
 const RATIO_WEIGHT: f64 = 0.3;
 /// Likenesses that differ by less, relatively, are the same.
@@ -107,9 +107,7 @@ impl Alike {
             for &i in &point.seen_by {
                 let i = i as usize;
                 let there = point.position - centers[i];
-                let angle = there.cross(here).length().atan2(there.dot(here));
-                let ratio = (there.length() * node.inverse_distance).ln().abs();
-                let own = worth / (EASY_ANGLE + angle + RATIO_WEIGHT * ratio);
+                let own = worth / (EASY_ANGLE + unlikeness(here, there));
                 in_all[i] += own;
                 for (corner, share) in around {
                     likeness[corner][i] += share * own;
@@ -136,6 +134,14 @@ impl Alike {
         };
         point.seen_by.iter().map(of_view).fold(0.0, f64::max)
     }
+}
+
+/// How differently a point is seen from two places, as it lies from each: the angle between, in
+/// radians, and what the ratio of the distances is worth.
+#[inline]
+pub(crate) fn unlikeness(here: DVec3, there: DVec3) -> f64 {
+    let angle = there.cross(here).length().atan2(there.dot(here));
+    angle + RATIO_WEIGHT * (there.length() / here.length()).ln().abs()
 }
 
 /// Weights of the few views of greatest likeness, 0…1, that fall to zero before another takes the

@@ -108,9 +108,10 @@ fn without(near: &[Neighbour<'_>]) -> Option<f64> {
 
 /// Changes all nodes at once.
 fn change(chart: &mut Chart, changed: impl Fn(Node, &Nearest<'_>) -> Node + Sync) {
-    let left: Vec<Node> = chart.left().collect();
-    let nearest = Nearest::new(&left);
+    let indexed = chart.indexed();
+    let nodes: Vec<Node> = indexed.iter().map(|(_, node)| *node).collect();
+    let nearest = Nearest::new(&nodes);
     let of = |(index, node): (usize, Node)| (index, changed(node, &nearest));
-    let nodes: Vec<(usize, Node)> = chart.indexed().into_par_iter().map(of).collect();
-    chart.change(nodes);
+    let changed: Vec<(usize, Node)> = indexed.into_par_iter().map(of).collect();
+    chart.change(changed);
 }

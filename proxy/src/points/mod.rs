@@ -13,6 +13,7 @@ mod nearest;
 
 use crate::Facets;
 use alike::Alike;
+pub(crate) use alike::{EASY_ANGLE, unlikeness};
 use calibrate::{Pixel, View};
 use chart::{Chart, distinct};
 use clean::{drop_odd, fade};

@@ -40,7 +40,7 @@ impl<'a> Nearest<'a> {
         let mut asked = 2 * shares.ceil() as usize + 2;
         let (near, end) = loop {
             let near = self.of(at, asked);
-            let are_all = near.len() < asked;
+            let are_all = asked >= self.nodes.len();
             let parts = near.iter().map(|(squared, node)| (*squared, part(node)));
             if let Some(end) = end(parts, are_all, shares) {
                 break (near, end);
