@@ -34,6 +34,9 @@ pub enum FileError {
     /// Its points, of a kind, contradict themselves.
     #[error("{path}: {reason}; find the points anew with `lumigraph proxy … {kind}`", path = .0.display(), kind = .1, reason = .2)]
     Points(PathBuf, &'static str, String),
+    /// The closed mesh that bounds it contradicts itself.
+    #[error("{path}: {reason}; make it anew with `lumigraph proxy`", path = .0.display(), reason = .1)]
+    Within(PathBuf, String),
     /// JSON is no place for a mesh.
     #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
     NoMesh(PathBuf),
@@ -62,6 +65,9 @@ struct Stored {
     /// Of a mesh: whether it hides what lies behind it, where it does not as its kind does.
     #[serde(skip_serializing_if = "Option::is_none")]
     occludes: Option<bool>,
+    /// The closed mesh that bounds it, of points or a mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    within: Option<StoredMesh>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -73,16 +79,11 @@ enum StoredSurface {
     },
     #[serde(rename = "view-plane")]
     ViewPlane,
-    Points {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        within: Option<StoredMesh>,
-    },
+    Points {},
     Dense {
         views: Vec<String>,
         points: Vec<[f64; 3]>,
         seen_by: Vec<Vec<u32>>,
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        within: Option<StoredMesh>,
     },
     // Of a GLB, whose geometry says the rest.
     Tunnel,
@@ -94,7 +95,7 @@ enum StoredSurface {
     Mesh,
 }
 
-/// A closed mesh that bounds what is made of points.
+/// A closed mesh that bounds a proxy.
 #[derive(Serialize, Deserialize)]
 struct StoredMesh {
     positions: Vec<[f64; 3]>,
@@ -102,7 +103,7 @@ struct StoredMesh {
 }
 
 impl StoredMesh {
-    fn of(solid: &Arc<Solid>) -> Self {
+    fn of(solid: &Solid) -> Self {
         let mesh = solid.mesh();
         Self {
             positions: mesh.positions.iter().map(|p| p.to_array()).collect(),
@@ -115,7 +116,7 @@ impl StoredMesh {
         let missing = |t: &&[u32; 3]| t.iter().any(|&i| i as usize >= count);
         if let Some(triangle) = self.triangles.iter().find(missing) {
             return Err(format!(
-                "the hull around its points has {count} corners, and a triangle {triangle:?}"
+                "the hull around it has {count} corners, and a triangle {triangle:?}"
             ));
         }
         let mesh = mesh::Mesh {
@@ -134,16 +135,13 @@ impl Stored {
                 normal: plane.normal().to_array(),
             },
             Proxy::ViewPlane => StoredSurface::ViewPlane,
-            Proxy::Points { within } => StoredSurface::Points {
-                within: within.as_ref().map(StoredMesh::of),
-            },
+            Proxy::Points { .. } => StoredSurface::Points {},
             Proxy::Dense(dense) => {
                 let points = dense.points.iter();
                 StoredSurface::Dense {
                     views: dense.names.clone(),
                     points: points.clone().map(|p| p.position.to_array()).collect(),
                     seen_by: points.map(|p| p.seen_by.clone()).collect(),
-                    within: dense.within.as_ref().map(StoredMesh::of),
                 }
             }
             Proxy::Mesh(solid) => match solid.kind() {
@@ -160,6 +158,7 @@ impl Stored {
             version: 1,
             surface,
             occludes: transparent.then_some(false),
+            within: proxy.within().map(StoredMesh::of),
         }
     }
 
@@ -172,6 +171,8 @@ impl Stored {
         if self.version != 1 {
             return Err(FileError::Version(path.to_owned(), self.version));
         }
+        let within = self.within.map(StoredMesh::solid).transpose();
+        let within = within.map_err(|e| FileError::Within(path.to_owned(), e))?;
         let kind = match self.surface {
             StoredSurface::Plane { point, normal } => {
                 return Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
@@ -179,16 +180,11 @@ impl Stored {
                     .map_err(|e| FileError::Plane(path.to_owned(), e));
             }
             StoredSurface::ViewPlane => return Ok(Proxy::ViewPlane),
-            StoredSurface::Points { within } => {
-                let within = within.map(StoredMesh::solid).transpose();
-                let within = within.map_err(|e| FileError::Points(path.to_owned(), "points", e))?;
-                return Ok(Proxy::Points { within });
-            }
+            StoredSurface::Points {} => return Ok(Proxy::Points { within }),
             StoredSurface::Dense {
                 views,
                 points,
                 seen_by,
-                within,
             } => {
                 return dense(views, &points, seen_by, within)
                     .map_err(|reason| FileError::Points(path.to_owned(), "dense", reason));
@@ -200,12 +196,13 @@ impl Stored {
             StoredSurface::Depth => MeshKind::Depth,
             StoredSurface::Mesh => MeshKind::Mesh,
         };
-        Ok(solid(kind, mesh()?, self.occludes != Some(false)))
+        Ok(solid(kind, mesh()?, self.occludes != Some(false), within))
     }
 }
 
-fn solid(kind: MeshKind, mesh: mesh::Mesh, occludes: bool) -> Proxy {
+fn solid(kind: MeshKind, mesh: mesh::Mesh, occludes: bool, within: Option<Arc<Solid>>) -> Proxy {
     let mut solid = Solid::new(kind, mesh);
+    within.into_iter().for_each(|hull| solid.keep_within(hull));
     if !occludes {
         solid.hide_nothing();
     }
@@ -221,7 +218,7 @@ fn dense(
     names: Vec<String>,
     points: &[[f64; 3]],
     seen_by: Vec<Vec<u32>>,
-    within: Option<StoredMesh>,
+    within: Option<Arc<Solid>>,
 ) -> Result<Proxy, String> {
     if points.len() != seen_by.len() {
         let (points, seen) = (points.len(), seen_by.len());
@@ -240,7 +237,7 @@ fn dense(
     Ok(Proxy::Dense(Arc::new(DensePoints {
         names,
         points,
-        within: within.map(StoredMesh::solid).transpose()?,
+        within,
     })))
 }
 
@@ -273,14 +270,16 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
             // Extras of somebody else's are none of ours.
             match extras.and_then(|text| serde_json::from_str::<Stored>(&text).ok()) {
                 Some(stored) => stored.proxy(path, mesh),
-                None => Ok(solid(MeshKind::Mesh, mesh()?, true)),
+                None => Ok(solid(MeshKind::Mesh, mesh()?, true, None)),
             }
         }
         "ply" => {
             let (kind, occludes) = kind_of_ply(bytes);
-            Ok(solid(kind, mesh()?, occludes))
+            let hull = mesh::ply_hull(path, bytes)?;
+            let hull = hull.map(|hull| Arc::new(Solid::new(MeshKind::Hull, hull)));
+            Ok(solid(kind, mesh()?, occludes, hull))
         }
-        "gltf" | "obj" => Ok(solid(MeshKind::Mesh, mesh()?, true)),
+        "gltf" | "obj" => Ok(solid(MeshKind::Mesh, mesh()?, true, None)),
         _ => Err(FileError::Extension(path.to_owned())),
     }
 }
@@ -338,7 +337,8 @@ pub fn write(
             } else {
                 ""
             };
-            mesh::to_ply(solid.mesh(), &format!("{KIND_COMMENT}{kind}{how}"))
+            let comment = format!("{KIND_COMMENT}{kind}{how}");
+            mesh::to_ply(solid.mesh(), solid.within().map(Solid::mesh), &comment)
         }
         ("glb", Proxy::Mesh(_) | Proxy::Plane(_)) => {
             let extras = serde_json::to_string(&Stored::of(proxy)).map_err(json)?;
@@ -460,7 +460,11 @@ mod tests {
             }],
             within: None,
         };
-        let within = Some(Arc::new(Solid::new(MeshKind::Hull, mesh.clone())));
+        let mut larger = mesh.clone();
+        larger.positions.push(corner(0.5, 3.0));
+        larger.triangles.push([1, 2, 3]);
+        let hull = Arc::new(Solid::new(MeshKind::Hull, larger));
+        let within = Some(Arc::clone(&hull));
         let bounded = DensePoints {
             within: within.clone(),
             ..dense.clone()
@@ -476,6 +480,11 @@ mod tests {
             let solid = Proxy::Mesh(Arc::new(Solid::new(kind, mesh.clone())));
             proxies.push(("ply", solid.clone()));
             proxies.push(("glb", solid));
+            let mut bounded = Solid::new(kind, mesh.clone());
+            bounded.keep_within(Arc::clone(&hull));
+            let bounded = Proxy::Mesh(Arc::new(bounded));
+            proxies.push(("ply", bounded.clone()));
+            proxies.push(("glb", bounded));
             let mut seen_through = Solid::new(kind, mesh.clone());
             seen_through.hide_nothing();
             let seen_through = Proxy::Mesh(Arc::new(seen_through));
@@ -489,6 +498,7 @@ mod tests {
             assert_eq!(back.kind(), proxy.kind());
             let occludes = |p: &Proxy| matches!(p, Proxy::Mesh(solid) if solid.occludes());
             assert_eq!(occludes(&back), occludes(&proxy), "{extension}");
+            assert_eq!(back.within(), proxy.within());
             if extension != "glb" {
                 assert_eq!(back, proxy);
             }

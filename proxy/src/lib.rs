@@ -75,12 +75,13 @@ impl Proxy {
         }
     }
 
-    /// The closed mesh that bounds what is made of points, if there is one.
+    /// The closed mesh that bounds it, if there is one.
     pub fn within(&self) -> Option<&Solid> {
         match self {
             Self::Points { within } => within.as_deref(),
             Self::Dense(dense) => dense.within.as_deref(),
-            Self::Plane(_) | Self::ViewPlane | Self::Mesh(_) => None,
+            Self::Mesh(solid) => solid.within(),
+            Self::Plane(_) | Self::ViewPlane => None,
         }
     }
 

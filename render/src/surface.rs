@@ -232,7 +232,7 @@ impl FacetMap {
             match *kept {
                 Kept::AsItIs => {}
                 Kept::Nowhere => *facet = NO_FACET,
-                Kept::On(triangle_idx) => {
+                Kept::On { triangle_idx, .. } => {
                     let own = &mut facet_of[triangle_idx as usize];
                     if *own == NO_FACET {
                         *own = self.planes.len() as u32;
@@ -268,10 +268,9 @@ impl FacetMap {
     fn of_mesh(solid: &Solid, desired: &View, rays: Option<&Rays>) -> Self {
         let center = desired.center();
         let rotation = desired.camera_from_world.rotation;
-        let mesh = solid.mesh();
         let plane =
-            |i: usize| Self::plane_through(mesh.corners(i).map(|p| rotation * (p - center)));
-        let triangles = (0..mesh.triangles.len()).into_par_iter();
+            |i: usize| Self::plane_through(solid.corners(i).map(|p| rotation * (p - center)));
+        let triangles = (0..solid.triangle_count()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
         if let Some(rays) = rays {
             let scan = solid.scan_along(desired, rays);

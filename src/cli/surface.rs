@@ -180,8 +180,8 @@ pub(super) fn proxy_text(proxy: &Proxy) -> String {
             );
         }
         Proxy::Mesh(solid) => {
-            let count = solid.mesh().triangles.len();
-            return format!("{} of {count} triangles", solid.kind().name());
+            let (kind, count) = (solid.kind().name(), solid.mesh().triangles.len());
+            return format!("{kind} of {count} triangles{}", within_text(proxy));
         }
     };
     let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);

@@ -64,14 +64,14 @@ impl CarvedPoints {
         Fitted::new(Proxy::Dense(Arc::new(dense)), how)
     }
 
-    /// The surface.
+    /// The surface, within a hull if there is one.
     ///
     /// # Errors
     /// There is none.
-    pub(super) fn surface(self) -> Result<Fitted, SceneError> {
+    pub(super) fn surface(self, within: Option<Arc<Solid>>) -> Result<Fitted, SceneError> {
         let how = format!("carved through {}", self.count());
         let mesh = self.mesh.map_err(unfit)?;
-        Ok(Fitted::mesh(MeshKind::CarvedDense, mesh, how))
+        Ok(Fitted::mesh(MeshKind::CarvedDense, mesh, how).within_hull(within))
     }
 
     /// The same, to be drawn once.

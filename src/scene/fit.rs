@@ -126,8 +126,7 @@ impl Scene {
             }
             Kind::Points => {
                 self.needs_points(kind)?;
-                let cutout = self.cutout(without, None)?;
-                Ok(Fitted::points(cutout.map(|cutout| cutout.hull)))
+                Ok(Fitted::points(self.bound(without)?))
             }
             Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
             Kind::Carved => {
@@ -135,12 +134,15 @@ impl Scene {
                 let surface = carve::surface(&views, &points, &carve::Options::default());
                 let how = format!("carved out of {} points", points.len());
                 let mesh = surface.map_err(unfit)?.mesh;
-                Ok(Fitted::mesh(MeshKind::Carved, mesh, how))
+                Ok(Fitted::mesh(MeshKind::Carved, mesh, how).within_hull(self.bound(without)?))
             }
             Kind::Hull => self.fit_hull(without),
             Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without),
-            Kind::CarvedDense => self.dense_surface(kind, without)?.surface(),
+            Kind::CarvedDense => {
+                let surface = self.dense_surface(kind, without)?;
+                surface.surface(self.bound(without)?)
+            }
         }
     }
 
@@ -257,8 +259,12 @@ impl Scene {
         let surface = self.dense_surface(Kind::Dense, without)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
-        let within = self.cutout(without, None)?.map(|cutout| cutout.hull);
-        Ok(surface.dense(names, within))
+        Ok(surface.dense(names, self.bound(without)?))
+    }
+
+    /// The hull that bounds what is made of points, where photos are cut out.
+    fn bound(&self, without: &BTreeSet<String>) -> Result<Option<Arc<Solid>>, SceneError> {
+        Ok(self.cutout(without, None)?.map(|cutout| cutout.hull))
     }
 
     fn dense_surface(
@@ -310,6 +316,16 @@ impl Fitted {
             100.0 * tunnel.share_on_walls
         );
         Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how).with_condition(tunnel.condition)
+    }
+
+    /// Keeps a mesh within a hull, if there is one.
+    pub(super) fn within_hull(mut self, hull: Option<Arc<Solid>>) -> Self {
+        if let (Some(hull), Proxy::Mesh(solid)) = (hull, &mut self.proxy)
+            && let Some(own) = Arc::get_mut(solid)
+        {
+            own.keep_within(hull);
+        }
+        self
     }
 
     /// Says so where the fit is ill-posed.

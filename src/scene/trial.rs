@@ -175,7 +175,8 @@ impl<'a> Trials<'a> {
 
     /// The surface carved out of them.
     pub(super) fn carved_dense(&mut self) -> Result<Fitted, SceneError> {
-        self.dense_of_all()?.surface()
+        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        self.dense_of_all()?.surface(within)
     }
 
     fn dense_of_all(&mut self) -> Result<CarvedPoints, SceneError> {
@@ -255,7 +256,7 @@ impl<'a> Trials<'a> {
         let mut fewer = self.without.clone();
         fewer.extend(judges.iter().map(|&j| self.judges[j].name.clone()));
         let within = match kind {
-            Kind::Points | Kind::Dense => self.bound(judges[0])?,
+            Kind::Points | Kind::Dense | Kind::CarvedDense => self.bound(judges[0])?,
             _ => None,
         };
         let sparse = || self.scene.sparse_points(&fewer, &self.names);
@@ -275,7 +276,8 @@ impl<'a> Trials<'a> {
                 (Proxy::Dense(Arc::new(dense)), points)
             }
             Kind::CarvedDense => {
-                let solid = self.dense_without(judges[0])?.solid()?;
+                let mut solid = self.dense_without(judges[0])?.solid()?;
+                within.into_iter().for_each(|hull| solid.keep_within(hull));
                 (Proxy::Mesh(Arc::new(solid)), Vec::new())
             }
             // A box may happen to suit a few photos of anything.

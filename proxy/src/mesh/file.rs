@@ -78,7 +78,7 @@ pub fn write(
     let failed = |e: ExportError| MeshFileError::Export(path.to_owned(), e);
     let bytes = match extension(path).as_str() {
         "glb" => to_glb(mesh, cameras, extras).map_err(failed)?,
-        "ply" => to_ply(mesh, "written by lumigraph"),
+        "ply" => to_ply(mesh, None, "written by lumigraph"),
         _ => return Err(MeshFileError::Extension(path.to_owned())),
     };
     crate::file::write_whole(path, &bytes).map_err(|e| MeshFileError::Io(path.to_owned(), e))

@@ -24,7 +24,7 @@ pub use look::lies_where_cameras_look;
 pub use model::{Material, Model, ModelNode, Part, Wrap, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
-pub use ply::to_ply;
+pub use ply::{ply_hull, to_ply};
 pub use skin::{MOST as MOST_PLACES, Places, Skin};
 
 use glam::{DMat4, DVec3};

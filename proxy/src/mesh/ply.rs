@@ -8,6 +8,30 @@ use std::path::Path;
 
 /// Reads corners and faces; other elements and properties are skipped.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let mesh = parse_named(path, bytes, ["vertex", "face"])?;
+    mesh.ok_or_else(|| {
+        let problem = "it has no element `vertex`";
+        MeshFileError::File(path.to_owned(), problem.to_owned())
+    })
+}
+
+/// What [`to_ply`] calls the elements of the hull around a mesh.
+const OF_HULL: [&str; 2] = ["hull_vertex", "hull_face"];
+
+/// Reads the hull around a mesh, if the file has one.
+///
+/// # Errors
+/// The file, the record and what is wrong with it.
+pub fn ply_hull(path: &Path, bytes: &[u8]) -> Result<Option<Mesh>, MeshFileError> {
+    parse_named(path, bytes, OF_HULL)
+}
+
+/// Reads the corners and faces that go by these names; none if there are no corners.
+fn parse_named(
+    path: &Path,
+    bytes: &[u8],
+    [corners, faces]: [&str; 2],
+) -> Result<Option<Mesh>, MeshFileError> {
     let header = ply_header::parse(bytes).map_err(|(line, problem)| MeshFileError::Line {
         path: path.to_owned(),
         line,
@@ -27,7 +51,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
             continue;
         }
         let columns = Columns::of(element);
-        let is_corner = element.name == "vertex";
+        let is_corner = element.name == corners;
         if is_corner && columns.position.is_none() {
             let problem = "its corners have no properties x, y and z";
             return Err(MeshFileError::File(path.to_owned(), problem.to_owned()));
@@ -36,8 +60,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
         for record in 0..element.count {
             let line = numbers.line_of_next();
             let read = match element.name.as_str() {
-                "vertex" => corner(&mut numbers, element, &columns, &mut mesh.positions),
-                "face" => {
+                name if name == corners => {
+                    corner(&mut numbers, element, &columns, &mut mesh.positions)
+                }
+                name if name == faces => {
                     let read = face(&mut numbers, element, &columns, &mut mesh.triangles);
                     read.map(|index| greatest = greatest.max((index, record, line)))
                 }
@@ -47,8 +73,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
         }
     }
     if !has_corners {
-        let problem = "it has no element `vertex`";
-        return Err(MeshFileError::File(path.to_owned(), problem.to_owned()));
+        return Ok(None);
     }
     let (index, record, line) = greatest;
     if !mesh.triangles.is_empty() && index as usize >= mesh.positions.len() {
@@ -56,13 +81,13 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
             "it uses corner {index}, but there are {} (the first is 0); is the file cut off?",
             mesh.positions.len()
         );
-        let face = header.elements.iter().find(|e| e.name == "face");
+        let face = header.elements.iter().find(|e| e.name == faces);
         return Err(match face {
             Some(face) => bad(path, header.format, face, record, line, problem),
             None => MeshFileError::File(path.to_owned(), problem),
         });
     }
-    Ok(mesh)
+    Ok(Some(mesh))
 }
 
 fn bad(
@@ -294,25 +319,36 @@ impl Numbers<'_> {
     }
 }
 
-/// A mesh as binary PLY (little-endian), its positions in double precision: every digit.
+/// A mesh as binary PLY (little-endian), its positions in double precision: every digit. The hull
+/// around it, if there is one, is in elements of its own, which other programs skip.
 /// `comment` goes into its header, and should be one line.
-pub fn to_ply(mesh: &Mesh, comment: &str) -> Vec<u8> {
-    let header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment {comment}\n\
-         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-        mesh.positions.len(),
-        mesh.triangles.len()
-    );
-    let length = header.len() + 24 * mesh.positions.len() + 13 * mesh.triangles.len();
-    let mut bytes = Vec::with_capacity(length);
-    bytes.extend(header.into_bytes());
-    for position in &mesh.positions {
-        bytes.extend(position.to_array().iter().flat_map(|x| x.to_le_bytes()));
+pub fn to_ply(mesh: &Mesh, hull: Option<&Mesh>, comment: &str) -> Vec<u8> {
+    let meshes = || {
+        [(mesh, ["vertex", "face"])]
+            .into_iter()
+            .chain(hull.map(|hull| (hull, OF_HULL)))
+    };
+    let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {comment}\n");
+    for (mesh, [corners, faces]) in meshes() {
+        header += &format!(
+            "element {corners} {}\nproperty double x\nproperty double y\nproperty double z\n\
+             element {faces} {}\nproperty list uchar uint vertex_indices\n",
+            mesh.positions.len(),
+            mesh.triangles.len()
+        );
     }
-    for triangle in &mesh.triangles {
-        bytes.push(3);
-        bytes.extend(triangle.iter().flat_map(|i| i.to_le_bytes()));
+    header += "end_header\n";
+    let size = |(mesh, _): (&Mesh, _)| 24 * mesh.positions.len() + 13 * mesh.triangles.len();
+    let mut bytes = Vec::with_capacity(header.len() + meshes().map(size).sum::<usize>());
+    bytes.extend(header.into_bytes());
+    for (mesh, _) in meshes() {
+        for position in &mesh.positions {
+            bytes.extend(position.to_array().iter().flat_map(|x| x.to_le_bytes()));
+        }
+        for triangle in &mesh.triangles {
+            bytes.push(3);
+            bytes.extend(triangle.iter().flat_map(|i| i.to_le_bytes()));
+        }
     }
     bytes
 }

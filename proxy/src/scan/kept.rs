@@ -11,14 +11,19 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Where a pixel's point belongs, given a mesh that it has to be within.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kept {
     /// Nowhere: the ray misses the mesh.
     Nowhere,
     /// It is within.
     AsItIs,
-    /// On this triangle.
-    On(u32),
+    /// On a side of the mesh.
+    On {
+        /// Which triangle.
+        triangle_idx: u32,
+        /// 1/z there, or 1/along.
+        inverse: f64,
+    },
 }
 
 /// A side of the mesh that a ray meets.
@@ -29,6 +34,15 @@ struct Side {
     triangle_idx: u32,
     /// Whether the ray enters there.
     enters: bool,
+}
+
+impl Side {
+    fn kept(self) -> Kept {
+        Kept::On {
+            triangle_idx: self.triangle_idx,
+            inverse: self.inverse,
+        }
+    }
 }
 
 /// The sides next to a point along its ray.
@@ -55,12 +69,12 @@ impl Around {
         match (self.before, self.behind) {
             (Some(before), _) if before.enters => Kept::AsItIs,
             (None, Some(behind)) if !behind.enters => Kept::AsItIs,
-            (Some(side), None) | (None, Some(side)) => Kept::On(side.triangle_idx),
+            (Some(side), None) | (None, Some(side)) => side.kept(),
             (None, None) => Kept::Nowhere,
             (Some(before), Some(behind)) => {
                 let far = |inverse: f64| (1.0 / inverse - 1.0 / point_inverse).abs();
                 let is_nearer = far(before.inverse) <= far(behind.inverse);
-                Kept::On(if is_nearer { before } else { behind }.triangle_idx)
+                if is_nearer { before } else { behind }.kept()
             }
         }
     }
@@ -124,7 +138,7 @@ impl Solid {
         while let Some(hit) = self.first_hit(from_in_world + direction * passed, direction) {
             // A little on, so that it is not met again.
             passed = (passed + hit.along) * (1.0 + ON);
-            let [a, b, c] = self.mesh().corners(hit.triangle_idx as usize);
+            let [a, b, c] = self.corners(hit.triangle_idx as usize);
             let side = Side {
                 inverse: passed.recip(),
                 triangle_idx: hit.triangle_idx,
@@ -145,10 +159,11 @@ const ON: f64 = 1e-9;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Mesh, MeshKind};
+    use crate::{Mesh, MeshKind, Scan};
     use calibrate::{Distortion, Lens, Pixel, Rigid3};
     use glam::{DQuat, DVec2};
     use proptest::prelude::*;
+    use std::sync::Arc;
 
     /// Boxes, each with its own corners.
     fn boxes(of: &[(DVec3, DVec3)]) -> Solid {
@@ -204,8 +219,8 @@ mod tests {
             (DVec3::new(-1.0, -1.0, 5.0), DVec3::new(1.0, 1.0, 6.0)),
         ]);
         let side = |kept: Kept| match kept {
-            Kept::On(i) => {
-                let corners = solid.mesh().corners(i as usize);
+            Kept::On { triangle_idx, .. } => {
+                let corners = solid.mesh().corners(triangle_idx as usize);
                 Some(corners.map(|p| p.z).iter().sum::<f64>() / 3.0)
             }
             _ => None,
@@ -260,17 +275,57 @@ mod tests {
                 let expected = solid.keep_on_ray(view.center(), direction, depth(x));
                 // A ray along an edge meets either of its triangles.
                 let alike = match (found, expected) {
-                    (Kept::On(a), Kept::On(b)) => {
+                    (
+                        Kept::On { triangle_idx: a, inverse: at_a },
+                        Kept::On { triangle_idx: b, inverse: at_b },
+                    ) => {
                         let along = |i: u32| {
                             let [a, b, c] = solid.mesh().corners(i as usize);
                             let normal = (b - a).cross(c - a);
                             normal.dot(a - view.center()) / normal.dot(direction)
                         };
                         (along(a) - along(b)).abs() < 1e-6
+                            && (at_a.recip() - along(a)).abs() < 1e-6
+                            && (at_b.recip() - along(b)).abs() < 1e-6
                     }
                     _ => found == expected,
                 };
                 prop_assert!(alike, "{x} {y}: {found:?}, {expected:?}");
+            }
+        }
+
+        #[test]
+        fn a_mesh_within_a_hull_is_met_there_by_rays_and_scans_alike(
+            center in prop::array::uniform3(-3.5..3.5),
+            turn in prop::array::uniform3(-3.0..3.0),
+            sizes in prop::array::uniform3(0.1..1.5),
+            offset in prop::array::uniform3(-1.0..1.0),
+        ) {
+            let (half, at) = (DVec3::from_array(sizes), DVec3::from_array(offset));
+            let hull = Arc::new(boxes(&[(-half, half)]));
+            let mut solid = boxes(&[(at - 0.8, at + 0.8)]);
+            solid.keep_within(hull);
+            let view = view(DVec3::from_array(center), DQuat::from_scaled_axis(turn.into()), 0.0);
+            let rays = Rays::of(&view.lens, (view.width, view.height)).unwrap();
+            let scan = solid.scan_along(&view, &rays);
+            let world_from_camera = view.camera_from_world.rotation.conjugate();
+            for (i, triangle_idx) in scan.triangle_of.iter().enumerate() {
+                let pixel = Pixel::center_of(i as u32 % view.width, i as u32 / view.width);
+                let ray = view.lens.unproject(pixel).unwrap();
+                let direction = world_from_camera * (ray / ray.z);
+                let Some(hit) = solid.first_hit(view.center(), direction) else {
+                    prop_assert_eq!(*triangle_idx, Scan::NOTHING);
+                    continue;
+                };
+                // 1. Alike, on a triangle that has that name.
+                prop_assert!((scan.inverse_depth[i].recip() - hit.along).abs() < 1e-6);
+                let [a, b, c] = solid.corners(*triangle_idx as usize);
+                let normal = (b - a).cross(c - a);
+                let along = normal.dot(a - view.center()) / normal.dot(direction);
+                prop_assert!((along - hit.along).abs() < 1e-6, "{along}, {hit:?}");
+                // 2. Within.
+                let point = view.center() + direction * hit.along;
+                prop_assert!((point.abs() - half).max_element() < 1e-6, "{point}");
             }
         }
     }

@@ -26,7 +26,8 @@ use std::ops::Range;
 pub struct Scan {
     /// Pixels across.
     pub width: usize,
-    /// Row by row, the triangle at each pixel's centre; [`Scan::NOTHING`] where there is none.
+    /// Row by row, the triangle at each pixel's centre; [`Scan::NOTHING`] where there is none. Those
+    /// of what bounds a solid come after its own, as [`Solid::corners`] counts.
     pub triangle_of: Vec<u32>,
     /// Row by row, 1/z of that point in the camera's frame; zero where there is none.
     pub inverse_depth: Vec<f64>,
@@ -83,7 +84,12 @@ impl Solid {
         };
         let triangles = (0..self.mesh().triangles.len()).into_par_iter();
         let triangles = triangles.with_min_len(256).filter_map(prepare).collect();
-        Scan::of(triangles, rays)
+        let mut scan = Scan::of(triangles, rays);
+        if let Some(hull) = self.within() {
+            let kept = hull.keep(view, rays, &scan.inverse_depth);
+            scan.keep(&kept, self.mesh().triangles.len() as u32);
+        }
+        scan
     }
 }
 
@@ -153,6 +159,21 @@ impl Scan {
             }
         });
         scan
+    }
+
+    /// Moves what pixels see to where it is kept, triangles of what keeps it counted from `first`.
+    fn keep(&mut self, kept: &[Kept], first: u32) {
+        let pixels = self.triangle_of.iter_mut().zip(&mut self.inverse_depth);
+        for ((id, depth), kept) in pixels.zip(kept) {
+            (*id, *depth) = match *kept {
+                Kept::AsItIs => continue,
+                Kept::Nowhere => (Self::NOTHING, 0.0),
+                Kept::On {
+                    triangle_idx,
+                    inverse,
+                } => (first + triangle_idx, inverse),
+            };
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A mesh as a proxy: its kind, and rays that meet it.
 
-use crate::Mesh;
+use crate::{Kept, Mesh};
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -8,6 +8,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Where a mesh came from.
@@ -69,6 +70,8 @@ pub struct Solid {
     kind: MeshKind,
     occludes: bool,
     mesh: Mesh,
+    /// What every ray's point is kept within.
+    within: Option<Arc<Solid>>,
     bvh: Bvh2,
     /// Where the hierarchy's origin lies in the world: f32 has digits only around it.
     origin: DVec3,
@@ -77,7 +80,7 @@ pub struct Solid {
 /// Where a ray first meets a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Which triangle.
+    /// Which triangle; see [`Solid::corners`].
     pub triangle_idx: u32,
     /// How far along, in lengths of the ray's direction.
     pub along: f64,
@@ -127,6 +130,7 @@ impl Solid {
             kind,
             occludes: kind.can_occlude_itself(),
             mesh,
+            within: None,
             bvh,
             origin,
         }
@@ -136,6 +140,32 @@ impl Solid {
     /// it would hide from photos is what they show best.
     pub fn hide_nothing(&mut self) {
         self.occludes = false;
+    }
+
+    /// From now on what a ray meets is kept within a closed mesh, as [`Self::keep`] has it: what
+    /// lies outside goes to the nearest of its sides, and what misses it meets nothing.
+    pub fn keep_within(&mut self, hull: Arc<Self>) {
+        self.within = Some(hull);
+    }
+
+    /// The closed mesh that bounds it, if there is one.
+    pub fn within(&self) -> Option<&Self> {
+        self.within.as_deref()
+    }
+
+    /// How many triangles a ray may meet: its own, and those of what bounds it.
+    pub fn triangle_count(&self) -> usize {
+        let bound = self.within().map_or(0, Self::triangle_count);
+        self.mesh.triangles.len() + bound
+    }
+
+    /// The corners of a triangle that a ray meets. Those of what bounds it come after its own.
+    pub fn corners(&self, triangle_idx: usize) -> [DVec3; 3] {
+        let own = self.mesh.triangles.len();
+        match &self.within {
+            Some(hull) if triangle_idx >= own => hull.corners(triangle_idx - own),
+            _ => self.mesh.corners(triangle_idx),
+        }
     }
 
     /// Whether what lies behind a part of it counts as hidden.
@@ -148,14 +178,33 @@ impl Solid {
         self.kind
     }
 
-    /// The mesh itself.
+    /// The mesh itself, without what bounds it.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
     /// The first triangle that a ray from a point meets, from either side but for kinds that
-    /// [have front sides only](MeshKind::has_front_sides_only).
+    /// [have front sides only](MeshKind::has_front_sides_only); kept within what bounds it.
     pub fn first_hit(&self, from_in_world: DVec3, direction: DVec3) -> Option<Hit> {
+        let own = self.first_own_hit(from_in_world, direction);
+        let Some(hull) = &self.within else {
+            return own;
+        };
+        let along = own.map_or(f64::INFINITY, |hit| hit.along);
+        match hull.keep_on_ray(from_in_world, direction, along) {
+            Kept::Nowhere => None,
+            Kept::AsItIs => own,
+            Kept::On {
+                triangle_idx,
+                inverse,
+            } => Some(Hit {
+                triangle_idx: self.mesh.triangles.len() as u32 + triangle_idx,
+                along: inverse.recip(),
+            }),
+        }
+    }
+
+    fn first_own_hit(&self, from_in_world: DVec3, direction: DVec3) -> Option<Hit> {
         let from = from_in_world - self.origin;
         if self.mesh.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
             return None;
@@ -198,7 +247,9 @@ impl Solid {
 /// Two meshes are alike where their triangles are; the rest follows from them.
 impl PartialEq for Solid {
     fn eq(&self, other: &Self) -> bool {
-        (self.kind, self.occludes) == (other.kind, other.occludes) && self.mesh == other.mesh
+        (self.kind, self.occludes) == (other.kind, other.occludes)
+            && self.mesh == other.mesh
+            && self.within == other.within
     }
 }
 

@@ -546,7 +546,7 @@ proptest! {
             positions: corners.iter().map(|p| DVec3::from_array(*p)).collect(),
             triangles: triangles.iter().map(|t| t.map(|i| i % count)).collect(),
         };
-        prop_assert_eq!(&parse("a.ply", mesh::to_ply(&mesh, "any")).unwrap(), &mesh);
+        prop_assert_eq!(&parse("a.ply", mesh::to_ply(&mesh, None, "any")).unwrap(), &mesh);
         let bytes = mesh::to_glb(&mesh, &[], None).unwrap();
         checked(&bytes);
         let back = parse("a.glb", bytes).unwrap();
@@ -560,7 +560,7 @@ proptest! {
     fn no_cut_or_changed_file_panics(at in 0..1000_usize, value: u8, kind in 0..2_usize) {
         let mesh = far_mesh();
         let (name, mut bytes) = match kind {
-            0 => ("a.ply", mesh::to_ply(&mesh, "any")),
+            0 => ("a.ply", mesh::to_ply(&mesh, None, "any")),
             _ => ("a.glb", mesh::to_glb(&mesh, &[], None).unwrap()),
         };
         let at = at * (bytes.len() - 1) / 999;
