@@ -107,7 +107,11 @@ impl Corpus {
         let glb = proxy::mesh::to_glb(&square, &[], None).map_err(io::Error::other)?;
         self.add("mesh_glb", "own", &glb)?;
         self.add("model_glb", "own", &model::textured_glb())?;
-        self.add("mesh_ply", "own", &proxy::mesh::to_ply(&square, None, "by hand"))
+        self.add(
+            "mesh_ply",
+            "own",
+            &proxy::mesh::to_ply(&square, None, "by hand"),
+        )
     }
 
     /// A model's three files, together and each alone.
