@@ -31,12 +31,9 @@ pub enum FileError {
     /// Its mesh cannot be read or written.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// Its points, of a kind, contradict themselves.
+    /// Its points, of a kind, or the hull around it contradict themselves.
     #[error("{path}: {reason}; find the points anew with `lumigraph proxy … {kind}`", path = .0.display(), kind = .1, reason = .2)]
     Points(PathBuf, &'static str, String),
-    /// The closed mesh that bounds it contradicts itself.
-    #[error("{path}: {reason}; make it anew with `lumigraph proxy`", path = .0.display(), reason = .1)]
-    Within(PathBuf, String),
     /// JSON is no place for a mesh.
     #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
     NoMesh(PathBuf),
@@ -172,7 +169,7 @@ impl Stored {
             return Err(FileError::Version(path.to_owned(), self.version));
         }
         let within = self.within.map(StoredMesh::solid).transpose();
-        let within = within.map_err(|e| FileError::Within(path.to_owned(), e))?;
+        let bad = |kind| move |reason| FileError::Points(path.to_owned(), kind, reason);
         let kind = match self.surface {
             StoredSurface::Plane { point, normal } => {
                 return Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
@@ -180,14 +177,17 @@ impl Stored {
                     .map_err(|e| FileError::Plane(path.to_owned(), e));
             }
             StoredSurface::ViewPlane => return Ok(Proxy::ViewPlane),
-            StoredSurface::Points {} => return Ok(Proxy::Points { within }),
+            StoredSurface::Points {} => {
+                let within = within.map_err(bad("points"))?;
+                return Ok(Proxy::Points { within });
+            }
             StoredSurface::Dense {
                 views,
                 points,
                 seen_by,
             } => {
-                return dense(views, &points, seen_by, within)
-                    .map_err(|reason| FileError::Points(path.to_owned(), "dense", reason));
+                let within = within.map_err(bad("dense"))?;
+                return dense(views, &points, seen_by, within).map_err(bad("dense"));
             }
             StoredSurface::Tunnel => MeshKind::Tunnel,
             StoredSurface::Hull => MeshKind::Hull,
@@ -196,6 +196,7 @@ impl Stored {
             StoredSurface::Depth => MeshKind::Depth,
             StoredSurface::Mesh => MeshKind::Mesh,
         };
+        let within = within.map_err(bad(kind.name()))?;
         Ok(solid(kind, mesh()?, self.occludes != Some(false), within))
     }
 }

@@ -105,7 +105,7 @@ fn silhouettes_in_masks_carve_without_being_asked_for() {
     fs::write(here.join("broken.json"), broken).unwrap();
     let error = lumigraph(here, "evaluate mattes --proxy broken.json").error(1);
     assert!(
-        error.contains("broken.json: the hull around its points has"),
+        error.contains("broken.json: the hull around it has"),
         "{error}"
     );
     // Pictures stay whole.
