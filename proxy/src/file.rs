@@ -203,7 +203,7 @@ impl Stored {
 
 fn solid(kind: MeshKind, mesh: mesh::Mesh, occludes: bool, within: Option<Arc<Solid>>) -> Proxy {
     let mut solid = Solid::new(kind, mesh);
-    within.into_iter().for_each(|hull| solid.keep_within(hull));
+    solid.keep_within(within);
     if !occludes {
         solid.hide_nothing();
     }
@@ -482,7 +482,7 @@ mod tests {
             proxies.push(("ply", solid.clone()));
             proxies.push(("glb", solid));
             let mut bounded = Solid::new(kind, mesh.clone());
-            bounded.keep_within(Arc::clone(&hull));
+            bounded.keep_within(Some(Arc::clone(&hull)));
             let bounded = Proxy::Mesh(Arc::new(bounded));
             proxies.push(("ply", bounded.clone()));
             proxies.push(("glb", bounded));

@@ -71,7 +71,8 @@ impl CarvedPoints {
     pub(super) fn surface(self, within: Option<Arc<Solid>>) -> Result<Fitted, SceneError> {
         let how = format!("carved through {}", self.count());
         let mesh = self.mesh.map_err(unfit)?;
-        Ok(Fitted::mesh(MeshKind::CarvedDense, mesh, how).within_hull(within))
+        let kind = MeshKind::CarvedDense;
+        Ok(Fitted::mesh_within(kind, mesh, within, how))
     }
 
     /// The same, to be drawn once.

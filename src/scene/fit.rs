@@ -134,7 +134,8 @@ impl Scene {
                 let surface = carve::surface(&views, &points, &carve::Options::default());
                 let how = format!("carved out of {} points", points.len());
                 let mesh = surface.map_err(unfit)?.mesh;
-                Ok(Fitted::mesh(MeshKind::Carved, mesh, how).within_hull(self.bound(without)?))
+                let within = self.bound(without)?;
+                Ok(Fitted::mesh_within(MeshKind::Carved, mesh, within, how))
             }
             Kind::Hull => self.fit_hull(without),
             Kind::Depth => self.fit_depth(without),
@@ -318,16 +319,6 @@ impl Fitted {
         Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how).with_condition(tunnel.condition)
     }
 
-    /// Keeps a mesh within a hull, if there is one.
-    pub(super) fn within_hull(mut self, hull: Option<Arc<Solid>>) -> Self {
-        if let (Some(hull), Proxy::Mesh(solid)) = (hull, &mut self.proxy)
-            && let Some(own) = Arc::get_mut(solid)
-        {
-            own.keep_within(hull);
-        }
-        self
-    }
-
     /// Says so where the fit is ill-posed.
     fn with_condition(mut self, condition: f64) -> Self {
         if condition > ILL_CONDITIONED {
@@ -345,7 +336,19 @@ impl Fitted {
     }
 
     pub(super) fn mesh(kind: MeshKind, mesh: Mesh, how: String) -> Self {
-        Self::new(Proxy::Mesh(Arc::new(Solid::new(kind, mesh))), how)
+        Self::mesh_within(kind, mesh, None, how)
+    }
+
+    /// A mesh, within a hull if there is one.
+    pub(super) fn mesh_within(
+        kind: MeshKind,
+        mesh: Mesh,
+        within: Option<Arc<Solid>>,
+        how: String,
+    ) -> Self {
+        let mut solid = Solid::new(kind, mesh);
+        solid.keep_within(within);
+        Self::new(Proxy::Mesh(Arc::new(solid)), how)
     }
 }
 

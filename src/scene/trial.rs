@@ -169,13 +169,13 @@ impl<'a> Trials<'a> {
 
     /// The dense points of all photos, which are half known where they were on trial.
     pub(super) fn dense(&mut self) -> Result<Fitted, SceneError> {
-        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        let within = self.bound_of_all()?;
         Ok(self.dense_of_all()?.dense(self.names.clone(), within))
     }
 
     /// The surface carved out of them.
     pub(super) fn carved_dense(&mut self) -> Result<Fitted, SceneError> {
-        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        let within = self.bound_of_all()?;
         self.dense_of_all()?.surface(within)
     }
 
@@ -214,7 +214,7 @@ impl<'a> Trials<'a> {
 
     /// The sparse points of all photos.
     pub(super) fn points(&mut self) -> Result<Fitted, SceneError> {
-        let within = self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull));
+        let within = self.bound_of_all()?;
         Ok(Fitted::points(within))
     }
 
@@ -230,6 +230,11 @@ impl<'a> Trials<'a> {
             None => self.scene.cutout(self.without, None)?,
         };
         Ok(self.cutout.insert(found))
+    }
+
+    /// What bounds points of all photos.
+    fn bound_of_all(&mut self) -> Result<Option<Arc<Solid>>, SceneError> {
+        Ok(self.cutout()?.as_ref().map(|c| Arc::clone(&c.hull)))
     }
 
     /// What bounds points where a judge is drawn: carved without it, and with it a few others.
@@ -277,7 +282,7 @@ impl<'a> Trials<'a> {
             }
             Kind::CarvedDense => {
                 let mut solid = self.dense_without(judges[0])?.solid()?;
-                within.into_iter().for_each(|hull| solid.keep_within(hull));
+                solid.keep_within(within);
                 (Proxy::Mesh(Arc::new(solid)), Vec::new())
             }
             // A box may happen to suit a few photos of anything.

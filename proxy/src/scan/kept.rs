@@ -304,7 +304,7 @@ mod tests {
             let (half, at) = (DVec3::from_array(sizes), DVec3::from_array(offset));
             let hull = Arc::new(boxes(&[(-half, half)]));
             let mut solid = boxes(&[(at - 0.8, at + 0.8)]);
-            solid.keep_within(hull);
+            solid.keep_within(Some(hull));
             let view = view(DVec3::from_array(center), DQuat::from_scaled_axis(turn.into()), 0.0);
             let rays = Rays::of(&view.lens, (view.width, view.height)).unwrap();
             let scan = solid.scan_along(&view, &rays);

@@ -142,10 +142,10 @@ impl Solid {
         self.occludes = false;
     }
 
-    /// From now on what a ray meets is kept within a closed mesh, as [`Self::keep`] has it: what
+    /// From now on what a ray meets is kept within a closed mesh, if there is one, as [`Self::keep`] has it: what
     /// lies outside goes to the nearest of its sides, and what misses it meets nothing.
-    pub fn keep_within(&mut self, hull: Arc<Self>) {
-        self.within = Some(hull);
+    pub fn keep_within(&mut self, hull: Option<Arc<Self>>) {
+        self.within = hull;
     }
 
     /// The closed mesh that bounds it, if there is one.
