@@ -67,6 +67,18 @@ pub(crate) fn log2(x: f32) -> f32 {
     exponent + m * polynomial
 }
 
+/// The whole part of 0 ≤ x < 2²², as both kinds of number; anything else gives any number. (A cast
+/// to an integer says what becomes of those, too, and is done one by one.)
+#[inline(always)]
+pub(crate) fn whole(x: f32) -> (f32, i32) {
+    // Beyond 2²³ numbers have no digits for fractions.
+    const SHIFT: f32 = 8_388_608.0;
+    let nearest = (x + SHIFT) - SHIFT;
+    let floor = nearest - if nearest > x { 1.0 } else { 0.0 };
+    let bits = (floor + SHIFT).to_bits() as i32;
+    (floor, bits.wrapping_sub(SHIFT.to_bits() as i32))
+}
+
 /// Newton's steps for a cubic from 1, which approach its root from one side; beyond
 /// [`LARGEST_CUBIC_TERM`] they stop outside every image.
 const CUBIC_STEPS: usize = 8;
@@ -87,6 +99,15 @@ pub(crate) fn cubic_root(t: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_parts_are_those_of_a_cast() {
+        let near = |n: f32| [n.next_down(), n, n.next_up(), n + 0.5, (n + 0.5).next_up()];
+        let numbers = (0..200).chain([1 << 15, (1 << 22) - 1]).map(|n| n as f32);
+        for x in numbers.flat_map(near).filter(|x| *x >= 0.0) {
+            assert_eq!(whole(x), (x.floor(), x as i32), "{x}");
+        }
+    }
 
     #[test]
     fn angles_are_right_all_round_and_when_tiny() {

@@ -13,7 +13,7 @@ pub(crate) mod source;
 mod weights;
 
 use crate::RenderError;
-use crate::field::TriangulatedField;
+use crate::field::{FieldEntry, TriangulatedField};
 use crate::frame::Frame;
 use crate::held::Held;
 use crate::options::Method;
@@ -26,6 +26,7 @@ use image::RgbaImage;
 use lanes::{LANES, Lane, each, vectorised};
 use rayon::prelude::*;
 use source::{Sight, Source, Tile};
+use std::ops::Range;
 use std::sync::OnceLock;
 use weights::{Term, weigh};
 
@@ -129,37 +130,18 @@ fn draw_field(
             let mut is_bordered = [false; LANES];
             for span in spans.iter().filter(crossing) {
                 let lanes = within(span);
-                let mut shares = [[0.0; LANES]; 3];
-                for k in lanes.clone() {
-                    let share = raster.barycentric(span.triangle_idx, x0 + k, row);
-                    (0..3).for_each(|corner| shares[corner][k] = share[corner]);
-                }
                 let bordered = field.triangles[span.triangle_idx].bordered;
                 is_bordered[lanes.clone()].fill(bordered);
-                for entry in field.entries_of(span.triangle_idx) {
-                    let i = entry.source_idx as usize;
-                    let at = active
-                        .iter()
-                        .position(|s| s.source_idx == i)
-                        .unwrap_or_else(|| {
-                            active.push(Interpolated::nothing(i));
-                            active.len() - 1
-                        });
-                    let into = &mut active[at];
-                    let [v0, v1, v2] = entry.values;
-                    let values = if bordered {
-                        &mut into.diff
-                    } else {
-                        &mut into.weight
-                    };
-                    for k in lanes.clone() {
-                        values[k] = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
-                    }
-                    if bordered {
-                        into.blended[lanes.clone()].fill(1.0);
-                    }
-                }
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        let shares = raster.shares(span.triangle_idx, x0, row);
+                        let entries = field.entries_of(span.triangle_idx);
+                        active.add(entries, bordered, &lanes, &shares);
+                    },
+                );
             }
+            let active = active.all();
             for k in 0..LANES {
                 is_bordered[k] &= tile.s[k] >= 0.0;
             }
@@ -223,7 +205,7 @@ const THEN_ASKED: usize = 4;
 #[derive(Default)]
 struct Scratch {
     spans: Vec<Span>,
-    active: Vec<Interpolated>,
+    active: Active,
     /// Of what is active, by the least difference: that and its index.
     order: Vec<(f32, usize)>,
     seen: Seen,
@@ -283,6 +265,66 @@ impl Seen {
     }
 }
 
+/// What a field says of the source views over a tile.
+#[derive(Default)]
+struct Active {
+    count: usize,
+    /// At least one for each of them.
+    all: Vec<Interpolated>,
+}
+
+impl Active {
+    fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    fn all(&self) -> &[Interpolated] {
+        &self.all[..self.count]
+    }
+
+    /// Where what is known of a source view is, or is to be put.
+    #[inline(always)]
+    fn of(&mut self, source_idx: usize) -> &mut Interpolated {
+        let at = self.all().iter().position(|s| s.source_idx == source_idx);
+        let at = at.unwrap_or_else(|| {
+            if self.all.len() == self.count {
+                self.all.push(Interpolated::nothing());
+            }
+            self.all[self.count].clear(source_idx);
+            self.count += 1;
+            self.count - 1
+        });
+        &mut self.all[at]
+    }
+
+    /// Adds a triangle's list over the pixels that it covers, in which its corners have these shares.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        entries: &[FieldEntry],
+        bordered: bool,
+        lanes: &Range<usize>,
+        shares: &[Lane; 3],
+    ) {
+        let covers = |k: usize| (lanes.start..lanes.end).contains(&k);
+        for entry in entries {
+            let into = self.of(entry.source_idx as usize);
+            let [v0, v1, v2] = entry.values;
+            let values = match bordered {
+                true => &mut into.diff,
+                false => &mut into.weight,
+            };
+            for k in 0..LANES {
+                let value = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
+                values[k] = if covers(k) { value } else { values[k] };
+            }
+            if bordered {
+                into.blended[lanes.clone()].fill(1.0);
+            }
+        }
+    }
+}
+
 /// What a field says of one source view over a tile.
 struct Interpolated {
     source_idx: usize,
@@ -295,13 +337,22 @@ struct Interpolated {
 }
 
 impl Interpolated {
-    fn nothing(source_idx: usize) -> Self {
+    fn nothing() -> Self {
         Self {
-            source_idx,
+            source_idx: 0,
             weight: [0.0; LANES],
             diff: [1.0; LANES],
             blended: [0.0; LANES],
         }
+    }
+
+    /// Begins anew with a source view of which nothing is known.
+    #[inline(always)]
+    fn clear(&mut self, source_idx: usize) {
+        self.source_idx = source_idx;
+        self.weight.fill(0.0);
+        self.diff.fill(1.0);
+        self.blended.fill(0.0);
     }
 
     /// The least difference in bordered triangles; less than any where it has weights, too, and

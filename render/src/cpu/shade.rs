@@ -1,14 +1,13 @@
 //! Sampling photos and masks: the f32 twin of [`crate::reference::sample`].
 
-use super::lanes::{LANES, Lane, each};
+use super::lanes::{LANES, Lane, each, whole};
 use super::source::Sight;
 use crate::frame::SHOULDER;
 use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
 use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TEXEL_PER_PIXEL, TOLERANCE};
 use glam::Vec4;
-use image::{ImageBuffer, Pixel};
-use std::ops::{Add, Mul, Sub};
+use image::GrayImage;
 
 /// Adds a photo's colours, by its weights, to those of a tile and to their sum.
 #[inline(always)]
@@ -20,10 +19,11 @@ pub(super) fn add(
     color: &mut [Vec4; LANES],
     sum: &mut Lane,
 ) {
+    let samples = sample(photo, sight, weights);
     let as_it_is = exposure == Vec4::ONE;
     for (k, &w) in weights.iter().enumerate().take(LANES) {
         if w > 0.0 {
-            let mut seen = sample(photo, sight.u[k], sight.v[k], sight.level[k]);
+            let mut seen = samples[k];
             if !as_it_is {
                 seen = exposed(seen, exposure);
             }
@@ -33,12 +33,101 @@ pub(super) fn add(
     }
 }
 
-/// Trilinear; premultiplied, 0…255.
+/// The photo's colours at those pixels of a tile that weigh something; trilinear, premultiplied, 0…255.
+/// Level by level, as neighbours share theirs.
 #[inline(always)]
-pub(crate) fn sample(photo: &Pyramid, u: f32, v: f32, level: f32) -> Vec4 {
-    let texel =
-        |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
-    trilinear(&photo.levels, u, v, level.max(photo.finest as f32), texel)
+fn sample(photo: &Pyramid, sight: &Sight, weights: &[f32]) -> [Vec4; LANES] {
+    let (finest, coarsest) = (photo.finest as f32, (photo.levels.len() - 1) as f32);
+    let level = each(|k| sight.level[k].max(finest).min(coarsest));
+    let (mut lower, mut share) = ([0; LANES], [0.0; LANES]);
+    for k in 0..LANES {
+        let (floor, whole) = whole(level[k]);
+        (lower[k], share[k]) = (whole, level[k] - floor);
+    }
+    let (mut first, mut last) = (i32::MAX, -1);
+    for k in 0..weights.len().min(LANES) {
+        if weights[k] > 0.0 {
+            first = first.min(lower[k]);
+            last = last.max(lower[k] + i32::from(share[k] > 0.0));
+        }
+    }
+    let mut samples = [Vec4::ZERO; LANES];
+    for of in first..=last {
+        let image = &photo.levels[of as usize];
+        let (texels, _) = image.as_raw().as_chunks::<4>();
+        let places = Places::new(image.dimensions(), sight, of);
+        for (k, &w) in weights.iter().enumerate().take(LANES) {
+            if w > 0.0 && lower[k] == of {
+                samples[k] = places.bilinear(texels, k);
+            } else if w > 0.0 && lower[k] + 1 == of && share[k] > 0.0 {
+                samples[k] += (places.bilinear(texels, k) - samples[k]) * share[k];
+            }
+        }
+    }
+    samples
+}
+
+/// Which texels of a level the pixels of a tile lie between.
+struct Places {
+    /// The upper left of 2 × 2, all of which are in the image.
+    at: Lane<i32>,
+    /// How far the pixel is from it to the right, and down: 0…1.
+    share: [Lane; 2],
+    /// From one texel to the next, and from one row to the next: nothing where there is only one.
+    step: [usize; 2],
+}
+
+impl Places {
+    #[inline(always)]
+    fn new((width, height): (u32, u32), sight: &Sight, level: i32) -> Self {
+        let scale = 1.0 / (1_u32 << level) as f32;
+        let (columns, x) = Self::along(&sight.u, scale, width as i32);
+        let (rows, y) = Self::along(&sight.v, scale, height as i32);
+        let mut at = [0; LANES];
+        for k in 0..LANES {
+            at[k] = rows[k] * width as i32 + columns[k];
+        }
+        Self {
+            at,
+            share: [x, y],
+            step: [
+                usize::from(width > 1),
+                if height > 1 { width as usize } else { 0 },
+            ],
+        }
+    }
+
+    /// The texel before, and the share of the next. At the border that is all or nothing: what would lie
+    /// beyond repeats it.
+    #[inline(always)]
+    fn along(at: &Lane, scale: f32, count: i32) -> (Lane<i32>, Lane) {
+        let (mut before, mut share) = ([0; LANES], [0.0; LANES]);
+        let last = (count - 2).max(0);
+        for k in 0..LANES {
+            // The pixel lies inside the photo, so a shift by one keeps truncation a floor.
+            let x = at[k] * scale + 0.5;
+            let (floor, next) = whole(x);
+            // Of pixels that weigh nothing it may be any number.
+            let own = next.wrapping_sub(1);
+            before[k] = own.min(last).max(0);
+            let inner = if own >= 0 { x - floor } else { 0.0 };
+            share[k] = if own > last { 1.0 } else { inner };
+        }
+        (before, share)
+    }
+
+    #[inline(always)]
+    fn bilinear(&self, texels: &[[u8; 4]], k: usize) -> Vec4 {
+        let texel = |at: usize| {
+            let [r, g, b, a] = texels[at];
+            Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
+        };
+        let (at, [right, down]) = (self.at[k] as usize, self.step);
+        let (x, y) = (self.share[0][k], self.share[1][k]);
+        let top = texel(at) + (texel(at + right) - texel(at)) * x;
+        let low = texel(at + down) + (texel(at + down + right) - texel(at + down)) * x;
+        top + (low - top) * y
+    }
 }
 
 /// [`crate::frame::exposed`] for a colour of 0…255.
@@ -64,52 +153,19 @@ pub(crate) fn straight_rgba8(color: Vec4, weights: f32) -> [u8; 4] {
 /// What a mask leaves of its photo, 0…1; trilinear.
 #[inline]
 pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
-    let texel = |[value]: [u8; 1]| f32::from(value);
-    let value = trilinear(&mask.levels, u, v, level, texel);
+    let level = level.min((mask.levels.len() - 1) as f32);
+    let lower = level.max(0.0) as usize;
+    let fraction = level - lower as f32;
+    let mut value = bilinear(&mask.levels[lower], u, v, lower);
+    if fraction > 0.0 {
+        value += (bilinear(&mask.levels[lower + 1], u, v, lower + 1) - value) * fraction;
+    }
     ((value - IGNORED) / (255.0 - IGNORED)).max(0.0)
 }
 
-/// `texel` makes a number or several of a texel's bytes.
 #[inline(always)]
-fn trilinear<P, T, const CHANNELS: usize>(
-    levels: &[ImageBuffer<P, Vec<u8>>],
-    u: f32,
-    v: f32,
-    level: f32,
-    texel: impl Fn([u8; CHANNELS]) -> T + Copy,
-) -> T
-where
-    P: Pixel<Subpixel = u8>,
-    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
-{
-    if level <= 0.0 {
-        return bilinear(levels, u, v, 0, texel);
-    }
-    let level = level.min((levels.len() - 1) as f32);
-    let lower = level as usize;
-    let fraction = level - lower as f32;
-    let color = bilinear(levels, u, v, lower, texel);
-    if fraction > 0.0 {
-        color + (bilinear(levels, u, v, lower + 1, texel) - color) * fraction
-    } else {
-        color
-    }
-}
-
-#[inline(always)]
-fn bilinear<P, T, const CHANNELS: usize>(
-    levels: &[ImageBuffer<P, Vec<u8>>],
-    u: f32,
-    v: f32,
-    level: usize,
-    texel: impl Fn([u8; CHANNELS]) -> T,
-) -> T
-where
-    P: Pixel<Subpixel = u8>,
-    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
-{
-    let image = &levels[level];
-    let (texels, _) = image.as_raw().as_chunks::<CHANNELS>();
+fn bilinear(image: &GrayImage, u: f32, v: f32, level: usize) -> f32 {
+    let texels = image.as_raw();
     let (last_x, last_y) = (image.width() as i32 - 1, image.height() as i32 - 1);
     let scale = 1.0 / (1_u32 << level) as f32;
     // The pixel lies inside the photo, so a shift by one keeps truncation a floor.
@@ -121,7 +177,7 @@ where
     let pitch = image.width() as usize;
     let row0 = (bottom - 1).clamp(0, last_y) as usize * pitch;
     let row1 = bottom.clamp(0, last_y) as usize * pitch;
-    let at = |i: usize| texel(texels[i]);
+    let at = |i: usize| f32::from(texels[i]);
     let top = at(row0 + x0) + (at(row0 + x1) - at(row0 + x0)) * fx;
     let low = at(row1 + x0) + (at(row1 + x1) - at(row1 + x0)) * fx;
     top + (low - top) * fy
@@ -151,16 +207,18 @@ pub(super) fn visible(map: &DistanceMap, sight: &Sight) -> Lane {
 fn nearest(map: &DistanceMap, sight: &Sight) -> Lane {
     let [width, height] = map.size.map(|side| side as i32);
     let (mut at, mut shares) = ([[0; LANES]; 4], [[0.0; LANES]; 2]);
-    // What is not in the photo may be anywhere, and no number.
-    let within = |at: f32, side: i32| at.max(-1.0).min(side as f32);
+    // What is not in the photo may be anywhere, and no number. (From the texel before the first on, so that
+    // no number is negative.)
+    let within = |at: f32, side: i32| at.max(0.0).min((side + 1) as f32);
     for k in 0..LANES {
-        let x = within(sight.u[k] * TEXEL_PER_PIXEL - 0.5, width);
-        let y = within(sight.v[k] * TEXEL_PER_PIXEL - 0.5, height);
-        let (left, top) = (floor(x), floor(y));
-        (shares[0][k], shares[1][k]) = (x - left as f32, y - top as f32);
+        let x = within(sight.u[k] * TEXEL_PER_PIXEL + 0.5, width);
+        let y = within(sight.v[k] * TEXEL_PER_PIXEL + 0.5, height);
+        let ((left, right), (top, bottom)) = (whole(x), whole(y));
+        (shares[0][k], shares[1][k]) = (x - left, y - top);
+        let (left, top) = (right - 1, bottom - 1);
         let column = |i: i32| i.clamp(0, width - 1);
         let row = |i: i32| i.clamp(0, height - 1) * width;
-        let (x0, x1, y0, y1) = (column(left), column(left + 1), row(top), row(top + 1));
+        let (x0, x1, y0, y1) = (column(left), column(right), row(top), row(bottom));
         at[0][k] = y0 + x0;
         at[1][k] = y0 + x1;
         at[2][k] = y1 + x0;
@@ -181,11 +239,4 @@ fn nearest(map: &DistanceMap, sight: &Sight) -> Lane {
             upper + shares[1][k] * (lower - upper)
         },
     )
-}
-
-/// Without a call.
-#[inline(always)]
-fn floor(x: f32) -> i32 {
-    let whole = x as i32;
-    whole - i32::from(x < whole as f32)
 }
