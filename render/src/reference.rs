@@ -3,7 +3,7 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
-use crate::frame::{Frame, ProxyPoint, exposed};
+use crate::frame::{Frame, ProxyPoint, exposed, trust};
 use crate::held::Held;
 use crate::image_out::straight_rgba8;
 use crate::mask::IGNORED;
@@ -55,7 +55,8 @@ pub(crate) fn candidate(
 
 /// The colour of a proxy point: premultiplied sRGB and coverage, 0…1.
 ///
-/// Each contributor is brought to the frame's exposure first.
+/// Each contributor is brought to the frame's exposure first, and counts less where its matte shows
+/// nothing.
 ///
 /// # Errors
 /// A contributor's photo cannot be decoded.
@@ -65,7 +66,7 @@ pub fn color_at(
     point: &ProxyPoint,
     contributors: &[Contributor],
 ) -> Result<[f64; 4], PhotoError> {
-    let mut color = [0.0; 4];
+    let (mut color, mut sum) = ([0.0; 4], 0.0);
     for &Contributor { source_idx, weight } in contributors {
         let Some(pixel) = frame.project(source_idx, point) else {
             continue;
@@ -73,11 +74,17 @@ pub fn color_at(
         let photo = photos.get(source_idx)?;
         let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
         let sample = exposed(sample, frame.sources[source_idx].exposure);
+        let weight = weight * trust(sample[3]);
         for c in 0..4 {
             color[c] += weight * sample[c];
         }
+        sum += weight;
     }
-    Ok(color)
+    Ok(if sum > 0.0 {
+        color.map(|v| v / sum)
+    } else {
+        color
+    })
 }
 
 /// The exact picture: straight alpha, alpha = coverage.

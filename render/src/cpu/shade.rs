@@ -2,7 +2,7 @@
 
 use super::lanes::{LANES, Lane, each, whole};
 use super::source::Sight;
-use crate::frame::SHOULDER;
+use crate::frame::{SHOULDER, TRANSPARENT};
 use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
 use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TEXEL_PER_PIXEL, TOLERANCE};
@@ -27,6 +27,11 @@ pub(super) fn add(
             if !as_it_is {
                 seen = exposed(seen, exposure);
             }
+            // As [`crate::frame::trust`] has it; opaque photos pay nothing for it.
+            let w = match seen.w == 255.0 {
+                true => w,
+                false => w * (TRANSPARENT as f32 + (1.0 - TRANSPARENT) as f32 / 255.0 * seen.w),
+            };
             color[k] += seen * w;
             sum[k] += w;
         }

@@ -38,6 +38,8 @@ const CONTRIBUTORS = 16u;
 const SAME_RAY: f32 = 1e-12;
 // SHOULDER of frame.rs.
 const SHOULDER: f32 = 0.25;
+// TRANSPARENT of frame.rs.
+const TRANSPARENT: f32 = 0.25;
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 const INFINITY: f32 = 3e38;
 
@@ -497,7 +499,9 @@ fn exposed(color: vec4f, exposure: vec4f) -> vec4f {
     return color + (exposure - 1.0) * color * share;
 }
 
-fn add(mix: ptr<function, Mix>, weight: f32, color: vec4f, source_idx: u32) {
+fn add(mix: ptr<function, Mix>, share: f32, color: vec4f, source_idx: u32) {
+    // `trust` of frame.rs.
+    let weight = share * (TRANSPARENT + (1.0 - TRANSPARENT) * color.a);
     if params.exposures_differ == 1u {
         (*mix).color += weight * exposed(color, source_data(source_idx, EXPOSURE));
     } else {

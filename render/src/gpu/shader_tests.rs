@@ -201,6 +201,7 @@ fn shared_numbers_are_the_same() {
             ("RESOLUTION_LENGTH", 1.0),
             ("LEVEL_BIAS", crate::LEVEL_BIAS),
             ("SHOULDER", crate::frame::SHOULDER),
+            ("TRANSPARENT", crate::frame::TRANSPARENT),
             ("IGNORED", f64::from(crate::mask::IGNORED)),
             ("LENS_PINHOLE", f64::from(layout::LENS_PINHOLE)),
             ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),

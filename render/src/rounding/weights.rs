@@ -8,6 +8,7 @@
 use super::interval::Interval;
 use crate::blend::{SAME_RAY, threshold};
 use crate::cpu::source::EDGE;
+use crate::frame::trust;
 use crate::options::{FieldOptions, MAX_CONTRIBUTORS};
 
 /// A source view that may see a point.
@@ -24,7 +25,10 @@ pub(super) fn blended<const N: u32>(
     options: &FieldOptions,
 ) -> [Interval<N>; 4] {
     let is_sure = candidates.iter().any(|c| c.a.lo > 0.0);
-    let weights = weights(candidates, options);
+    let mut weights = weights(candidates, options);
+    for (weight, candidate) in weights.iter_mut().zip(candidates) {
+        *weight = trusted(*weight, candidate.color[3]);
+    }
     std::array::from_fn(|channel| {
         let bounds = candidates.iter().map(|c| c.color[channel]);
         let of = |end: fn(Interval<N>) -> f64, sign: f64| {
@@ -37,14 +41,20 @@ pub(super) fn blended<const N: u32>(
             true => Interval::new(lo, hi),
             false => Interval::new(0.0, 0.0),
         };
-        // Products, their sum, that of the weights, and a quotient.
-        let error = (2 * candidates.len() + 4) as f64 * Interval::<N>::ERROR;
+        // Products, their sum, that of the weights, and a quotient; what mattes take off.
+        let error = (2 * candidates.len() + 8) as f64 * Interval::<N>::ERROR;
         let mean = mean.wider(error * mean.hi);
         match is_sure {
             true => mean,
             false => mean.with(Interval::new(0.0, 0.0)),
         }
     })
+}
+
+/// What is left of a weight where a photo's alpha, 0…255, is so much: see [`trust`].
+fn trusted<const N: u32>(weight: Interval<N>, alpha: Interval<N>) -> Interval<N> {
+    let of = |weight: f64, alpha: f64| weight * trust((alpha / 255.0).clamp(0.0, 1.0));
+    Interval::new(of(weight.lo, alpha.lo), of(weight.hi, alpha.hi))
 }
 
 /// What each candidate may weigh, not normalised.

@@ -529,3 +529,22 @@ fn soft_mattes_and_masks_meet_in_one_photo() {
         assert_eq!(picture.get_pixel(40, 60).0[3], 128, "{engine}");
     }
 }
+
+#[test]
+fn a_hole_in_one_matte_among_photos_that_show_the_object_is_no_hole_in_it() {
+    // Midway between two photos, one of which shows nothing: it counts a quarter.
+    let shot = Shot::of("wall", 2, None);
+    let mut photos = shot.photos.clone();
+    photos[0].pixels_mut().for_each(|p| p.0[3] = 0);
+    let lumigraph = Lumigraph {
+        photos: PhotoStore::from_images(photos),
+        ..shot.lumigraph()
+    };
+    let desired = shot.views[0].between(&shot.views[1], 0.5);
+    for method in METHODS {
+        for (engine, picture) in by_all(&frame(&lumigraph, &desired), method) {
+            let [.., alpha] = picture.unwrap().get_pixel(SIZE.0 / 2, SIZE.1 / 2).0;
+            assert!(alpha.abs_diff(204) <= 2, "{engine}, {method:?}: {alpha}");
+        }
+    }
+}
