@@ -106,29 +106,31 @@ fn draw_field(
     draw(frame, |row, scratch: &mut Scratch, pixels| {
         let Scratch {
             spans,
+            crossing,
             active,
             order,
             seen,
         } = scratch;
         raster.spans(row, spans);
-        let mut triangle_of = [None; LANES];
         for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
             let x0 = tile_idx * LANES;
-            let crossing = |s: &&Span| s.start < x0 + LANES && s.end > x0;
             let within = |s: &Span| s.start.max(x0) - x0..s.end.min(x0 + LANES) - x0;
-            triangle_of.fill(None);
-            for span in spans.iter().filter(crossing) {
-                triangle_of[within(span)].fill(Some(span.triangle_idx));
+            let (mut is_covered, mut is_bordered) = ([false; LANES], [false; LANES]);
+            crossing.clear();
+            for (i, span) in spans.iter().enumerate() {
+                if span.start < x0 + LANES && span.end > x0 {
+                    is_covered[within(span)].fill(true);
+                    crossing.push(i);
+                }
             }
-            let tile = engine.tile(x0, row, |k| triangle_of[k].is_some());
+            let tile = engine.tile(x0, row, |k| is_covered[k]);
             if tile.s.iter().all(|s| *s < 0.0) {
                 continue;
             }
             // 1. The interpolated weights, or differences, of the triangles that cross the
             // tile.
             active.clear();
-            let mut is_bordered = [false; LANES];
-            for span in spans.iter().filter(crossing) {
+            for span in crossing.iter().map(|&i| &spans[i]) {
                 let lanes = within(span);
                 let bordered = field.triangles[span.triangle_idx].bordered;
                 is_bordered[lanes.clone()].fill(bordered);
@@ -150,8 +152,17 @@ fn draw_field(
             // triangle, with the mask, a term of the blend. Of the latter the views that
             // differ least come first, as far as they leave room for more.
             order.clear();
-            let least = active.iter().map(|source| source.least(&is_bordered));
-            order.extend(least.zip(0..).filter(|(least, _)| *least < f32::INFINITY));
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (i, source) in active.iter().enumerate() {
+                        let least = source.least(&is_bordered);
+                        if least < f32::INFINITY {
+                            order.push((least, i));
+                        }
+                    }
+                },
+            );
             order.sort_unstable_by(|a, b| {
                 let source_idx = |i: usize| active[i].source_idx;
                 a.0.total_cmp(&b.0)
@@ -204,7 +215,9 @@ const THEN_ASKED: usize = 4;
 /// What a thread uses again for every tile that it draws of a triangulated field.
 #[derive(Default)]
 struct Scratch {
+    /// Of the row, and the indices of those that cross the tile.
     spans: Vec<Span>,
+    crossing: Vec<usize>,
     active: Active,
     /// Of what is active, by the least difference: that and its index.
     order: Vec<(f32, usize)>,
@@ -218,6 +231,8 @@ struct Seen {
     /// At least one for each of them.
     sights: Vec<Sight>,
     terms: Vec<Term>,
+    /// While they are sorted: which of them comes first, and so on.
+    order: Vec<usize>,
 }
 
 impl Seen {
@@ -242,14 +257,22 @@ impl Seen {
 
     /// By source view.
     fn sort(&mut self) {
-        // They are few, and mostly in order.
-        for end in 1..self.source_idxs.len() {
-            let mut at = end;
-            while at > 0 && self.source_idxs[at - 1] > self.source_idxs[at] {
-                self.source_idxs.swap(at - 1, at);
-                self.sights.swap(at - 1, at);
-                self.terms.swap(at - 1, at);
-                at -= 1;
+        let Self {
+            source_idxs, order, ..
+        } = self;
+        order.clear();
+        order.extend(0..source_idxs.len());
+        order.sort_unstable_by_key(|&i| source_idxs[i]);
+        // What belongs here may have gone elsewhere in exchange: a kilobyte each moves as little as can be.
+        for at in 0..self.order.len() {
+            let mut from = self.order[at];
+            while from < at {
+                from = self.order[from];
+            }
+            if from != at {
+                self.source_idxs.swap(at, from);
+                self.sights.swap(at, from);
+                self.terms.swap(at, from);
             }
         }
     }
@@ -357,13 +380,22 @@ impl Interpolated {
 
     /// The least difference in bordered triangles; less than any where it has weights, too, and
     /// infinite where it has nothing.
+    #[inline(always)]
     fn least(&self, is_bordered: &[bool; LANES]) -> f32 {
         if self.weight != [0.0; LANES] {
             return -1.0;
         }
-        let counts = |k: &usize| is_bordered[*k] && self.blended[*k] > 0.0;
-        let diffs = (0..LANES).filter(counts).map(|k| self.diff[k].max(0.0));
-        diffs.fold(f32::INFINITY, f32::min)
+        let mut least = [f32::INFINITY; 8];
+        for k in 0..LANES {
+            let counts = is_bordered[k] & (self.blended[k] > 0.0);
+            let diff = if counts {
+                self.diff[k].max(0.0)
+            } else {
+                f32::INFINITY
+            };
+            least[k % 8] = least[k % 8].min(diff);
+        }
+        least.into_iter().fold(f32::INFINITY, f32::min)
     }
 }
 
@@ -495,11 +527,17 @@ impl<'a> Engine<'a> {
                 },
             );
         }
-        for (k, out) in out.chunks_exact_mut(4).enumerate() {
-            if sum[k] > 0.0 {
-                out.copy_from_slice(&shade::straight_rgba8(color[k], sum[k]));
-            }
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                let (out, _) = out.as_chunks_mut::<4>();
+                for (k, out) in out.iter_mut().enumerate() {
+                    if sum[k] > 0.0 {
+                        *out = shade::straight_rgba8(color[k], sum[k]);
+                    }
+                }
+            },
+        );
         Ok(())
     }
 }

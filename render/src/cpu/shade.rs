@@ -145,14 +145,14 @@ pub(crate) fn exposed(color: Vec4, exposure: Vec4) -> Vec4 {
 
 /// Straight 8-bit RGBA of a sum of premultiplied colours of 0…255, over the sum of their weights;
 /// see [`crate::image_out::straight_rgba8`].
-#[inline]
-pub(crate) fn straight_rgba8(color: Vec4, weights: f32) -> [u8; 4] {
-    let alpha = (color.w / weights + 0.5) as u8;
-    if alpha == 0 {
-        return [0; 4];
-    }
+#[inline(always)]
+pub(super) fn straight_rgba8(color: Vec4, weights: f32) -> [u8; 4] {
+    // They are 0…256.
+    let byte = |v: f32| whole(v).1 as u8;
+    let alpha = byte(color.w / weights + 0.5);
     let straight = (color * (255.0 / color.w) + 0.5).min(Vec4::splat(255.0));
-    [straight.x as u8, straight.y as u8, straight.z as u8, alpha]
+    let opaque = [byte(straight.x), byte(straight.y), byte(straight.z), alpha];
+    if alpha == 0 { [0; 4] } else { opaque }
 }
 
 /// What a mask leaves of its photo, 0…1; trilinear.
