@@ -263,7 +263,8 @@ impl Seen {
         order.clear();
         order.extend(0..source_idxs.len());
         order.sort_unstable_by_key(|&i| source_idxs[i]);
-        // What belongs here may have gone elsewhere in exchange: a kilobyte each moves as little as can be.
+        // At most as many exchanges as there are views, as each moves a kilobyte. What belongs here may
+        // have been moved by one before.
         for at in 0..self.order.len() {
             let mut from = self.order[at];
             while from < at {
