@@ -49,9 +49,8 @@ const EXPOSURE_GRID: f64 = 16.0;
 pub(crate) const SHOULDER: f64 = 0.25;
 
 /// How much a photo counts in a blend where its matte shows nothing, of what it counts where it shows
-/// the object. Mattes err towards nothing, in shadows and at rims, and one hole among photos
-/// that show the object is no hole in it. Chosen among 1, 0.5, 0.25 and 0.1 by held-out mattes, of which
-/// it is the largest that leaves 99 % covered (ARCHITECTURE.md).
+/// the object: a hole in one matte among photos that show the object is no hole in it. Of 1, 0.5, 0.25 and
+/// 0.1 it is the largest with which 99 % of held-out mattes are covered (ARCHITECTURE.md).
 pub(crate) const TRANSPARENT: f64 = 0.25;
 
 /// How much a photo counts where its alpha, 0…1, is so much: one where it is opaque.

@@ -139,11 +139,10 @@ fn draw_field(
                     || {
                         let shares = raster.shares(span.triangle_idx, x0, row);
                         let entries = field.entries_of(span.triangle_idx);
-                        active.add(entries, bordered, &lanes, &shares);
+                        interpolate(active, entries, bordered, &lanes, &shares);
                     },
                 );
             }
-            let active = active.all();
             for k in 0..LANES {
                 is_bordered[k] &= tile.s[k] >= 0.0;
             }
@@ -218,7 +217,7 @@ struct Scratch {
     /// Of the row, and the indices of those that cross the tile.
     spans: Vec<Span>,
     crossing: Vec<usize>,
-    active: Active,
+    active: Vec<Interpolated>,
     /// Of what is active, by the least difference: that and its index.
     order: Vec<(f32, usize)>,
     seen: Seen,
@@ -289,62 +288,35 @@ impl Seen {
     }
 }
 
-/// What a field says of the source views over a tile.
-#[derive(Default)]
-struct Active {
-    count: usize,
-    /// At least one for each of them.
-    all: Vec<Interpolated>,
-}
-
-impl Active {
-    fn clear(&mut self) {
-        self.count = 0;
-    }
-
-    fn all(&self) -> &[Interpolated] {
-        &self.all[..self.count]
-    }
-
-    /// Where what is known of a source view is, or is to be put.
-    #[inline(always)]
-    fn of(&mut self, source_idx: usize) -> &mut Interpolated {
-        let at = self.all().iter().position(|s| s.source_idx == source_idx);
+/// Adds a triangle's list to what a field says of source views, over the pixels that it covers, in which its
+/// corners have these shares.
+#[inline(always)]
+fn interpolate(
+    active: &mut Vec<Interpolated>,
+    entries: &[FieldEntry],
+    bordered: bool,
+    lanes: &Range<usize>,
+    shares: &[Lane; 3],
+) {
+    for entry in entries {
+        let source_idx = entry.source_idx as usize;
+        let at = active.iter().position(|s| s.source_idx == source_idx);
         let at = at.unwrap_or_else(|| {
-            if self.all.len() == self.count {
-                self.all.push(Interpolated::nothing());
-            }
-            self.all[self.count].clear(source_idx);
-            self.count += 1;
-            self.count - 1
+            active.push(Interpolated::nothing(source_idx));
+            active.len() - 1
         });
-        &mut self.all[at]
-    }
-
-    /// Adds a triangle's list over the pixels that it covers, in which its corners have these shares.
-    #[inline(always)]
-    fn add(
-        &mut self,
-        entries: &[FieldEntry],
-        bordered: bool,
-        lanes: &Range<usize>,
-        shares: &[Lane; 3],
-    ) {
-        let covers = |k: usize| (lanes.start..lanes.end).contains(&k);
-        for entry in entries {
-            let into = self.of(entry.source_idx as usize);
-            let [v0, v1, v2] = entry.values;
-            let values = match bordered {
-                true => &mut into.diff,
-                false => &mut into.weight,
-            };
-            for k in 0..LANES {
-                let value = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
-                values[k] = if covers(k) { value } else { values[k] };
-            }
-            if bordered {
-                into.blended[lanes.clone()].fill(1.0);
-            }
+        let into = &mut active[at];
+        let [v0, v1, v2] = entry.values;
+        let values = match bordered {
+            true => &mut into.diff,
+            false => &mut into.weight,
+        };
+        for k in 0..LANES {
+            let value = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
+            values[k] = if lanes.contains(&k) { value } else { values[k] };
+        }
+        if bordered {
+            into.blended[lanes.clone()].fill(1.0);
         }
     }
 }
@@ -361,22 +333,13 @@ struct Interpolated {
 }
 
 impl Interpolated {
-    fn nothing() -> Self {
+    fn nothing(source_idx: usize) -> Self {
         Self {
-            source_idx: 0,
+            source_idx,
             weight: [0.0; LANES],
             diff: [1.0; LANES],
             blended: [0.0; LANES],
         }
-    }
-
-    /// Begins anew with a source view of which nothing is known.
-    #[inline(always)]
-    fn clear(&mut self, source_idx: usize) {
-        self.source_idx = source_idx;
-        self.weight.fill(0.0);
-        self.diff.fill(1.0);
-        self.blended.fill(0.0);
     }
 
     /// The least difference in bordered triangles; less than any where it has weights, too, and
@@ -473,9 +436,13 @@ impl<'a> Engine<'a> {
         let lumigraph = self.frame.lumigraph;
         let seen = |sight: &Sight, k: usize| sight.a[k] > 0.0 && wanted(k);
         if let Some(mask) = lumigraph.photos.mask(source_idx) {
+            let left = vectorised(
+                #[inline(always)]
+                || shade::left_by(mask, sight, |k| seen(sight, k)),
+            );
             for k in 0..LANES {
                 if seen(sight, k) {
-                    sight.a[k] *= shade::sample_mask(mask, sight.u[k], sight.v[k], sight.level[k]);
+                    sight.a[k] *= left[k];
                 }
             }
         }

@@ -7,7 +7,8 @@ use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
 use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TEXEL_PER_PIXEL, TOLERANCE};
 use glam::Vec4;
-use image::GrayImage;
+use image::{ImageBuffer, Pixel};
+use std::ops::{Add, Mul, Sub};
 
 /// Adds a photo's colours, by its weights, to those of a tile and to their sum.
 #[inline(always)]
@@ -19,30 +20,41 @@ pub(super) fn add(
     color: &mut [Vec4; LANES],
     sum: &mut Lane,
 ) {
-    let samples = sample(photo, sight, weights);
+    let weighs = |k: usize| k < weights.len() && weights[k] > 0.0;
+    let texel =
+        |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
+    let samples = sample(&photo.levels, photo.finest, sight, weighs, texel);
     let as_it_is = exposure == Vec4::ONE;
-    for (k, &w) in weights.iter().enumerate().take(LANES) {
-        if w > 0.0 {
-            let mut seen = samples[k];
-            if !as_it_is {
-                seen = exposed(seen, exposure);
-            }
-            // As [`crate::frame::trust`] has it; opaque photos pay nothing for it.
-            let w = match seen.w == 255.0 {
-                true => w,
-                false => w * (TRANSPARENT as f32 + (1.0 - TRANSPARENT) as f32 / 255.0 * seen.w),
-            };
-            color[k] += seen * w;
-            sum[k] += w;
+    for k in (0..LANES).filter(|&k| weighs(k)) {
+        let mut seen = samples[k];
+        if !as_it_is {
+            seen = exposed(seen, exposure);
         }
+        let mut w = weights[k];
+        if !photo.opaque {
+            // As [`crate::frame::trust`] has it.
+            w *= TRANSPARENT as f32 + (1.0 - TRANSPARENT) as f32 / 255.0 * seen.w;
+        }
+        color[k] += seen * w;
+        sum[k] += w;
     }
 }
 
-/// The photo's colours at those pixels of a tile that weigh something; trilinear, premultiplied, 0…255.
-/// Level by level, as neighbours share theirs.
+/// What levels of a photo or a mask have at those pixels of a tile that are wanted; trilinear, 0…255. Level
+/// by level, as neighbours share theirs. `texel` makes a number or several of a texel's bytes.
 #[inline(always)]
-fn sample(photo: &Pyramid, sight: &Sight, weights: &[f32]) -> [Vec4; LANES] {
-    let (finest, coarsest) = (photo.finest as f32, (photo.levels.len() - 1) as f32);
+fn sample<P, T, const CHANNELS: usize>(
+    levels: &[ImageBuffer<P, Vec<u8>>],
+    finest: usize,
+    sight: &Sight,
+    wanted: impl Fn(usize) -> bool,
+    texel: impl Fn([u8; CHANNELS]) -> T + Copy,
+) -> [T; LANES]
+where
+    P: Pixel<Subpixel = u8>,
+    T: Copy + Default + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+{
+    let (finest, coarsest) = (finest as f32, (levels.len() - 1) as f32);
     let level = each(|k| sight.level[k].max(finest).min(coarsest));
     let (mut lower, mut share) = ([0; LANES], [0.0; LANES]);
     for k in 0..LANES {
@@ -50,22 +62,23 @@ fn sample(photo: &Pyramid, sight: &Sight, weights: &[f32]) -> [Vec4; LANES] {
         (lower[k], share[k]) = (whole, level[k] - floor);
     }
     let (mut first, mut last) = (i32::MAX, -1);
-    for k in 0..weights.len().min(LANES) {
-        if weights[k] > 0.0 {
+    for k in 0..LANES {
+        if wanted(k) {
             first = first.min(lower[k]);
             last = last.max(lower[k] + i32::from(share[k] > 0.0));
         }
     }
-    let mut samples = [Vec4::ZERO; LANES];
+    let mut samples = [T::default(); LANES];
     for of in first..=last {
-        let image = &photo.levels[of as usize];
-        let (texels, _) = image.as_raw().as_chunks::<4>();
+        let image = &levels[of as usize];
+        let (texels, _) = image.as_raw().as_chunks::<CHANNELS>();
         let places = Places::new(image.dimensions(), sight, of);
-        for (k, &w) in weights.iter().enumerate().take(LANES) {
-            if w > 0.0 && lower[k] == of {
-                samples[k] = places.bilinear(texels, k);
-            } else if w > 0.0 && lower[k] + 1 == of && share[k] > 0.0 {
-                samples[k] += (places.bilinear(texels, k) - samples[k]) * share[k];
+        let at = |k: usize| places.bilinear(|i| texel(texels[i]), k);
+        for k in 0..LANES {
+            if wanted(k) && lower[k] == of {
+                samples[k] = at(k);
+            } else if wanted(k) && lower[k] + 1 == of && share[k] > 0.0 {
+                samples[k] = samples[k] + (at(k) - samples[k]) * share[k];
             }
         }
     }
@@ -122,11 +135,10 @@ impl Places {
     }
 
     #[inline(always)]
-    fn bilinear(&self, texels: &[[u8; 4]], k: usize) -> Vec4 {
-        let texel = |at: usize| {
-            let [r, g, b, a] = texels[at];
-            Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
-        };
+    fn bilinear<T>(&self, texel: impl Fn(usize) -> T, k: usize) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+    {
         let (at, [right, down]) = (self.at[k] as usize, self.step);
         let (x, y) = (self.share[0][k], self.share[1][k]);
         let top = texel(at) + (texel(at + right) - texel(at)) * x;
@@ -155,37 +167,16 @@ pub(super) fn straight_rgba8(color: Vec4, weights: f32) -> [u8; 4] {
     if alpha == 0 { [0; 4] } else { opaque }
 }
 
-/// What a mask leaves of its photo, 0…1; trilinear.
-#[inline]
-pub(crate) fn sample_mask(mask: &Mask, u: f32, v: f32, level: f32) -> f32 {
-    let level = level.min((mask.levels.len() - 1) as f32);
-    let lower = level.max(0.0) as usize;
-    let fraction = level - lower as f32;
-    let mut value = bilinear(&mask.levels[lower], u, v, lower);
-    if fraction > 0.0 {
-        value += (bilinear(&mask.levels[lower + 1], u, v, lower + 1) - value) * fraction;
-    }
-    ((value - IGNORED) / (255.0 - IGNORED)).max(0.0)
-}
-
+/// What a mask leaves of its photo at those pixels of a tile that are wanted, 0…1.
 #[inline(always)]
-fn bilinear(image: &GrayImage, u: f32, v: f32, level: usize) -> f32 {
-    let texels = image.as_raw();
-    let (last_x, last_y) = (image.width() as i32 - 1, image.height() as i32 - 1);
-    let scale = 1.0 / (1_u32 << level) as f32;
-    // The pixel lies inside the photo, so a shift by one keeps truncation a floor.
-    let (x, y) = (u * scale + 0.5, v * scale + 0.5);
-    let (right, bottom) = (x as i32, y as i32);
-    let (fx, fy) = (x - right as f32, y - bottom as f32);
-    let x0 = (right - 1).clamp(0, last_x) as usize;
-    let x1 = right.clamp(0, last_x) as usize;
-    let pitch = image.width() as usize;
-    let row0 = (bottom - 1).clamp(0, last_y) as usize * pitch;
-    let row1 = bottom.clamp(0, last_y) as usize * pitch;
-    let at = |i: usize| f32::from(texels[i]);
-    let top = at(row0 + x0) + (at(row0 + x1) - at(row0 + x0)) * fx;
-    let low = at(row1 + x0) + (at(row1 + x1) - at(row1 + x0)) * fx;
-    top + (low - top) * fy
+pub(super) fn left_by(mask: &Mask, sight: &Sight, wanted: impl Fn(usize) -> bool) -> Lane {
+    let values = sample(&mask.levels, 0, sight, wanted, |[value]: [u8; 1]| {
+        f32::from(value)
+    });
+    each(
+        #[inline(always)]
+        |k| ((values[k] - IGNORED) / (255.0 - IGNORED)).max(0.0),
+    )
 }
 
 /// How much a photo counts at the points of a tile: see [`crate::visibility`]. Of pixels that it
