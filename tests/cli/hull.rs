@@ -99,7 +99,8 @@ fn silhouettes_in_masks_carve_without_being_asked_for() {
         gain("covered_background") < 0.0 && gain("coverage_background") < 0.0,
         "{within}, {free}"
     );
-    assert!(share(&within, "covered_matte") > 0.99, "{within}");
+    // No half a per cent less than free points cover if all photos count alike, transparent or not: 99.62 %.
+    assert!(share(&within, "covered_matte") > 0.9912, "{within}");
     // A file's hull has to be one.
     let broken = bounded.replacen("\"triangles\":[[", "\"triangles\":[[999999,0,1],[", 1);
     fs::write(here.join("broken.json"), broken).unwrap();
