@@ -241,4 +241,10 @@ impl Options {
             most: within(options.most, least_wide, MOST),
         }
     }
+
+    /// Half a side of what a patch of that half side covers if nothing else does.
+    #[inline(always)]
+    fn wide_half(&self, half: f32) -> f32 {
+        (half * self.wide).max(self.least_wide).min(self.most)
+    }
 }

@@ -93,17 +93,8 @@ impl Drawn {
     /// Half a side of what it covers if nothing else does.
     #[inline(always)]
     fn wide(&self, options: Options) -> [f32; 2] {
-        let Options {
-            wide,
-            least_wide,
-            most,
-            ..
-        } = options;
         let [x, y] = self.half;
-        [x, y].map(
-            #[inline(always)]
-            |h| (h * wide).max(least_wide).min(most),
-        )
+        [options.wide_half(x), options.wide_half(y)]
     }
 }
 

@@ -59,11 +59,6 @@ impl Work<'_> {
                             & (y > -most)
                             & (y < height + most);
                     }
-                    for k in 0..LANES {
-                        let y = if ready.is_seen[k] { block.y[k] } else { 0.0 };
-                        ready.bands[0][k] = (y - most - 0.5) as i32 / BAND as i32;
-                        ready.bands[1][k] = (y + most + 0.5) as i32 / BAND as i32;
-                    }
                     for (axis, at) in [&block.x, &block.y].into_iter().enumerate() {
                         for k in 0..LANES {
                             let half = ready.half[axis][k] * (grow * block.scale[k]);
@@ -72,6 +67,14 @@ impl Work<'_> {
                             let at = if ready.is_seen[k] { at[k] } else { 0.0 };
                             ready.first[axis][k] = first_within(at, BEYOND * half);
                         }
+                    }
+                    for k in 0..LANES {
+                        let y = if ready.is_seen[k] { block.y[k] } else { 0.0 };
+                        let half = ready.half[1][k];
+                        // A pixel's middle is half a pixel off, and the rest is for rounding.
+                        let reach = (BEYOND * half).max(self.options.wide_half(half)) + 0.51;
+                        ready.bands[0][k] = (y - reach) as i32 / BAND as i32;
+                        ready.bands[1][k] = (y + reach) as i32 / BAND as i32;
                     }
                     for k in 0..LANES.min(samples.end - first) {
                         if !ready.is_seen[k] {
