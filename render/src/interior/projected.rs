@@ -13,6 +13,13 @@ pub(super) struct Corner {
     pub(super) inverse_depth: f64,
 }
 
+impl Corner {
+    const EYE: Self = Self {
+        point: DVec3::ZERO,
+        inverse_depth: 0.0,
+    };
+}
+
 /// A run's points relative to a camera.
 #[derive(Debug, Default)]
 pub(super) struct Projected {
@@ -39,23 +46,28 @@ impl Projected {
     pub(super) fn project(&mut self, run: &Run, camera: &Pinhole) {
         let (focal, principal) = (camera.focal, camera.principal);
         let [across, down] = [camera.width, camera.height].map(f64::from);
-        self.corners.clear();
-        self.bounds.clear();
-        for point in &run.points {
+        let count = run.points.len();
+        self.corners.resize(count, Corner::EYE);
+        self.bounds.resize(count, [ANYWHERE; 4]);
+        let corners = self.corners.iter_mut().zip(&mut self.bounds);
+        // Nothing here says what becomes of one point alone, so several are looked at together.
+        for (point, (corner, bounds)) in run.points.iter().zip(corners) {
             let point = camera.point(*point);
             let inverse_depth = 1.0 / point.z;
-            self.corners.push(Corner {
+            *corner = Corner {
                 point,
                 inverse_depth,
-            });
-            let pixel = point.truncate() * inverse_depth * focal + principal;
-            let [left, right] = between(pixel.x - ROOM, pixel.x + ROOM, across);
-            let [top, bottom] = between(pixel.y - ROOM, pixel.y + ROOM, down);
-            let is_in_front = point.z > IN_FRONT * point.abs().max_element();
-            self.bounds.push(match is_in_front {
-                true => [left, top, -right, -bottom],
-                false => [ANYWHERE; 4],
-            });
+            };
+            let x = point.x * inverse_depth * focal.x + principal.x;
+            let y = point.y * inverse_depth * focal.y + principal.y;
+            let [left, right] = between(x - ROOM, x + ROOM, across);
+            let [top, bottom] = between(y - ROOM, y + ROOM, down);
+            let most = point.x.abs().max(point.y.abs()).max(point.z.abs());
+            let is_in_front = point.z > IN_FRONT * most;
+            let around = [left, top, -right, -bottom];
+            for k in 0..4 {
+                bounds[k] = if is_in_front { around[k] } else { ANYWHERE };
+            }
         }
     }
 
@@ -81,10 +93,20 @@ impl Projected {
 /// is at `high` or before.
 #[inline(always)]
 pub(super) fn between(low: f64, high: f64, count: f64) -> [i32; 2] {
-    // A cast takes the whole part of what is positive.
     let first = (low - 0.5).max(0.0).min(count);
-    let whole = first as i32;
-    let from = whole + i32::from(f64::from(whole) < first);
-    let to = (high + 0.5).max(0.0).min(count) as i32;
+    let (whole, from) = floor(first);
+    let from = from + if whole < first { 1 } else { 0 };
+    let (_, to) = floor((high + 0.5).max(0.0).min(count));
     [from, to]
+}
+
+/// The whole part of 0 ≤ x < 2³¹, as both kinds of number. (A cast says what becomes of others, too, and is
+/// done one by one.)
+#[inline(always)]
+fn floor(x: f64) -> (f64, i32) {
+    // Beyond 2⁵² numbers have no digits for fractions.
+    const SHIFT: f64 = (1_u64 << 52) as f64;
+    let nearest = (x + SHIFT) - SHIFT;
+    let floor = nearest - if nearest > x { 1.0 } else { 0.0 };
+    (floor, (floor + SHIFT).to_bits() as i32)
 }
