@@ -5,14 +5,14 @@ use calibrate::{Pixel, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use proxy::Solid;
-use proxy::mesh::{Model, linear_from_srgb};
+use proxy::mesh::{Model, footprint, linear_from_srgb};
 use rayon::prelude::*;
 
 /// The picture and the depth along z of each pixel's centre, row by row, in world units; alpha
 /// is 0 and the depth NaN where the ray through the centre meets nothing.
 ///
-/// The model's own colours ([`Model::color`]), no light added; a pixel is the mean, in linear
-/// light, of `samples_per_side` squared rays, spread evenly over it.
+/// The model's own colours ([`Model::color`], of textures' levels that suit the rays), no light added; a
+/// pixel is the mean, in linear light, of `samples_per_side` squared rays, spread evenly over it.
 pub(crate) fn render_model(
     model: &Model,
     solid: &Solid,
@@ -21,10 +21,19 @@ pub(crate) fn render_model(
 ) -> (RgbaImage, Vec<f64>) {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let center = view.center();
+    // In rays, not pixels.
+    let focal = view.lens.focal * f64::from(samples_per_side.max(1));
+    let rotation = view.camera_from_world.matrix();
     let look = |at: Pixel| {
         let ray = view.lens.unproject(at)?;
-        let (_, along, color) = look(model, solid, center, world_from_camera * ray)?;
-        Some((color, along * ray.z))
+        let direction = world_from_camera * ray;
+        let hit = solid.first_hit(center, direction)?;
+        let corners = model.mesh.corners(hit.triangle_idx as usize);
+        let point = center + hit.along * direction;
+        let in_camera = corners.map(|corner| rotation * (corner - center));
+        let footprint = footprint(in_camera, ray / ray.z, focal);
+        let color = model.color(hit.triangle_idx, shares(corners, point), footprint);
+        Some((color, hit.along * ray.z))
     };
     let pixel = |i: u32| {
         let (x, y) = (i % view.width, i / view.width);
@@ -64,7 +73,7 @@ pub(crate) fn render_model(
 }
 
 /// The place that a ray meets first, how far along in lengths of `direction`, and its colour
-/// in steps of 255.
+/// in steps of 255, textures at their finest.
 pub(crate) fn look(
     model: &Model,
     solid: &Solid,
@@ -74,7 +83,7 @@ pub(crate) fn look(
     let hit = solid.first_hit(from, direction)?;
     let corners = model.mesh.corners(hit.triangle_idx as usize);
     let point = from + hit.along * direction;
-    let color = model.color(hit.triangle_idx, shares(corners, point));
+    let color = model.color(hit.triangle_idx, shares(corners, point), 0.0);
     Some((point, hit.along, color))
 }
 

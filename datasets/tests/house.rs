@@ -125,8 +125,8 @@ fn what_is_written_is_what_was_built() {
     for (part, other) in model.parts.iter().zip(&house.model.parts) {
         if part == other {
             let (a, b) = (
-                model.color(part.triangles.start, shares),
-                house.model.color(other.triangles.start, shares),
+                model.color(part.triangles.start, shares, 0.0),
+                house.model.color(other.triangles.start, shares, 0.0),
             );
             worst = (0..3).fold(worst, |w, k| w.max((a[k] - b[k]).abs()));
         }

@@ -41,7 +41,7 @@ pub fn written(
 
 /// Two rooms, an opening and a texture, as .glb.
 pub fn textured_glb() -> Vec<u8> {
-    use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, model_to_glb};
+    use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, Texture, model_to_glb};
     let node = |name: &str| ModelNode {
         name: name.to_owned(),
         parent_idx: None,
@@ -69,9 +69,9 @@ pub fn textured_glb() -> Vec<u8> {
             texture_idx: Some(0),
             ..Material::default()
         }],
-        textures: vec![image::RgbaImage::from_fn(4, 2, |x, y| {
+        textures: vec![Texture::new(image::RgbaImage::from_fn(4, 2, |x, y| {
             image::Rgba([60 * x as u8, 100 * y as u8, 7, 255])
-        })],
+        }))],
     };
     model_to_glb(&model).expect("a model that is whole")
 }

@@ -2,7 +2,7 @@
 
 use super::textures::Picture;
 use glam::{DVec2, DVec3};
-use proxy::mesh::{Material, Mesh, Model, ModelNode, Part};
+use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, Texture};
 use std::f64::consts::{PI, TAU};
 
 /// A material: what picture, how it is tinted, and whether it shines by itself.
@@ -286,6 +286,7 @@ impl Builder {
                 ..Material::default()
             });
         }
+        let pictures = pictures.into_iter();
         Model {
             mesh: Mesh {
                 positions: self.positions,
@@ -296,7 +297,7 @@ impl Builder {
             parts: self.parts,
             nodes: self.nodes,
             materials,
-            textures: pictures.into_iter().map(Picture::draw).collect(),
+            textures: pictures.map(|p| Texture::new(p.draw())).collect(),
         }
     }
 

@@ -16,16 +16,18 @@ mod ply_header;
 mod quadric;
 mod simplify;
 mod skin;
+mod texture;
 
 pub use error::{ExportError, MeshFileError};
 pub use file::{parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
-pub use model::{Material, Model, ModelNode, Part, Wrap, linear_from_srgb};
+pub use model::{Material, Model, ModelNode, Part, Wrap, footprint, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::{ply_hull, to_ply};
 pub use skin::{MOST as MOST_PLACES, Places, Skin};
+pub use texture::{Level, Texture, level_of};
 
 use glam::{DMat4, DVec3};
 

@@ -1,7 +1,8 @@
 //! A textured model: a mesh and how it looks.
 
 use super::Mesh;
-use image::RgbaImage;
+use super::texture::{Level, Texture, level_of};
+use glam::{DVec2, DVec3};
 use std::ops::Range;
 
 /// A mesh, the colours of its surface and the names of its parts.
@@ -23,8 +24,8 @@ pub struct Model {
     pub nodes: Vec<ModelNode>,
     /// What the parts refer to.
     pub materials: Vec<Material>,
-    /// What the materials refer to; sRGB.
-    pub textures: Vec<RgbaImage>,
+    /// What the materials refer to.
+    pub textures: Vec<Texture>,
 }
 
 /// A run of triangles of one node and one material.
@@ -107,11 +108,13 @@ impl Model {
         part.triangles.contains(&triangle_idx).then_some(part)
     }
 
-    /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the texture
-    /// bilinear at its finest level, the product of all that colours it. `shares` are the
-    /// corners' barycentric weights, and sum to 1. [`Skin`](super::Skin) is the fast twin, in f32, for
-    /// many places of a triangle.
-    pub fn color(&self, triangle_idx: u32, shares: [f64; 3]) -> [f64; 3] {
+    /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the product of all that
+    /// colours it. `shares` are the corners' barycentric weights, and sum to 1.
+    ///
+    /// The texture is bilinear in each of the two levels that suit a pixel with a [`footprint`], and
+    /// mixed between them; 0 asks for the finest. [`Skin`](super::Skin) is the fast twin, in f32, for many
+    /// places of a triangle.
+    pub fn color(&self, triangle_idx: u32, shares: [f64; 3], footprint: f64) -> [f64; 3] {
         let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
         let (mut color, mut uv) = ([0.0; 3], [0.0; 2]);
         for (share, corner) in shares.iter().zip(corners) {
@@ -128,7 +131,11 @@ impl Model {
         };
         let texture = material.texture_idx;
         let texture = texture.and_then(|i| self.textures.get(i as usize));
-        let texel = texture.map_or([255.0; 3], |t| sample(t, uv, material.wrap));
+        let uvs = corners.map(|corner| self.uvs[corner].map(f64::from));
+        let texel = texture.map_or([255.0; 3], |texture| {
+            let texels = (footprint * texel_area(texture, uvs)) as f32;
+            sample(texture, uv, material.wrap, texels)
+        });
         [0, 1, 2].map(|k| color[k] * f64::from(material.base_color[k]) * texel[k] / 255.0)
     }
 
@@ -153,12 +160,53 @@ impl Model {
     }
 }
 
-/// A texture's colour, bilinear between the pixels' centres.
-fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
-    let (width, height) = texture.dimensions();
-    if width == 0 || height == 0 {
-        return [255.0; 3];
+/// How much of a triangle a pixel covers: the area that its barycentric weights, two of them, cover
+/// there. Corners and the ray, with z = 1, are in the camera's frame; `focal` is in pixels, and the lens is taken
+/// for one that bends nothing. 0 where the ray does not meet its plane.
+///
+/// Weights are edges times the ray over their sum (Olano and Greer 1997), as a map from rays to weights
+/// one of the plane to itself, whose Jacobian is its determinant, the volume squared, over the sum cubed.
+pub fn footprint([a, b, c]: [DVec3; 3], ray: DVec3, focal: DVec2) -> f64 {
+    let edges = b.cross(c) + c.cross(a) + a.cross(b);
+    let (volume, sum) = (a.dot(b.cross(c)), edges.dot(ray));
+    let footprint = (volume * volume / (sum * sum * sum)).abs() / (focal.x * focal.y);
+    if footprint.is_finite() {
+        footprint
+    } else {
+        0.0
     }
+}
+
+/// Texels of the finest level of a texture that a footprint of 1 covers, where those are a triangle's
+/// texture coordinates.
+pub(super) fn texel_area(texture: &Texture, [a, b, c]: [[f64; 2]; 3]) -> f64 {
+    let [b, c] = [b, c].map(|corner| [corner[0] - a[0], corner[1] - a[1]]);
+    let area = (b[0] * c[1] - b[1] * c[0]).abs();
+    texture.levels().first().map_or(0.0, |level| {
+        area * f64::from(level.width) * f64::from(level.height)
+    })
+}
+
+/// A texture's colour where a pixel covers so many texels.
+fn sample(texture: &Texture, uv: [f64; 2], wrap: [Wrap; 2], texels: f32) -> [f64; 3] {
+    let Some(last) = texture.levels().len().checked_sub(1) else {
+        return [255.0; 3];
+    };
+    let level = level_of(texels).max(0.0).min(last as f32);
+    let fine = level as usize;
+    let share = f64::from(level - fine as f32);
+    let of = |i: usize| bilinear(texture, &texture.levels()[i.min(last)], uv, wrap);
+    let (fine, coarse) = (of(fine), of(fine + 1));
+    [0, 1, 2].map(|k| fine[k] + share * (coarse[k] - fine[k]))
+}
+
+/// A level's colour, bilinear between the texels' centres.
+fn bilinear(texture: &Texture, level: &Level, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
+    let Level {
+        first,
+        width,
+        height,
+    } = *level;
     let [x, y] = [uv[0] * f64::from(width), uv[1] * f64::from(height)].map(|at| at - 0.5);
     let (left, top) = (x.floor(), y.floor());
     let (right_share, bottom_share) = (x - left, y - top);
@@ -166,7 +214,8 @@ fn sample(texture: &RgbaImage, uv: [f64; 2], wrap: [Wrap; 2]) -> [f64; 3] {
     for (dy, down) in [(0.0, 1.0 - bottom_share), (1.0, bottom_share)] {
         for (dx, across) in [(0.0, 1.0 - right_share), (1.0, right_share)] {
             let column = wrap[0].texel(left + dx, width);
-            let texel = texture.get_pixel(column, wrap[1].texel(top + dy, height)).0;
+            let row = wrap[1].texel(top + dy, height);
+            let texel = texture.texels()[(first + row * width + column) as usize];
             for k in 0..3 {
                 color[k] += across * down * f64::from(texel[k]);
             }
@@ -206,9 +255,39 @@ mod tests {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             assert!(wrap.texel(1e300, 3) < 3 && wrap.texel(-1e300, 3) < 3);
         }
-        let texture = RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
-        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2])[0];
+        let picture = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([100 * x as u8; 4]));
+        let texture = Texture::new(picture);
+        let at = |u: f64| sample(&texture, [u, 0.3], [Wrap::Clamp; 2], 0.0)[0];
         assert_eq!([at(0.25), at(0.5), at(0.75)], [0.0, 50.0, 100.0]);
+        // From two texels a pixel on, half way to the level of one texel, the mean in linear light.
+        let coarse = |texels: f32| sample(&texture, [0.25, 0.3], [Wrap::Clamp; 2], texels)[0];
+        assert_eq!([coarse(1.0), coarse(2.0)], [0.0, 0.5 * coarse(4.0)]);
+        assert_eq!([coarse(4.0), coarse(f32::INFINITY)], [71.0; 2]);
+    }
+
+    #[test]
+    fn a_footprint_is_the_area_between_neighbouring_pixels() {
+        let corners = [[0.3, -0.2, 2.0], [1.4, 0.1, 3.0], [-0.1, 1.2, 2.5]].map(DVec3::from);
+        let focal = DVec2::new(500.0, 430.0);
+        let [a, b, c] = corners;
+        let weights = |x: f64, y: f64| {
+            let ray = DVec3::new(x, y, 1.0);
+            let edges = [b.cross(c), c.cross(a), a.cross(b)].map(|edge| edge.dot(ray));
+            let sum: f64 = edges.iter().sum();
+            DVec2::new(edges[1] / sum, edges[2] / sum)
+        };
+        for (x, y) in [(0.2, 0.1), (0.3, 0.3), (0.05, 0.4)] {
+            let step = 1e-3;
+            let here = weights(x, y);
+            let right = weights(x + step / focal.x, y) - here;
+            let below = weights(x, y + step / focal.y) - here;
+            let area = right.perp_dot(below).abs() / (step * step);
+            let found = footprint(corners, DVec3::new(x, y, 1.0), focal);
+            assert!((found / area - 1.0).abs() < 1e-4, "{found} for {area}");
+        }
+        // Edge on, or of no area.
+        assert!(footprint([a, b, a + b], DVec3::Z, focal) < 1e-30);
+        assert_eq!(footprint([a, a, b], DVec3::Z, focal), 0.0);
     }
 
     #[test]

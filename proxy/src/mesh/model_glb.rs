@@ -72,7 +72,7 @@ pub fn model_to_glb(model: &Model) -> Result<Vec<u8>, ExportError> {
         });
         if let Some(source) = material.texture_idx {
             let [s, t] = material.wrap.map(code);
-            let sampler = json!({"magFilter": 9729, "wrapS": s, "wrapT": t});
+            let sampler = json!({"magFilter": 9729, "minFilter": 9987, "wrapS": s, "wrapT": t});
             let sampler_idx = place(&mut samplers, sampler);
             let texture = json!({"source": source, "sampler": sampler_idx});
             looks["baseColorTexture"] = json!({"index": place(&mut textures, texture)});
@@ -84,9 +84,10 @@ pub fn model_to_glb(model: &Model) -> Result<Vec<u8>, ExportError> {
         let mut png = Vec::new();
         let encoder =
             PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive);
-        let (width, height) = texture.dimensions();
+        let picture = texture.picture();
+        let (width, height) = picture.dimensions();
         encoder
-            .write_image(texture, width, height, ExtendedColorType::Rgba8)
+            .write_image(&picture, width, height, ExtendedColorType::Rgba8)
             .map_err(ExportError::Picture)?;
         let view = file.view(&png, None);
         images.push(json!({"bufferView": view, "mimeType": "image/png"}));

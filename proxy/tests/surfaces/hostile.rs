@@ -8,7 +8,9 @@ use proxy::interior::{
     Contents, Interior, SemicircleOptions, interior_from_nodes, parse_interior, parse_rooms,
     semicircles,
 };
-use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, Wrap, model_to_glb, parse_model};
+use proxy::mesh::{
+    Material, Mesh, Model, ModelNode, Part, Texture, Wrap, model_to_glb, parse_model,
+};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -165,7 +167,7 @@ fn model() -> &'static Model {
                 wrap: [Wrap::Clamp, Wrap::Mirror],
                 ..Material::default()
             }],
-            textures: vec![texture],
+            textures: vec![Texture::new(texture)],
         }
     })
 }
@@ -205,8 +207,10 @@ fn check_model(bytes: &[u8]) {
             let indices = model.mesh.triangles.as_flattened();
             assert!(indices.iter().all(|i| (*i as usize) < corners));
             for i in 0..model.mesh.triangles.len() as u32 {
-                let color = model.color(i, [0.2, 0.3, 0.5]);
-                assert!(color.iter().all(|c| (0.0..=255.0).contains(c)), "{color:?}");
+                for footprint in [0.0, 0.3, f64::INFINITY] {
+                    let color = model.color(i, [0.2, 0.3, 0.5], footprint);
+                    assert!(color.iter().all(|c| (0.0..=255.0).contains(c)), "{color:?}");
+                }
             }
             assert!(warnings.iter().all(|w| !w.is_empty()));
             // Names of nodes say what they like.

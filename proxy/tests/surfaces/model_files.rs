@@ -4,7 +4,7 @@ use crate::common;
 
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
-use proxy::mesh::{self, Material, Mesh, Model, ModelNode, Part, Wrap};
+use proxy::mesh::{self, Material, Mesh, Model, ModelNode, Part, Texture, Wrap};
 use std::path::Path;
 
 /// Two nodes, one below the other; a texture, a base colour and corners' colours.
@@ -61,7 +61,7 @@ fn small() -> Model {
                 ..Material::default()
             },
         ],
-        textures: vec![texture],
+        textures: vec![Texture::new(texture)],
     }
 }
 
@@ -103,12 +103,12 @@ fn a_model_comes_back_from_its_file() {
 fn colours_are_products_of_what_colours_a_place() {
     let model = small();
     // At the corner (1, 1): the texture's top right pixel, by the corner's colour.
-    let color = model.color(0, [0.0, 0.0, 1.0]);
+    let color = model.color(0, [0.0, 0.0, 1.0], 0.0);
     let expected = [180.0 * 128.0 / 255.0, 0.0, 7.0 * 3.0 / 255.0];
     for (a, b) in color.iter().zip(expected) {
         assert!((a - b).abs() < 1e-9, "{color:?}");
     }
-    let color = model.color(1, [1.0, 0.0, 0.0]);
+    let color = model.color(1, [1.0, 0.0, 0.0], 0.0);
     assert_eq!(color, [127.5, 63.75, 255.0]);
     // The twin that is made ready once for all places.
     for idx in 0..model.mesh.triangles.len() as u32 {
@@ -116,15 +116,20 @@ fn colours_are_products_of_what_colours_a_place() {
         for i in 0..=20 {
             for j in 0..=20 - i {
                 let [b, c] = [i, j].map(|n| f64::from(n) / 20.0);
-                let expected = model.color(idx, [1.0 - b - c, b, c]);
+                let footprints = [0.0, 0.1, 0.4, 1e9];
                 let mut places = mesh::Places::default();
-                places.add(&skin, b, c);
+                for footprint in footprints {
+                    places.add(&skin, b, c, footprint);
+                }
                 let found = places.colors();
-                for k in 0..3 {
-                    assert!(
-                        (f64::from(found[k][0]) - expected[k]).abs() < 1e-3,
-                        "{idx} {b} {c}"
-                    );
+                for (i, footprint) in footprints.into_iter().enumerate() {
+                    let expected = model.color(idx, [1.0 - b - c, b, c], footprint);
+                    for k in 0..3 {
+                        assert!(
+                            (f64::from(found[k][i]) - expected[k]).abs() < 1e-3,
+                            "{idx} {b} {c} {footprint}"
+                        );
+                    }
                 }
             }
         }
@@ -202,7 +207,7 @@ fn what_has_no_triangles_takes_nobodys_looks() {
     assert_eq!(read.colors.len(), read.mesh.positions.len());
     let shares = [0.2, 0.3, 0.5];
     for i in 0..plain.mesh.triangles.len() as u32 {
-        assert_eq!(read.color(i, shares), plain.color(i, shares));
+        assert_eq!(read.color(i, shares, 0.0), plain.color(i, shares, 0.0));
     }
 }
 
@@ -274,7 +279,7 @@ fn the_captured_house_has_its_textures() {
         model.mesh.triangles.len()
     );
     for triangle in (0..model.mesh.triangles.len() as u32).step_by(97) {
-        let color = model.color(triangle, [0.2, 0.3, 0.5]);
+        let color = model.color(triangle, [0.2, 0.3, 0.5], 0.0);
         assert!(color.iter().all(|c| (0.0..=255.0).contains(c)), "{color:?}");
     }
 }

@@ -15,6 +15,8 @@ struct Face<'a> {
     idx: u32,
     /// The second corner's weight along a ray with z = 1, the third's, and all three's.
     weights: [DVec3; 3],
+    /// Of its footprint in a pixel, what does not depend on the pixel.
+    footprint: f64,
     skin: Skin<'a>,
 }
 
@@ -101,7 +103,8 @@ impl Raster {
                     // Rounding does not leave the triangle; nor does what is seen edge on.
                     let second = second.min(1.0);
                     wanted[places.len()] = here;
-                    places.add(&face.skin, second, third.min(1.0 - second));
+                    let footprint = face.footprint * (scale * scale * scale).abs();
+                    places.add(&face.skin, second, third.min(1.0 - second), footprint);
                     depths[here] = inverse_depth;
                 }
                 if places.is_empty() {
@@ -151,10 +154,14 @@ impl<'a> Face<'a> {
     fn new(model: &'a Model, part: Option<&Part>, camera: &Pinhole, idx: u32) -> Self {
         let [a, b, c] = model.mesh.triangles[idx as usize];
         let corner = |i: u32| camera.point(model.mesh.positions[i as usize]);
-        let [a, b, c] = edges([corner(a), corner(b), corner(c)]);
+        let corners = [corner(a), corner(b), corner(c)];
+        let [a, b, c] = edges(corners);
+        // As `proxy::mesh::footprint` has it.
+        let volume = corners[0].dot(a);
         Self {
             idx,
             weights: [b, c, a + b + c],
+            footprint: volume * volume / (camera.focal.x * camera.focal.y),
             skin: Skin::new(model, part, idx),
         }
     }

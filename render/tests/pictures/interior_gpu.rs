@@ -7,7 +7,7 @@ use glam::DVec3;
 use house::{Pixels, small_house, view, viewpoint};
 use image::RgbaImage;
 use proxy::interior::{Contents, Interior, parse_rooms};
-use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, Wrap};
+use proxy::mesh::{Material, Mesh, Model, ModelNode, Part, Texture, Wrap};
 use render::DeviceChoice;
 use render::gpu::DeviceLimits;
 use render::interior::{Painter, PortalFill, Target, Walk, WalkOptions};
@@ -202,7 +202,7 @@ fn textured(wrap: [Wrap; 2], repeats: f32, to_world: impl Fn(DVec3) -> DVec3) ->
             texture_idx: Some(0),
             wrap,
         }],
-        textures: vec![texture],
+        textures: vec![Texture::new(texture)],
     }
 }
 

@@ -142,7 +142,10 @@ fn steps(fill: PortalFill, angle: f64) -> Vec<[f64; 2]> {
     let aside = normal.cross(DVec3::Y);
     let ahead = -(normal * f64::cos(angle) + aside * f64::sin(angle));
     let center = portal.polygon.center();
-    let options = WalkOptions::default();
+    let mut options = WalkOptions::default();
+    // No finer than they are seen: images that are drawn smaller than they are flicker, as nothing
+    // filters them.
+    options.library.size = [64; 2];
     let new = || Walk::new(interior, &contents, &house.model, options);
     let (mut truth, mut walk) = (new(), new());
     let mut last: Option<[Target; 2]> = None;

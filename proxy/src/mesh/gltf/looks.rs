@@ -4,7 +4,7 @@ use super::accessor::Accessors;
 use super::buffers::fetch;
 use super::{Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
-use crate::mesh::{Material, MeshFileError, Model, ModelNode, Part, Wrap};
+use crate::mesh::{Material, MeshFileError, Model, ModelNode, Part, Texture, Wrap};
 use image::{ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -134,10 +134,14 @@ pub(in crate::mesh) fn parse_model(
         }
     }
     // On all threads, in order.
-    let decoded: Vec<_> = pictures.par_iter().map(|p| decode(path, p)).collect();
-    for picture in decoded {
-        let (picture, warning) = picture?;
-        model.textures.push(picture);
+    let texture = |p: &_| {
+        let (picture, warning) = decode(path, p)?;
+        Ok((Texture::new(picture), warning))
+    };
+    let decoded: Vec<Result<_, MeshFileError>> = pictures.par_iter().map(texture).collect();
+    for texture in decoded {
+        let (texture, warning) = texture?;
+        model.textures.push(texture);
         warnings.extend(warning);
     }
     Ok((model, warnings))
@@ -368,12 +372,13 @@ const MAX_PICTURE: u64 = 1 << 30;
 /// Bytes that all of a model's may take.
 const MAX_PICTURES: u64 = 4 << 30;
 
-/// Bytes that a picture takes as RGBA, by what it says of itself; none where it does not.
+/// Bytes that a picture takes as RGBA, with the smaller ones of it, by what it says of itself; none where
+/// it does not.
 fn decoded_size(bytes: &[u8]) -> u64 {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let size = reader.ok().and_then(|r| r.into_dimensions().ok());
     size.map_or(0, |(width, height)| {
-        4 * u64::from(width) * u64::from(height)
+        16 * u64::from(width) * u64::from(height) / 3
     })
 }
 

@@ -117,6 +117,8 @@ struct Met {
     inverse_depth: f32,
     // Whether it meets the triangle.
     is_inside: bool,
+    // How much of the triangle a pixel covers: see `proxy::mesh::footprint`.
+    footprint: f32,
 }
 
 // How far outside of a triangle still counts as inside, in shares of its size.
@@ -138,7 +140,9 @@ fn met(triangle: u32, pixel: vec2u) -> Met {
     let shares = select(vec3f(1.0, 0.0, 0.0), inside / all, all > 0.0);
     let depth = dot(shares, vec3f(a.z, b.z, c.z));
     let is_inside = all > 0.0 && all_at_least(turned, -NEARLY * all);
-    return Met(corners, shares, select(0.0, 1.0 / depth, depth > 0.0), is_inside);
+    // The volume over the sum is the depth.
+    let footprint = depth * depth / (abs(sum) * camera.lens.x * camera.lens.y);
+    return Met(corners, shares, select(0.0, 1.0 / depth, depth > 0.0), is_inside, footprint);
 }
 
 fn all_at_least(v: vec3f, least: f32) -> bool {
@@ -176,19 +180,45 @@ fn wrapped(i: i32, count: i32, wrap: u32) -> u32 {
     return u32(clamp(i, 0, count - 1));
 }
 
-// Bilinear between the centres of a texture's finest pixels.
-fn sampled(texture: vec4u, wrap: vec2u, uv: vec2f) -> vec3f {
-    let size = vec2i(texture.yz);
+// Bilinear between the centres of a level's texels; x is its first one, y and z columns and rows.
+fn bilinear(level: vec3u, wrap: vec2u, uv: vec2f) -> vec3f {
+    let size = vec2i(level.yz);
     let at = clamp(uv * vec2f(size) - 0.5, vec2f(-1e9), vec2f(1e9));
     let corner = floor(at);
     let share = at - corner;
     let left = wrapped(i32(corner.x), size.x, wrap.x);
     let right = wrapped(i32(corner.x) + 1, size.x, wrap.x);
-    let top = texture.x + texture.y * wrapped(i32(corner.y), size.y, wrap.y);
-    let bottom = texture.x + texture.y * wrapped(i32(corner.y) + 1, size.y, wrap.y);
+    let top = level.x + level.y * wrapped(i32(corner.y), size.y, wrap.y);
+    let bottom = level.x + level.y * wrapped(i32(corner.y) + 1, size.y, wrap.y);
     let above = mix(texel(top + left), texel(top + right), share.x);
     let below = mix(texel(bottom + left), texel(bottom + right), share.x);
     return mix(above, below, share.y);
+}
+
+fn coarser(level: vec3u) -> vec3u {
+    return vec3u(level.x + level.y * level.z, max(level.yz, vec2u(2u)) / 2u);
+}
+
+// See `proxy::mesh::level_of`.
+fn level_of(texels: f32) -> f32 {
+    // 1's bits, and a power of 2 of the rest.
+    return f32(bitcast<i32>(texels) - 0x3f800000) * (0.5 / 8388608.0);
+}
+
+// Where a pixel covers so many of the finest texels; w is how many levels there are.
+fn sampled(texture: vec4u, wrap: vec2u, uv: vec2f, texels: f32) -> vec3f {
+    let at = clamp(level_of(texels), 0.0, f32(texture.w - 1u));
+    let fine = u32(at);
+    var level = texture.xyz;
+    for (var i = 0u; i < fine; i++) {
+        level = coarser(level);
+    }
+    let color = bilinear(level, wrap, uv);
+    let share = at - f32(fine);
+    if share == 0.0 {
+        return color;
+    }
+    return mix(color, bilinear(coarser(level), wrap, uv), share);
 }
 
 fn texel(i: u32) -> vec3f {
@@ -204,7 +234,7 @@ fn corner_uv(i: u32) -> vec2f {
 fn shade(@builtin(position) position: vec4f) -> @location(0) vec2u {
     let pixel = vec2u(position.xy);
     let found = textureLoad(seen, pixel, 0).x;
-    var it = Met(vec4u(0u), vec3f(0.0), 0.0, false);
+    var it = Met(vec4u(0u), vec3f(0.0), 0.0, false, 0.0);
     if found > 0u {
         it = met(found - 1u, pixel);
     }
@@ -240,10 +270,16 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec2u {
         // Periods of the texture are left out before digits are.
         let first = corner_uv(it.corners.x);
         let base = select(vec2f(0.0), 2.0 * floor(0.5 * first), wrap <= vec2u(MIRROR));
+        let second = corner_uv(it.corners.y);
+        let third = corner_uv(it.corners.z);
         let uv = it.shares.x * (first - base)
-            + it.shares.y * (corner_uv(it.corners.y) - base)
-            + it.shares.z * (corner_uv(it.corners.z) - base);
-        color *= sampled(texture, wrap, uv) / 255.0;
+            + it.shares.y * (second - base)
+            + it.shares.z * (third - base);
+        let across = second - first;
+        let down = third - first;
+        let area = abs(across.x * down.y - across.y * down.x);
+        let texels = it.footprint * area * f32(texture.y) * f32(texture.z);
+        color *= sampled(texture, wrap, uv, texels) / 255.0;
     }
     let codes = vec3u(clamp(floor(color + 0.5), vec3f(0.0), vec3f(255.0)));
     let packed = codes.x | (codes.y << 8u) | (codes.z << 16u) | (255u << 24u);

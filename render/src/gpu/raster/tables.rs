@@ -180,19 +180,21 @@ impl Tables<'_> {
         let places = self.table("corners", places.as_flattened())?;
         let uvs: Vec<[u32; 2]> = model.uvs.iter().map(|uv| uv.map(f32::to_bits)).collect();
         let uvs = self.table("corners", &uvs)?;
-        // Textures one after the other.
+        // Textures one after the other, each with its levels.
         let mut texels: Vec<[u32; 1]> = Vec::new();
         let mut firsts = Vec::new();
         for texture in &model.textures {
-            let (width, height) = texture.dimensions();
-            if texels.len() + texture.pixels().len() > MOST {
+            if texels.len() + texture.texels().len() > MOST {
                 return Err(RenderError::Gpu(format!(
                     "textures of more than {MOST} pixels together are more than it draws; use \
                      --device cpu"
                 )));
             }
-            firsts.push([texels.len() as u32, width, height, 0]);
-            texels.extend(texture.pixels().map(|p| [u32::from_le_bytes(p.0)]));
+            let finest = texture.levels().first();
+            let [width, height] = finest.map_or([0; 2], |level| [level.width, level.height]);
+            let count = texture.levels().len() as u32;
+            firsts.push([texels.len() as u32, width, height, count]);
+            texels.extend(texture.texels().iter().map(|t| [u32::from_le_bytes(*t)]));
         }
         let texels = self.table("pixels of textures", &texels)?;
         let plain = Material::default();
