@@ -79,6 +79,15 @@ pub(crate) fn whole(x: f32) -> (f32, i32) {
     (floor, bits.wrapping_sub(SHIFT.to_bits() as i32))
 }
 
+/// [`whole`] of 0 ≤ x < 2³¹ in f64.
+#[inline(always)]
+pub(crate) fn whole_f64(x: f64) -> (f64, i32) {
+    const SHIFT: f64 = (1_u64 << 52) as f64;
+    let nearest = (x + SHIFT) - SHIFT;
+    let floor = nearest - if nearest > x { 1.0 } else { 0.0 };
+    (floor, (floor + SHIFT).to_bits() as i32)
+}
+
 /// Newton's steps for a cubic from 1, which approach its root from one side; beyond
 /// [`LARGEST_CUBIC_TERM`] they stop outside every image.
 const CUBIC_STEPS: usize = 8;
@@ -106,6 +115,14 @@ mod tests {
         let numbers = (0..200).chain([1 << 15, (1 << 22) - 1]).map(|n| n as f32);
         for x in numbers.flat_map(near).filter(|x| *x >= 0.0) {
             assert_eq!(whole(x), (x.floor(), x as i32), "{x}");
+        }
+        let near = |n: f64| [n.next_down(), n, n.next_up(), n + 0.5, (n + 0.5).next_up()];
+        let numbers = (0..200).chain([1 << 20, i32::MAX]).map(f64::from);
+        for x in numbers
+            .flat_map(near)
+            .filter(|x| (0.0..2.0_f64.powi(31)).contains(x))
+        {
+            assert_eq!(whole_f64(x), (x.floor(), x as i32), "{x}");
         }
     }
 

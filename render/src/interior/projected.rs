@@ -2,6 +2,7 @@
 
 use super::Pinhole;
 use super::geometry::Run;
+use crate::cpu::lanes::whole_f64;
 use glam::DVec3;
 
 /// A point relative to a camera.
@@ -94,19 +95,8 @@ impl Projected {
 #[inline(always)]
 pub(super) fn between(low: f64, high: f64, count: f64) -> [i32; 2] {
     let first = (low - 0.5).max(0.0).min(count);
-    let (whole, from) = floor(first);
+    let (whole, from) = whole_f64(first);
     let from = from + if whole < first { 1 } else { 0 };
-    let (_, to) = floor((high + 0.5).max(0.0).min(count));
+    let (_, to) = whole_f64((high + 0.5).max(0.0).min(count));
     [from, to]
-}
-
-/// The whole part of 0 ≤ x < 2³¹, as both kinds of number. (A cast says what becomes of others, too, and is
-/// done one by one.)
-#[inline(always)]
-fn floor(x: f64) -> (f64, i32) {
-    // Beyond 2⁵² numbers have no digits for fractions.
-    const SHIFT: f64 = (1_u64 << 52) as f64;
-    let nearest = (x + SHIFT) - SHIFT;
-    let floor = nearest - if nearest > x { 1.0 } else { 0.0 };
-    (floor, (floor + SHIFT).to_bits() as i32)
 }
