@@ -36,32 +36,35 @@ impl Texture {
         if width == 0 || height == 0 {
             return Self::default();
         }
-        let mut level = Level {
+        // 1. Where they are, so that memory is asked for once.
+        let mut levels = vec![Level {
             first: 0,
             width,
             height,
-        };
-        let mut texture = Self {
-            bytes: picture.into_raw(),
-            levels: vec![level],
-        };
-        let mut light: Vec<[f32; 4]> = Vec::new();
-        while level.width > 1 || level.height > 1 {
-            let size = [level.width, level.height].map(|n| n as usize);
-            let (halved, [width, height]) = match light.is_empty() {
-                true => halved(|i| light_of(texture.texels()[i]), size),
-                false => halved(|i| light[i], size),
+        }];
+        let mut last = levels[0];
+        while last.width > 1 || last.height > 1 {
+            let [width, height] = [last.width, last.height].map(|n| n.max(2) / 2);
+            let first = last.first + last.width * last.height;
+            last = Level {
+                first,
+                width,
+                height,
             };
-            light = halved;
-            level = Level {
-                first: texture.texels().len() as u32,
-                width: width as u32,
-                height: height as u32,
-            };
-            texture.levels.push(level);
-            texture.bytes.extend(light.iter().flat_map(|l| code_of(*l)));
+            levels.push(last);
         }
-        texture
+        // 2. Each of the one before, as light that was not rounded to codes.
+        let mut bytes = picture.into_raw();
+        bytes.reserve_exact(4 * (last.first as usize + 1) - bytes.len());
+        let mut light: Vec<[f32; 4]> = Vec::new();
+        for pair in levels.windows(2) {
+            light = match light.is_empty() {
+                true => halved(|i| light_of(bytes.as_chunks().0[i]), pair),
+                false => halved(|i| light[i], pair),
+            };
+            bytes.extend(light.iter().flat_map(|light| code_of(*light)));
+        }
+        Self { bytes, levels }
     }
 
     /// Red, green, blue and what is of no use, of all levels.
@@ -106,21 +109,19 @@ pub fn level_of(texels: f32) -> f32 {
     log2 as f32 * (0.5 / (1 << 23) as f32)
 }
 
-/// Means of two columns and two rows, or of three where there is an odd one, as much of each as lies
-/// under the new texel.
-fn halved(
-    light: impl Fn(usize) -> [f32; 4],
-    [width, height]: [usize; 2],
-) -> (Vec<[f32; 4]>, [usize; 2]) {
-    let size = [width.max(2) / 2, height.max(2) / 2];
-    let shares = [under(width, size[0]), under(height, size[1])];
-    let mut halved = Vec::with_capacity(size[0] * size[1]);
+/// A level of the one before it: means of two columns and two rows, or of three where there is an odd
+/// one, as much of each as lies under the new texel.
+fn halved(light: impl Fn(usize) -> [f32; 4], pair: &[Level]) -> Vec<[f32; 4]> {
+    let [old, new] = [pair[0], pair[1]].map(|level| [level.width, level.height]);
+    let [old, new] = [old, new].map(|size| size.map(|n| n as usize));
+    let shares = [0, 1].map(|axis| under(old[axis], new[axis]));
+    let mut halved = Vec::with_capacity(new[0] * new[1]);
     for (top, down) in &shares[1] {
         for (left, across) in &shares[0] {
             let mut sum = [0.0; 4];
             for (y, down) in down.iter().enumerate().filter(|(_, share)| **share > 0.0) {
                 for (x, across) in across.iter().enumerate().filter(|(_, s)| **s > 0.0) {
-                    let light = light((top + y) * width + left + x);
+                    let light = light((top + y) * old[0] + left + x);
                     for k in 0..4 {
                         sum[k] += down * across * light[k];
                     }
@@ -129,7 +130,7 @@ fn halved(
             halved.push(sum);
         }
     }
-    (halved, size)
+    halved
 }
 
 /// Of each of so many new columns (or rows) the first old one under it, and how much of it is that
