@@ -246,7 +246,7 @@ fn photos_taken_where_planned_make_the_ldi_that_images_make() {
         // would be fewer.
         let error = |psnr: &f64| 10.0_f64.powf(-0.1 * psnr);
         let added = error(psnr) - error(psnr_of_exact);
-        assert!(added < 0.0023, "{psnr} {psnr_of_exact}");
+        assert!(added < 0.0019, "{psnr} {psnr_of_exact}");
     }
     // Lenses that bend see beyond the portal, so some have fewer pixels of it.
     let bent = self::taken(0.0, -0.05);
