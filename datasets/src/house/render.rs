@@ -59,7 +59,7 @@ mod tests {
             }
         }
         let psnr = 10.0 * (255.0 * 255.0 * count / sum).log10();
-        // 31.03; of textures at their finest 29.57. The rest are edges.
+        // 31.03; of textures at their finest 29.57.
         assert!(psnr > 30.8, "{psnr}");
     }
 }

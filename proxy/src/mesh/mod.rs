@@ -27,7 +27,7 @@ pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::{ply_hull, to_ply};
 pub use skin::{MOST as MOST_PLACES, Places, Skin};
-pub use texture::{Level, Texture, level_of};
+pub use texture::{Level, Texture};
 
 use glam::{DMat4, DVec3};
 

@@ -217,7 +217,7 @@ impl<'a> Places<'a> {
             idxs[3][i] = whole(below + columns[1]);
             (shares[0][i], shares[1][i]) = (across as f32, down as f32);
         }
-        // 2. The texels, with nothing between them, so that waiting for one is waiting for many.
+        // 2. The texels.
         let mut texels = [[0; MOST]; 4];
         for i in 0..self.count.min(MOST) {
             for k in 0..4 {

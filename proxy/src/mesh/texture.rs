@@ -103,7 +103,7 @@ impl std::fmt::Debug for Texture {
 /// A pixel that is long and narrow on the surface is taken for a square as large: finer
 /// across it than it could be, coarser along it than it should.
 #[inline(always)]
-pub fn level_of(texels: f32) -> f32 {
+pub(super) fn level_of(texels: f32) -> f32 {
     // The bits of a number are its logarithm, but for what lies between powers of two.
     let log2 = texels.to_bits().wrapping_sub(1.0_f32.to_bits()) as i32;
     log2 as f32 * (0.5 / (1 << 23) as f32)

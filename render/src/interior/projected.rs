@@ -51,7 +51,7 @@ impl Projected {
         self.corners.resize(count, Corner::EYE);
         self.bounds.resize(count, [ANYWHERE; 4]);
         let corners = self.corners.iter_mut().zip(&mut self.bounds);
-        // Nothing here says what becomes of one point alone, so several are looked at together.
+        // Without pushes, branches and casts that would keep it from becoming vector instructions.
         for (point, (corner, bounds)) in run.points.iter().zip(corners) {
             let point = camera.point(*point);
             let inverse_depth = 1.0 / point.z;

@@ -2,7 +2,7 @@
 
 use super::{Beyond, Pinhole, Reference, Target, Warp, Window};
 use crate::cpu::lanes::{vectorised, whole_f64};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Pixels of a row that are looked at together.
@@ -84,13 +84,12 @@ impl Places {
         for k in 0..TOGETHER {
             across[k] = desired.columns[(first + k).min(last)];
         }
-        let row = warp.pixel_from_pixel.y_axis * (y as f64 + 0.5);
-        // Loops without branches: they are compiled to vector instructions.
+        // Without a branch, so that it may become vector instructions.
         for k in 0..TOGETHER {
             let ray = DVec3::new(across[k], desired.rows[y], 1.0);
             let s = plane.inverse_depth(ray);
-            let column = warp.pixel_from_pixel.x_axis * ((first + k) as f64 + 0.5);
-            let at = column + row + warp.pixel_from_pixel.z_axis + warp.shift * s;
+            let center = DVec2::new((first + k) as f64 + 0.5, y as f64 + 0.5);
+            let at = warp.homogeneous(center, s);
             let (x, y) = (at.x / at.z - 0.5, at.y / at.z - 0.5);
             let (left, top) = (x.floor(), y.floor());
             // What is no number is not compared with any.

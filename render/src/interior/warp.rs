@@ -74,11 +74,17 @@ impl Warp {
         }
     }
 
+    /// The homogeneous desired pixel of a reference pixel whose point has that inverse depth.
+    #[inline(always)]
+    pub(super) fn homogeneous(&self, pixel: DVec2, inverse_depth: f64) -> DVec3 {
+        self.pixel_from_pixel * pixel.extend(1.0) + inverse_depth * self.shift
+    }
+
     /// Where a reference pixel falls whose point has that inverse depth; `None` behind the desired
     /// camera.
     #[inline]
     pub fn at(&self, pixel: DVec2, inverse_depth: f64) -> Option<Warped> {
-        let at = self.pixel_from_pixel * pixel.extend(1.0) + inverse_depth * self.shift;
+        let at = self.homogeneous(pixel, inverse_depth);
         let is_in_front = at.z > 0.0 && at.is_finite();
         is_in_front.then(|| Warped {
             pixel: at.truncate() / at.z,

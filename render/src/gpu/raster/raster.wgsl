@@ -199,7 +199,7 @@ fn coarser(level: vec3u) -> vec3u {
     return vec3u(level.x + level.y * level.z, max(level.yz, vec2u(2u)) / 2u);
 }
 
-// See `proxy::mesh::level_of`.
+// As `level_of` of a model's textures on the CPU (`proxy/src/mesh/texture.rs`).
 fn level_of(texels: f32) -> f32 {
     // 1's bits, and a power of 2 of the rest.
     return f32(bitcast<i32>(texels) - 0x3f800000) * (0.5 / 8388608.0);
