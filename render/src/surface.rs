@@ -107,6 +107,11 @@ impl FacetMap {
         self.facet_of.iter().map(|&facet| self.is_moved(facet))
     }
 
+    /// Whether any pixel looks at something that was moved.
+    pub(crate) fn any_is_moved(&self) -> bool {
+        (self.moved_from as usize) < self.planes.len()
+    }
+
     fn is_moved(&self, facet: u32) -> bool {
         facet != NO_FACET && facet >= self.moved_from
     }

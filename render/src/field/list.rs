@@ -127,13 +127,14 @@ impl List {
             let ranks = triangle.ranks(&listed);
             let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
             let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
-            listed.sort_by(|x, y| {
-                let by_rank = rank(x).cmp(&rank(y));
-                let nearer = least(x).total_cmp(&least(y));
-                by_rank.then(nearer).then(x.source_idx.cmp(&y.source_idx))
-            });
-            listed.truncate(MAX_LISTED);
-            listed.sort_by_key(|view| view.source_idx);
+            let key = |view: &Listed| (rank(view), least(view), view.source_idx);
+            let mut keys: Vec<(usize, f64, usize)> = listed.iter().map(key).collect();
+            let order = |x: &(usize, f64, usize), y: &(usize, f64, usize)| {
+                let by_rank = x.0.cmp(&y.0);
+                by_rank.then(x.1.total_cmp(&y.1)).then(x.2.cmp(&y.2))
+            };
+            let (_, &mut last, _) = keys.select_nth_unstable_by(MAX_LISTED - 1, order);
+            listed.retain(|view| order(&key(view), &last).is_le());
         }
         let entry = |view: Listed| FieldEntry {
             source_idx: view.source_idx as u32,
@@ -366,6 +367,9 @@ impl Triangle<'_> {
         let Surface::Facets(map) = &self.frame.surface else {
             return Vec::new();
         };
+        if !map.any_is_moved() {
+            return Vec::new();
+        }
         // Few pixels may have been moved, between all that are asked.
         let mut seen: BTreeSet<usize> = self.moved_to(map).collect();
         if !seen.is_empty() || self.patch().is_moved {

@@ -107,7 +107,7 @@ impl TriangulatedField {
                 Surface::Facets(map) => map.any_within(a.min(b).min(c), a.max(b).max(c)),
             }
         };
-        let visible: Vec<[u32; 3]> = plane.triangles.into_iter().filter(seen).collect();
+        let visible: Vec<[u32; 3]> = plane.triangles.into_par_iter().filter(seen).collect();
         let mut is_used = vec![false; plane.vertices.len()];
         for &corner in visible.iter().flatten() {
             is_used[corner as usize] = true;

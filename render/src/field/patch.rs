@@ -1,10 +1,11 @@
 //! What is seen between the corners of a triangle.
 
 use super::vertex::Vertex;
-use crate::frame::{Frame, ProxyPoint};
+use crate::cpu::lanes::vectorised;
+use crate::frame::{Frame, FrameSource, ProxyPoint};
 use crate::view_tree::Ball;
 use crate::visibility::{DistanceMap, TOLERANCE, visible};
-use calibrate::Pixel;
+use calibrate::{Distortion, Pixel};
 use glam::{DVec2, DVec3};
 
 /// Steps between points that are spread over a triangle, along each side.
@@ -16,8 +17,8 @@ pub(super) struct Patch {
     points: Vec<Option<ProxyPoint>>,
     /// Whether pixels at some of them look at what was moved into some photo.
     pub(super) is_moved: bool,
-    /// Whether they are all about as far as the corners say: nothing juts out between those.
-    is_smooth: bool,
+    /// Where they are all about as far as the corners say: nothing juts out between those.
+    smooth: Option<Rays>,
 }
 
 impl Patch {
@@ -27,8 +28,9 @@ impl Patch {
         let pixels: Vec<Pixel> = places.map(|at: DVec2| Pixel::new(at.x, at.y)).collect();
         let points: Vec<Option<ProxyPoint>> =
             pixels.iter().map(|p| frame.proxy_point(*p)).collect();
+        let is_smooth = is_smooth(&points, corners.map(|corner| corner.point));
         Self {
-            is_smooth: is_smooth(&points, corners.map(|corner| corner.point)),
+            smooth: is_smooth.then(|| Rays::of(&points)).flatten(),
             points,
             is_moved: pixels.iter().any(|p| frame.surface.is_moved_at(*p)),
         }
@@ -71,38 +73,125 @@ impl Patch {
         source_idx: usize,
         map: &DistanceMap,
     ) -> bool {
-        if !self.is_smooth {
+        let Some(rays) = &self.smooth else {
+            return false;
+        };
+        // 1. Where each point is in the photo, and its inverse distance from there.
+        let Some(seen) = rays.seen_by(&frame.sources[source_idx]) else {
+            return false;
+        };
+        let Seen { x, y, inverse } = &seen;
+        // 2. Each itself is seen.
+        let is_hidden = |i: usize| {
+            let nearest = map.inverse_distance(Pixel::new(x[i], y[i]));
+            visible(inverse[i], nearest) < 1.0
+        };
+        if (0..POINTS).any(is_hidden) {
             return false;
         }
-        let source = &frame.sources[source_idx];
-        // Where each is in the photo, and its inverse distance from there.
-        let mut seen = [(DVec2::ZERO, 0.0); POINTS];
-        for (seen, point) in seen.iter_mut().zip(&self.points) {
-            let Some(point) = point else { return false };
-            let Some(pixel) = frame.project(source_idx, point) else {
-                return false;
-            };
-            let in_source =
-                source.rotation * point.ray + source.translation * point.inverse_distance;
-            let inverse_distance = point.inverse_distance / in_source.length();
-            if visible(inverse_distance, map.inverse_distance(pixel)) < 1.0 {
-                return false;
-            }
-            *seen = (DVec2::new(pixel.x, pixel.y), inverse_distance);
-        }
-        // Nothing may be much nearer than the nearest corner of each small triangle, wherever that
-        // falls in the photo.
-        let is_open = |corners: [usize; 3]| {
-            let [a, b, c] = corners.map(|i| seen[i]);
-            let (least, most) = (a.0.min(b.0).min(c.0), a.0.max(b.0).max(c.0));
-            let nearest = a.1.max(b.1).max(c.1);
-            let largest = map.largest_within(least.to_array(), most.to_array());
-            largest <= nearest * (1.0 + 2.0 * TOLERANCE)
+        // 3. Nothing may be much nearer than the nearest corner of each small triangle, wherever that
+        // falls in the photo. Where nothing is anywhere around, triangles need not be asked.
+        let most = |corners: [usize; 3]| {
+            let [a, b, c] = corners.map(|i| inverse[i]);
+            a.max(b).max(c) * (1.0 + 2.0 * TOLERANCE)
         };
-        let below = |n: usize| (0..n).flat_map(move |i| (0..n - i).map(move |j| (i, j)));
-        below(STEPS).all(|(i, j)| is_open([at(i, j), at(i + 1, j), at(i, j + 1)]))
-            && below(STEPS - 1)
-                .all(|(i, j)| is_open([at(i + 1, j + 1), at(i + 1, j), at(i, j + 1)]))
+        let all = seen.largest(map, 0..POINTS);
+        let is_open = |corners: &[usize; 3]| {
+            let most = most(*corners);
+            all <= most || seen.largest(map, *corners) <= most
+        };
+        TRIANGLES.iter().all(is_open)
+    }
+}
+
+/// The points of a patch, as numbers of which several are worked on at once.
+struct Rays {
+    /// x, y and z.
+    ray: [[f64; PADDED]; 3],
+    inverse_distance: [f64; PADDED],
+}
+
+/// Where a photo has them.
+struct Seen {
+    /// In pixels.
+    x: [f64; PADDED],
+    y: [f64; PADDED],
+    /// One over their distances from there.
+    inverse: [f64; PADDED],
+}
+
+impl Rays {
+    /// `None` where there is nothing at some point.
+    fn of(points: &[Option<ProxyPoint>]) -> Option<Self> {
+        let mut rays = Self {
+            ray: [[0.0; PADDED]; 3],
+            inverse_distance: [0.0; PADDED],
+        };
+        for k in 0..PADDED {
+            let point = points[k.min(POINTS - 1)]?;
+            for axis in 0..3 {
+                rays.ray[axis][k] = point.ray[axis];
+            }
+            rays.inverse_distance[k] = point.inverse_distance;
+        }
+        Some(rays)
+    }
+
+    /// `None` where the source view's lens does not see one.
+    fn seen_by(&self, source: &FrameSource) -> Option<Seen> {
+        let [a, b, c] = source.rotation.to_cols_array_2d();
+        let t = source.translation.to_array();
+        let ([x, y, z], s) = (&self.ray, &self.inverse_distance);
+        // In the source camera's frame, scaled as the rays are.
+        let mut at = [[0.0; PADDED]; 3];
+        let mut seen = Seen {
+            x: [0.0; PADDED],
+            y: [0.0; PADDED],
+            inverse: [0.0; PADDED],
+        };
+        vectorised(
+            #[inline(always)]
+            || {
+                for (axis, at) in at.iter_mut().enumerate() {
+                    for k in 0..PADDED {
+                        let turned = a[axis] * x[k] + b[axis] * y[k] + c[axis] * z[k];
+                        at[k] = turned + t[axis] * s[k];
+                    }
+                }
+                let [x, y, z] = &at;
+                for k in 0..PADDED {
+                    let length = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
+                    seen.inverse[k] = s[k] / length;
+                    // Of a pinhole that is all there is to it.
+                    seen.x[k] = x[k] / z[k] * source.lens.focal.x + source.lens.principal.x;
+                    seen.y[k] = y[k] / z[k] * source.lens.focal.y + source.lens.principal.y;
+                }
+            },
+        );
+        if source.lens.distortion() == Distortion::None {
+            let is_seen =
+                |k: usize| at[2][k] > 0.0 && seen.x[k].is_finite() && seen.y[k].is_finite();
+            return (0..PADDED).all(is_seen).then_some(seen);
+        }
+        for k in 0..POINTS {
+            let point = DVec3::new(at[0][k], at[1][k], at[2][k]);
+            let pixel = source.lens.project(point)?;
+            (seen.x[k], seen.y[k]) = (pixel.x, pixel.y);
+        }
+        Some(seen)
+    }
+}
+
+impl Seen {
+    /// The largest inverse distance that a map has around some of the points.
+    fn largest(&self, map: &DistanceMap, points: impl IntoIterator<Item = usize>) -> f64 {
+        let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for i in points {
+            let (x, y) = (self.x[i], self.y[i]);
+            least = [least[0].min(x), least[1].min(y)];
+            most = [most[0].max(x), most[1].max(y)];
+        }
+        map.largest_within(least, most)
     }
 }
 
@@ -121,8 +210,29 @@ fn is_smooth(points: &[Option<ProxyPoint>], corners: [Option<ProxyPoint>; 3]) ->
     })
 }
 
-/// How many there are.
+/// How many there are, and so many that vectors have them all.
 const POINTS: usize = (STEPS + 1) * (STEPS + 2) / 2;
+const PADDED: usize = POINTS.next_multiple_of(4);
+
+/// The small triangles between them.
+const TRIANGLES: [[usize; 3]; STEPS * STEPS] = {
+    let mut triangles = [[0; 3]; STEPS * STEPS];
+    let (mut count, mut i) = (0, 0);
+    while i < STEPS {
+        let mut j = 0;
+        while j < STEPS - i {
+            triangles[count] = [at(i, j), at(i + 1, j), at(i, j + 1)];
+            count += 1;
+            if i + j + 1 < STEPS {
+                triangles[count] = [at(i + 1, j + 1), at(i + 1, j), at(i, j + 1)];
+                count += 1;
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    triangles
+};
 
 /// Rows, and places in them, of all.
 fn steps() -> impl Iterator<Item = (usize, usize)> {
@@ -135,7 +245,7 @@ fn share(steps: usize) -> f64 {
 }
 
 /// The index of a row's j-th.
-fn at(row: usize, j: usize) -> usize {
+const fn at(row: usize, j: usize) -> usize {
     row * (STEPS + 1) - row * row.saturating_sub(1) / 2 + j
 }
 
