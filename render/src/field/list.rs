@@ -128,13 +128,14 @@ impl List {
             let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
             let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
             let key = |view: &Listed| (rank(view), least(view), view.source_idx);
-            let mut keys: Vec<(usize, f64, usize)> = listed.iter().map(key).collect();
+            let keys: Vec<(usize, f64, usize)> = listed.iter().map(key).collect();
             let order = |x: &(usize, f64, usize), y: &(usize, f64, usize)| {
                 let by_rank = x.0.cmp(&y.0);
                 by_rank.then(x.1.total_cmp(&y.1)).then(x.2.cmp(&y.2))
             };
-            let (_, &mut last, _) = keys.select_nth_unstable_by(MAX_LISTED - 1, order);
-            listed.retain(|view| order(&key(view), &last).is_le());
+            let (_, &mut last, _) = keys.clone().select_nth_unstable_by(MAX_LISTED - 1, order);
+            let mut stays = keys.iter().map(|key| order(key, &last).is_le());
+            listed.retain(|_| stays.next() == Some(true));
         }
         let entry = |view: Listed| FieldEntry {
             source_idx: view.source_idx as u32,

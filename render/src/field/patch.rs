@@ -18,7 +18,7 @@ pub(super) struct Patch {
     /// Whether pixels at some of them look at what was moved into some photo.
     pub(super) is_moved: bool,
     /// Where they are all about as far as the corners say: nothing juts out between those.
-    smooth: Option<Rays>,
+    smooth: Option<Spread>,
 }
 
 impl Patch {
@@ -30,7 +30,7 @@ impl Patch {
             pixels.iter().map(|p| frame.proxy_point(*p)).collect();
         let is_smooth = is_smooth(&points, corners.map(|corner| corner.point));
         Self {
-            smooth: is_smooth.then(|| Rays::of(&points)).flatten(),
+            smooth: is_smooth.then(|| Spread::of(&points)).flatten(),
             points,
             is_moved: pixels.iter().any(|p| frame.surface.is_moved_at(*p)),
         }
@@ -73,11 +73,11 @@ impl Patch {
         source_idx: usize,
         map: &DistanceMap,
     ) -> bool {
-        let Some(rays) = &self.smooth else {
+        let Some(spread) = &self.smooth else {
             return false;
         };
         // 1. Where each point is in the photo, and its inverse distance from there.
-        let Some(seen) = rays.seen_by(&frame.sources[source_idx]) else {
+        let Some(seen) = spread.seen_by(&frame.sources[source_idx]) else {
             return false;
         };
         let Seen { x, y, inverse } = &seen;
@@ -105,7 +105,7 @@ impl Patch {
 }
 
 /// The points of a patch, as numbers of which several are worked on at once.
-struct Rays {
+struct Spread {
     /// x, y and z.
     ray: [[f64; PADDED]; 3],
     inverse_distance: [f64; PADDED],
@@ -120,21 +120,21 @@ struct Seen {
     inverse: [f64; PADDED],
 }
 
-impl Rays {
+impl Spread {
     /// `None` where there is nothing at some point.
     fn of(points: &[Option<ProxyPoint>]) -> Option<Self> {
-        let mut rays = Self {
+        let mut spread = Self {
             ray: [[0.0; PADDED]; 3],
             inverse_distance: [0.0; PADDED],
         };
         for k in 0..PADDED {
             let point = points[k.min(POINTS - 1)]?;
             for axis in 0..3 {
-                rays.ray[axis][k] = point.ray[axis];
+                spread.ray[axis][k] = point.ray[axis];
             }
-            rays.inverse_distance[k] = point.inverse_distance;
+            spread.inverse_distance[k] = point.inverse_distance;
         }
-        Some(rays)
+        Some(spread)
     }
 
     /// `None` where the source view's lens does not see one.
@@ -162,7 +162,7 @@ impl Rays {
                 for k in 0..PADDED {
                     let length = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
                     seen.inverse[k] = s[k] / length;
-                    // Of a pinhole that is all there is to it.
+                    // As a pinhole has it: see [`calibrate::Lens::project`].
                     seen.x[k] = x[k] / z[k] * source.lens.focal.x + source.lens.principal.x;
                     seen.y[k] = y[k] / z[k] * source.lens.focal.y + source.lens.principal.y;
                 }
