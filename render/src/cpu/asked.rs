@@ -75,8 +75,8 @@ impl Asked {
             return false;
         };
         let needed = MARGIN * f64::from(reach);
-        block.needed = needed.max(block.needed);
         if needed <= block.within {
+            block.needed = needed.max(block.needed);
             // The tiles below will hardly need more.
             if block.within > TOO_MUCH * block.needed {
                 block.within = ROOM * block.needed;

@@ -403,6 +403,9 @@ impl<'a> Engine<'a> {
     /// where those asked first don't settle it.
     fn weigh_tile(&self, asked: &mut Asked, tile_idx: usize, row: usize, seen: &mut Seen) {
         let tile = self.tile(tile_idx * LANES, row, |_| true);
+        if tile.s.iter().all(|s| *s < 0.0) {
+            return seen.clear();
+        }
         loop {
             let views = asked.views(self, tile_idx, row).iter();
             self.score(views.map(|&i| i as usize), &tile, seen);
