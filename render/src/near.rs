@@ -47,19 +47,40 @@ impl Frame<'_> {
     /// is `None`: at infinity.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
-            Some(ball) => {
-                let measure = Measure {
-                    beta: self.options.beta,
-                    by_length: self.options.resolution == Resolution::Length,
-                };
-                self.view_tree().within(ball, measure, most, found);
-            }
+            Some(ball) => self.view_tree().within(ball, self.measure(), most, found),
             None => {
                 found.clear();
                 found.extend(self.taking_part().map(|i| i as u32));
             }
         }
         self.tally.note(found);
+    }
+
+    /// For [`Self::views_of_groups`] of smaller balls inside of this one, and of `most` or less.
+    pub(crate) fn groups_within(&self, ball: &Ball, most: f64, groups: &mut Vec<u32>) {
+        let measure = self.measure();
+        self.view_tree().groups_within(ball, measure, most, groups);
+    }
+
+    /// [`Self::views_within`] of those groups that were found for all around the ball.
+    pub(crate) fn views_of_groups(
+        &self,
+        groups: &[u32],
+        ball: &Ball,
+        most: f64,
+        found: &mut Vec<u32>,
+    ) {
+        let measure = self.measure();
+        self.view_tree()
+            .within_groups(groups, ball, measure, most, found);
+        self.tally.note(found);
+    }
+
+    fn measure(&self) -> Measure {
+        Measure {
+            beta: self.options.beta,
+            by_length: self.options.resolution == Resolution::Length,
+        }
     }
 
     /// What [`blend`](crate::blend::blend) needs at a point, exactly: with it the weights

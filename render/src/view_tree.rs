@@ -123,28 +123,67 @@ impl ViewTree {
     pub(crate) fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
         let query = Query::new(ball, measure, most);
+        self.visit(&query, |group, may| self.add(group, may, found));
+        self.sort(found);
+    }
+
+    /// The groups in which the views are that [`Self::within`] finds.
+    pub(crate) fn groups_within(
+        &self,
+        ball: &Ball,
+        measure: Measure,
+        most: f64,
+        groups: &mut Vec<u32>,
+    ) {
+        groups.clear();
+        let query = Query::new(ball, measure, most);
+        self.visit(&query, |group, may| {
+            if may.contains(&true) {
+                groups.push(group as u32);
+            }
+        });
+    }
+
+    /// [`Self::within`], where it is known in which groups the views are.
+    pub(crate) fn within_groups(
+        &self,
+        groups: &[u32],
+        ball: &Ball,
+        measure: Measure,
+        most: f64,
+        found: &mut Vec<u32>,
+    ) {
+        found.clear();
+        let query = Query::new(ball, measure, most);
+        vectorised(
+            #[inline(always)]
+            || {
+                for &group in groups {
+                    let group = group as usize;
+                    self.add(group, self.levels[0][group].may_matter(&query), found);
+                }
+            },
+        );
+        self.sort(found);
+    }
+
+    /// Goes through the groups of views of which some may matter, and a few more.
+    fn visit(&self, query: &Query, mut with: impl FnMut(usize, [bool; GROUP])) {
         vectorised(
             #[inline(always)]
             || match self.levels.len() {
-                1 => self.ask_each(&query, found),
-                _ => self.descend(&query, found),
+                1 => {
+                    for (i, group) in self.levels[0].iter().enumerate() {
+                        with(i, group.may_matter(query));
+                    }
+                }
+                _ => self.descend(query, with),
             },
         );
-        found.sort_unstable();
-        if self.levels.len() > 1 && is_planted(Fault::DroppedView) {
-            found.pop();
-        }
     }
 
     #[inline(always)]
-    fn ask_each(&self, query: &Query, found: &mut Vec<u32>) {
-        for (group, first) in self.levels[0].iter().zip((0..).step_by(GROUP)) {
-            self.add(first, group.may_matter(query), found);
-        }
-    }
-
-    #[inline(always)]
-    fn descend(&self, query: &Query, found: &mut Vec<u32>) {
+    fn descend(&self, query: &Query, mut with: impl FnMut(usize, [bool; GROUP])) {
         // Groups that are yet to be asked, by level and number; of each level at most seven beside the one
         // that is gone into.
         let mut open = [(0_u32, 0_u32); GROUP * LEVELS + 1];
@@ -155,7 +194,7 @@ impl ViewTree {
             let (level, group) = (open[count].0 as usize, open[count].1 as usize);
             let may = self.levels[level][group].may_matter(query);
             if level == 0 {
-                self.add(GROUP * group, may, found);
+                with(group, may);
                 continue;
             }
             let first = GROUP * group;
@@ -170,9 +209,16 @@ impl ViewTree {
 
     /// Adds the views of a group that may matter.
     #[inline(always)]
-    fn add(&self, first: usize, may: [bool; GROUP], found: &mut Vec<u32>) {
-        let views = self.views[first..].iter().zip(may);
+    fn add(&self, group: usize, may: [bool; GROUP], found: &mut Vec<u32>) {
+        let views = self.views[GROUP * group..].iter().zip(may);
         found.extend(views.filter_map(|(view, may)| may.then_some(*view)));
+    }
+
+    fn sort(&self, found: &mut Vec<u32>) {
+        found.sort_unstable();
+        if self.levels.len() > 1 && is_planted(Fault::DroppedView) {
+            found.pop();
+        }
     }
 }
 

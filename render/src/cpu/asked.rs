@@ -1,119 +1,146 @@
-//! Which source views a block of pixels is to ask.
+//! Which source views a tile of pixels is to ask.
 
-use super::lanes::LANES;
-use super::{BAND, Engine};
+use super::lanes::{LANES, vectorised};
+use super::source::Tile;
+use crate::frame::Frame;
 use crate::near::wider;
 use crate::view_tree::Ball;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-/// For a thread: the views that the tiles of the rows it works on ask, each with those below and
-/// above it in a band. What is asked before changes time alone: views that matter are always among
-/// them in the end.
+/// For a thread: what it knows of the source views that the tiles of a block of pixels need. What it
+/// knows changes time alone: views that matter are always among those that are asked in the end.
 #[derive(Default)]
 pub(super) struct Asked {
-    band: Option<usize>,
-    /// `None` where no tile of the band asked yet.
-    blocks: Vec<Option<Block>>,
-}
-
-#[derive(Clone)]
-struct Block {
-    /// Where its proxy points are; `None` where they are everywhere.
-    ball: Option<Ball>,
-    /// All that differ by as much or less are among the views, unless they are `stale`.
-    within: f64,
+    /// Where the block's proxy points are; `None` where one is at infinity.
+    around: Option<Ball>,
+    /// Those groups of views in which all are that differ by `covered` or less there.
+    groups: Vec<u32>,
+    covered: f64,
+    /// By how much those differ that the next tile may need; zero if nothing says.
+    guess: f64,
     views: Vec<u32>,
-    stale: bool,
-    /// The most that a tile needed.
-    needed: f64,
 }
 
 /// Over what a tile needed, for rounding to f32.
 const MARGIN: f64 = 1.001;
 /// And for the next tile.
 const ROOM: f64 = 1.1;
-/// Asking again for fewer pays from here on.
-const TOO_MUCH: f64 = 1.5;
 
 impl Asked {
-    /// The views for a tile of a row, by index.
-    pub(super) fn views(&mut self, engine: &Engine<'_>, tile_idx: usize, row: usize) -> &[u32] {
-        let frame = engine.frame;
-        if self.band != Some(row / BAND) {
-            self.band = Some(row / BAND);
-            let tiles = (frame.desired.width as usize).div_ceil(LANES);
-            self.blocks.clear();
-            self.blocks.resize(tiles, None);
-        }
-        let before = tile_idx.checked_sub(1);
-        let before = before.and_then(|i| Some(self.blocks[i].as_ref()?.needed));
-        let block = self.blocks[tile_idx].get_or_insert_with(|| {
-            let ball = ball_of(engine, tile_idx, row / BAND);
-            let guess = match before {
-                Some(needed) if needed < f64::INFINITY => ROOM * needed,
-                _ => frame.first_guess(),
-            };
-            Block {
-                within: ball.map_or(f64::INFINITY, |_| guess),
-                ball,
-                views: Vec::new(),
-                stale: true,
-                needed: 0.0,
-            }
-        });
-        if block.stale {
-            frame.views_within(block.ball.as_ref(), block.within, &mut block.views);
-            block.stale = false;
-        }
-        &block.views
+    /// Forgets what it knows: for the first block of some.
+    pub(super) fn forget(&mut self, frame: &Frame<'_>) {
+        self.guess = frame.first_guess();
     }
 
-    /// Whether a tile that needs views as different as `reach` had them all; if not, it asks for
-    /// more next.
-    pub(super) fn settles(&mut self, tile_idx: usize, reach: f32) -> bool {
-        let Some(block) = &mut self.blocks[tile_idx] else {
-            return false;
-        };
-        let needed = MARGIN * f64::from(reach);
-        if needed <= block.within {
-            block.needed = needed.max(block.needed);
-            // The tiles below will hardly need more.
-            if block.within > TOO_MUCH * block.needed {
-                block.within = ROOM * block.needed;
-                block.stale = true;
+    /// Goes on to the next block, by where its tiles' points are.
+    pub(super) fn enter(&mut self, block: Extent) {
+        self.around = block.ball();
+        self.covered = f64::NEG_INFINITY;
+    }
+
+    /// Of a tile of the block, the difference within which to ask first.
+    pub(super) fn first(&self, tile: Option<&Ball>) -> f64 {
+        tile.map_or(f64::INFINITY, |_| self.guess)
+    }
+
+    /// The views, by index, that may differ by `within` or less in a tile of the block.
+    pub(super) fn views(&mut self, frame: &Frame<'_>, tile: Option<&Ball>, within: f64) -> &[u32] {
+        let views = &mut self.views;
+        match (&self.around, tile) {
+            (Some(around), Some(tile)) => {
+                if within > self.covered {
+                    // With room for what its other tiles need.
+                    self.covered = ROOM * within;
+                    frame.groups_within(around, self.covered, &mut self.groups);
+                }
+                frame.views_of_groups(&self.groups, tile, within, views);
             }
-            return true;
+            _ => frame.views_within(tile, within, views),
         }
-        block.within = if needed < f64::INFINITY {
-            ROOM * needed
-        } else {
-            wider(block.within)
-        };
-        block.stale = true;
-        false
+        views
+    }
+
+    /// Whether a tile that needs views as different as `reach` had them all, being asked `within` a
+    /// difference; if not, within which to ask next.
+    pub(super) fn settles(&mut self, within: f64, reach: f32) -> Result<(), f64> {
+        let needed = MARGIN * f64::from(reach);
+        if needed > within {
+            // More views can only lower what is needed.
+            return Err(wider(within).min(ROOM * needed));
+        }
+        if needed < f64::INFINITY {
+            self.guess = ROOM * needed;
+        }
+        Ok(())
     }
 }
 
-/// What holds the proxy points of a block of pixels; `None` where one is at infinity.
-fn ball_of(engine: &Engine<'_>, tile_idx: usize, band: usize) -> Option<Ball> {
-    let desired = &engine.frame.desired;
-    let rows = band * BAND..((band + 1) * BAND).min(desired.height as usize);
-    let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for row in rows {
-        let tile = engine.tile(tile_idx * LANES, row, |_| true);
-        for k in (0..LANES).filter(|&k| tile.s[k] >= 0.0) {
-            let ray = DVec3::new(tile.x[k].into(), tile.y[k].into(), tile.z[k].into());
-            let point = ray / f64::from(tile.s[k]);
-            least = least.min(point);
-            most = most.max(point);
+/// A box around points in the desired camera's frame; of none at all it is empty.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    least: Vec3,
+    most: Vec3,
+}
+
+impl Extent {
+    /// Around none.
+    pub(super) const EMPTY: Self = Self {
+        least: Vec3::INFINITY,
+        most: Vec3::NEG_INFINITY,
+    };
+
+    /// Around a tile's proxy points.
+    pub(super) fn of(tile: &Tile) -> Self {
+        vectorised(
+            #[inline(always)]
+            || {
+                let along = |ray: &[f32; LANES]| {
+                    let (mut least, mut most) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+                    for k in 0..LANES {
+                        let there = ray[k] / tile.s[k];
+                        let is_there = tile.s[k] >= 0.0;
+                        let low = if is_there { there } else { f32::INFINITY };
+                        let high = if is_there { there } else { f32::NEG_INFINITY };
+                        least[k % 8] = least[k % 8].min(low);
+                        most[k % 8] = most[k % 8].max(high);
+                    }
+                    let least = least.into_iter().fold(f32::INFINITY, f32::min);
+                    (least, most.into_iter().fold(f32::NEG_INFINITY, f32::max))
+                };
+                let (x, y, z) = (along(&tile.x), along(&tile.y), along(&tile.z));
+                Self {
+                    least: Vec3::new(x.0, y.0, z.0),
+                    most: Vec3::new(x.1, y.1, z.1),
+                }
+            },
+        )
+    }
+
+    /// Around two.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
         }
     }
-    let center = 0.5 * (least + most);
-    // Of nothing at all it is not finite either.
-    let radius = 0.5 * (most - least).length() * (1.0 + 1e-5);
-    (center.is_finite() && radius.is_finite()).then_some(Ball {
-        center,
-        radius,
-        sight: radius,
-    })
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.least.z > self.most.z
+    }
+
+    /// What holds all that it is around; `None` where that goes to infinity.
+    pub(super) fn ball(&self) -> Option<Ball> {
+        /// What rounding to f32 makes of a point, relative to its distance.
+        const ROUNDING: f64 = 1e-6;
+        let (least, most): (DVec3, DVec3) = (self.least.into(), self.most.into());
+        let center = 0.5 * (least + most);
+        let radius = 0.5 * (most - least).length();
+        let radius = radius + ROUNDING * (center.length() + radius);
+        // Of nothing at all it is not finite either.
+        (center.is_finite() && radius.is_finite()).then_some(Ball {
+            center,
+            radius,
+            sight: radius,
+        })
+    }
 }

@@ -30,6 +30,15 @@ pub(crate) fn each<T: Scalar>(f: impl Fn(usize) -> T) -> Lane<T> {
     lane
 }
 
+/// Whether something holds of any pixel.
+#[inline]
+pub(crate) fn any(holds: impl Fn(usize) -> bool) -> bool {
+    vectorised(
+        #[inline(always)]
+        || (0..LANES).fold(false, |any, k| any | holds(k)),
+    )
+}
+
 /// atan2 for y ≥ 0, to 2e-7 relative; 0 at the origin.
 ///
 /// The quotient is brought to [0, 1], then by atan q = π/4 + atan((q − 1)/(q + 1)) to

@@ -1,7 +1,6 @@
 //! Which photos the exact field samples, found before any is decoded.
 
 use super::asked::Asked;
-use super::lanes::LANES;
 use super::{BAND, Engine, Seen};
 use crate::held::Held;
 use rayon::prelude::*;
@@ -20,22 +19,18 @@ pub(super) fn hold<'a>(engine: &Engine<'a>, sources: &[usize]) -> Held<'a> {
 fn marked(engine: &Engine<'_>) -> Vec<usize> {
     let sources = engine.frame.lumigraph.sources.iter();
     let used: Vec<AtomicBool> = sources.map(|_| AtomicBool::new(false)).collect();
-    let desired = &engine.frame.desired;
-    let (width, height) = (desired.width as usize, desired.height as usize);
-    let of_band = |(asked, seen): &mut (Asked, Seen), band: usize| {
-        for row in band * BAND..((band + 1) * BAND).min(height) {
-            for (tile_idx, x0) in (0..width).step_by(LANES).enumerate() {
-                let count = LANES.min(width - x0);
-                engine.weigh_tile(asked, tile_idx, row, seen);
-                for (i, _, term) in seen.iter() {
-                    if term.weight[..count].iter().any(|w| *w > 0.0) {
-                        used[i].store(true, Ordering::Relaxed);
-                    }
+    let of_band = |scratch: &mut (Asked, Seen), band: usize| {
+        let done = engine.weigh_band(band, scratch, |_, seen| {
+            for (i, _, term) in seen.iter() {
+                if term.weight.iter().any(|w| *w > 0.0) {
+                    used[i].store(true, Ordering::Relaxed);
                 }
             }
-        }
+            Ok(())
+        });
+        done.expect("no photo is asked for");
     };
-    let bands = 0..height.div_ceil(BAND);
+    let bands = 0..(engine.frame.desired.height as usize).div_ceil(BAND);
     bands
         .into_par_iter()
         .for_each_init(Default::default, of_band);

@@ -4,31 +4,32 @@
 //! same bytes.
 
 mod asked;
+mod exact;
 pub(crate) mod lanes;
 mod mark;
 pub(crate) mod probe;
 pub(crate) mod scalar;
 mod shade;
 pub(crate) mod source;
+mod triangulated;
 mod weights;
 
 use crate::RenderError;
-use crate::field::{FieldEntry, TriangulatedField};
+use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
 use crate::options::Method;
 use crate::photos::PhotoError;
-use crate::raster::{Raster, Span};
 use crate::rays::{RayCache, RayMap};
-use asked::Asked;
+use exact::draw_exact;
 use glam::Vec4;
 use image::RgbaImage;
-use lanes::{LANES, Lane, each, vectorised};
+use lanes::{LANES, Lane, vectorised};
 use rayon::prelude::*;
 use source::{Sight, Source, Tile};
-use std::ops::Range;
 use std::sync::OnceLock;
-use weights::{Term, weigh};
+use triangulated::draw_field;
+use weights::Term;
 
 /// Rows that one thread does in one go.
 const BAND: usize = 8;
@@ -74,153 +75,6 @@ impl Cpu {
 /// As [`Cpu::render`].
 pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderError> {
     Cpu::default().render(frame, method)
-}
-
-/// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
-fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
-    let engine = Engine::new(frame, rays);
-    let sources: Vec<usize> = frame.taking_part().collect();
-    let photos = mark::hold(&engine, &sources);
-    draw(frame, |row, (asked, seen): &mut (Asked, Seen), pixels| {
-        for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
-            // 1. Who sees the tile, and what that weighs.
-            engine.weigh_tile(asked, tile_idx, row, seen);
-            // 2. The photos' colours.
-            engine.shade(&photos, seen, |_, term| &term.weight, out)?;
-        }
-        Ok(())
-    })
-}
-
-/// The field interpolated over triangles. What changes faster than that (fovBlend, the
-/// proxy point, the photos) is evaluated at every pixel.
-fn draw_field(
-    frame: &Frame<'_>,
-    field: &TriangulatedField,
-    rays: &RayMap,
-) -> Result<RgbaImage, PhotoError> {
-    let engine = Engine::new(frame, rays);
-    let raster = Raster::new(field);
-    let photos = Held::new(frame, &field.listed());
-    let may_skip = frame.may_skip();
-    draw(frame, |row, scratch: &mut Scratch, pixels| {
-        let Scratch {
-            spans,
-            crossing,
-            active,
-            order,
-            seen,
-        } = scratch;
-        raster.spans(row, spans);
-        for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
-            let x0 = tile_idx * LANES;
-            let within = |s: &Span| s.start.max(x0) - x0..s.end.min(x0 + LANES) - x0;
-            let (mut is_covered, mut is_bordered) = ([false; LANES], [false; LANES]);
-            crossing.clear();
-            for (i, span) in spans.iter().enumerate() {
-                if span.start < x0 + LANES && span.end > x0 {
-                    is_covered[within(span)].fill(true);
-                    crossing.push(i);
-                }
-            }
-            let tile = engine.tile(x0, row, |k| is_covered[k]);
-            if tile.s.iter().all(|s| *s < 0.0) {
-                continue;
-            }
-            // 1. The interpolated weights, or differences, of the triangles that cross the
-            // tile.
-            active.clear();
-            for span in crossing.iter().map(|&i| &spans[i]) {
-                let lanes = within(span);
-                let bordered = field.triangles[span.triangle_idx].bordered;
-                is_bordered[lanes.clone()].fill(bordered);
-                vectorised(
-                    #[inline(always)]
-                    || {
-                        let shares = raster.shares(span.triangle_idx, x0, row);
-                        let entries = field.entries_of(span.triangle_idx);
-                        interpolate(active, entries, bordered, &lanes, &shares);
-                    },
-                );
-            }
-            for k in 0..LANES {
-                is_bordered[k] &= tile.s[k] >= 0.0;
-            }
-            let any_bordered = is_bordered.contains(&true);
-            // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
-            // triangle, with the mask, a term of the blend. Of the latter the views that
-            // differ least come first, as far as they leave room for more.
-            order.clear();
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (i, source) in active.iter().enumerate() {
-                        let least = source.least(&is_bordered);
-                        if least < f32::INFINITY {
-                            order.push((least, i));
-                        }
-                    }
-                },
-            );
-            order.sort_unstable_by(|a, b| {
-                let source_idx = |i: usize| active[i].source_idx;
-                a.0.total_cmp(&b.0)
-                    .then_with(|| source_idx(a.1).cmp(&source_idx(b.1)))
-            });
-            seen.clear();
-            let mut check = FIRST_ASKED;
-            for (asked, &(least, i)) in order.iter().enumerate() {
-                let source = &active[i];
-                if asked >= check && least >= 0.0 && may_skip {
-                    let reach = weigh(seen.kept().1, &frame.options);
-                    let wanted = (0..LANES).filter(|&k| is_bordered[k]);
-                    if wanted.map(|k| reach[k]).fold(0.0, f32::max) <= least {
-                        break;
-                    }
-                    check = asked + THEN_ASKED;
-                }
-                let (sight, term) = seen.next();
-                if !engine.source(source.source_idx).see(&tile, sight) {
-                    continue;
-                }
-                if any_bordered {
-                    // Elsewhere the masks of all that is listed are one.
-                    engine.mask(source.source_idx, sight, |k| source.blended[k] > 0.0);
-                    term.diff = source.diff;
-                    term.a = each(|k| sight.a[k] * source.blended[k]);
-                }
-                sight.a = each(|k| sight.a[k] * source.weight[k]);
-                seen.keep(source.source_idx);
-            }
-            if any_bordered {
-                seen.sort();
-                let (sights, terms) = seen.kept();
-                weigh(terms, &frame.options);
-                for (sight, term) in sights.iter_mut().zip(terms) {
-                    sight.a = each(|k| sight.a[k] + term.weight[k]);
-                }
-            }
-            engine.shade(&photos, seen, |sight, _| &sight.a, out)?;
-        }
-        Ok(())
-    })
-}
-
-/// Source views that are asked about a tile before it is seen whether others may count, and again
-/// after so many more.
-const FIRST_ASKED: usize = 8;
-const THEN_ASKED: usize = 4;
-
-/// What a thread uses again for every tile that it draws of a triangulated field.
-#[derive(Default)]
-struct Scratch {
-    /// Of the row, and the indices of those that cross the tile.
-    spans: Vec<Span>,
-    crossing: Vec<usize>,
-    active: Vec<Interpolated>,
-    /// Of what is active, by the least difference: that and its index.
-    order: Vec<(f32, usize)>,
-    seen: Seen,
 }
 
 /// The source views that see something of a tile, in order.
@@ -288,81 +142,6 @@ impl Seen {
     }
 }
 
-/// Adds a triangle's list to what a field says of source views, over the pixels that it covers, in which its
-/// corners have these shares.
-#[inline(always)]
-fn interpolate(
-    active: &mut Vec<Interpolated>,
-    entries: &[FieldEntry],
-    bordered: bool,
-    lanes: &Range<usize>,
-    shares: &[Lane; 3],
-) {
-    for entry in entries {
-        let source_idx = entry.source_idx as usize;
-        let at = active.iter().position(|s| s.source_idx == source_idx);
-        let at = at.unwrap_or_else(|| {
-            active.push(Interpolated::nothing(source_idx));
-            active.len() - 1
-        });
-        let into = &mut active[at];
-        let [v0, v1, v2] = entry.values;
-        let values = match bordered {
-            true => &mut into.diff,
-            false => &mut into.weight,
-        };
-        for k in 0..LANES {
-            let value = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
-            values[k] = if lanes.contains(&k) { value } else { values[k] };
-        }
-        if bordered {
-            into.blended[lanes.clone()].fill(1.0);
-        }
-    }
-}
-
-/// What a field says of one source view over a tile.
-struct Interpolated {
-    source_idx: usize,
-    /// In triangles that no photo's or mask's border crosses; zero elsewhere.
-    weight: Lane,
-    /// In the others.
-    diff: Lane,
-    /// One where `diff` counts, else zero.
-    blended: Lane,
-}
-
-impl Interpolated {
-    fn nothing(source_idx: usize) -> Self {
-        Self {
-            source_idx,
-            weight: [0.0; LANES],
-            diff: [1.0; LANES],
-            blended: [0.0; LANES],
-        }
-    }
-
-    /// The least difference in bordered triangles; less than any where it has weights, too, and
-    /// infinite where it has nothing.
-    #[inline(always)]
-    fn least(&self, is_bordered: &[bool; LANES]) -> f32 {
-        if self.weight != [0.0; LANES] {
-            return -1.0;
-        }
-        let mut least = [f32::INFINITY; 8];
-        for k in 0..LANES {
-            let counts = is_bordered[k] & (self.blended[k] > 0.0);
-            let diff = if counts {
-                self.diff[k].max(0.0)
-            } else {
-                f32::INFINITY
-            };
-            least[k % 8] = least[k % 8].min(diff);
-        }
-        least.into_iter().fold(f32::INFINITY, f32::min)
-    }
-}
-
 /// What all pixels of a frame share.
 struct Engine<'a> {
     frame: &'a Frame<'a>,
@@ -397,40 +176,6 @@ impl<'a> Engine<'a> {
             }
         }
         tile
-    }
-
-    /// The exact field of a tile: the source views that see it, and what they weigh; of more views
-    /// where those asked first don't settle it.
-    fn weigh_tile(&self, asked: &mut Asked, tile_idx: usize, row: usize, seen: &mut Seen) {
-        let tile = self.tile(tile_idx * LANES, row, |_| true);
-        if tile.s.iter().all(|s| *s < 0.0) {
-            return seen.clear();
-        }
-        loop {
-            let views = asked.views(self, tile_idx, row).iter();
-            self.score(views.map(|&i| i as usize), &tile, seen);
-            let reach = weigh(seen.kept().1, &self.frame.options);
-            let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
-            if asked.settles(tile_idx, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
-                return;
-            }
-        }
-    }
-
-    /// Of some source views those that see something of a tile, and by what they differ.
-    fn score(&self, views: impl Iterator<Item = usize>, tile: &Tile, seen: &mut Seen) {
-        seen.clear();
-        for source_idx in views {
-            let source = self.source(source_idx);
-            let (sight, term) = seen.next();
-            if !source.see(tile, sight) {
-                continue;
-            }
-            self.mask(source_idx, sight, |_| true);
-            term.diff = source.difference(tile);
-            term.a = sight.a;
-            seen.keep(source_idx);
-        }
     }
 
     /// Takes what a photo's mask ignores and what hides points from it off its relevance, in
@@ -513,10 +258,10 @@ impl<'a> Engine<'a> {
     }
 }
 
-/// Runs `row(row, scratch, pixels)` for every row of the picture, in parallel.
+/// Runs `band(band, scratch, pixels)` for every band of rows of the picture, in parallel.
 fn draw<S: Default + Send>(
     frame: &Frame<'_>,
-    row: impl Fn(usize, &mut S, &mut [u8]) -> Result<(), PhotoError> + Sync,
+    band: impl Fn(usize, &mut S, &mut [u8]) -> Result<(), PhotoError> + Sync,
 ) -> Result<RgbaImage, PhotoError> {
     let (width, height) = (frame.desired.width, frame.desired.height);
     let pitch = width as usize * 4;
@@ -524,11 +269,7 @@ fn draw<S: Default + Send>(
     pixels
         .par_chunks_mut(pitch * BAND)
         .enumerate()
-        .map_init(S::default, |scratch, (band, rows)| {
-            let rows = rows.chunks_mut(pitch).enumerate();
-            rows.map(|(y, pixels)| row(band * BAND + y, scratch, pixels))
-                .try_for_each(|done| done)
-        })
+        .map_init(S::default, |scratch, (i, pixels)| band(i, scratch, pixels))
         // The first error from the top, whichever thread is the first to meet one.
         .find_map_first(Result::err)
         .map_or(Ok(()), Err)?;

@@ -33,7 +33,7 @@ pub(crate) fn colors(
                 tile.set(k, ray, plane);
             }
         }
-        engine.score(frame.taking_part(), &tile, &mut seen);
+        engine.score(frame.taking_part(), f32::INFINITY, &tile, &mut seen);
         weigh(seen.kept().1, &frame.options);
         let mut color = [Vec4::ZERO; LANES];
         let mut sum: Lane = [0.0; LANES];
