@@ -2,6 +2,7 @@
 
 use crate::blend::{Candidate, SAME_RAY};
 use crate::frame::{Frame, ProxyPoint};
+use crate::near::wider;
 use crate::reference::candidate;
 use crate::surface::Surface;
 use crate::triangulation::Grid;
@@ -107,14 +108,22 @@ fn is_behind_two(frame: &Frame<'_>, epipole: &Epipole, known: &mut Vec<u32>) -> 
     if known.iter().filter(|i| counts_more(i)).nth(1).is_some() {
         return true;
     }
+    let ball = Ball::around(point, 0.0);
     let mut nearer = Vec::new();
-    frame.views_within(Ball::around(point, 0.0).as_ref(), own.diff, &mut nearer);
-    let two: Vec<u32> = nearer.into_iter().filter(counts_more).take(2).collect();
-    let is_behind = two.len() == 2;
-    if is_behind {
-        *known = two;
+    // Mostly there are two that differ by much less than its own.
+    let mut within = frame.first_guess().min(own.diff);
+    loop {
+        frame.views_within(ball.as_ref(), within, &mut nearer);
+        let two: Vec<u32> = nearer.iter().copied().filter(counts_more).take(2).collect();
+        if two.len() == 2 {
+            *known = two;
+            return true;
+        }
+        if within >= own.diff {
+            return false;
+        }
+        within = wider(within).min(own.diff);
     }
-    is_behind
 }
 
 /// The horizon of the plane in the desired image: where its inverse distance is zero.
