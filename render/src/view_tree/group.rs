@@ -67,6 +67,9 @@ impl Bounds {
     }
 }
 
+/// Of angles of so many radians sines are little less: 2 per cent.
+const SINES_TELL: f64 = 0.35;
+
 /// A number of each.
 type Each = [f64; GROUP];
 
@@ -157,9 +160,13 @@ impl Group {
         let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
         let along = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
         let by_distance = each(|i| 1.0 / distance[i]);
-        // At most the angle: its sine, or one where that is obtuse.
+        // At most the angle: its sine, or one where that is obtuse, or what is less by a few hundredths where
+        // that is too little to tell.
         let sine = each(|i| across[i] * (by_here * by_distance[i]));
-        let angle = each(|i| if along[i] > 0.0 { sine[i] } else { 1.0 });
+        let angle = match query.most < SINES_TELL {
+            true => each(|i| if along[i] > 0.0 { sine[i] } else { 1.0 }),
+            false => each(|i| less_than_angle(sine[i], along[i] * (by_here * by_distance[i]))),
+        };
         let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - vary[i]);
         let measure = query.measure;
         let coarser = match measure.by_length {
@@ -203,10 +210,45 @@ fn at_least_0(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
 }
 
+/// At most the angle, up to π, of which these are sine and cosine: twice Shafer's bound of the arctangent,
+/// 3τ / (1 + 2 √(1 + τ²)), for that of its half.
+#[inline(always)]
+fn less_than_angle(sine: f64, cosine: f64) -> f64 {
+    let more = at_least_0(1.0 + cosine);
+    let bound = 6.0 * sine / (more + (8.0 * more).sqrt());
+    // What it tends to: near π rounding could make more of it.
+    if bound < 3.0 { bound } else { 3.0 }
+}
+
 /// At least asin x, of 0…1.
 #[inline(always)]
 fn more_than_asin(x: f64) -> f64 {
     // x over asin x falls steadily.
     let steep = if x < 0.5 { 1.048 } else { 1.571 };
     x * if x < 0.25 { 1.011 } else { steep }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn bounds_of_angles_are_below_them_and_near() {
+        let near_pi = (0..60).map(|i| PI - 0.1 * 0.5_f64.powi(i));
+        for angle in (0..=1000)
+            .map(|i| PI * f64::from(i) / 1000.0)
+            .chain(near_pi)
+        {
+            let (sine, cosine) = angle.sin_cos();
+            let bound = less_than_angle(sine.max(0.0), cosine);
+            assert!(bound <= angle + SLACK, "{angle}: {bound}");
+            // At π rounding of the cosine takes the rest.
+            let near = if angle < 1.6 { 0.997 } else { 0.85 };
+            assert!(
+                bound >= near * angle || angle > PI - 1e-7,
+                "{angle}: {bound}"
+            );
+        }
+    }
 }
