@@ -121,26 +121,27 @@ impl Raster {
     /// The shares of a triangle's corners in a pixel that it covers.
     #[inline]
     pub(crate) fn barycentric(&self, triangle_idx: usize, column: usize, row: usize) -> [f32; 3] {
-        self.shares::<1>(triangle_idx, column, row)
+        self.shares(triangle_idx, [column, row], [[0; 2]])
             .map(|[share]| share)
     }
 
-    /// The same of so many pixels of a row, from `column` on.
+    /// The same of several pixels, so far to the right of and below the first.
     #[inline(always)]
     pub(crate) fn shares<const COUNT: usize>(
         &self,
         triangle_idx: usize,
-        column: usize,
-        row: usize,
+        [column, row]: [usize; 2],
+        places: [[usize; 2]; COUNT],
     ) -> [[f32; COUNT]; 3] {
         let triangle = &self.triangles[triangle_idx];
         let mut shares = [[0.0; COUNT]; 3];
         for (shares, edge) in shares.iter_mut().zip(&triangle.edges) {
             // These whole numbers are exact in f64, which a vector of pixels has at once.
-            let a = edge.a as f64;
+            let (a, b) = (edge.a as f64, edge.b as f64);
             let first = (edge.a * column as i64 + edge.b * row as i64 + edge.c) as f64;
             for k in 0..COUNT {
-                shares[k] = (a * k as f64 + first) as f32 * triangle.inverse_area;
+                let [right, down] = places[k].map(|steps| steps as f64);
+                shares[k] = (a * right + b * down + first) as f32 * triangle.inverse_area;
             }
         }
         shares

@@ -3,20 +3,15 @@
 use super::asked::{Asked, Extent};
 use super::lanes::{LANES, any};
 use super::source::Tile;
-use super::weights::weigh;
-use super::{BAND, Engine, Seen, draw, mark};
+use super::{BAND, Engine, Seen, TILE, draw, mark, put, tiles_of_band};
 use crate::frame::Frame;
 use crate::photos::PhotoError;
 use crate::rays::RayMap;
 use crate::view_tree::Ball;
 use image::RgbaImage;
-use std::array::from_fn;
 
-/// What the exact field weighs together: pixels as near one another as may be, as what they need are the
-/// same source views; and what asks for those together, from the top of a band to its bottom.
-const TILE: [usize; 2] = [8, LANES / 8];
-const BLOCK_WIDTH: usize = 32;
-const TILES_OF_BLOCK: usize = BLOCK_WIDTH * BAND / LANES;
+/// Tiles that ask for source views together, first: from the top of a band to its bottom.
+const TILES_OF_BLOCK: usize = 4 * BAND / TILE[1];
 
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
@@ -25,39 +20,17 @@ pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, 
     let photos = mark::hold(&engine, &sources);
     let pitch = frame.desired.width as usize * 4;
     draw(frame, |band, scratch: &mut (Asked, Seen), pixels| {
-        engine.weigh_band(band, scratch, |[x0, y0], seen| {
-            let mut out = [0; LANES * 4];
-            engine.shade(&photos, seen, |_, term| &term.weight, &mut out)?;
-            let rows = pixels.chunks_mut(pitch).skip(y0 - band * BAND);
-            for (row, out) in rows.zip(out.chunks(TILE[0] * 4)) {
-                let row = &mut row[x0 * 4..];
-                let count = row.len().min(out.len());
-                row[..count].copy_from_slice(&out[..count]);
-            }
+        engine.weigh_band(band, scratch, |at, seen| {
+            let tile = engine.shade(&photos, seen, |_, term| &term.weight)?;
+            put(&tile, pixels, pitch, at);
             Ok(())
         })
     })
 }
 
 impl Engine<'_> {
-    /// As [`Self::tile`], of pixels as near one another as may be.
-    fn square(&self, [x0, y0]: [usize; 2]) -> Tile {
-        let mut tile = Tile::nothing();
-        let desired = &self.frame.desired;
-        let (width, height) = (desired.width as usize, desired.height as usize);
-        for (k, y) in (y0..(y0 + TILE[1]).min(height)).enumerate() {
-            for (i, x) in (x0..(x0 + TILE[0]).min(width)).enumerate() {
-                let plane = self.frame.surface.plane_of(x, y);
-                if let (Some(ray), Some(plane)) = (self.rays.ray(x, y), plane) {
-                    tile.set(k * TILE[0] + i, ray, plane);
-                }
-            }
-        }
-        tile
-    }
-
-    /// The exact field of a band of rows: for each tile in which there is something, its first pixel, the
-    /// source views that see it, and what they weigh.
+    /// The exact field of a band of rows: for each tile in which there is something, where in the band it
+    /// begins, the source views that see it, and what they weigh.
     pub(super) fn weigh_band(
         &self,
         band: usize,
@@ -65,21 +38,16 @@ impl Engine<'_> {
         mut then: impl FnMut([usize; 2], &Seen) -> Result<(), PhotoError>,
     ) -> Result<(), PhotoError> {
         asked.forget(self.frame);
-        for x0 in (0..self.frame.desired.width as usize).step_by(BLOCK_WIDTH) {
-            let across = BLOCK_WIDTH / TILE[0];
-            let corner = |i: usize| {
-                [
-                    x0 + i % across * TILE[0],
-                    band * BAND + i / across * TILE[1],
-                ]
-            };
-            let tiles: [Tile; TILES_OF_BLOCK] = from_fn(|i| self.square(corner(i)));
-            let extents: [Extent; TILES_OF_BLOCK] = from_fn(|i| Extent::of(&tiles[i]));
+        let places: Vec<_> = tiles_of_band(self.frame.desired.width as usize).collect();
+        for block in places.chunks(TILES_OF_BLOCK) {
+            let tile = |&[x, y]: &[usize; 2]| self.tile([x, band * BAND + y], |_| true);
+            let tiles: Vec<Tile> = block.iter().map(tile).collect();
+            let extents: Vec<Extent> = tiles.iter().map(Extent::of).collect();
             asked.enter(extents.iter().copied().fold(Extent::EMPTY, Extent::and));
-            for (i, (tile, extent)) in tiles.iter().zip(&extents).enumerate() {
+            for ((tile, extent), at) in tiles.iter().zip(&extents).zip(block) {
                 if !extent.is_empty() {
                     self.weigh(tile, extent.ball().as_ref(), asked, seen);
-                    then(corner(i), seen)?;
+                    then(*at, seen)?;
                 }
             }
         }
@@ -92,7 +60,7 @@ impl Engine<'_> {
         loop {
             let views = asked.views(self.frame, ball, within).iter();
             self.score(views.map(|&i| i as usize), within as f32, tile, seen);
-            let reach = weigh(seen.kept().1, &self.frame.options);
+            let reach = seen.weigh(&self.frame.options);
             let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
             match asked.settles(within, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
                 Ok(()) => return,

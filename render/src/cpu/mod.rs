@@ -18,13 +18,13 @@ use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
-use crate::options::Method;
+use crate::options::{FieldOptions, Method};
 use crate::photos::PhotoError;
 use crate::rays::{RayCache, RayMap};
 use exact::draw_exact;
 use glam::Vec4;
 use image::RgbaImage;
-use lanes::{LANES, Lane, vectorised};
+use lanes::{LANES, Lane, each, vectorised};
 use rayon::prelude::*;
 use source::{Sight, Source, Tile};
 use std::sync::OnceLock;
@@ -33,6 +33,20 @@ use weights::Term;
 
 /// Rows that one thread does in one go.
 const BAND: usize = 8;
+
+/// Pixels that are worked on together, across and down: near one another, so that the same source views
+/// matter to them.
+const TILE: [usize; 2] = [8, LANES / 8];
+/// The column and row of each of its pixels.
+const PLACES: [[usize; 2]; LANES] = {
+    let mut places = [[0; 2]; LANES];
+    let mut k = 0;
+    while k < LANES {
+        places[k] = [k % TILE[0], k / TILE[0]];
+        k += 1;
+    }
+    places
+};
 
 /// The engine, with what it keeps between frames.
 #[derive(Debug, Default)]
@@ -77,20 +91,21 @@ pub fn render(frame: &Frame<'_>, method: Method) -> Result<RgbaImage, RenderErro
     Cpu::default().render(frame, method)
 }
 
-/// The source views that see something of a tile, in order.
+/// The source views that see something of a tile.
 #[derive(Default)]
 struct Seen {
+    /// Of each, in the order in which they were kept; `sights` and `terms` may hold more.
     source_idxs: Vec<usize>,
-    /// At least one for each of them.
     sights: Vec<Sight>,
     terms: Vec<Term>,
-    /// While they are sorted: which of them comes first, and so on.
+    /// Where they are, in the order of the views. (Each is a kilobyte to move.)
     order: Vec<usize>,
 }
 
 impl Seen {
     fn clear(&mut self) {
         self.source_idxs.clear();
+        self.order.clear();
     }
 
     /// Where to put what is found out about the next source view.
@@ -105,40 +120,29 @@ impl Seen {
 
     /// Keeps what was put there.
     fn keep(&mut self, source_idx: usize) {
+        let before = |&i: &usize| self.source_idxs[i] < source_idx;
+        let at = self.order.partition_point(before);
+        self.order.insert(at, self.source_idxs.len());
         self.source_idxs.push(source_idx);
     }
 
-    /// By source view.
-    fn sort(&mut self) {
-        let Self {
-            source_idxs, order, ..
-        } = self;
-        order.clear();
-        order.extend(0..source_idxs.len());
-        order.sort_unstable_by_key(|&i| source_idxs[i]);
-        // At most as many exchanges as there are views, as each moves a kilobyte. What belongs here may
-        // have been moved by one before.
-        for at in 0..self.order.len() {
-            let mut from = self.order[at];
-            while from < at {
-                from = self.order[from];
-            }
-            if from != at {
-                self.source_idxs.swap(at, from);
-                self.sights.swap(at, from);
-                self.terms.swap(at, from);
-            }
+    /// Finds the weights of their terms: see [`weights::weigh`].
+    fn weigh(&mut self, options: &FieldOptions) -> Lane {
+        weights::weigh(&mut self.terms, &self.order, options)
+    }
+
+    /// Adds the terms' weights to what the sights are worth.
+    fn add_weights(&mut self) {
+        for &i in &self.order {
+            let (sight, term) = (&mut self.sights[i], &self.terms[i]);
+            sight.a = each(|k| sight.a[k] + term.weight[k]);
         }
     }
 
-    fn kept(&mut self) -> (&mut [Sight], &mut [Term]) {
-        let count = self.source_idxs.len();
-        (&mut self.sights[..count], &mut self.terms[..count])
-    }
-
+    /// In the order of the views.
     fn iter(&self) -> impl Iterator<Item = (usize, &Sight, &Term)> {
-        let each = self.source_idxs.iter().zip(&self.sights).zip(&self.terms);
-        each.map(|((i, sight), term)| (*i, sight, term))
+        let order = self.order.iter();
+        order.map(|&i| (self.source_idxs[i], &self.sights[i], &self.terms[i]))
     }
 }
 
@@ -164,15 +168,19 @@ impl<'a> Engine<'a> {
         self.sources[source_idx].get_or_init(|| Source::new(self.frame, source_idx))
     }
 
-    /// The rays of a tile and where they meet the proxy.
-    fn tile(&self, x0: usize, row: usize, wanted: impl Fn(usize) -> bool) -> Tile {
+    /// The rays of a tile and where they meet the proxy, where that is wanted. It begins at a pixel, and
+    /// may reach out of the picture, where nothing is.
+    fn tile(&self, [x0, y0]: [usize; 2], wanted: impl Fn(usize) -> bool) -> Tile {
         let mut tile = Tile::nothing();
-        let width = self.frame.desired.width as usize;
-        for k in 0..LANES.min(width - x0) {
-            let surface = &self.frame.surface;
-            let plane = surface.plane_of(x0 + k, row).filter(|_| wanted(k));
-            if let (Some(ray), Some(plane)) = (self.rays.ray(x0 + k, row), plane) {
-                tile.set(k, ray, plane);
+        let desired = &self.frame.desired;
+        let (width, height) = (desired.width as usize, desired.height as usize);
+        for (k, [x, y]) in PLACES.into_iter().enumerate() {
+            let (x, y) = (x0 + x, y0 + y);
+            if x < width && y < height && wanted(k) {
+                let plane = self.frame.surface.plane_of(x, y);
+                if let (Some(ray), Some(plane)) = (self.rays.ray(x, y), plane) {
+                    tile.set(k, ray, plane);
+                }
             }
         }
         tile
@@ -211,50 +219,54 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Blends the photos of a tile and writes its pixels.
+    /// Blends the photos of a tile: its pixels, straight RGBA.
     fn shade(
         &self,
         photos: &Held<'_>,
         seen: &Seen,
         weight: impl for<'s> Fn(&'s Sight, &'s Term) -> &'s Lane,
-        out: &mut [u8],
-    ) -> Result<(), PhotoError> {
-        let count = out.len() / 4;
+    ) -> Result<[[u8; 4]; LANES], PhotoError> {
         let mut color = [Vec4::ZERO; LANES];
         let mut sum = [0.0_f32; LANES];
         for (i, sight, term) in seen.iter() {
             let weight = weight(sight, term);
-            if weight[..count].iter().all(|w| *w == 0.0) {
+            if weight.iter().all(|w| *w == 0.0) {
                 continue;
             }
             let photo = photos.get(i)?;
             let exposure = self.source(i).exposure;
             vectorised(
                 #[inline(always)]
-                || {
-                    shade::add(
-                        photo,
-                        exposure,
-                        sight,
-                        &weight[..count],
-                        &mut color,
-                        &mut sum,
-                    )
-                },
+                || shade::add(photo, exposure, sight, weight, &mut color, &mut sum),
             );
         }
+        let mut pixels = [[0; 4]; LANES];
         vectorised(
             #[inline(always)]
             || {
-                let (out, _) = out.as_chunks_mut::<4>();
-                for (k, out) in out.iter_mut().enumerate() {
+                for k in 0..LANES {
                     if sum[k] > 0.0 {
-                        *out = shade::straight_rgba8(color[k], sum[k]);
+                        pixels[k] = shade::straight_rgba8(color[k], sum[k]);
                     }
                 }
             },
         );
-        Ok(())
+        Ok(pixels)
+    }
+}
+
+/// Where the tiles of a band begin in a picture so wide: column, and row in the band.
+fn tiles_of_band(width: usize) -> impl Iterator<Item = [usize; 2]> {
+    let columns = (0..width).step_by(TILE[0]);
+    columns.flat_map(|x| (0..BAND).step_by(TILE[1]).map(move |y| [x, y]))
+}
+
+/// Puts a tile's pixels, as far as they are in the picture, into a band of rows, each of `pitch` bytes.
+fn put(tile: &[[u8; 4]; LANES], band: &mut [u8], pitch: usize, [x, y]: [usize; 2]) {
+    for (row, tile) in band.chunks_mut(pitch).skip(y).zip(tile.chunks(TILE[0])) {
+        let (row, _) = row[4 * x..].as_chunks_mut::<4>();
+        let count = row.len().min(tile.len());
+        row[..count].copy_from_slice(&tile[..count]);
     }
 }
 

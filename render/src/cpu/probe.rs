@@ -3,7 +3,6 @@
 
 use super::lanes::{LANES, Lane};
 use super::source::Tile;
-use super::weights::weigh;
 use super::{Engine, Seen, shade};
 use crate::frame::Frame;
 use crate::held::Held;
@@ -34,7 +33,7 @@ pub(crate) fn colors(
             }
         }
         engine.score(frame.taking_part(), f32::INFINITY, &tile, &mut seen);
-        weigh(seen.kept().1, &frame.options);
+        seen.weigh(&frame.options);
         let mut color = [Vec4::ZERO; LANES];
         let mut sum: Lane = [0.0; LANES];
         for (i, sight, term) in seen.iter() {

@@ -16,11 +16,11 @@ pub(super) fn add(
     photo: &Pyramid,
     exposure: Vec4,
     sight: &Sight,
-    weights: &[f32],
+    weights: &Lane,
     color: &mut [Vec4; LANES],
     sum: &mut Lane,
 ) {
-    let weighs = |k: usize| k < weights.len() && weights[k] > 0.0;
+    let weighs = |k: usize| weights[k] > 0.0;
     let texel =
         |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
     let samples = sample(&photo.levels, photo.finest, sight, weighs, texel);

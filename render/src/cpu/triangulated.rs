@@ -1,9 +1,8 @@
 //! Frames of the triangulated field.
 
 use super::lanes::{LANES, Lane, each, vectorised};
-use super::weights::weigh;
-use super::{BAND, Engine, Seen, draw};
-use crate::field::{FieldEntry, TriangulatedField};
+use super::{BAND, Engine, PLACES, Seen, TILE, draw, put, tiles_of_band};
+use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
 use crate::photos::PhotoError;
@@ -23,113 +22,144 @@ pub(super) fn draw_field(
     let raster = Raster::new(field);
     let photos = Held::new(frame, &field.listed());
     let may_skip = frame.may_skip();
-    let draw_row = |row: usize, scratch: &mut Scratch, pixels: &mut [u8]| {
+    let (width, pitch) = (
+        frame.desired.width as usize,
+        frame.desired.width as usize * 4,
+    );
+    draw(frame, |band, scratch: &mut Scratch, pixels| {
         let Scratch {
             spans,
-            crossing,
-            active,
-            order,
+            covering,
+            parts,
+            mentions,
             seen,
         } = scratch;
-        raster.spans(row, spans);
-        for (tile_idx, out) in pixels.chunks_mut(LANES * 4).enumerate() {
-            let x0 = tile_idx * LANES;
-            let within = |s: &Span| s.start.max(x0) - x0..s.end.min(x0 + LANES) - x0;
-            let (mut is_covered, mut is_bordered) = ([false; LANES], [false; LANES]);
-            crossing.clear();
-            for (i, span) in spans.iter().enumerate() {
-                if span.start < x0 + LANES && span.end > x0 {
-                    is_covered[within(span)].fill(true);
-                    crossing.push(i);
-                }
+        // The triangle of each pixel.
+        covering.clear();
+        covering.resize(width * BAND, NO_TRIANGLE);
+        for (y, covering) in covering.chunks_mut(width).enumerate() {
+            raster.spans(band * BAND + y, spans);
+            for span in spans.iter() {
+                covering[span.start..span.end.min(width)].fill(span.triangle_idx as u32);
             }
-            let tile = engine.tile(x0, row, |k| is_covered[k]);
+        }
+        for [x, y] in tiles_of_band(width) {
+            Part::of_tile(covering, width, [x, y], parts);
+            if parts.is_empty() {
+                continue;
+            }
+            let mut is_covered = [false; LANES];
+            parts.iter().for_each(|part| part.mark(&mut is_covered));
+            let first = [x, band * BAND + y];
+            let tile = engine.tile(first, |k| is_covered[k]);
             if tile.s.iter().all(|s| *s < 0.0) {
                 continue;
             }
-            // 1. The interpolated weights, or differences, of the triangles that cross the
-            // tile.
-            active.clear();
-            for span in crossing.iter().map(|&i| &spans[i]) {
-                let lanes = within(span);
-                let bordered = field.triangles[span.triangle_idx].bordered;
-                is_bordered[lanes.clone()].fill(bordered);
+            // 1. The triangles that cross the tile, and what they list, view by view.
+            let mut is_bordered = [false; LANES];
+            for part in parts.iter_mut() {
+                part.bordered = field.triangles[part.triangle_idx].bordered;
+                if part.bordered {
+                    part.mark(&mut is_bordered);
+                }
                 vectorised(
                     #[inline(always)]
-                    || {
-                        let shares = raster.shares(span.triangle_idx, x0, row);
-                        let entries = field.entries_of(span.triangle_idx);
-                        interpolate(active, entries, bordered, &lanes, &shares);
-                    },
+                    || part.shares = raster.shares(part.triangle_idx, first, PLACES),
                 );
             }
             for k in 0..LANES {
                 is_bordered[k] &= tile.s[k] >= 0.0;
             }
             let any_bordered = is_bordered.contains(&true);
+            mentions.of_parts(parts, field);
             // 2. Each pixel's own fovBlend: a factor of the weight, or in a bordered
             // triangle, with the mask, a term of the blend. Of the latter the views that
             // differ least come first, as far as they leave room for more.
-            order.clear();
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (i, source) in active.iter().enumerate() {
-                        let least = source.least(&is_bordered);
-                        if least < f32::INFINITY {
-                            order.push((least, i));
-                        }
-                    }
-                },
-            );
-            order.sort_unstable_by(|a, b| {
-                let source_idx = |i: usize| active[i].source_idx;
-                a.0.total_cmp(&b.0)
-                    .then_with(|| source_idx(a.1).cmp(&source_idx(b.1)))
-            });
             seen.clear();
             let mut check = FIRST_ASKED;
-            for (asked, &(least, i)) in order.iter().enumerate() {
-                let source = &active[i];
-                if asked >= check && least >= 0.0 && may_skip {
-                    let reach = weigh(seen.kept().1, &frame.options);
+            let mut is_weighed = false;
+            for (asked, view) in mentions.views().iter().enumerate() {
+                if asked >= check && view.least >= 0.0 && may_skip {
+                    let reach = seen.weigh(&frame.options);
+                    is_weighed = true;
                     let wanted = (0..LANES).filter(|&k| is_bordered[k]);
-                    if wanted.map(|k| reach[k]).fold(0.0, f32::max) <= least {
+                    if wanted.map(|k| reach[k]).fold(0.0, f32::max) <= view.least {
                         break;
                     }
                     check = asked + THEN_ASKED;
                 }
                 let (sight, term) = seen.next();
-                if !engine.source(source.source_idx).see(&tile, sight) {
+                if !engine.source(view.source_idx).see(&tile, sight) {
                     continue;
                 }
+                let listed = mentions.interpolated(view, parts);
                 if any_bordered {
                     // Elsewhere the masks of all that is listed are one.
-                    engine.mask(source.source_idx, sight, |k| source.blended[k] > 0.0);
-                    term.diff = source.diff;
-                    term.a = each(|k| sight.a[k] * source.blended[k]);
+                    engine.mask(view.source_idx, sight, |k| listed.blended[k] > 0.0);
+                    term.diff = listed.diff;
+                    term.a = each(|k| sight.a[k] * listed.blended[k]);
                 }
-                sight.a = each(|k| sight.a[k] * source.weight[k]);
-                seen.keep(source.source_idx);
+                sight.a = each(|k| sight.a[k] * listed.weight[k]);
+                seen.keep(view.source_idx);
+                is_weighed = false;
             }
             if any_bordered {
-                seen.sort();
-                let (sights, terms) = seen.kept();
-                weigh(terms, &frame.options);
-                for (sight, term) in sights.iter_mut().zip(terms) {
-                    sight.a = each(|k| sight.a[k] + term.weight[k]);
+                if !is_weighed {
+                    seen.weigh(&frame.options);
                 }
+                seen.add_weights();
             }
-            engine.shade(&photos, seen, |sight, _| &sight.a, out)?;
+            let colors = engine.shade(&photos, seen, |sight, _| &sight.a)?;
+            put(&colors, pixels, pitch, [x, y]);
         }
         Ok(())
-    };
-    let pitch = frame.desired.width as usize * 4;
-    draw(frame, |band, scratch: &mut Scratch, pixels| {
-        let rows = pixels.chunks_mut(pitch).enumerate();
-        rows.map(|(y, pixels)| draw_row(band * BAND + y, scratch, pixels))
-            .try_for_each(|done| done)
     })
+}
+
+/// Where nothing covers a pixel.
+const NO_TRIANGLE: u32 = u32::MAX;
+
+/// A triangle and the pixels of a tile that it covers.
+struct Part {
+    triangle_idx: usize,
+    covers: [bool; LANES],
+    bordered: bool,
+    /// Its corners', in all of the tile's pixels.
+    shares: [Lane; 3],
+}
+
+impl Part {
+    /// All of a tile, which begins in this column and row of a band of so wide a picture, by the triangles that
+    /// cover its pixels.
+    fn of_tile(covering: &[u32], width: usize, [x, y]: [usize; 2], parts: &mut Vec<Self>) {
+        parts.clear();
+        for (row, covering) in covering.chunks(width).skip(y).take(TILE[1]).enumerate() {
+            for (column, &triangle) in covering[x..].iter().take(TILE[0]).enumerate() {
+                if triangle == NO_TRIANGLE {
+                    continue;
+                }
+                let triangle_idx = triangle as usize;
+                let known = parts.iter().rposition(|p| p.triangle_idx == triangle_idx);
+                let at = known.unwrap_or_else(|| {
+                    parts.push(Self {
+                        triangle_idx,
+                        covers: [false; LANES],
+                        bordered: false,
+                        shares: [[0.0; LANES]; 3],
+                    });
+                    parts.len() - 1
+                });
+                parts[at].covers[row * TILE[0] + column] = true;
+            }
+        }
+    }
+
+    /// Says so of the pixels that it covers.
+    fn mark(&self, lanes: &mut [bool; LANES]) {
+        for k in 0..LANES {
+            lanes[k] |= self.covers[k];
+        }
+    }
 }
 
 /// Source views that are asked about a tile before it is seen whether others may count, and again
@@ -140,86 +170,110 @@ const THEN_ASKED: usize = 4;
 /// What a thread uses again for every tile that it draws of a triangulated field.
 #[derive(Default)]
 struct Scratch {
-    /// Of the row, and the indices of those that cross the tile.
     spans: Vec<Span>,
-    crossing: Vec<usize>,
-    active: Vec<Interpolated>,
-    /// Of what is active, by the least difference: that and its index.
-    order: Vec<(f32, usize)>,
+    /// Of the band, row by row: the triangle that covers a pixel.
+    covering: Vec<u32>,
+    parts: Vec<Part>,
+    mentions: Mentions,
     seen: Seen,
 }
 
-/// Adds a triangle's list to what a field says of source views, over the pixels that it covers, in which its
-/// corners have these shares.
-#[inline(always)]
-fn interpolate(
-    active: &mut Vec<Interpolated>,
-    entries: &[FieldEntry],
-    bordered: bool,
-    lanes: &Range<usize>,
-    shares: &[Lane; 3],
-) {
-    for entry in entries {
-        let source_idx = entry.source_idx as usize;
-        let at = active.iter().position(|s| s.source_idx == source_idx);
-        let at = at.unwrap_or_else(|| {
-            active.push(Interpolated::nothing(source_idx));
-            active.len() - 1
-        });
-        let into = &mut active[at];
-        let [v0, v1, v2] = entry.values;
-        let values = match bordered {
-            true => &mut into.diff,
-            false => &mut into.weight,
+/// What the triangles that cross a tile list.
+#[derive(Default)]
+struct Mentions {
+    /// The source view, which of the tile's parts has it, and the corners' values; view by view.
+    all: Vec<(u32, usize, [f32; 3])>,
+    /// Those that may count, by the least difference.
+    views: Vec<Mentioned>,
+}
+
+/// A source view that some triangle lists.
+struct Mentioned {
+    source_idx: usize,
+    /// At most its least difference in bordered triangles; less than any where it has weights, too.
+    least: f32,
+    /// Which of all mentions are of it.
+    mentions: Range<usize>,
+}
+
+impl Mentions {
+    fn of_parts(&mut self, parts: &[Part], field: &TriangulatedField) {
+        let Self { all, views } = self;
+        all.clear();
+        for (i, part) in parts.iter().enumerate() {
+            let entries = field.entries_of(part.triangle_idx).iter();
+            all.extend(entries.map(|entry| (entry.source_idx, i, entry.values)));
+        }
+        all.sort_unstable_by_key(|(source_idx, part, _)| (*source_idx, *part));
+        views.clear();
+        for of_view in all.chunk_by(|x, y| x.0 == y.0) {
+            let start = views.last().map_or(0, |v: &Mentioned| v.mentions.end);
+            let least = |(_, part, values): &(u32, usize, [f32; 3])| match parts[*part].bordered {
+                true => values
+                    .iter()
+                    .copied()
+                    .fold(f32::INFINITY, f32::min)
+                    .max(0.0),
+                false if values == &[0.0; 3] => f32::INFINITY,
+                false => -1.0,
+            };
+            views.push(Mentioned {
+                source_idx: of_view[0].0 as usize,
+                least: of_view.iter().map(least).fold(f32::INFINITY, f32::min),
+                mentions: start..start + of_view.len(),
+            });
+        }
+        views.retain(|view| view.least < f32::INFINITY);
+        views.sort_by(|x, y| x.least.total_cmp(&y.least));
+    }
+
+    /// Those that may count; the least different first, of equal ones the first.
+    fn views(&self) -> &[Mentioned] {
+        &self.views
+    }
+
+    /// What the triangles say of a view in each of the tile's pixels.
+    fn interpolated(&self, view: &Mentioned, parts: &[Part]) -> Interpolated {
+        let mut into = Interpolated {
+            weight: [0.0; LANES],
+            diff: [1.0; LANES],
+            blended: [0.0; LANES],
         };
-        for k in 0..LANES {
-            let value = shares[0][k] * v0 + shares[1][k] * v1 + shares[2][k] * v2;
-            values[k] = if lanes.contains(&k) { value } else { values[k] };
-        }
-        if bordered {
-            into.blended[lanes.clone()].fill(1.0);
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                for (_, part, [v0, v1, v2]) in &self.all[view.mentions.clone()] {
+                    let part = &parts[*part];
+                    let values = match part.bordered {
+                        true => &mut into.diff,
+                        false => &mut into.weight,
+                    };
+                    let [a, b, c] = &part.shares;
+                    for k in 0..LANES {
+                        let value = a[k] * v0 + b[k] * v1 + c[k] * v2;
+                        values[k] = if part.covers[k] { value } else { values[k] };
+                    }
+                    let blended = if part.bordered { 1.0 } else { 0.0 };
+                    for k in 0..LANES {
+                        into.blended[k] = if part.covers[k] {
+                            blended
+                        } else {
+                            into.blended[k]
+                        };
+                    }
+                }
+            },
+        );
+        into
     }
 }
 
 /// What a field says of one source view over a tile.
 struct Interpolated {
-    source_idx: usize,
     /// In triangles that no photo's or mask's border crosses; zero elsewhere.
     weight: Lane,
     /// In the others.
     diff: Lane,
     /// One where `diff` counts, else zero.
     blended: Lane,
-}
-
-impl Interpolated {
-    fn nothing(source_idx: usize) -> Self {
-        Self {
-            source_idx,
-            weight: [0.0; LANES],
-            diff: [1.0; LANES],
-            blended: [0.0; LANES],
-        }
-    }
-
-    /// The least difference in bordered triangles; less than any where it has weights, too, and
-    /// infinite where it has nothing.
-    #[inline(always)]
-    fn least(&self, is_bordered: &[bool; LANES]) -> f32 {
-        if self.weight != [0.0; LANES] {
-            return -1.0;
-        }
-        let mut least = [f32::INFINITY; 8];
-        for k in 0..LANES {
-            let counts = is_bordered[k] & (self.blended[k] > 0.0);
-            let diff = if counts {
-                self.diff[k].max(0.0)
-            } else {
-                f32::INFINITY
-            };
-            least[k % 8] = least[k % 8].min(diff);
-        }
-        least.into_iter().fold(f32::INFINITY, f32::min)
-    }
 }

@@ -28,18 +28,19 @@ const SMALLEST: f32 = SAME_RAY as f32;
 /// Keeps diff/t defined where every diff is zero.
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 
-/// Fills in the weights. For each pixel the difference beyond which no further view could change
-/// them; infinite while any could.
-pub(crate) fn weigh(terms: &mut [Term], options: &FieldOptions) -> Lane {
+/// Fills in the weights of those terms that are in `order`. For each pixel the difference beyond which no
+/// further view could change them; infinite while any could.
+pub(crate) fn weigh(terms: &mut [Term], order: &[usize], options: &FieldOptions) -> Lane {
     vectorised(
         #[inline(always)]
-        || weigh_by_lanes(terms, options),
+        || weigh_by_lanes(terms, order, options),
     )
 }
 
 #[inline(always)]
-fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
-    for term in terms.iter_mut() {
+fn weigh_by_lanes(terms: &mut [Term], order: &[usize], options: &FieldOptions) -> Lane {
+    for &i in order {
+        let term = &mut terms[i];
         term.diff = each(|k| {
             if term.diff[k] > SMALLEST {
                 term.diff[k]
@@ -49,21 +50,22 @@ fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
         });
     }
     let t = match options.blend {
-        Blend::Consistent => consistent_threshold(terms, options.full_weight() as f32),
-        Blend::Paper => each(|k| nth_smallest(terms, k, options.k)),
+        Blend::Consistent => consistent_threshold(terms, order, options.full_weight() as f32),
+        Blend::Paper => each(|k| nth_smallest(terms, order, k, options.k)),
     };
     let mut reach = each(|k| t[k].max(SMALLEST));
     if options.blend == Blend::Paper {
         let mut candidates = [0; LANES];
-        for term in terms.iter() {
-            (0..LANES).for_each(|k| candidates[k] += usize::from(term.a[k] > 0.0));
+        for &i in order {
+            (0..LANES).for_each(|k| candidates[k] += usize::from(terms[i].a[k] > 0.0));
         }
         (0..LANES)
             .filter(|&k| candidates[k] < options.k)
             .for_each(|k| reach[k] = f32::INFINITY);
     }
     let mut sum = [0.0; LANES];
-    for term in terms.iter_mut() {
+    for &i in order {
+        let term = &mut terms[i];
         for k in 0..LANES {
             // Where so many tie at zero that they are the threshold, none is nearer than it.
             let ratio = if t[k] > SMALLEST_THRESHOLD {
@@ -82,13 +84,18 @@ fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
     }
     // All candidates tied: the nearest share, lowest indices first.
     for k in 0..LANES {
-        if sum[k] == 0.0 && terms.iter().any(|term| term.a[k] > 0.0) {
-            let nearest = nth_smallest(terms, k, 1);
-            let tied = terms
-                .iter_mut()
-                .filter(|t| t.a[k] > 0.0 && t.diff[k] <= nearest);
-            tied.take(MAX_CONTRIBUTORS)
-                .for_each(|term| term.weight[k] = term.a[k]);
+        if sum[k] == 0.0 && order.iter().any(|&i| terms[i].a[k] > 0.0) {
+            let nearest = nth_smallest(terms, order, k, 1);
+            let tied = |i: &&usize| terms[**i].a[k] > 0.0 && terms[**i].diff[k] <= nearest;
+            let tied: Vec<usize> = order
+                .iter()
+                .filter(tied)
+                .take(MAX_CONTRIBUTORS)
+                .copied()
+                .collect();
+            for i in tied {
+                terms[i].weight[k] = terms[i].a[k];
+            }
         }
     }
     reach
@@ -99,19 +106,16 @@ fn weigh_by_lanes(terms: &mut [Term], options: &FieldOptions) -> Lane {
 /// The sum is convex and piecewise linear in 1/t, so from t = ∞ the steps come down on
 /// the root from above and land on it exactly: no sorting.
 #[inline(always)]
-fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
+fn consistent_threshold(terms: &[Term], order: &[usize], m: f32) -> Lane {
     let mut t = [f32::INFINITY; LANES];
-    let mut contributors = [0.0_f32; LANES];
-    for _ in 0..=terms.len() {
+    for _ in 0..=order.len() {
         let mut sum_a = [0.0_f32; LANES];
         let mut sum_a_diff = [0.0_f32; LANES];
-        contributors = [0.0; LANES];
-        for term in terms {
+        for term in order.iter().map(|&i| &terms[i]) {
             for k in 0..LANES {
                 let a = if term.diff[k] < t[k] { term.a[k] } else { 0.0 };
                 sum_a[k] += a;
                 sum_a_diff[k] += a * term.diff[k];
-                contributors[k] += if a > 0.0 { 1.0 } else { 0.0 };
             }
         }
         let mut moved = false;
@@ -129,9 +133,12 @@ fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
             break;
         }
     }
-    for k in 0..LANES {
-        if contributors[k] > MAX_CONTRIBUTORS as f32 {
-            t[k] = t[k].min(nth_smallest(terms, k, MAX_CONTRIBUTORS + 1));
+    if order.len() > MAX_CONTRIBUTORS {
+        for k in 0..LANES {
+            let contributes = |i: &&usize| terms[**i].a[k] > 0.0 && terms[**i].diff[k] < t[k];
+            if order.iter().filter(contributes).count() > MAX_CONTRIBUTORS {
+                t[k] = t[k].min(nth_smallest(terms, order, k, MAX_CONTRIBUTORS + 1));
+            }
         }
     }
     t
@@ -139,9 +146,10 @@ fn consistent_threshold(terms: &[Term], m: f32) -> Lane {
 
 /// The n-th smallest diff among the candidates of one pixel, or the largest if there are
 /// fewer; at least [`SMALLEST_THRESHOLD`].
-fn nth_smallest(terms: &[Term], k: usize, n: usize) -> f32 {
-    let mut diffs: Vec<f32> = terms
+fn nth_smallest(terms: &[Term], order: &[usize], k: usize, n: usize) -> f32 {
+    let mut diffs: Vec<f32> = order
         .iter()
+        .map(|&i| &terms[i])
         .filter(|t| t.a[k] > 0.0)
         .map(|t| t.diff[k])
         .collect();
