@@ -82,12 +82,13 @@ impl Engine<'_> {
         for source_idx in views {
             let source = self.source(source_idx);
             let (sight, term) = seen.next();
-            term.diff = source.difference(tile);
-            let little = |k: usize| (tile.s[k] >= 0.0) & !(term.diff[k] > within);
+            let diff = source.difference(tile);
+            let little = |k: usize| (tile.s[k] >= 0.0) & !(diff[k] > within);
             if !any(little) || !source.see(tile, sight) {
                 continue;
             }
             self.mask(source_idx, sight, |_| true);
+            term.differ(&diff);
             term.a = sight.a;
             seen.keep(source_idx);
         }

@@ -96,7 +96,7 @@ pub(super) fn draw_field(
                 if any_bordered {
                     // Elsewhere the masks of all that is listed are one.
                     engine.mask(view.source_idx, sight, |k| listed.blended[k] > 0.0);
-                    term.diff = listed.diff;
+                    term.differ(&listed.diff);
                     term.a = each(|k| sight.a[k] * listed.blended[k]);
                 }
                 sight.a = each(|k| sight.a[k] * listed.weight[k]);

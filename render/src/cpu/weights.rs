@@ -6,7 +6,8 @@ use crate::options::{Blend, FieldOptions, MAX_CONTRIBUTORS};
 
 /// One source view's terms over a tile.
 pub(crate) struct Term {
-    pub diff: Lane,
+    /// See [`Self::differ`].
+    diff: Lane,
     pub a: Lane,
     /// The weight, not yet normalised; what this module computes.
     pub weight: Lane,
@@ -19,6 +20,14 @@ impl Term {
             diff: [0.0; LANES],
             a: [0.0; LANES],
             weight: [0.0; LANES],
+        }
+    }
+
+    /// Sets by how much the view differs, where that is more than noise; else by nothing.
+    #[inline(always)]
+    pub(crate) fn differ(&mut self, diff: &Lane) {
+        for k in 0..LANES {
+            self.diff[k] = if diff[k] > SMALLEST { diff[k] } else { 0.0 };
         }
     }
 }
@@ -39,16 +48,6 @@ pub(crate) fn weigh(terms: &mut [Term], order: &[usize], options: &FieldOptions)
 
 #[inline(always)]
 fn weigh_by_lanes(terms: &mut [Term], order: &[usize], options: &FieldOptions) -> Lane {
-    for &i in order {
-        let term = &mut terms[i];
-        term.diff = each(|k| {
-            if term.diff[k] > SMALLEST {
-                term.diff[k]
-            } else {
-                0.0
-            }
-        });
-    }
     let t = match options.blend {
         Blend::Consistent => consistent_threshold(terms, order, options.full_weight() as f32),
         Blend::Paper => each(|k| nth_smallest(terms, order, k, options.k)),
