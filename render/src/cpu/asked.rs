@@ -16,7 +16,7 @@ pub(super) struct Asked {
     /// Those groups of views in which all are that differ by `covered` or less there.
     groups: Vec<u32>,
     covered: f64,
-    /// By how much those differ that the next tile may need; zero if nothing says.
+    /// By how much those differ that the next tile may need.
     guess: f64,
     views: Vec<u32>,
 }
@@ -60,8 +60,10 @@ impl Asked {
         views
     }
 
-    /// Whether a tile that needs views as different as `reach` had them all, being asked `within` a
-    /// difference; if not, within which to ask next.
+    /// Learns that a tile, having asked `within` a difference, needs views as different as `reach`.
+    ///
+    /// # Errors
+    /// It did not have them all: the difference within which to ask next.
     pub(super) fn settles(&mut self, within: f64, reach: f32) -> Result<(), f64> {
         let needed = MARGIN * f64::from(reach);
         if needed > within {
@@ -125,7 +127,8 @@ impl Extent {
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.least.z > self.most.z
+        // Of points at infinity some coordinates are no numbers, but not all.
+        self.least.cmpgt(self.most).all()
     }
 
     /// What holds all that it is around; `None` where that goes to infinity.
@@ -142,5 +145,48 @@ impl Extent {
             radius,
             sight: radius,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tile(points: &[[f32; 4]]) -> Tile {
+        let mut tile = Tile::nothing();
+        for (k, &[x, y, z, s]) in points.iter().enumerate() {
+            (tile.x[k], tile.y[k], tile.z[k], tile.s[k]) = (x, y, z, s);
+        }
+        tile
+    }
+
+    #[test]
+    fn balls_hold_their_tiles_points() {
+        let points = [
+            [0.1, 0.2, 1.0, 0.5],
+            [-0.3, 0.1, 1.0, 0.25],
+            [0.0, 0.7, 1.0, 2.0],
+        ];
+        let ball = Extent::of(&tile(&points)).ball().unwrap();
+        for [x, y, z, s] in points.map(|point| point.map(f64::from)) {
+            let distance = (DVec3::new(x, y, z) / s).distance(ball.center);
+            assert!(distance <= ball.radius && ball.radius < 3.0);
+        }
+        let more = Extent::of(&tile(&[[9.0, 0.0, 1.0, 1.0]]));
+        let both = Extent::of(&tile(&points)).and(more).ball().unwrap();
+        assert!(both.radius > ball.radius);
+    }
+
+    #[test]
+    fn what_is_at_infinity_has_no_ball_but_is_there() {
+        assert!(Extent::of(&Tile::nothing()).is_empty());
+        assert!(Extent::EMPTY.is_empty() && Extent::EMPTY.ball().is_none());
+        for ray in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -2.0, 0.5]] {
+            let [x, y, z] = ray;
+            let extent = Extent::of(&tile(&[[x, y, z, 0.0]]));
+            assert!(!extent.is_empty() && extent.ball().is_none(), "{ray:?}");
+            let with_others = extent.and(Extent::of(&tile(&[[0.1, 0.2, 1.0, 0.5]])));
+            assert!(with_others.ball().is_none(), "{ray:?}");
+        }
     }
 }
