@@ -2,6 +2,9 @@
 
 use crate::field::TriangulatedField;
 
+/// Where no triangle covers a pixel.
+pub(crate) const NO_TRIANGLE: u32 = u32::MAX;
+
 /// Lattice steps a pixel; triangulations have their vertices on this lattice.
 const STEPS: i64 = 64;
 
@@ -118,6 +121,16 @@ impl Raster {
         }
     }
 
+    /// Notes for the pixels of a row which triangle covers each; the others stay as they are. `spans` is
+    /// room to work in.
+    pub(crate) fn cover(&self, row: usize, spans: &mut Vec<Span>, pixels: &mut [u32]) {
+        self.spans(row, spans);
+        let width = pixels.len();
+        for span in spans.iter() {
+            pixels[span.start..span.end.min(width)].fill(span.triangle_idx as u32);
+        }
+    }
+
     /// The shares of a triangle's corners in a pixel that it covers.
     #[inline]
     pub(crate) fn barycentric(&self, triangle_idx: usize, column: usize, row: usize) -> [f32; 3] {
@@ -160,15 +173,12 @@ fn edge(a: [i64; 2], b: [i64; 2]) -> Edge {
     }
 }
 
-/// The triangle under each pixel of an image, row by row; `u32::MAX` where there is none.
+/// The triangle under each pixel of an image, row by row; [`NO_TRIANGLE`] where there is none.
 pub(crate) fn triangle_map(raster: &Raster, width: usize, height: usize) -> Vec<u32> {
-    let mut map = vec![u32::MAX; width * height];
+    let mut map = vec![NO_TRIANGLE; width * height];
     let mut spans = Vec::new();
     for (row, pixels) in map.chunks_exact_mut(width).enumerate() {
-        raster.spans(row, &mut spans);
-        for span in &spans {
-            pixels[span.start..span.end.min(width)].fill(span.triangle_idx as u32);
-        }
+        raster.cover(row, &mut spans, pixels);
     }
     map
 }

@@ -6,7 +6,7 @@ use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
 use crate::photos::PhotoError;
-use crate::raster::{Raster, Span};
+use crate::raster::{NO_TRIANGLE, Raster, Span};
 use crate::rays::RayMap;
 use image::RgbaImage;
 use std::ops::Range;
@@ -22,10 +22,7 @@ pub(super) fn draw_field(
     let raster = Raster::new(field);
     let photos = Held::new(frame, &field.listed());
     let may_skip = frame.may_skip();
-    let (width, pitch) = (
-        frame.desired.width as usize,
-        frame.desired.width as usize * 4,
-    );
+    let width = frame.desired.width as usize;
     draw(frame, |band, scratch: &mut Scratch, pixels| {
         let Scratch {
             spans,
@@ -38,10 +35,7 @@ pub(super) fn draw_field(
         covering.clear();
         covering.resize(width * BAND, NO_TRIANGLE);
         for (y, covering) in covering.chunks_mut(width).enumerate() {
-            raster.spans(band * BAND + y, spans);
-            for span in spans.iter() {
-                covering[span.start..span.end.min(width)].fill(span.triangle_idx as u32);
-            }
+            raster.cover(band * BAND + y, spans, covering);
         }
         for [x, y] in tiles_of_band(width) {
             Part::of_tile(covering, width, [x, y], parts);
@@ -110,14 +104,11 @@ pub(super) fn draw_field(
                 seen.add_weights();
             }
             let colors = engine.shade(&photos, seen, |sight, _| &sight.a)?;
-            put(&colors, pixels, pitch, [x, y]);
+            put(&colors, pixels, width * 4, [x, y]);
         }
         Ok(())
     })
 }
-
-/// Where nothing covers a pixel.
-const NO_TRIANGLE: u32 = u32::MAX;
 
 /// A triangle and the pixels of a tile that it covers.
 struct Part {

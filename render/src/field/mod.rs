@@ -20,7 +20,7 @@ use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::held::Held;
 use crate::photos::PhotoError;
-use crate::raster::{Raster, triangle_map};
+use crate::raster::{NO_TRIANGLE, Raster, triangle_map};
 use crate::reference::{self, candidate};
 use crate::surface::Surface;
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
@@ -177,7 +177,7 @@ impl TriangulatedField {
         let at_pixel = |i: usize| {
             let (x, y) = (i % width, i / width);
             let point = frame.proxy_point(Pixel::center_of(x as u32, y as u32));
-            let Some(point) = point.filter(|_| map[i] != u32::MAX) else {
+            let Some(point) = point.filter(|_| map[i] != NO_TRIANGLE) else {
                 return Vec::new();
             };
             let shares = raster.barycentric(map[i] as usize, x, y).map(f64::from);
