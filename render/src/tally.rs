@@ -19,7 +19,7 @@ impl Tally {
         }
     }
 
-    /// That when it was asked for a point, triangle or block of pixels, the views `found` are scored.
+    /// That when it was asked for a point, triangle or tile of pixels, the views `found` are scored.
     pub(crate) fn note(&self, found: &[u32]) {
         self.questions.fetch_add(1, Ordering::Relaxed);
         let count = found.len() as u64;
@@ -49,7 +49,7 @@ impl Tally {
 /// What was scored for a frame so far: see [`Frame::scored`](crate::Frame::scored).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scored {
-    /// How often it was asked which views to score: for vertices, triangles and blocks of pixels,
+    /// How often it was asked which views to score: for vertices, triangles and tiles of pixels,
     /// again where too few were found.
     pub questions: u64,
     /// How many views were, over all of them.
