@@ -1,4 +1,4 @@
-//! A row of pixels at a time: plain loops over fixed arrays, which the compiler turns into
+//! A tile of pixels at a time: plain loops over fixed arrays, which the compiler turns into
 //! vector instructions: the widest that the machine has, found when the program runs. No fused
 //! multiply-adds, so every machine computes the same bytes.
 

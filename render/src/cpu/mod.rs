@@ -1,4 +1,4 @@
-//! The shipped CPU engine: f32, a row of pixels at a time, all threads.
+//! The shipped CPU engine: f32, a tile of pixels at a time, all threads.
 //!
 //! Every pixel is computed from its own inputs alone, so any number of threads gives the
 //! same bytes.

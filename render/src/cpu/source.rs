@@ -9,7 +9,7 @@ use crate::options::Resolution;
 use glam::DVec3;
 use lens::LensOf;
 
-/// Pixels, of one row as a rule: their rays (desired camera's frame) and proxy points.
+/// Pixels: their rays (desired camera's frame) and proxy points.
 pub(crate) struct Tile<T = f32> {
     pub x: Lane<T>,
     pub y: Lane<T>,

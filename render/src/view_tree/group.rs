@@ -160,8 +160,8 @@ impl Group {
         let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
         let along = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
         let by_distance = each(|i| 1.0 / distance[i]);
-        // At most the angle: its sine, or one where that is obtuse, or what is less by a few hundredths where
-        // that is too little to tell.
+        // At most the angle: its sine, or one where that is obtuse; where those are too little to tell,
+        // a closer bound.
         let sine = each(|i| across[i] * (by_here * by_distance[i]));
         let angle = match query.most < SINES_TELL {
             true => each(|i| if along[i] > 0.0 { sine[i] } else { 1.0 }),
