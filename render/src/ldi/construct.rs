@@ -1,7 +1,9 @@
 //! An LDI of the images that a portal's semicircle has, or of photos that see through the portal.
 
+use super::ends::quarter_turns;
+use super::fit::{Offered, fitted};
 use super::layered::pinhole_view;
-use super::{Layered, LdiError, Look, Sample};
+use super::{Ends, Layered, LdiError, Look, Sample};
 use crate::interior::{Pinhole, Reference, Warp, normal_at};
 use glam::{DVec2, DVec3};
 use proxy::interior::SemicircleView;
@@ -9,14 +11,16 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// When two samples count as one surface, and what becomes of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Conflict {
     /// The one that sees the smaller patch of the surface stays; two of one image both do
     /// (Rafferty et al. 1998, "Images for accelerating architectural walkthroughs", §4.1). Not so
     /// those that are farther apart than half the larger patch's side: they are of different places
-    /// of a surface that is seen along.
-    #[default]
-    SmallerPatch,
+    /// of a surface that is seen along; nor those of another colour, between which there is an edge.
+    SmallerPatch {
+        /// The greatest difference of a channel that is the same colour, of 255: 255 is the paper's rule.
+        same_color: u8,
+    },
     /// The first stays; another colour is another surface (Popescu et al. 1998, §3.1).
     RangeThenColor {
         /// The greatest difference of a channel that is the same colour, of 255.
@@ -39,6 +43,14 @@ pub struct ConstructOptions {
     pub center_in_front: bool,
     /// How far the LDI reaches to each side of the central image, in widths and heights of that.
     pub margin: f64,
+    /// Whether colours are fitted to all samples offered, those that gave way, too.
+    pub fit: bool,
+}
+
+impl Default for Conflict {
+    fn default() -> Self {
+        Self::SmallerPatch { same_color: 16 }
+    }
 }
 
 impl Default for ConstructOptions {
@@ -48,6 +60,7 @@ impl Default for ConstructOptions {
             conflict: Conflict::default(),
             center_in_front: true,
             margin: 3.0,
+            fit: true,
         }
     }
 }
@@ -133,7 +146,8 @@ pub fn construct_around(
 /// they show. There is no central image: all samples are alike, in depth order.
 ///
 /// `noise` is the standard deviation of the photos' inverse depths: samples are one surface within
-/// the range that the options say, or within what two such depths differ by.
+/// the range that the options say, or within what two such depths differ by. Colours decide nothing, and
+/// are those of the photos.
 ///
 /// # Errors
 /// No images; a camera that is none.
@@ -147,7 +161,15 @@ pub fn construct_of_photos(
     if photos.is_empty() {
         return Err(LdiError::NoImages);
     }
-    made(place, camera, photos, 1, noise.max(0.0), options)
+    // Photos differ by exposure, focus and noise of depths, not only where there is an edge.
+    let mut options = ConstructOptions {
+        fit: false,
+        ..*options
+    };
+    if let Conflict::SmallerPatch { same_color } = &mut options.conflict {
+        *same_color = u8::MAX;
+    }
+    made(place, camera, photos, 1, noise.max(0.0), &options)
 }
 
 /// Images in order, the first of which is so-manieth: the central one is 0.
@@ -201,6 +223,8 @@ fn made(
     for (rank, &image) in (first..).zip(images) {
         let warp = Warp::new(&image.camera, &ldi_camera);
         let turn = ldi_camera.rotation * image.camera.rotation.transpose();
+        let quarters = quarter_turns(turn);
+        let size_of_image = [image.seen.width, image.seen.height].map(|n| n as usize);
         let node = |(pixel, s): (DVec2, f64)| {
             let at = warp.at(pixel, s)?;
             let corner = at.pixel.floor();
@@ -211,15 +235,18 @@ fn made(
             }
             let (normal, area) = patch(image, pixel, s);
             let normal = turn * normal;
+            let i = index(image, pixel);
+            let ends = Ends::of(&image.seen.inverse_depth, size_of_image, i, noise);
             let ray = (at.pixel - ldi_camera.principal) / ldi_camera.focal;
             let ray = ray.extend(1.0);
             let cosine = normal.dot(ray).abs() / (normal.length() * ray.length());
             let offset = (256.0 * (at.pixel - corner - 0.5)).floor();
             let sample = Sample {
-                color: image.seen.color[index(image, pixel)],
+                color: image.seen.color[i],
                 inverse_depth,
                 offset: [offset.x as i8, offset.y as i8],
                 look: Look::new(normal, area.sqrt() * at.inverse_depth),
+                ends: ends.turned(quarters),
             };
             // Depth here is there / s plus what no depth changes.
             let change = warp.pixel_from_pixel.row(2).dot(pixel.extend(1.0)).abs() / (s * s);
@@ -254,7 +281,13 @@ fn made(
     let crowded = sorted.iter().map(|s| s.crowded).sum();
     let before_center = sorted.iter().map(|s| s.before_center).sum();
     let merged = bands.iter().map(|band| band.merged).sum();
-    let ldi = Layered::new(view, place.portal.0, &counts, samples.into_iter())?;
+    let mut ldi = Layered::new(view, place.portal.0, &counts, samples.into_iter())?;
+    // 4. Their colours.
+    if options.fit {
+        let offered: Vec<&[Offered]> = bands.iter().map(|b| b.offered.as_slice()).collect();
+        let colors = fitted(&ldi, &offered, rows, options.range);
+        ldi.color[..colors.len()].copy_from_slice(&colors);
+    }
     Ok(Constructed {
         ldi,
         offered,
@@ -296,6 +329,8 @@ struct Making {
     pixels: Range<usize>,
     heads: Vec<u32>,
     nodes: Vec<Node>,
+    /// All samples that fall in it, if colours are fitted to them.
+    offered: Vec<Offered>,
     options: ConstructOptions,
     merged: usize,
 }
@@ -316,6 +351,7 @@ impl Making {
             heads: vec![NONE; pixels.len()],
             pixels,
             nodes: Vec::new(),
+            offered: Vec::new(),
             options,
             merged: 0,
         }
@@ -367,6 +403,10 @@ impl Making {
     /// Puts a sample into a pixel's list, or merges it with the one nearest in depth of those that it
     /// is in conflict with.
     fn add(&mut self, new: Node, pixel: usize) {
+        if self.options.fit {
+            let (pixel, sample) = (pixel as u32, new.sample);
+            self.offered.push(Offered { pixel, sample });
+        }
         let pixel = pixel - self.pixels.start;
         let (sample, s) = (new.sample, f64::from(new.sample.inverse_depth));
         let mut found: Option<(usize, f64)> = None;
@@ -376,17 +416,20 @@ impl Making {
             // Of the depths' difference the share of the greater: 1 - s₁/s₂.
             let apart = 1.0 - s.min(other) / s.max(other);
             let noise = SAME_SURFACE * new.deviation.hypot(node.deviation) * s.min(other);
+            let is_like = |same_color| {
+                let [a, b] = [node.sample.color, sample.color];
+                (0..3).all(|k| a[k].abs_diff(b[k]) <= same_color)
+            };
             let is_other = match self.options.conflict {
-                Conflict::SmallerPatch => node.image != new.image,
-                Conflict::RangeThenColor { same_color } => {
-                    let [a, b] = [node.sample.color, sample.color];
-                    (0..3).all(|k| a[k].abs_diff(b[k]) <= same_color)
+                Conflict::SmallerPatch { same_color } => {
+                    node.image != new.image && is_like(same_color)
                 }
+                Conflict::RangeThenColor { same_color } => is_like(same_color),
                 Conflict::Average => true,
             };
             // Of a surface that is seen along a pixel has several places, each with its own patch.
             let range = match self.options.conflict {
-                Conflict::SmallerPatch if new.is_seen_along || node.is_seen_along => {
+                Conflict::SmallerPatch { .. } if new.is_seen_along || node.is_seen_along => {
                     let side = new.area.max(node.area).sqrt();
                     self.options.range.min(PATCHES * side * s.min(other))
                 }
@@ -407,7 +450,7 @@ impl Making {
         self.merged += 1;
         let node = &mut self.nodes[i];
         match self.options.conflict {
-            Conflict::SmallerPatch => {
+            Conflict::SmallerPatch { .. } => {
                 if node.image != 0 && new.area < node.area {
                     *node = Node {
                         next: node.next,

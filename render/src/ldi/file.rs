@@ -1,4 +1,4 @@
-//! LDIs as files, version 1.
+//! LDIs as files, version 2.
 //!
 //! Little-endian, every part at a multiple of 8 bytes:
 //!
@@ -12,10 +12,10 @@
 //! | 4 × 4 | portal, width, height, 0 |
 //! | 4 × (height + 1) | how many samples are before each row; all |
 //! | width × height | how many samples each pixel has |
-//! | 12 each | samples, back to front: rgba8, f32 inverse depth, two i8 offsets, u16 look |
+//! | 12 each | samples, back to front: rgb8, a byte of [`Ends`], f32 inverse depth, two i8 offsets, u16 look |
 
 use super::layered::pinhole_view;
-use super::{Layered, LdiError, Look, Sample};
+use super::{Ends, Layered, LdiError, Look, Sample};
 use bytemuck::{Pod, Zeroable};
 use calibrate::Rigid3;
 use glam::{DQuat, DVec2, DVec3};
@@ -38,7 +38,7 @@ pub enum LdiFileError {
     #[error("{}: no LDI: it does not begin with LUMI-LDI", .0.display())]
     Magic(PathBuf),
     /// Of a version that this program does not know.
-    #[error("{}: LDI version {found}; expected 1: make it again with this program", .path.display())]
+    #[error("{}: LDI version {found}; expected {VERSION}: make it again with this program", .path.display())]
     Version {
         /// Of the file.
         path: PathBuf,
@@ -90,7 +90,7 @@ pub enum LdiFileError {
 }
 
 const MAGIC: [u8; 8] = *b"LUMI-LDI";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// As the file begins.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -115,7 +115,8 @@ const HEADER: usize = size_of::<Header>();
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Record {
-    color: [u8; 4],
+    color: [u8; 3],
+    ends: u8,
     inverse_depth: u32,
     offset: [i8; 2],
     look: u16,
@@ -245,11 +246,13 @@ pub fn parse(path: &Path, content: &[u8]) -> Result<Layered, LdiFileError> {
     let records = part(samples_at, bytes).chunks_exact(size_of::<Record>());
     let samples = records.map(|bytes| {
         let record: Record = bytemuck::pod_read_unaligned(bytes);
+        let [r, g, b] = record.color;
         Sample {
-            color: record.color,
+            color: [r, g, b, 255],
             inverse_depth: f32::from_bits(u32::from_le(record.inverse_depth)),
             offset: record.offset,
             look: Look(u16::from_le(record.look)),
+            ends: Ends(record.ends & 15),
         }
     });
     Layered::new(view, u32::from_le(header.portal), counts, samples).map_err(content_error)
@@ -311,8 +314,10 @@ fn bytes(ldi: &Layered) -> Vec<u8> {
     bytes.extend(ldi.counts());
     pad(&mut bytes);
     for sample in ldi.samples() {
+        let [r, g, b, _] = sample.color;
         let record = Record {
-            color: sample.color,
+            color: [r, g, b],
+            ends: sample.ends.0,
             inverse_depth: sample.inverse_depth.to_bits().to_le(),
             offset: sample.offset,
             look: sample.look.0.to_le(),

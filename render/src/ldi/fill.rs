@@ -39,13 +39,28 @@ impl Met {
 }
 
 /// Fills the pixels of a window that show nothing from those that do, along their row and
-/// column, where one of the two is open over no more than a distance; how many are left.
+/// column, where one of the two is open over no more than a distance, be it once the others are filled;
+/// how many are left.
 pub(crate) fn fill(
+    window: &Window,
+    box_of_pixels: [&Range<u32>; 2],
+    reach: u32,
+    into: &mut Target,
+) -> usize {
+    let [filled, left] = fill_narrow(window, box_of_pixels, reach, into);
+    match (filled, left) {
+        (0, _) | (_, 0) => left,
+        _ => fill_narrow(window, box_of_pixels, reach, into)[1],
+    }
+}
+
+/// Fills those that are narrow now; how many, and how many are left.
+fn fill_narrow(
     window: &Window,
     [across, down]: [&Range<u32>; 2],
     reach: u32,
     into: &mut Target,
-) -> usize {
+) -> [usize; 2] {
     let width = into.width as usize;
     let reach = reach.min(1 << 20) as i32;
     let (colors, depths) = (&into.color, &into.inverse_depth);
@@ -117,13 +132,14 @@ pub(crate) fn fill(
         (filled, left)
     };
     let rows: Vec<_> = down.clone().into_par_iter().map(fill_row).collect();
-    let mut left = 0;
+    let [mut count, mut left] = [0; 2];
     for (row, unfilled) in rows {
+        count += row.len();
         left += unfilled;
         for (i, color, depth) in row {
             into.color[i] = color;
             into.inverse_depth[i] = depth;
         }
     }
-    left
+    [count, left]
 }

@@ -9,6 +9,7 @@
 mod band;
 mod place;
 
+use super::ends::Ends;
 use super::fill::fill;
 use super::look::Sizes;
 use super::project::Projection;
@@ -16,6 +17,7 @@ use super::{Clipped, Layered};
 use crate::cpu::lanes::vectorised;
 use crate::interior::{Pinhole, Target, Window};
 use band::{BAND, Band, MARGIN};
+pub(super) use band::{gaussian, narrowness};
 use place::{Chunk, Work};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -27,6 +29,8 @@ pub struct FreeOptions {
     pub tolerance: f32,
     /// The Gaussian's deviation, in half sides of the sample's patch.
     pub deviation: f32,
+    /// What of half a side a patch covers where its surface ends.
+    pub end: f32,
     /// What patches are made larger by, so that few gaps are left between neighbours.
     pub grow: f32,
     /// The least half side of a patch, in pixels.
@@ -56,10 +60,11 @@ impl FreeOptions {
 impl Default for FreeOptions {
     fn default() -> Self {
         Self {
-            tolerance: 0.05,
-            deviation: 0.7,
-            grow: 1.3,
-            least: 0.6,
+            tolerance: 0.06,
+            deviation: 0.5,
+            end: 0.2,
+            grow: 1.5,
+            least: 0.5,
             wide: 1.6,
             least_wide: 1.5,
             most: 4.0,
@@ -219,6 +224,7 @@ pub(crate) struct Options {
     /// What makes the nearest inverse depth the farthest of the same surface.
     pub(crate) nearer: f32,
     pub(crate) deviation: f32,
+    pub(crate) end: f32,
     pub(crate) grow: f32,
     pub(crate) least: f32,
     pub(crate) wide: f32,
@@ -234,12 +240,19 @@ impl Options {
         Self {
             nearer: 1.0 - within(options.tolerance, 0.0, 0.5),
             deviation: within(options.deviation, 0.2, 2.0),
+            end: within(options.end, 0.0, 1.0),
             grow: within(options.grow, 0.1, 10.0),
             least,
             wide: within(options.wide, 1.0, 4.0),
             least_wide,
             most: within(options.most, least_wide, MOST),
         }
+    }
+
+    /// By where its surface ends, what of half a side a patch covers to the right, below, to the left
+    /// and above.
+    fn covered(&self) -> [[f32; 4]; 16] {
+        std::array::from_fn(|bits| Ends(bits as u8).covered(self.end))
     }
 
     /// Half a side of what a patch of that half side covers if nothing else does.

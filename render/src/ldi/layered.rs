@@ -1,6 +1,6 @@
 //! The data of a layered depth image.
 
-use super::Look;
+use super::{Ends, Look};
 use crate::interior::{Pinhole, PinholeError};
 use calibrate::{Lens, Rigid3, View};
 use glam::DVec2;
@@ -32,6 +32,7 @@ pub struct Layered {
     pub(super) inverse_depth: Vec<f32>,
     pub(super) color: Vec<[u8; 4]>,
     pub(super) look: Vec<Look>,
+    pub(super) ends: Vec<Ends>,
 }
 
 /// One sample of a pixel.
@@ -45,6 +46,8 @@ pub struct Sample {
     pub offset: [i8; 2],
     /// The surface's normal and the size of what the sample stands for.
     pub look: Look,
+    /// Where its surface ends, as the LDI's camera sees it.
+    pub ends: Ends,
 }
 
 /// Why samples make no LDI.
@@ -120,6 +123,7 @@ impl Layered {
             inverse_depth: Vec::with_capacity(room),
             color: Vec::with_capacity(room),
             look: Vec::with_capacity(room),
+            ends: Vec::with_capacity(room),
             first: Vec::new(),
             near: 0.0,
             view,
@@ -144,6 +148,7 @@ impl Layered {
                 ldi.inverse_depth.push(s);
                 ldi.color.push(sample.color);
                 ldi.look.push(sample.look);
+                ldi.ends.push(sample.ends);
             }
         }
         first.push(ldi.x.len() as u32);
@@ -156,6 +161,7 @@ impl Layered {
         ldi.inverse_depth.resize(room, 0.0);
         ldi.color.resize(room, [0; 4]);
         ldi.look.resize(room, Look::default());
+        ldi.ends.resize(room, Ends::default());
         Ok(ldi)
     }
 
@@ -165,11 +171,12 @@ impl Layered {
     }
 
     /// Its samples as a graphics device has them: x, y from the row's middle, inverse depth, colour
-    /// and look.
+    /// with where the surface ends in place of alpha, and look.
     pub(crate) fn words(&self) -> impl ExactSizeIterator<Item = [u32; 5]> + '_ {
         (0..self.len()).map(|i| {
             let [x, y, s] = [self.x[i], self.y[i], self.inverse_depth[i]].map(f32::to_bits);
-            let color = u32::from_le_bytes(self.color[i]);
+            let [r, g, b, _] = self.color[i];
+            let color = u32::from_le_bytes([r, g, b, self.ends[i].0]);
             [x, y, s, color, u32::from(self.look[i].0)]
         })
     }
@@ -181,7 +188,8 @@ impl Layered {
 
     /// What it takes in memory.
     pub fn bytes(&self) -> u64 {
-        let sample = size_of::<[f32; 3]>() + size_of::<[u8; 4]>() + size_of::<Look>();
+        let sample =
+            size_of::<[f32; 3]>() + size_of::<[u8; 4]>() + size_of::<Look>() + size_of::<Ends>();
         (self.x.len() * sample + self.first.len() * size_of::<u32>()) as u64
     }
 
@@ -208,6 +216,7 @@ impl Layered {
             inverse_depth: self.inverse_depth[i],
             offset: [self.x[i] - column, self.y[i]].map(|o| (256.0 * o) as i8),
             look: self.look[i],
+            ends: self.ends[i],
         })
     }
 

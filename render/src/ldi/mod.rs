@@ -10,8 +10,10 @@
 
 mod clip;
 mod construct;
+mod ends;
 mod file;
 mod fill;
+mod fit;
 mod fragments;
 mod free;
 mod layered;
@@ -26,6 +28,7 @@ pub use clip::{ClipTree, Clipped};
 pub use construct::{
     Conflict, ConstructOptions, Constructed, construct, construct_around, construct_of_photos,
 };
+pub use ends::Ends;
 pub use file::{LdiFileError, parse, read, read_before, write};
 pub use fragments::Pieces;
 pub use free::{Free, FreeCost, FreeOptions, free};

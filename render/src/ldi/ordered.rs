@@ -2,7 +2,9 @@
 //!
 //! With several fragments they are drawn at once, but for the samples whose stamps may reach
 //! another one's. Those pixels are then cleared, and all samples that reach them are drawn again
-//! in the one order that there is. So the bytes are those of one fragment.
+//! in the one order that there is. So the bytes are those of one fragment. Where half a pixel of the LDI
+//! is so large that a sample lies far beyond the cut that its pixel's middle is on this side of, all is
+//! drawn as one fragment.
 
 use super::fragments::{Pieces, Wedge, overlap};
 use super::free::bounds;
@@ -47,7 +49,7 @@ pub struct OrderedCost {
     pub buffer: usize,
     /// Those drawn a second time beside them.
     pub again: usize,
-    /// By fragment, samples looked at.
+    /// By fragment, samples looked at; of one where no cut was of use.
     pub areas: Vec<usize>,
 }
 
@@ -122,22 +124,11 @@ pub fn ordered_by(
         .canvas
         .resize_with(stride * height, AtomicU64::default);
     let canvas = &mut scratch.canvas;
-    canvas.par_chunks_mut(1 << 14).for_each(|part| {
-        for cell in part {
-            *cell.get_mut() = 0;
-        }
-    });
+    clear(canvas);
     // 1. Fragments, each in order.
     let warp = Warp::new(&ldi.camera, desired);
-    if options.fragments <= 1 {
-        let mut part = Part::default();
-        vectorised(
-            #[inline(always)]
-            || work.draw(None, None, canvas, &mut part),
-        );
-        (cost.samples, cost.drawn) = (part.samples, part.drawn);
-        cost.areas = vec![part.samples];
-    } else {
+    let mut is_drawn = false;
+    if options.fragments > 1 {
         let (f, c) = (ldi.camera.focal, ldi.camera.principal);
         let epipole = DVec3::new(
             f.x * warp.center.x + c.x * warp.center.z,
@@ -149,30 +140,44 @@ pub fn ordered_by(
         let fences: Vec<Fence> = wedges
             .map(|w| Fence::new(w, &warp, options.stamp))
             .collect();
-        let canvas = &*canvas;
+        let cells = &*canvas;
         let draw = |(spans, fence): (&Vec<(u32, Range<u32>)>, &Fence)| {
             let mut part = Part::default();
             vectorised(
                 #[inline(always)]
-                || work.draw(Some(spans), Some(fence), canvas, &mut part),
+                || work.draw(Some(spans), Some(fence), cells, &mut part),
             );
             part
         };
         let all = pieces.spans.par_iter().zip(&fences).with_max_len(1);
         let parts: Vec<Part> = all.map(draw).collect();
-        for part in &parts {
+        is_drawn = !parts.iter().any(|part| part.has_strays);
+        if !is_drawn {
+            clear(canvas);
+        }
+        for part in parts.iter().filter(|_| is_drawn) {
             cost.samples += part.samples;
             cost.drawn += part.drawn;
             cost.areas.push(part.samples);
         }
         // 2. What lies between.
-        let mut zone: Vec<Kept> = parts.into_iter().flat_map(|part| part.zone).collect();
+        let zone = parts.into_iter().filter(|_| is_drawn);
+        let mut zone: Vec<Kept> = zone.flat_map(|part| part.zone).collect();
         zone.par_sort_unstable_by_key(|kept| kept.rank);
         cost.buffer = zone.iter().filter(|kept| kept.is_buffer).count();
         cost.again = zone.len() - cost.buffer;
         scratch.is_dirty.clear();
         scratch.is_dirty.resize(stride * height, false);
-        work.draw_again(&zone, &mut scratch.canvas, &mut scratch.is_dirty);
+        work.draw_again(&zone, canvas, &mut scratch.is_dirty);
+    }
+    if !is_drawn {
+        let mut part = Part::default();
+        vectorised(
+            #[inline(always)]
+            || work.draw(None, None, canvas, &mut part),
+        );
+        (cost.samples, cost.drawn) = (part.samples, part.drawn);
+        cost.areas = vec![part.samples];
     }
     // 3. Into the picture.
     let picture = into.width as usize;
@@ -193,6 +198,14 @@ pub fn ordered_by(
         }
     });
     cost
+}
+
+fn clear(canvas: &mut [AtomicU64]) {
+    canvas.par_chunks_mut(1 << 14).for_each(|part| {
+        for cell in part {
+            *cell.get_mut() = 0;
+        }
+    });
 }
 
 /// Where samples are in the order: how many come before each row.
@@ -283,6 +296,8 @@ struct Part {
     samples: usize,
     drawn: usize,
     zone: Vec<Kept>,
+    /// Whether a sample is drawn farther beyond a cut than zones are wide for.
+    has_strays: bool,
 }
 
 /// Samples of a run, ready to be drawn.
@@ -422,11 +437,12 @@ impl Work<'_> {
                     let off = |l: [f32; 3]| (l[0] * xs[k] + l[1] * ys[k] + l[2]) * block.scale[k];
                     let (a, b) = (off(a), off(b));
                     let nearer = a.abs().min(b.abs());
-                    let is_within = match fence.is_convex {
-                        true => (a > 0.0) & (b > 0.0),
-                        false => (a > 0.0) | (b > 0.0),
+                    // How far it lies within.
+                    let inside = match fence.is_convex {
+                        true => a.min(b),
+                        false => a.max(b),
                     };
-                    apart[k] = if is_within { nearer } else { -1.0 };
+                    apart[k] = if inside > 0.0 { nearer } else { inside };
                 }
             }
         }
@@ -454,8 +470,9 @@ impl Work<'_> {
             if fence.is_some() {
                 let apart = ready.apart[k];
                 let is_buffer = !(apart >= 1.0);
-                // A sample of the buffer is within one reach of a cut, and so is what it draws
-                // of it; what reaches that is within three.
+                // A sample of the buffer is within one reach of a cut, on either side, and so is what it
+                // draws of it; what reaches that is within three.
+                part.has_strays |= !(apart >= -1.0);
                 if !(apart >= 3.0) {
                     part.zone.push(Kept {
                         rank: self.ranks.rank(self.ldi, &self.traversal.columns, row, i),

@@ -5,6 +5,7 @@
 //! multiply-adds are fused, so every machine computes the same bytes.
 
 use super::Layered;
+use super::ends::quarter_turns;
 use crate::interior::{Pinhole, Warp};
 use glam::DVec3;
 
@@ -20,6 +21,8 @@ pub(crate) struct Projection {
     pub(crate) per_x: [f32; 3],
     pub(crate) per_y: [f32; 3],
     pub(crate) per_depth: [f32; 3],
+    /// By how many quarters the LDI is turned in the desired image, from right to below.
+    pub(crate) turn: u32,
 }
 
 /// Where up to [`LANES`] samples fall.
@@ -58,6 +61,7 @@ impl Projection {
             per_x: small(h.x_axis),
             per_y: small(h.y_axis),
             per_depth: small(warp.shift),
+            turn: quarter_turns(desired.rotation * ldi.camera.rotation.transpose()),
         }
     }
 

@@ -14,7 +14,7 @@ use render::interior::{
     Captured, CellGeometry, DepthMaps, LdiSource, Library, LibraryOptions, Painter, Pinhole,
     PortalLdi, Reference, Target, Window,
 };
-use render::ldi::{Clipped, Free, FreeOptions, free as free_order};
+use render::ldi::{Clipped, Conflict, ConstructOptions, Free, FreeOptions, free as free_order};
 use render::score::score;
 use render::{DeviceChoice, Engine, FieldOptions, Lumigraph, Method, PhotoStore, SourceView};
 use std::sync::Arc;
@@ -164,6 +164,12 @@ impl Taken {
             size: [96; 2],
             semicircles: semicircles(),
             ldi_of,
+            // As LDIs of photos are.
+            ldi: ConstructOptions {
+                conflict: Conflict::SmallerPatch { same_color: 255 },
+                fit: false,
+                ..ConstructOptions::default()
+            },
             ..LibraryOptions::default()
         };
         let (interior, model) = (&self.house.interior, &self.house.model);

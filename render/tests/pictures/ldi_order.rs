@@ -9,7 +9,7 @@ use proxy::interior::{SemicircleOptions, semicircles};
 use rayon::prelude::*;
 use render::interior::{CellGeometry, Pinhole, Reference, Target, Warp, Window};
 use render::ldi::{
-    Clipped, ConstructOptions, Layered, Look, Ordered, OrderedOptions, Run, Sample, Stamp,
+    Clipped, ConstructOptions, Ends, Layered, Look, Ordered, OrderedOptions, Run, Sample, Stamp,
     Traversal, construct, ordered, ordered_by,
 };
 
@@ -170,6 +170,7 @@ fn noise(seed: u64) -> Layered {
             inverse_depth,
             offset: [(256.0 * r() - 128.0) as i8, (256.0 * r() - 128.0) as i8],
             look: Look::default(),
+            ends: Ends::default(),
         }));
     }
     Layered::new(view, 0, &counts, samples.into_iter()).unwrap()
@@ -331,6 +332,7 @@ fn the_epipoles_row_and_column_come_at_the_right_end() {
                     inverse_depth: s as f32,
                     offset: [offset.x as i8, offset.y as i8],
                     look: Look::default(),
+                    ends: Ends::default(),
                 });
             }
             let ldi = Layered::new(view.clone(), 0, &counts, samples.into_iter()).unwrap();

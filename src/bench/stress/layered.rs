@@ -5,8 +5,8 @@ use calibrate::{Lens, Rigid3, View};
 use glam::{DVec2, DVec3};
 use render::interior::{Pinhole, Target, Window};
 use render::ldi::{
-    ClipTree, Clipped, Free, FreeOptions, Layered, Look, Ordered, OrderedOptions, Sample, Stamp,
-    free, ordered,
+    ClipTree, Clipped, Ends, Free, FreeOptions, Layered, Look, Ordered, OrderedOptions, Sample,
+    Stamp, free, ordered,
 };
 
 /// Pixels of the layered image and of the desired view.
@@ -111,6 +111,7 @@ fn layered(random: &mut Random) -> Result<(&'static str, Layered), String> {
                 inverse_depth: inverse_depth as f32,
                 offset,
                 look: Look(random.below(1 << 16) as u16),
+                ends: Ends(random.below(16) as u8),
             });
         }
     }

@@ -72,6 +72,7 @@ struct Params {
     size: [u32; 4],
     patches: [f32; 4],
     wide: [f32; 4],
+    end: [f32; 4],
 }
 
 impl fmt::Debug for GpuWarp {
@@ -388,7 +389,7 @@ fn params(
         per_x: wide(projection.per_x),
         per_y: wide(projection.per_y),
         per_depth: wide(projection.per_depth),
-        size: [width, height, stretches, 0],
+        size: [width, height, stretches, projection.turn],
         patches: [options.grow, options.least, options.most, options.nearer],
         wide: [
             options.wide,
@@ -396,6 +397,7 @@ fn params(
             options.deviation,
             crate::ldi::BEYOND,
         ],
+        end: [options.end, 0.0, 0.0, 0.0],
     }
 }
 

@@ -13,7 +13,8 @@ struct Warp {
     per_x: vec4f,
     per_y: vec4f,
     per_depth: vec4f,
-    // Width and height in pixels; how many stretches there are.
+    // Width and height in pixels; how many stretches there are; by how many quarters the samples' image is
+    // turned in the picture.
     size: vec4u,
     // What patches are made larger by, the least and the greatest half side, in pixels; what makes
     // the nearest depth the farthest of the same surface.
@@ -21,10 +22,13 @@ struct Warp {
     // What patches are made larger by, again, and the least half side, where none covers; the
     // Gaussian's deviation in half sides; how far beyond its patch a sample counts.
     wide: vec4f,
+    // What of half a side a patch covers where its surface ends.
+    end: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> warp: Warp;
-// By sample, five words: x, y from the row's middle, inverse depth, colour, look.
+// By sample, five words: x, y from the row's middle, inverse depth, colour with where the surface
+// ends in place of alpha, look.
 @group(0) @binding(1) var<storage, read> samples: array<u32>;
 // Samples of a row one after the other: the first, one past the last; then the row's base.
 @group(0) @binding(2) var<storage, read> stretches: array<vec4u>;
@@ -89,6 +93,16 @@ fn pixels_around(at: vec2f, reach: vec2f) -> Box {
 
 fn is_within(pixel: vec2u, at: vec2f, reach: vec2f) -> bool {
     return all(abs(vec2f(pixel) + 0.5 - at) <= reach);
+}
+
+// Whether a patch covers a pixel: less where its surface ends, 1 right, 2 below, 4 left, 8 above.
+fn is_covered(pixel: vec2u, drawn: Drawn) -> bool {
+    let ends = drawn.color >> 24u;
+    let turned = (ends << warp.size.w) | (ends >> (4u - warp.size.w));
+    let is_end = vec4u(turned & 1u, turned & 2u, turned & 4u, turned & 8u) != vec4u(0u);
+    let reach = select(vec4f(1.0), vec4f(warp.end.x), is_end) * drawn.half.xyxy;
+    let d = vec2f(pixel) + 0.5 - drawn.at;
+    return all(d <= reach.xy) && all(d >= -reach.zw);
 }
 
 // e⁻ᵗ within 6 % of 1 for t ≥ 0: (1 − t/16)¹⁶, zero from 16 on.
@@ -171,7 +185,7 @@ fn near(
             for (var x = box.first.x; x < box.end.x; x++) {
                 let pixel = y * warp.size.x + x;
                 let is_open = !is_wide || nearest_at(pixel) == 0.0;
-                if is_open && is_within(vec2u(x, y), drawn.at, drawn.half) {
+                if is_open && is_covered(vec2u(x, y), drawn) {
                     // Positive numbers are in the order of their bits.
                     let word = select(2u, 3u, is_wide) * pixel_count() + pixel;
                     atomicMax(&pixels[word], bitcast<u32>(drawn.inverse_depth));

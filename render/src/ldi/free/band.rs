@@ -1,6 +1,8 @@
 //! Drawing samples into the rows of a band: the nearest depths, then the means.
 
 use super::{BEYOND, Options};
+use crate::ldi::Ends;
+use std::ops::Range;
 
 /// A sample as it will be drawn.
 #[derive(Clone, Copy, Debug)]
@@ -12,7 +14,9 @@ pub(super) struct Drawn {
     pub(super) half: [f32; 2],
     /// The first column and row within reach, from the margin's.
     pub(super) first: [i16; 2],
-    pub(super) color: [u8; 4],
+    pub(super) color: [u8; 3],
+    /// Of its patch in the picture.
+    pub(super) ends: Ends,
 }
 
 /// Rows of the picture.
@@ -36,6 +40,9 @@ const WIDE: usize = 4;
 pub(super) const MARGIN: usize = 16;
 /// Pixels across that have their holes found together.
 const COLUMN: usize = 8;
+
+/// Rows of the tiles that a splat may reach, rounded up.
+const MOST_ROWS: usize = 16;
 
 /// Within less than 2, 4 and 6 pixels are no more than 4, 8 and 12 middles.
 #[inline(always)]
@@ -116,17 +123,18 @@ impl Band {
             plane.clear();
             plane.resize(size, 0.0);
         }
-        let deviation = options.deviation;
+        let covered = options.covered();
         let at = Place {
             top: (index * BAND) as i32,
             stride,
-            deviation,
+            deviation: options.deviation,
         };
         // What patches cover.
         for list in lists.clone() {
             for drawn in list {
                 let tiles = drawn.narrow_tiles(at.top);
-                near(drawn, &tiles, drawn.half, at, &mut self.nearest);
+                let covered = &covered[usize::from(drawn.ends.0 & 15)];
+                near(drawn, &tiles, drawn.half, covered, at, &mut self.nearest);
             }
         }
         for nearest in &mut self.nearest {
@@ -158,7 +166,8 @@ impl Band {
         for drawn in &self.beside {
             let wide = drawn.wide(options);
             let tiles = drawn.wide_tiles(wide, at.top);
-            near(drawn, &tiles, wide, at, &mut self.widest);
+            let covered = &covered[usize::from(drawn.ends.0 & 15)];
+            near(drawn, &tiles, wide, covered, at, &mut self.widest);
         }
         for (nearest, wide) in self.nearest.iter().zip(&mut self.widest) {
             *wide = if *nearest > 0.0 {
@@ -211,6 +220,16 @@ struct Place {
     deviation: f32,
 }
 
+impl Place {
+    /// The band's rows whose middles are within reach above and below a place.
+    #[inline(always)]
+    fn rows(&self, y: f32, [above, below]: [f32; 2]) -> Range<i32> {
+        let top = self.top + MARGIN as i32;
+        let past = (y + below + (MARGIN as f32 + 0.5)) as i32;
+        (first_within(y, above) - top).max(0)..(past - top).min(BAND as i32)
+    }
+}
+
 /// A plane's pixels in a row of a tile.
 #[inline(always)]
 fn row_of(plane: &mut [f32], i: usize) -> &mut [f32; WIDE] {
@@ -229,7 +248,7 @@ fn more(row: &mut [f32; WIDE], weights: [f32; WIDE], value: f32) {
 
 /// What a squared distance is multiplied by in the exponent, of a patch of that half side.
 #[inline(always)]
-fn narrowness(deviation: f32, half: f32) -> f32 {
+pub(in crate::ldi) fn narrowness(deviation: f32, half: f32) -> f32 {
     let deviation = deviation * half;
     0.5 / (deviation * deviation)
 }
@@ -247,25 +266,34 @@ fn weights(offset: f32, tile: i32, narrow: f32, reach: f32) -> [f32; WIDE] {
     weights
 }
 
-/// Keeps the nearest depths of what a box around a sample covers.
+/// Keeps the nearest depths of what a box around a sample covers: of half a side some part to the right,
+/// below, to the left and above.
 #[inline(always)]
-fn near(drawn: &Drawn, tiles: &Tiles, half: [f32; 2], at: Place, plane: &mut [f32]) {
+fn near(
+    drawn: &Drawn,
+    tiles: &Tiles,
+    half: [f32; 2],
+    [right, below, left, above]: &[f32; 4],
+    at: Place,
+    plane: &mut [f32],
+) {
     let s = drawn.inverse_depth;
-    for right in 0..tiles.count[0] {
+    let low = [-left * half[0], -above * half[1]];
+    let high = [right * half[0], below * half[1]];
+    let rows = at.rows(drawn.y, [-low[1], high[1]]);
+    for tile in 0..tiles.count[0] {
         let mut here = [0.0; WIDE];
         for k in 0..WIDE {
-            let d = tiles.offset[0] + (right * WIDE as i32 + k as i32) as f32;
-            here[k] = if d.abs() <= half[0] { s } else { 0.0 };
+            let d = tiles.offset[0] + (tile * WIDE as i32 + k as i32) as f32;
+            here[k] = if (d >= low[0]) & (d <= high[0]) {
+                s
+            } else {
+                0.0
+            };
         }
-        let column = (tiles.first[0] + right * WIDE as i32) as usize;
-        for row in 0..tiles.count[1] * WIDE as i32 {
-            let y = (tiles.first[1] + row) as usize;
-            let d = tiles.offset[1] + row as f32;
-            // Above the band is beyond it, too.
-            if y >= BAND || d.abs() > half[1] {
-                continue;
-            }
-            let depths = row_of(plane, y * at.stride + column);
+        let column = (tiles.first[0] + tile * WIDE as i32) as usize;
+        for y in rows.clone() {
+            let depths = row_of(plane, y as usize * at.stride + column);
             // As a value: a vector is stored, not parts of one.
             let mut nearest = *depths;
             for k in 0..WIDE {
@@ -312,41 +340,39 @@ fn add(
         narrowness(at.deviation, half[0]),
         narrowness(at.deviation, half[1]),
     ];
-    let [r, g, b, _] = drawn.color;
-    let (r, g, b) = (f32::from(r), f32::from(g), f32::from(b));
+    let [r, g, b] = drawn.color.map(f32::from);
     let [red, green, blue, sum] = sums;
-    for below in 0..tiles.count[1] {
-        for right in 0..tiles.count[0] {
-            let column = (tiles.first[0] + right * WIDE as i32) as usize;
-            let row = |j: usize| (tiles.first[1] + below * WIDE as i32 + j as i32) as usize;
-            // Most of what is behind something is so all over.
-            let mut is_any = false;
-            for y in (0..WIDE).map(row).filter(|y| *y < BAND) {
-                let nearest = *row_of(depths, y * at.stride + column);
-                is_any |= nearest.iter().fold(false, |any, n| any | is_same(s, *n));
+    let mut down = [0.0; MOST_ROWS];
+    for (tile, down) in (0..tiles.count[1]).zip(down.chunks_exact_mut(WIDE)) {
+        down.copy_from_slice(&weights(tiles.offset[1], tile, narrow[1], reach[1]));
+    }
+    let rows = at.rows(drawn.y, [reach[1]; 2]);
+    for tile in 0..tiles.count[0] {
+        let column = (tiles.first[0] + tile * WIDE as i32) as usize;
+        let start = |y: i32| y as usize * at.stride + column;
+        // Most of what is behind something is so all over.
+        let mut is_any = false;
+        for y in rows.clone() {
+            let nearest = *row_of(depths, start(y));
+            is_any |= nearest.iter().fold(false, |any, n| any | is_same(s, *n));
+        }
+        if !is_any {
+            continue;
+        }
+        let across = weights(tiles.offset[0], tile, narrow[0], reach[0]);
+        for y in rows.clone() {
+            let i = start(y);
+            let down = down[(y - tiles.first[1]) as usize % MOST_ROWS];
+            let nearest = *row_of(depths, i);
+            let mut here = [0.0; WIDE];
+            for k in 0..WIDE {
+                let weight = down * across[k];
+                here[k] = if is_same(s, nearest[k]) { weight } else { 0.0 };
             }
-            if !is_any {
-                continue;
-            }
-            let across = weights(tiles.offset[0], right, narrow[0], reach[0]);
-            let down = weights(tiles.offset[1], below, narrow[1], reach[1]);
-            for j in 0..WIDE {
-                let y = row(j);
-                if y >= BAND || down[j] == 0.0 {
-                    continue;
-                }
-                let i = y * at.stride + column;
-                let nearest = *row_of(depths, i);
-                let mut here = [0.0; WIDE];
-                for k in 0..WIDE {
-                    let weight = down[j] * across[k];
-                    here[k] = if is_same(s, nearest[k]) { weight } else { 0.0 };
-                }
-                more(row_of(red, i), here, r);
-                more(row_of(green, i), here, g);
-                more(row_of(blue, i), here, b);
-                more(row_of(sum, i), here, 1.0);
-            }
+            more(row_of(red, i), here, r);
+            more(row_of(green, i), here, g);
+            more(row_of(blue, i), here, b);
+            more(row_of(sum, i), here, 1.0);
         }
     }
 }
@@ -359,7 +385,7 @@ fn is_same(s: f32, farthest: f32) -> bool {
 
 /// e⁻ᵗ within 6 % of 1 for t ≥ 0: (1 − t/16)¹⁶, zero from 16 on.
 #[inline(always)]
-fn gaussian(t: f32) -> f32 {
+pub(in crate::ldi) fn gaussian(t: f32) -> f32 {
     let base = (1.0 - t * (1.0 / 16.0)).max(0.0);
     let two = base * base;
     let four = two * two;

@@ -81,13 +81,16 @@ impl Work<'_> {
                             continue;
                         }
                         chunk.drawn += 1;
+                        let [r, g, b, _] = self.ldi.color[first + k];
+                        let ends = self.ldi.ends[first + k].turned(self.projection.turn);
                         let drawn = Drawn {
                             x: block.x[k],
                             y: block.y[k],
                             inverse_depth: block.inverse_depth[k],
                             half: [ready.half[0][k], ready.half[1][k]],
                             first: [ready.first[0][k] as i16, ready.first[1][k] as i16],
-                            color: self.ldi.color[first + k],
+                            color: [r, g, b],
+                            ends,
                         };
                         let from = ready.bands[0][k].max(0) as usize;
                         let to = (ready.bands[1][k].max(0) as usize).min(self.band_count - 1);

@@ -115,6 +115,7 @@ fn wall(side: u32) -> Layered {
         inverse_depth: 0.5,
         offset: [0, 0],
         look: Look::new(DVec3::Z, 1.0 / f64::from(side)),
+        ends: Ends((i % 16) as u8),
     });
     let counts = vec![1; (side * side) as usize];
     Layered::new(view, 0, &counts, samples.collect::<Vec<_>>().into_iter()).unwrap()

@@ -36,7 +36,7 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     };
     assert_eq!(
         text(&changed(8, &[9])),
-        "a.ldi: LDI version 9; expected 1: make it again with this program"
+        "a.ldi: LDI version 9; expected 2: make it again with this program"
     );
     // Sizes that would need more memory than there is.
     for (at, bytes) in [

@@ -10,7 +10,7 @@ fn the_central_image_stays_and_the_rest_is_added() {
         for center_in_front in [false, true] {
             let options = ConstructOptions {
                 center_in_front,
-                ..ConstructOptions::default()
+                ..of_the_papers()
             };
             let made = construct(&images, &options).unwrap();
             let ldi = &made.ldi;
@@ -103,16 +103,24 @@ fn conflicts_are_resolved_by_each_papers_rule() {
         let options = ConstructOptions {
             conflict,
             range: 0.01,
-            ..ConstructOptions::default()
+            ..of_the_papers()
         };
         construct(&images, &options).unwrap().ldi
     };
     let at = |ldi: &Layered| -> Vec<[u8; 4]> { ldi.pixel(8, 8).map(|s| s.color).collect() };
     // The smaller patch wins, and all four of its image are kept.
-    let ldi = made(Conflict::SmallerPatch, [2.0, 2.01], [blue, green]);
+    let ldi = made(
+        Conflict::SmallerPatch { same_color: 255 },
+        [2.0, 2.01],
+        [blue, green],
+    );
     assert_eq!(at(&ldi), [green; 4]);
     // Farther apart than the range, all are.
-    let ldi = made(Conflict::SmallerPatch, [2.0, 2.1], [blue, green]);
+    let ldi = made(
+        Conflict::SmallerPatch { same_color: 255 },
+        [2.0, 2.1],
+        [blue, green],
+    );
     assert_eq!(at(&ldi), [green, green, green, green, blue]);
     // The first stays; another colour is another surface.
     let rule = Conflict::RangeThenColor { same_color: 10 };
@@ -132,9 +140,7 @@ fn conflicts_are_resolved_by_each_papers_rule() {
     images[1].seen.color.fill(red);
     images[1].seen.inverse_depth.fill(0.5);
     let images: Vec<&Reference> = images.iter().collect();
-    let ldi = construct(&images, &ConstructOptions::default())
-        .unwrap()
-        .ldi;
+    let ldi = construct(&images, &of_the_papers()).unwrap().ldi;
     assert_eq!(at(&ldi), [red]);
 }
 
@@ -165,7 +171,7 @@ fn images_of_nothing_make_an_empty_ldi_and_no_images_none() {
     let images: Vec<&Reference> = many.iter().collect();
     let options = ConstructOptions {
         range: 0.0,
-        ..ConstructOptions::default()
+        ..of_the_papers()
     };
     let made = construct(&images, &options).unwrap();
     assert_eq!(made.ldi.count(0, 0), 151);

@@ -20,7 +20,7 @@ use render::interior::{
     Beyond, CellGeometry, Pinhole, Reference, Splat, Target, Warp, Window, warp,
 };
 use render::ldi::{
-    ClipTree, Clipped, Conflict, ConstructOptions, Free, FreeOptions, Layered, Look, Ordered,
+    ClipTree, Clipped, Conflict, ConstructOptions, Ends, Free, FreeOptions, Layered, Look, Ordered,
     OrderedOptions, Sample, Stamp, construct, free, layers, ordered, parse, read, write,
 };
 use std::path::Path;
@@ -56,12 +56,22 @@ fn nonsense() -> FreeOptions {
     FreeOptions {
         tolerance: f32::NAN,
         deviation: f32::NAN,
+        end: f32::NAN,
         grow: f32::INFINITY,
         least: -1.0,
         wide: f32::NAN,
         least_wide: 1e9,
         most: f32::NAN,
         fill: u32::MAX,
+    }
+}
+
+/// As Rafferty et al. make LDIs: the smaller patch wins whatever its colour, and colours are those seen.
+fn of_the_papers() -> ConstructOptions {
+    ConstructOptions {
+        conflict: Conflict::SmallerPatch { same_color: 255 },
+        fit: false,
+        ..ConstructOptions::default()
     }
 }
 

@@ -43,6 +43,7 @@ pub(super) fn random_ldi(counts: &[u8], size: [u32; 2], seed: u64) -> Layered {
         inverse_depth: (0.1 + 0.9 * r()) as f32,
         offset: [(255.0 * r() - 128.0) as i8, (255.0 * r() - 128.0) as i8],
         look: Look((65535.0 * r()) as u16),
+        ends: Ends((16.0 * r()) as u8),
     };
     let samples: Vec<Sample> = (0..total).map(sample).collect();
     Layered::new(view, 3, counts, samples.into_iter()).unwrap()

@@ -165,3 +165,26 @@ fn every_number_of_fragments_draws_the_same() {
         }
     }
 }
+
+/// Pixels of the LDI that are many of the picture's wide, so that a sample may be drawn far beyond the cut that
+/// its pixel's middle lies on this side of.
+#[test]
+fn fragments_change_nothing_where_pixels_are_huge() {
+    for seed in 0..6 {
+        let ldi = places::random_ldi(&[255; 16 * 12], [16, 12], seed);
+        let whole = Clipped::whole(&ldi);
+        for (z, x) in [(1.0, 1.0), (1.5, -1.0), (2.0, 1.0), (2.0, -1.0), (3.0, 1.0)] {
+            let eye = DVec3::new(0.0, 0.0, z);
+            let desired = view(eye, eye + DVec3::new(x, 0.1, 0.2), [40, 30]);
+            let camera = Pinhole::new(&desired).unwrap();
+            let open = Window::whole(40, 30);
+            for stamp in [Stamp::Five, Stamp::Sized] {
+                let serial = drawn_ordered(&ldi, &whole, &camera, &open, stamp, 1);
+                for fragments in [2, 5, 16] {
+                    let drawn = drawn_ordered(&ldi, &whole, &camera, &open, stamp, fragments);
+                    assert!(drawn == serial, "{seed} {z} {stamp:?} {fragments}");
+                }
+            }
+        }
+    }
+}
