@@ -108,7 +108,9 @@ impl<'a> Fit<'a> {
                 let at = [x as f32 + 0.5 + dx, y as f32 - row as f32 + dy];
                 let samples = ldi.samples_of(x.saturating_sub(1)..x + 2, row);
                 for block in samples.clone().step_by(LANES) {
-                    let weights = self.weights(block, at, s, samples.end - block);
+                    let Some(weights) = self.weights(block, at, s, samples.end - block) else {
+                        continue;
+                    };
                     for k in 0..LANES {
                         drawn[3][k] += weights[k];
                     }
@@ -147,8 +149,9 @@ impl<'a> Fit<'a> {
     }
 
     /// How much samples from one on, of a row, count at a place, from the row's middle, on a surface: so many.
+    /// `None` where none does.
     #[inline(always)]
-    fn weights(&self, from: usize, at: [f32; 2], s: f32, count: usize) -> [f32; LANES] {
+    fn weights(&self, from: usize, at: [f32; 2], s: f32, count: usize) -> Option<[f32; LANES]> {
         let list = |list: &[f32]| -> [f32; LANES] {
             let list = &list[from..from + LANES];
             list.try_into().expect("as many")
@@ -159,16 +162,24 @@ impl<'a> Fit<'a> {
             list(&self.ldi.inverse_depth),
         );
         let [right, down] = self.reach.each_ref().map(|reach| list(reach));
+        let mut counts = [false; LANES];
+        for k in 0..LANES {
+            let d = [at[0] - x[k], at[1] - y[k]];
+            let is_same = s.min(others[k]) >= self.same * s.max(others[k]);
+            let is_within = (d[0].abs() <= right[k]) & (d[1].abs() <= down[k]);
+            counts[k] = is_same & is_within & (k < count);
+        }
+        // Half of the rows are out of reach.
+        if !counts.iter().fold(false, |any, counts| any | counts) {
+            return None;
+        }
         let [narrow_x, narrow_y] = self.narrow.each_ref().map(|narrow| list(narrow));
         let mut weights = [0.0; LANES];
         for k in 0..LANES {
             let d = [at[0] - x[k], at[1] - y[k]];
             let weight = gaussian(d[0] * d[0] * narrow_x[k]) * gaussian(d[1] * d[1] * narrow_y[k]);
-            let is_same = s.min(others[k]) >= self.same * s.max(others[k]);
-            let is_within = (d[0].abs() <= right[k]) & (d[1].abs() <= down[k]);
-            let counts = is_same & is_within & (k < count);
-            weights[k] = if counts { weight } else { 0.0 };
+            weights[k] = if counts[k] { weight } else { 0.0 };
         }
-        weights
+        Some(weights)
     }
 }
