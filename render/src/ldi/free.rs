@@ -61,11 +61,11 @@ impl Default for FreeOptions {
     fn default() -> Self {
         Self {
             tolerance: 0.06,
-            deviation: 0.5,
+            deviation: 0.48,
             end: 0.2,
             grow: 1.5,
             least: 0.5,
-            wide: 1.6,
+            wide: 1.2,
             least_wide: 1.5,
             most: 4.0,
             fill: 8,
