@@ -1,5 +1,6 @@
 //! Triangle meshes, and the files that hold them.
 
+mod coloring;
 mod error;
 mod file;
 mod glb;
@@ -18,6 +19,7 @@ mod simplify;
 mod skin;
 mod texture;
 
+pub use coloring::{Coloring, FEW, Neighbours};
 pub use error::{ExportError, MeshFileError};
 pub use file::{parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
@@ -26,7 +28,7 @@ pub use model::{Material, Model, ModelNode, Part, Wrap, footprint, linear_from_s
 pub use model_glb::model_to_glb;
 pub use paint::Painting;
 pub use ply::{ply_hull, to_ply};
-pub use skin::{MOST as MOST_PLACES, Places, Skin};
+pub use skin::Skin;
 pub use texture::{Level, Texture};
 
 use glam::{DMat4, DVec3};

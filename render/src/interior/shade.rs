@@ -3,11 +3,11 @@
 //! What colours a triangle is made ready once for all its pixels in a band of rows, square by square,
 //! so that few triangles are at hand at a time.
 
-use super::triangle::edges;
+use super::triangle::{TOGETHER, edges, together};
 use super::{Pinhole, Raster, Target};
 use crate::cpu::lanes::vectorised;
 use glam::DVec3;
-use proxy::mesh::{MOST_PLACES, Model, Part, Places, Skin};
+use proxy::mesh::{Coloring, FEW, Model, Neighbours, Part, Skin};
 use rayon::prelude::*;
 
 /// A triangle made ready to be coloured.
@@ -29,9 +29,11 @@ struct Faces<'a> {
 
 /// Rows in a band, and columns in a square.
 const BAND: usize = 16;
-const SQUARE: usize = MOST_PLACES;
+const SQUARE: usize = 32;
 /// Triangles at hand, a power of 2.
 const AT_HAND: usize = 256;
+
+const _: () = assert!(FEW == TOGETHER);
 
 impl Raster {
     /// Colours what was drawn, but for pixels that `is_wanted` declines (by pixel, and its inverse
@@ -46,80 +48,73 @@ impl Raster {
         let pixels = BAND * camera.width as usize;
         let colors = target.color.par_chunks_mut(pixels);
         let bands = colors.zip(target.inverse_depth.par_chunks_mut(pixels));
-        let band = |faces: &mut Faces<'m>, (i, (colors, depths)): (usize, Band<'_>)| {
+        let band = |(faces, coloring): &mut (Faces<'m>, Coloring<'m>), (i, band)| {
             vectorised(
                 #[inline(always)]
-                || self.shade_band(model, camera, faces, i * BAND, colors, depths, &is_wanted),
+                || self.shade_band(model, camera, faces, coloring, i * BAND, band, &is_wanted),
             )
         };
-        let band = bands.enumerate().map_init(Faces::default, band);
+        let band = bands.enumerate().map_init(Default::default, band);
         band.sum()
     }
 
     /// Colours rows from a first one on.
     #[inline(always)]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "compiled in place, where all is at hand"
+    )]
     fn shade_band<'a>(
         &self,
         model: &'a Model,
         camera: &Pinhole,
         faces: &mut Faces<'a>,
+        coloring: &mut Coloring<'a>,
         first: usize,
-        colors: &mut [[u8; 4]],
-        depths: &mut [f32],
+        (colors, depths): Band<'_>,
         is_wanted: &impl Fn(usize, f32) -> bool,
     ) -> usize {
         let width = camera.width as usize;
-        let mut count = 0;
-        let mut places = Places::default();
-        let mut wanted = [0; SQUARE];
+        let row_count = colors.len() / width;
+        let mut put = |here: u32, code: [u8; 4]| colors[here as usize] = code;
+        let mut total = 0;
         for left in (0..width).step_by(SQUARE) {
-            let columns = left..(left + SQUARE).min(width);
-            for y in 0..colors.len() / width {
+            let end = (left + SQUARE).min(width);
+            for y in 0..row_count {
                 let dy = camera.rows[first + y];
-                // The triangle of the pixel before, and its weights in this row but for x.
-                let mut last = None;
-                let mut rest = [0.0; 3];
-                places.clear();
-                for x in columns.clone() {
+                let mut x = left;
+                while x < end {
                     let (pixel, here) = ((first + y) * width + x, y * width + x);
-                    let Some((idx, inverse_depth)) = self.at(pixel) else {
+                    // 1. Neighbours that see the same triangle.
+                    let Some((idx, _)) = self.at(pixel) else {
+                        x += 1;
                         continue;
                     };
-                    if !is_wanted(pixel, inverse_depth) {
+                    let mut count = 0;
+                    while count < FEW.min(end - x) {
+                        match self.at(pixel + count) {
+                            Some((i, s)) if i == idx && is_wanted(pixel + count, s) => {
+                                depths[here + count] = s;
+                            }
+                            _ => break,
+                        }
+                        count += 1;
+                    }
+                    if count == 0 {
+                        x += 1;
                         continue;
                     }
+                    // 2. Where on it.
                     let face = faces.at(model, camera, idx);
-                    if last != Some(idx) {
-                        last = Some(idx);
-                        for k in 0..3 {
-                            rest[k] = face.weights[k].y * dy + face.weights[k].z;
-                        }
-                    }
-                    let dx = camera.columns[x];
-                    let [second, third, all] = &face.weights;
-                    let scale = 1.0 / (all.x * dx + rest[2]);
-                    let second = ((second.x * dx + rest[0]) * scale).max(0.0);
-                    let third = ((third.x * dx + rest[1]) * scale).max(0.0);
-                    // Rounding does not leave the triangle; nor does what is seen edge on.
-                    let second = second.min(1.0);
-                    wanted[places.len()] = here;
-                    let footprint = face.footprint * (scale * scale * scale).abs();
-                    places.add(&face.skin, second, third.min(1.0 - second), footprint);
-                    depths[here] = inverse_depth;
+                    let places = face.places(&together(&camera.columns, x), dy);
+                    coloring.add(&face.skin, &places, here as u32, count, &mut put);
+                    total += count;
+                    x += count;
                 }
-                if places.is_empty() {
-                    continue;
-                }
-                let codes = places.colors();
-                for (i, here) in wanted[..places.len()].iter().enumerate() {
-                    // Rounded without a call: they are not negative.
-                    let [r, g, b] = [0, 1, 2].map(|k| (codes[k][i] + 0.5) as u8);
-                    colors[*here] = [r, g, b, 255];
-                }
-                count += places.len();
             }
         }
-        count
+        coloring.finish(&mut put);
+        total
     }
 }
 
@@ -150,6 +145,29 @@ impl<'a> Faces<'a> {
 }
 
 impl<'a> Face<'a> {
+    /// Where rays meet it, by their x in a row.
+    #[inline(always)]
+    fn places(&self, across: &[f64; FEW], dy: f64) -> Neighbours {
+        let [second, third, all] = &self.weights;
+        let mut rest = [0.0; 3];
+        for k in 0..3 {
+            rest[k] = self.weights[k].y * dy + self.weights[k].z;
+        }
+        let mut places = Neighbours::default();
+        for k in 0..FEW {
+            let dx = across[k];
+            let scale = 1.0 / (all.x * dx + rest[2]);
+            let second = ((second.x * dx + rest[0]) * scale).max(0.0);
+            let third = ((third.x * dx + rest[1]) * scale).max(0.0);
+            // Rounding does not leave the triangle; nor does what is seen edge on.
+            let second = second.min(1.0);
+            places.second[k] = second;
+            places.third[k] = third.min(1.0 - second);
+            places.footprint[k] = self.footprint * (scale * scale * scale).abs();
+        }
+        places
+    }
+
     #[inline(never)]
     fn new(model: &'a Model, part: Option<&Part>, camera: &Pinhole, idx: u32) -> Self {
         let [a, b, c] = model.mesh.triangles[idx as usize];

@@ -64,7 +64,7 @@ const WIDE: u32 = 8;
 /// Edges that change less along the row than this, in shares of their terms, lie along it.
 const ALONG_ROW: f64 = 1e-9;
 /// Columns that are looked at together.
-const TOGETHER: usize = 4;
+pub(super) const TOGETHER: usize = 4;
 /// The least number above 0.
 const ABOVE_0: f64 = f64::from_bits(1);
 /// Inverse depths that are kept.
@@ -343,7 +343,7 @@ impl Ready {
 
 /// The rays' x of some columns from a first one on; the last one's again where there are no more.
 #[inline(always)]
-fn together(columns: &[f64], first: usize) -> [f64; TOGETHER] {
+pub(super) fn together(columns: &[f64], first: usize) -> [f64; TOGETHER] {
     let here = columns.get(first..first + TOGETHER);
     let here = here.and_then(|columns| columns.try_into().ok());
     here.unwrap_or_else(|| {
