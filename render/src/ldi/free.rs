@@ -118,6 +118,21 @@ pub(crate) fn bounds(window: &Window, into: &Target) -> Option<[Range<u32>; 2]> 
     (low[0] < high[0]).then(|| [low[0]..high[0], low[1]..high[1]])
 }
 
+/// By band of a window's rows the columns, from its first one on, that are open in any of them: from …
+/// to.
+fn open_by_band(window: &Window, into: &Target, [across, down]: [&Range<u32>; 2]) -> Vec<[u32; 2]> {
+    let of_band = |first: u32| {
+        let rows = first..(first + BAND as u32).min(down.end);
+        rows.map(|y| window.row(y))
+            .map(|row| [row.start, row.end.min(into.width)])
+            .filter(|[start, end]| start < end)
+            .map(|row| row.map(|x| x - across.start))
+            .reduce(|[a, b], [start, end]| [a.min(start), b.max(end)])
+            .unwrap_or_default()
+    };
+    down.clone().step_by(BAND).map(of_band).collect()
+}
+
 /// Draws the columns of an LDI that are left as a desired camera sees them, in the pixels of a
 /// window, over what is there. Nothing is drawn where the picture's size is not the camera's.
 pub fn free(
@@ -137,7 +152,8 @@ pub fn free(
         return cost;
     };
     let width = across.len();
-    let band_count = down.len().div_ceil(BAND);
+    let open: Vec<[u32; 2]> = open_by_band(window, into, [&across, &down]);
+    let band_count = open.len();
     let stride = width + 2 * MARGIN;
     // 1.
     let origin = [across.start as i32, down.start as i32];
@@ -151,7 +167,7 @@ pub fn free(
         sizes: &sizes,
         options: options.within_bounds(),
         size: [width as f32, down.len() as f32],
-        band_count,
+        open: &open,
     };
     let chunk_count = height.div_ceil(CHUNK) as usize;
     scratch
@@ -177,7 +193,7 @@ pub fn free(
         let lists = chunks.iter().map(|chunk| chunk.bands[i].as_slice());
         vectorised(
             #[inline(always)]
-            || band.draw(lists, i, stride, work.options),
+            || band.draw(lists, i, stride, open[i], work.options),
         );
     };
     let bands = &mut scratch.bands[..band_count];

@@ -112,6 +112,7 @@ impl Band {
         lists: impl Iterator<Item = &'a [Drawn]> + Clone,
         index: usize,
         stride: usize,
+        open: [u32; 2],
         options: Options,
     ) {
         let size = stride * BAND + WIDE;
@@ -150,7 +151,7 @@ impl Band {
             }
         }
         // What only wide ones do: of samples near a hole.
-        self.find_holes(stride);
+        self.find_holes(stride, open);
         let holes = &self.holes;
         let is_near_hole =
             |drawn: &&Drawn| holes[(drawn.x + MARGIN as f32) as i32 as usize / COLUMN];
@@ -194,17 +195,19 @@ impl Band {
         }
     }
 
-    /// Marks the columns with holes and those beside them.
+    /// Marks the columns with holes, among those that are open, and those beside them.
     #[inline(always)]
-    fn find_holes(&mut self, stride: usize) {
+    fn find_holes(&mut self, stride: usize, [from, to]: [u32; 2]) {
         let count = stride / COLUMN + 2;
         self.holes.clear();
         self.holes.resize(count, false);
         for row in self.nearest.chunks_exact(stride).take(BAND) {
-            let row = &row[MARGIN..stride - MARGIN];
+            // Whole columns of pixels that are worked on together.
+            let first = from as usize / COLUMN;
+            let row = &row[MARGIN + first * COLUMN..MARGIN + to as usize];
             for (i, part) in row.chunks(COLUMN).enumerate() {
                 if part.iter().fold(false, |any, s| any | (*s == 0.0)) {
-                    let i = i + MARGIN / COLUMN;
+                    let i = first + i + MARGIN / COLUMN;
                     self.holes[i - 1..=i + 1].fill(true);
                 }
             }

@@ -23,15 +23,17 @@ pub(super) struct Work<'a> {
     pub(super) sizes: &'a Sizes,
     pub(super) options: Options,
     pub(super) size: [f32; 2],
-    pub(super) band_count: usize,
+    /// By band of the picture, the columns that the window leaves open in any of its rows: from … to.
+    pub(super) open: &'a [[u32; 2]],
 }
 
 impl Work<'_> {
     #[inline(always)]
     pub(super) fn place(&self, rows: Range<u32>, chunk: &mut Chunk) {
+        let band_count = self.open.len();
         chunk
             .bands
-            .resize_with(self.band_count.max(chunk.bands.len()), Vec::new);
+            .resize_with(band_count.max(chunk.bands.len()), Vec::new);
         chunk.bands.iter_mut().for_each(Vec::clear);
         (chunk.samples, chunk.drawn) = (0, 0);
         let mut block = Block::EMPTY;
@@ -69,12 +71,16 @@ impl Work<'_> {
                         }
                     }
                     for k in 0..LANES {
-                        let y = if ready.is_seen[k] { block.y[k] } else { 0.0 };
-                        let half = ready.half[1][k];
                         // A pixel's middle is half a pixel off, and the rest is for rounding.
-                        let reach = (BEYOND * half).max(self.options.wide_half(half)) + 0.51;
-                        ready.bands[0][k] = (y - reach) as i32 / BAND as i32;
-                        ready.bands[1][k] = (y + reach) as i32 / BAND as i32;
+                        let reach =
+                            |half: f32| (BEYOND * half).max(self.options.wide_half(half)) + 0.51;
+                        let y = if ready.is_seen[k] { block.y[k] } else { 0.0 };
+                        let down = reach(ready.half[1][k]);
+                        ready.bands[0][k] = (y - down) as i32 / BAND as i32;
+                        ready.bands[1][k] = (y + down) as i32 / BAND as i32;
+                        let across = reach(ready.half[0][k]);
+                        ready.sides[0][k] = block.x[k] - across;
+                        ready.sides[1][k] = block.x[k] + across;
                     }
                     for k in 0..LANES.min(samples.end - first) {
                         if !ready.is_seen[k] {
@@ -93,9 +99,14 @@ impl Work<'_> {
                             ends,
                         };
                         let from = ready.bands[0][k].max(0) as usize;
-                        let to = (ready.bands[1][k].max(0) as usize).min(self.band_count - 1);
+                        let to = (ready.bands[1][k].max(0) as usize).min(band_count - 1);
+                        let (left, right) = (ready.sides[0][k], ready.sides[1][k]);
                         for band in from..=to {
-                            chunk.bands[band].push(drawn);
+                            // Of what only closed pixels would show nothing is seen.
+                            let [start, end] = self.open[band].map(|x| x as f32);
+                            if left <= end && right >= start {
+                                chunk.bands[band].push(drawn);
+                            }
                         }
                     }
                 }
@@ -111,6 +122,8 @@ struct Ready {
     first: [[i32; LANES]; 2],
     /// The first and the last band it may reach.
     bands: [[i32; LANES]; 2],
+    /// From where to where it reaches across.
+    sides: [[f32; LANES]; 2],
 }
 
 impl Ready {
@@ -119,5 +132,6 @@ impl Ready {
         half: [[0.0; LANES]; 2],
         first: [[0; LANES]; 2],
         bands: [[0; LANES]; 2],
+        sides: [[0.0; LANES]; 2],
     };
 }
