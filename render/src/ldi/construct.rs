@@ -261,15 +261,20 @@ fn made(
             };
             Some((corner.y as usize * width + corner.x as usize, node))
         };
-        let row = |y: u32| -> Vec<Option<(usize, Node)>> { pixels(image, y).map(node).collect() };
-        let nodes: Vec<_> = (0..image.seen.height).into_par_iter().map(row).collect();
-        let all = || nodes.iter().flatten();
-        offered += all().count();
-        outside += all().filter(|node| node.is_none()).count();
+        let row = |y: u32| Row::of(pixels(image, y).map(node));
+        let rows: Vec<Row> = (0..image.seen.height).into_par_iter().map(row).collect();
+        offered += rows
+            .iter()
+            .map(|row| row.nodes.len() + row.outside)
+            .sum::<usize>();
+        outside += rows.iter().map(|row| row.outside).sum::<usize>();
         bands.par_iter_mut().for_each(|band| {
-            for (pixel, node) in all().flatten() {
-                if band.pixels.contains(pixel) {
-                    band.add(*node, *pixel);
+            let pixels = band.pixels.clone();
+            for row in rows.iter().filter(|row| row.may_meet(&pixels)) {
+                for (pixel, node) in &row.nodes {
+                    if pixels.contains(pixel) {
+                        band.add(*node, *pixel);
+                    }
                 }
             }
         });
@@ -296,6 +301,40 @@ fn made(
         crowded,
         before_center,
     })
+}
+
+/// What of a row of an image an LDI is offered.
+struct Row {
+    /// The LDI's pixels, and the samples.
+    nodes: Vec<(usize, Node)>,
+    /// From the first of the pixels to past the last.
+    pixels: Range<usize>,
+    /// Samples that fall beside the LDI.
+    outside: usize,
+}
+
+impl Row {
+    fn of(offered: impl Iterator<Item = Option<(usize, Node)>>) -> Self {
+        let (mut nodes, mut outside) = (Vec::new(), 0);
+        let mut pixels = usize::MAX..0;
+        for node in offered {
+            let Some((pixel, node)) = node else {
+                outside += 1;
+                continue;
+            };
+            pixels = pixels.start.min(pixel)..pixels.end.max(pixel + 1);
+            nodes.push((pixel, node));
+        }
+        Self {
+            nodes,
+            pixels,
+            outside,
+        }
+    }
+
+    fn may_meet(&self, pixels: &Range<usize>) -> bool {
+        self.pixels.start < pixels.end && pixels.start < self.pixels.end
+    }
 }
 
 /// The middles of a row's pixels that show anything, with their inverse depths.

@@ -58,6 +58,18 @@ pub(super) fn fitted(ldi: &Layered, bands: &[&[Offered]], rows: usize, range: f6
     (0..ldi.len()).map(moved).collect()
 }
 
+/// Of all lanes, by halves: as deep a sum as need be.
+#[inline(always)]
+fn sum_of(lanes: [f32; LANES]) -> f32 {
+    let mut lanes = lanes;
+    for half in [4, 2, 1] {
+        for k in 0..half {
+            lanes[k] += lanes[k + half];
+        }
+    }
+    lanes[0]
+}
+
 /// The samples, property by property, as their own camera sees them.
 struct Fit<'a> {
     ldi: &'a Layered,
@@ -122,7 +134,7 @@ impl<'a> Fit<'a> {
                     around.push((block, weights));
                 }
             }
-            let [r, g, b, sum] = drawn.map(|lanes| lanes.iter().sum::<f32>());
+            let [r, g, b, sum] = drawn.map(sum_of);
             if !(sum > 0.0) {
                 continue;
             }
