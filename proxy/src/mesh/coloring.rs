@@ -72,7 +72,7 @@ impl Default for Coloring<'_> {
 impl<'a> Coloring<'a> {
     /// Adds the first few, up to `count`, of some places of a triangle, which are `number` and those
     /// after it. Red, green and blue of a place, and 255, go to `put` with its number sooner or later; see
-    /// [`Model::color`].
+    /// [`Model::color`](super::Model::color).
     #[inline(always)]
     pub fn add(
         &mut self,

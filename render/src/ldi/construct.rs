@@ -316,18 +316,18 @@ struct Row {
 impl Row {
     fn of(offered: impl Iterator<Item = Option<(usize, Node)>>) -> Self {
         let (mut nodes, mut outside) = (Vec::new(), 0);
-        let mut pixels = usize::MAX..0;
+        let (mut low, mut past) = (usize::MAX, 0);
         for node in offered {
             let Some((pixel, node)) = node else {
                 outside += 1;
                 continue;
             };
-            pixels = pixels.start.min(pixel)..pixels.end.max(pixel + 1);
+            (low, past) = (low.min(pixel), past.max(pixel + 1));
             nodes.push((pixel, node));
         }
         Self {
             nodes,
-            pixels,
+            pixels: low..past,
             outside,
         }
     }
