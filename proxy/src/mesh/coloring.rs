@@ -2,7 +2,7 @@
 //! same texture and level, to be coloured with them.
 
 use super::Wrap;
-use super::skin::{LEVEL_BITS, ONE_TEXEL, PLAIN, SIDE_BITS, Skin, WHITE};
+use super::skin::{LEVEL_BITS, ONE_TEXEL, PLAIN, SIDE_BITS, Skin};
 use super::texture::{Level, level_of};
 
 /// A few neighbouring places of a triangle, number by number: `second` and `third` are those corners'
@@ -50,12 +50,13 @@ pub const FEW: usize = 4;
 const MOST: usize = 32;
 /// Textures and levels that are waited for, a power of 2.
 const OPEN: usize = 8;
+
 impl Default for Coloring<'_> {
     fn default() -> Self {
         let places = Places {
             key: PLAIN,
             count: 0,
-            texels: &WHITE,
+            texels: &[],
             levels: [ONE_TEXEL[0]; 2],
             is_repeated: [false; 2],
             numbers: [0; MOST],
@@ -111,9 +112,9 @@ impl<'a> Coloring<'a> {
         for k in 0..FEW {
             let level = level_of((places.footprint[k] * skin.texel_area) as f32);
             let level = level.max(0.0).min(last);
-            let whole = level.floor();
-            fine[k] = code(whole);
-            shares[k] = level - whole;
+            let finer = level.floor();
+            fine[k] = whole(finer);
+            shares[k] = level - finer;
         }
         // 2. To those of the same level.
         let mut from = 0;
@@ -170,17 +171,14 @@ impl<'a> Coloring<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// Makes room for places of a skin's texture at the level that a key says.
+    /// Takes places of a skin's texture at the level that a key says.
     #[inline(always)]
     fn begin(&mut self, skin: &Skin<'a>, key: u32) {
-        if self.key == key {
-            return;
-        }
         let level = (key & ((1 << LEVEL_BITS) - 1)) as usize;
         let last = skin.levels.len() - 1;
         self.key = key;
         self.texels = skin.texels;
-        self.levels = [level.min(last), (level + 1).min(last)].map(|i| skin.levels[i]);
+        self.levels = [level, (level + 1).min(last)].map(|i| skin.levels[i]);
         self.is_repeated = [0, 1].map(|k| key >> (LEVEL_BITS + k) & 1 != 0);
     }
 
@@ -199,7 +197,7 @@ impl<'a> Places<'a> {
                 |k| {
                     // What is no number is black.
                     let rounded = (colors[k][i] + 0.5).max(0.0);
-                    code(rounded.min(255.0).floor())
+                    whole(rounded.min(255.0).floor())
                 },
             );
             codes[i] = r | g << 8 | b << 16 | 255 << 24;
@@ -320,7 +318,7 @@ fn around(at: f32, count: f32, is_repeated: bool) -> ([u32; 2], f32) {
     // Rounding and what is no number keep within range.
     let kept = [before, next].map(
         #[inline(always)]
-        |texel| code(texel.max(0.0).min(last)),
+        |texel| whole(texel.max(0.0).min(last)),
     );
     (kept, x - first)
 }
@@ -328,7 +326,7 @@ fn around(at: f32, count: f32, is_repeated: bool) -> ([u32; 2], f32) {
 /// A whole number of at least 0 and less than 2²³ as an integer. (A cast says what becomes of others,
 /// too, and is done one by one.)
 #[inline(always)]
-fn code(x: f32) -> u32 {
+fn whole(x: f32) -> u32 {
     // Beyond 2²³ numbers have no digits for fractions.
     const SHIFT: f32 = (1 << 23) as f32;
     (x + SHIFT).to_bits() & ((1 << 23) - 1)

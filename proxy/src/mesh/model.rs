@@ -112,8 +112,8 @@ impl Model {
     /// colours it. `shares` are the corners' barycentric weights, and sum to 1.
     ///
     /// The texture is bilinear in each of the two levels that suit a pixel with a [`footprint`], and
-    /// mixed between them; 0 asks for the finest. [`Skin`](super::Skin) is the fast twin, in f32, for many
-    /// places of a triangle.
+    /// mixed between them; 0 asks for the finest. [`Coloring`](super::Coloring) is the fast twin, in f32,
+    /// for many places.
     pub fn color(&self, triangle_idx: u32, shares: [f64; 3], footprint: f64) -> [f64; 3] {
         let corners = self.mesh.triangles[triangle_idx as usize].map(|i| i as usize);
         let (mut color, mut uv) = ([0.0; 3], [0.0; 2]);

@@ -12,7 +12,7 @@ pub struct Skin<'a> {
     pub(super) colors: [[f32; 3]; 3],
     /// The same of texture coordinates.
     pub(super) uvs: [[f64; 2]; 3],
-    /// The texture's, of all levels; white without one.
+    /// The texture's, of all levels; none without one.
     pub(super) texels: &'a [[u8; 4]],
     /// At least one.
     pub(super) levels: &'a [Level],
@@ -28,8 +28,7 @@ pub(super) const PLAIN: u32 = u32::MAX << LEVEL_BITS;
 /// Bits of a key that say which level, and beside which sides the texture is again.
 pub(super) const LEVEL_BITS: u32 = 5;
 pub(super) const SIDE_BITS: u32 = 2;
-/// What leaves a colour as it is.
-pub(super) static WHITE: [[u8; 4]; 1] = [[255; 4]];
+/// Of what has no texture.
 pub(super) static ONE_TEXEL: [Level; 1] = [Level {
     first: 0,
     width: 1,
@@ -66,7 +65,7 @@ impl<'a> Skin<'a> {
                 texel_area(texture, uvs),
                 key_of(idx, wraps),
             ),
-            None => (&WHITE[..], &ONE_TEXEL[..], 0.0, PLAIN),
+            None => (&[][..], &ONE_TEXEL[..], 0.0, PLAIN),
         };
         for i in 1..3 {
             for k in 0..3 {

@@ -201,9 +201,9 @@ impl Band {
         let count = stride / COLUMN + 2;
         self.holes.clear();
         self.holes.resize(count, false);
+        // Whole columns of pixels that are worked on together.
+        let first = from as usize / COLUMN;
         for row in self.nearest.chunks_exact(stride).take(BAND) {
-            // Whole columns of pixels that are worked on together.
-            let first = from as usize / COLUMN;
             let row = &row[MARGIN + first * COLUMN..MARGIN + to as usize];
             for (i, part) in row.chunks(COLUMN).enumerate() {
                 if part.iter().fold(false, |any, s| any | (*s == 0.0)) {
