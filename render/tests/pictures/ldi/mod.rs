@@ -14,7 +14,8 @@ use glam::{DQuat, DVec2, DVec3};
 use house::{random, small_house, view};
 use proptest::prelude::*;
 use proxy::interior::{
-    CellId, Contents, Interior, PortalId, SemicircleOptions, SemicircleView, semicircles, visible,
+    CellId, Contents, Interior, PortalId, Region, SemicircleOptions, SemicircleView, semicircles,
+    visible,
 };
 use render::interior::{
     Beyond, CellGeometry, Pinhole, Reference, Splat, Target, Warp, Window, warp,

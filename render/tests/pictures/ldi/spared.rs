@@ -102,6 +102,61 @@ fn clipping_changes_nothing_and_spares_columns() {
 }
 
 #[test]
+fn what_a_window_closes_changes_nothing_that_it_leaves_open() {
+    let set = set(3, 4, 96, 13, 4);
+    let [width, height] = [160, 128];
+    for (i, side) in set.sides.iter().enumerate().take(3) {
+        let ldi = ldi_of(side);
+        let columns = Clipped::whole(&ldi);
+        for (desired, _) in viewers(&set, i, 6, [width, height]) {
+            let camera = Pinhole::new(&desired).unwrap();
+            // A square on its corner, which reaches all sides of the picture but not its corners.
+            let across = (2.0_f64.sqrt() * 0.52 * f64::from(width)) as u32;
+            let forward = camera.rotation.transpose() * DVec3::Z;
+            let up = camera.rotation.transpose() * DVec3::new(1.0, -1.0, 0.0);
+            let corner_down = View {
+                width: across,
+                height: across,
+                lens: Lens::pinhole(camera.focal, DVec2::splat(0.5 * f64::from(across))),
+                camera_from_world: Rigid3::looking_at(camera.center, camera.center + forward, up),
+            };
+            let open = Window::of(&Region::of(&corner_down), &camera);
+            assert!(open.row(0).start > 0 && open.row(height / 2) == (0..width));
+            let drawn = |window: &Window| {
+                let options = FreeOptions {
+                    fill: 0,
+                    ..FreeOptions::default()
+                };
+                let mut target = Target::new(width, height);
+                let scratch = &mut Free::default();
+                free(
+                    &ldi,
+                    &columns,
+                    &camera,
+                    window,
+                    &options,
+                    scratch,
+                    &mut target,
+                );
+                target
+            };
+            let (some, all) = (drawn(&open), drawn(&Window::whole(width, height)));
+            assert!(all.color.iter().any(|color| color[3] > 0));
+            for y in 0..height {
+                for x in 0..width {
+                    let k = (y * width + x) as usize;
+                    let expected = match open.row(y).contains(&x) {
+                        true => (all.color[k], all.inverse_depth[k]),
+                        false => ([0; 4], 0.0),
+                    };
+                    assert_eq!((some.color[k], some.inverse_depth[k]), expected, "{x} {y}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn fragments_and_threads_change_nothing() {
     let set = set(3, 4, 96, 13, 4);
     let one = rayon::ThreadPoolBuilder::new()
