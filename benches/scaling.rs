@@ -1,5 +1,6 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --proxies NAME,NAME… --alone field|cpu|exact --json FILE --gpu]`; see README.md.
+//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact --json FILE --gpu]`;
+//! see README.md.
 
 use calibrate::View;
 use clap::Parser;
@@ -31,6 +32,9 @@ struct Args {
     /// What they show: plane, tunnel, hull; crowd, a hull from one place
     #[arg(long, value_delimiter = ',', default_values_t = ["plane", "tunnel", "hull"].map(String::from))]
     proxies: Vec<String>,
+    /// How wide pictures are: 960 (× 720), 1920 (× 1080)
+    #[arg(long, value_delimiter = ',', default_values_t = [960, 1920])]
+    widths: Vec<u32>,
     /// Only one stage, over and over, for profiles
     #[arg(long, value_parser = ["field", "cpu", "exact"])]
     alone: Option<String>,
@@ -68,7 +72,8 @@ fn main() {
     ];
     let is_asked = |kind: &Surroundings| args.proxies.iter().any(|name| name == kind.name());
     for kind in all.into_iter().filter(is_asked) {
-        for size in [(960, 720), (1920, 1080)] {
+        let is_wanted = |(width, _): &(u32, u32)| args.widths.contains(width);
+        for size in [(960, 720), (1920, 1080)].into_iter().filter(is_wanted) {
             for &count in &args.photos {
                 let occluded = matches!(kind, Surroundings::Ball { .. } | Surroundings::Crowd);
                 if occluded && count > MOST_OCCLUDED {

@@ -131,6 +131,12 @@ impl Seen {
         weights::weigh(&mut self.terms, &self.order, options)
     }
 
+    /// Whether, in the pixels that are `wanted`, views that differ by `least` or more would change no weight:
+    /// see [`weights::is_enough`].
+    fn is_enough(&self, options: &FieldOptions, least: f32, wanted: &[bool; LANES]) -> bool {
+        weights::is_enough(&self.terms, &self.order, options, least, wanted)
+    }
+
     /// Adds the terms' weights to what the sights are worth.
     fn add_weights(&mut self) {
         for &i in &self.order {

@@ -58,7 +58,10 @@ pub(super) fn draw_field(
                 }
                 vectorised(
                     #[inline(always)]
-                    || part.shares = raster.shares(part.triangle_idx, first, PLACES),
+                    || {
+                        part.shares = raster.shares(part.triangle_idx, first, PLACES);
+                        part.find_least();
+                    },
                 );
             }
             for k in 0..LANES {
@@ -71,13 +74,9 @@ pub(super) fn draw_field(
             // differ least come first, as far as they leave room for more.
             seen.clear();
             let mut check = FIRST_ASKED;
-            let mut is_weighed = false;
             for (asked, view) in mentions.views().iter().enumerate() {
                 if asked >= check && view.least >= 0.0 && may_skip {
-                    let reach = seen.weigh(&frame.options);
-                    is_weighed = true;
-                    let wanted = (0..LANES).filter(|&k| is_bordered[k]);
-                    if wanted.map(|k| reach[k]).fold(0.0, f32::max) <= view.least {
+                    if seen.is_enough(&frame.options, view.least, &is_bordered) {
                         break;
                     }
                     check = asked + THEN_ASKED;
@@ -95,12 +94,9 @@ pub(super) fn draw_field(
                 }
                 sight.a = each(|k| sight.a[k] * listed.weight[k]);
                 seen.keep(view.source_idx);
-                is_weighed = false;
             }
             if any_bordered {
-                if !is_weighed {
-                    seen.weigh(&frame.options);
-                }
+                seen.weigh(&frame.options);
                 seen.add_weights();
             }
             let colors = engine.shade(&photos, seen, |sight, _| &sight.a)?;
@@ -117,6 +113,9 @@ struct Part {
     bordered: bool,
     /// Its corners', in all of the tile's pixels.
     shares: [Lane; 3],
+    /// Of those in the pixels that it covers the least, corner by corner, and their sum in one: all have the same,
+    /// up to rounding.
+    least: ([f32; 3], f32),
 }
 
 impl Part {
@@ -137,12 +136,44 @@ impl Part {
                         covers: [false; LANES],
                         bordered: false,
                         shares: [[0.0; LANES]; 3],
+                        least: ([0.0; 3], 0.0),
                     });
                     parts.len() - 1
                 });
                 parts[at].covers[row * TILE[0] + column] = true;
             }
         }
+    }
+
+    #[inline(always)]
+    fn find_least(&mut self) {
+        let least = |of: &Lane| {
+            // They are not negative where it covers a pixel: in order as their bits are, of which vectors find
+            // the least.
+            let mut least = u32::MAX;
+            for k in 0..LANES {
+                let bits = if self.covers[k] { of[k].to_bits() } else { u32::MAX };
+                least = least.min(bits);
+            }
+            f32::from_bits(least)
+        };
+        let first = self.covers.iter().position(|covers| *covers).unwrap_or(0);
+        self.least = (
+            self.shares.each_ref().map(least),
+            self.shares.iter().map(|share| share[first]).sum(),
+        );
+    }
+
+    /// At most what is interpolated between so much at the corners, none of which is negative, in any of the
+    /// pixels that it covers.
+    fn at_least(&self, values: &[f32; 3]) -> f32 {
+        /// Of what is summed, more than rounding can take.
+        const SLACK: f32 = 4e-6;
+        let (shares, sum) = self.least;
+        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
+        let above = |c: usize| shares[c] * (values[c] - least);
+        let most = values.iter().copied().fold(0.0, f32::max);
+        (sum * least + above(0) + above(1) + above(2) - SLACK * most).max(0.0)
     }
 
     /// Says so of the pixels that it covers.
@@ -155,8 +186,8 @@ impl Part {
 
 /// Source views that are asked about a tile before it is seen whether others may count, and again
 /// after so many more.
-const FIRST_ASKED: usize = 8;
-const THEN_ASKED: usize = 4;
+const FIRST_ASKED: usize = 6;
+const THEN_ASKED: usize = 2;
 
 /// What a thread uses again for every tile that it draws of a triangulated field.
 #[derive(Default)]
@@ -200,11 +231,7 @@ impl Mentions {
         for of_view in all.chunk_by(|x, y| x.0 == y.0) {
             let start = views.last().map_or(0, |v: &Mentioned| v.mentions.end);
             let least = |(_, part, values): &(u32, usize, [f32; 3])| match parts[*part].bordered {
-                true => values
-                    .iter()
-                    .copied()
-                    .fold(f32::INFINITY, f32::min)
-                    .max(0.0),
+                true => parts[*part].at_least(values),
                 false if values == &[0.0; 3] => f32::INFINITY,
                 false => -1.0,
             };

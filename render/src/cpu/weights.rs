@@ -34,6 +34,8 @@ impl Term {
 
 /// Up to this, differences are noise: they count as none, and such views share all the weight.
 const SMALLEST: f32 = SAME_RAY as f32;
+/// Far more than what rounding does to a sum of relevances.
+const ROUNDING: f32 = 1e-4;
 /// Keeps diff/t defined where every diff is zero.
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 
@@ -43,6 +45,47 @@ pub(crate) fn weigh(terms: &mut [Term], order: &[usize], options: &FieldOptions)
     vectorised(
         #[inline(always)]
         || weigh_by_lanes(terms, order, options),
+    )
+}
+
+/// Whether, in the pixels that are `wanted`, further views that differ by `least` or more could not change the
+/// weights of those terms that are in `order`. (It may say no where they could not.)
+pub(crate) fn is_enough(
+    terms: &[Term],
+    order: &[usize],
+    options: &FieldOptions,
+    least: f32,
+    wanted: &[bool; LANES],
+) -> bool {
+    if !(least > SMALLEST) {
+        return false;
+    }
+    // The threshold is where this sum is so much, and the sum grows with it. Or so many candidates are nearer.
+    let enough = match options.blend {
+        Blend::Consistent => options.full_weight() as f32 * (1.0 + ROUNDING),
+        Blend::Paper => options.k as f32,
+    };
+    let by_least = 1.0 / least;
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut sum = [0.0; LANES];
+            for term in order.iter().map(|&i| &terms[i]) {
+                for k in 0..LANES {
+                    let (a, diff) = (term.a[k], term.diff[k]);
+                    sum[k] += match options.blend {
+                        Blend::Consistent => a * (1.0 - diff * by_least).max(0.0),
+                        Blend::Paper if a > 0.0 && diff <= least => 1.0,
+                        Blend::Paper => 0.0,
+                    };
+                }
+            }
+            let mut is_enough = true;
+            for k in 0..LANES {
+                is_enough &= !wanted[k] | (sum[k] >= enough);
+            }
+            is_enough
+        },
     )
 }
 
