@@ -4,7 +4,7 @@ use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::options::Resolution;
 use crate::reference::candidate;
-use crate::view_tree::{Ball, Measure};
+use crate::view_tree::{Around, Ball, Measure};
 use calibrate::Pixel;
 
 /// What there is to know about a point of the proxy without asking all source views.
@@ -53,30 +53,15 @@ impl Frame<'_> {
                 found.extend(self.taking_part().map(|i| i as u32));
             }
         }
-        self.tally.note(found);
+        self.tally.note(found.iter().copied());
     }
 
-    /// For [`Self::views_of_groups`] of smaller balls inside of this one, and of `most` or less.
-    pub(crate) fn groups_within(&self, ball: &Ball, most: f64, groups: &mut Vec<u32>) {
-        let measure = self.measure();
-        self.view_tree().groups_within(ball, measure, most, groups);
+    /// The same views, for parts of the ball to ask them.
+    pub(crate) fn views_around(&self, ball: &Ball, most: f64, found: &mut Around) {
+        self.view_tree().around(ball, self.measure(), most, found);
     }
 
-    /// [`Self::views_within`] of those groups that were found for all around the ball.
-    pub(crate) fn views_of_groups(
-        &self,
-        groups: &[u32],
-        ball: &Ball,
-        most: f64,
-        found: &mut Vec<u32>,
-    ) {
-        let measure = self.measure();
-        self.view_tree()
-            .within_groups(groups, ball, measure, most, found);
-        self.tally.note(found);
-    }
-
-    fn measure(&self) -> Measure {
+    pub(crate) fn measure(&self) -> Measure {
         Measure {
             beta: self.options.beta,
             by_length: self.options.resolution == Resolution::Length,

@@ -20,11 +20,11 @@ impl Tally {
     }
 
     /// That when it was asked for a point, triangle or tile of pixels, the views `found` are scored.
-    pub(crate) fn note(&self, found: &[u32]) {
+    pub(crate) fn note(&self, found: impl ExactSizeIterator<Item = u32>) {
         self.questions.fetch_add(1, Ordering::Relaxed);
         let count = found.len() as u64;
         self.scorings.fetch_add(count, Ordering::Relaxed);
-        for &i in found {
+        for i in found {
             let ever = &self.ever[i as usize];
             // Mostly they were, and a line of cache that is only read is shared.
             if !ever.load(Ordering::Relaxed) {

@@ -40,6 +40,25 @@ pub(crate) struct Ball {
     pub radius: f64,
     /// Within it, a view may see something; infinite for anywhere.
     pub sight: f64,
+    /// How far from its middle what it is around lies, seen from the viewer.
+    pub spread: Spread,
+}
+
+/// By how much points differ from another, as the viewer sees them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spread {
+    /// In direction, at most: radians.
+    pub aside: f64,
+    /// In distance, at most.
+    pub along: f64,
+}
+
+impl Spread {
+    /// Anything.
+    pub(crate) const UNKNOWN: Self = Self {
+        aside: f64::INFINITY,
+        along: f64::INFINITY,
+    };
 }
 
 impl Ball {
@@ -51,6 +70,7 @@ impl Ball {
             center,
             radius: 0.0,
             sight,
+            spread: Spread::UNKNOWN,
         })
     }
 }
@@ -127,44 +147,19 @@ impl ViewTree {
         self.sort(found);
     }
 
-    /// The groups in which the views are that [`Self::within`] finds.
-    pub(crate) fn groups_within(
-        &self,
-        ball: &Ball,
-        measure: Measure,
-        most: f64,
-        groups: &mut Vec<u32>,
-    ) {
-        groups.clear();
+    /// The views that [`Self::within`] finds, with what is known of them.
+    pub(crate) fn around(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Around) {
+        found.views.clear();
+        found.groups.clear();
         let query = Query::new(ball, measure, most);
         self.visit(&query, |group, may| {
-            if may.contains(&true) {
-                groups.push(group as u32);
+            let views = self.views[GROUP * group..].iter();
+            for (lane, (view, may)) in views.zip(may).enumerate() {
+                if may {
+                    found.put(*view, &self.levels[0][group], lane);
+                }
             }
         });
-    }
-
-    /// [`Self::within`], where it is known in which groups the views are.
-    pub(crate) fn within_groups(
-        &self,
-        groups: &[u32],
-        ball: &Ball,
-        measure: Measure,
-        most: f64,
-        found: &mut Vec<u32>,
-    ) {
-        found.clear();
-        let query = Query::new(ball, measure, most);
-        vectorised(
-            #[inline(always)]
-            || {
-                for &group in groups {
-                    let group = group as usize;
-                    self.add(group, self.levels[0][group].may_matter(&query), found);
-                }
-            },
-        );
-        self.sort(found);
     }
 
     /// Goes through the groups of views of which some may matter, and a few more.
@@ -219,6 +214,55 @@ impl ViewTree {
         if self.levels.len() > 1 && is_planted(Fault::DroppedView) {
             found.pop();
         }
+    }
+}
+
+/// The views that may matter around a part of the proxy: side by side, so that parts of it can ask which of
+/// them may matter there.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Around {
+    views: Vec<u32>,
+    /// Of each eight of them; of the last eight some may be missing.
+    groups: Vec<Group>,
+}
+
+impl Around {
+    #[inline(always)]
+    fn put(&mut self, view: u32, group: &Group, lane: usize) {
+        let at = self.views.len() % GROUP;
+        if at == 0 {
+            self.groups.push(*group);
+        }
+        let last = self.groups.last_mut().expect("one was added for the first");
+        last.put(at, group, lane);
+        self.views.push(view);
+    }
+
+    /// [`ViewTree::within`] a smaller ball inside of the one they were found for, and a difference of that or
+    /// less: by how much each view differs at least, and its index. Those that may differ least come
+    /// first.
+    pub(crate) fn within(
+        &self,
+        ball: &Ball,
+        measure: Measure,
+        most: f64,
+        found: &mut Vec<(f32, u32)>,
+    ) {
+        found.clear();
+        let query = Query::new(ball, measure, most);
+        vectorised(
+            #[inline(always)]
+            || {
+                for (group, views) in self.groups.iter().zip(self.views.chunks(GROUP)) {
+                    let (may, least) = group.bounded(&query);
+                    let all = views.iter().zip(least).zip(may);
+                    found.extend(
+                        all.filter_map(|((view, least), may)| may.then_some((least, *view))),
+                    );
+                }
+            },
+        );
+        found.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
     }
 }
 

@@ -4,7 +4,7 @@ use super::lanes::{LANES, vectorised};
 use super::source::Tile;
 use crate::frame::Frame;
 use crate::near::wider;
-use crate::view_tree::Ball;
+use crate::view_tree::{Around, Ball, Spread};
 use glam::{DVec3, Vec3};
 
 /// For a thread: what it knows of the source views that the tiles of a block of pixels need. What it
@@ -13,16 +13,17 @@ use glam::{DVec3, Vec3};
 pub(super) struct Asked {
     /// Where the block's proxy points are; `None` where one is at infinity.
     around: Option<Ball>,
-    /// Those groups of views in which all are that differ by `covered` or less there.
-    groups: Vec<u32>,
+    /// The views that may differ by `covered` or less there.
+    known: Around,
     covered: f64,
     /// By how much those differ that the next tile may need.
     guess: f64,
-    views: Vec<u32>,
+    views: Vec<(f32, u32)>,
+    all: Vec<u32>,
 }
 
 /// Over what a tile needed, for rounding to f32.
-const MARGIN: f64 = 1.001;
+pub(super) const MARGIN: f64 = 1.001;
 /// And for the next tile.
 const ROOM: f64 = 1.1;
 
@@ -32,9 +33,9 @@ impl Asked {
         self.guess = frame.first_guess();
     }
 
-    /// Goes on to the next block, by where its tiles' points are.
-    pub(super) fn enter(&mut self, block: Extent) {
-        self.around = block.ball();
+    /// Goes on to the next block, by what is around its tiles' points.
+    pub(super) fn enter(&mut self, block: Option<Ball>) {
+        self.around = block;
         self.covered = f64::NEG_INFINITY;
     }
 
@@ -43,21 +44,31 @@ impl Asked {
         tile.map_or(f64::INFINITY, |_| self.guess)
     }
 
-    /// The views, by index, that may differ by `within` or less in a tile of the block.
-    pub(super) fn views(&mut self, frame: &Frame<'_>, tile: Option<&Ball>, within: f64) -> &[u32] {
-        let views = &mut self.views;
+    /// The views that may differ by `within` or less in a tile of the block: by how much at least, and their
+    /// indices. Those that may differ least come first.
+    pub(super) fn views(
+        &mut self,
+        frame: &Frame<'_>,
+        tile: Option<&Ball>,
+        within: f64,
+    ) -> &[(f32, u32)] {
         match (&self.around, tile) {
             (Some(around), Some(tile)) => {
                 if within > self.covered {
                     // With room for what its other tiles need.
                     self.covered = ROOM * within;
-                    frame.groups_within(around, self.covered, &mut self.groups);
+                    frame.views_around(around, self.covered, &mut self.known);
                 }
-                frame.views_of_groups(&self.groups, tile, within, views);
+                let measure = frame.measure();
+                self.known.within(tile, measure, within, &mut self.views);
             }
-            _ => frame.views_within(tile, within, views),
+            _ => {
+                frame.views_within(tile, within, &mut self.all);
+                self.views.clear();
+                self.views.extend(self.all.iter().map(|view| (0.0, *view)));
+            }
         }
-        views
+        &self.views
     }
 
     /// Learns that a tile, having asked `within` a difference, needs views as different as `reach`.
@@ -132,9 +143,7 @@ impl Extent {
     }
 
     /// What holds all that it is around; `None` where that goes to infinity.
-    pub(super) fn ball(&self) -> Option<Ball> {
-        /// What rounding to f32 makes of a point, relative to its distance.
-        const ROUNDING: f64 = 1e-6;
+    fn ball(&self) -> Option<Ball> {
         let (least, most): (DVec3, DVec3) = (self.least.into(), self.most.into());
         let center = 0.5 * (least + most);
         let radius = 0.5 * (most - least).length();
@@ -144,7 +153,83 @@ impl Extent {
             center,
             radius,
             sight: radius,
+            spread: Spread::UNKNOWN,
         })
+    }
+
+    /// What holds a tile's proxy points, which it is around.
+    pub(super) fn ball_of(&self, tile: &Tile) -> Option<Ball> {
+        let ball = self.ball()?;
+        let here = ball.center.length();
+        let towards = (ball.center / here).as_vec3();
+        // How far they are from the middle: as chords of a unit's sphere, and in distance. They are not
+        // negative: in order as their bits are.
+        let (mut chord, mut along) = (0_u32, 0_u32);
+        vectorised(
+            #[inline(always)]
+            || {
+                for k in 0..LANES {
+                    let (x, y, z, s) = (tile.x[k], tile.y[k], tile.z[k], tile.s[k]);
+                    let length = (x * x + y * y + z * z).sqrt();
+                    let scale = 1.0 / length;
+                    let (dx, dy, dz) = (
+                        x * scale - towards.x,
+                        y * scale - towards.y,
+                        z * scale - towards.z,
+                    );
+                    let squared = dx * dx + dy * dy + dz * dz;
+                    let off = (length / s - here as f32).abs();
+                    let is_there = s >= 0.0;
+                    chord = chord.max(if is_there { squared.to_bits() } else { 0 });
+                    along = along.max(if is_there { off.to_bits() } else { 0 });
+                }
+            },
+        );
+        let chord = f64::from(f32::from_bits(chord)).sqrt() + ROUNDING;
+        let along = f64::from(f32::from_bits(along)) + ROUNDING * (here + ball.radius);
+        Some(Ball {
+            spread: Spread {
+                aside: more_than_angle(chord),
+                along,
+            },
+            ..ball
+        })
+    }
+
+    /// What holds all that it is around: these balls, of tiles. `None` where one goes to infinity.
+    pub(super) fn ball_of_all(&self, tiles: &[Option<Ball>]) -> Option<Ball> {
+        let ball = self.ball()?;
+        let here = ball.center.length();
+        let towards = ball.center / here;
+        let mut spread = Spread {
+            aside: 0.0,
+            along: 0.0,
+        };
+        for tile in tiles.iter().flatten() {
+            let there = tile.center.length();
+            let chord = towards.distance(tile.center / there) + ROUNDING;
+            let aside = more_than_angle(chord) + tile.spread.aside;
+            let along = (here - there).abs() + tile.spread.along;
+            spread = Spread {
+                aside: spread.aside.max(aside),
+                along: spread.along.max(along),
+            };
+        }
+        Some(Ball { spread, ..ball })
+    }
+}
+
+/// What rounding to f32 makes of a point, relative to its distance.
+const ROUNDING: f64 = 1e-6;
+
+/// At least the angle between directions so far apart, as points of a unit's sphere; infinite where that is
+/// much.
+fn more_than_angle(chord: f64) -> f64 {
+    // 2 asin(c/2) = c + c³/24 + …, of which the rest is less than a fifth up to one.
+    if chord < 1.0 {
+        chord * (1.0 + 0.05 * chord * chord)
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -167,14 +252,29 @@ mod tests {
             [-0.3, 0.1, 1.0, 0.25],
             [0.0, 0.7, 1.0, 2.0],
         ];
-        let ball = Extent::of(&tile(&points)).ball().unwrap();
+        let of = |tile: &Tile| Extent::of(tile).ball_of(tile).unwrap();
+        let ball = of(&tile(&points));
+        let here = ball.center.length();
         for [x, y, z, s] in points.map(|point| point.map(f64::from)) {
-            let distance = (DVec3::new(x, y, z) / s).distance(ball.center);
+            let point = DVec3::new(x, y, z) / s;
+            let distance = point.distance(ball.center);
             assert!(distance <= ball.radius && ball.radius < 3.0);
+            let Spread { aside, along } = ball.spread;
+            let angle = point.angle_between(ball.center);
+            assert!(angle <= aside && aside < 1.5, "{angle}, {aside}");
+            let off = (point.length() - here).abs();
+            assert!(off <= along && along < 3.0, "{off}, {along}");
         }
-        let more = Extent::of(&tile(&[[9.0, 0.0, 1.0, 1.0]]));
-        let both = Extent::of(&tile(&points)).and(more).ball().unwrap();
+        let more = tile(&[[3.0, 0.0, 1.0, 1.0]]);
+        let extent = Extent::of(&tile(&points)).and(Extent::of(&more));
+        let both = extent.ball_of_all(&[Some(ball), Some(of(&more)), None]);
+        let both = both.unwrap();
         assert!(both.radius > ball.radius);
+        for point in [DVec3::new(3.0, 0.0, 1.0), DVec3::new(-0.3, 0.1, 1.0) / 0.25] {
+            assert!(point.angle_between(both.center) <= both.spread.aside);
+            let off = (point.length() - both.center.length()).abs();
+            assert!(off <= both.spread.along && both.spread.along < 5.0);
+        }
     }
 
     #[test]
@@ -187,6 +287,7 @@ mod tests {
             assert!(!extent.is_empty() && extent.ball().is_none(), "{ray:?}");
             let with_others = extent.and(Extent::of(&tile(&[[0.1, 0.2, 1.0, 0.5]])));
             assert!(with_others.ball().is_none(), "{ray:?}");
+            assert!(with_others.ball_of_all(&[]).is_none(), "{ray:?}");
         }
     }
 }

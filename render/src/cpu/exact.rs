@@ -1,9 +1,9 @@
 //! Frames of the exact field.
 
-use super::asked::{Asked, Extent};
+use super::asked::{Asked, Extent, MARGIN};
 use super::lanes::{LANES, any};
 use super::source::Tile;
-use super::{BAND, Engine, Seen, TILE, draw, mark, put, tiles_of_band};
+use super::{BAND, Engine, FIRST_ASKED, Seen, THEN_ASKED, TILE, draw, mark, put, tiles_of_band};
 use crate::frame::Frame;
 use crate::photos::PhotoError;
 use crate::rays::RayMap;
@@ -43,10 +43,13 @@ impl Engine<'_> {
             let tile = |&[x, y]: &[usize; 2]| self.tile([x, band * BAND + y], |_| true);
             let tiles: Vec<Tile> = block.iter().map(tile).collect();
             let extents: Vec<Extent> = tiles.iter().map(Extent::of).collect();
-            asked.enter(extents.iter().copied().fold(Extent::EMPTY, Extent::and));
-            for ((tile, extent), at) in tiles.iter().zip(&extents).zip(block) {
+            let balls = tiles.iter().zip(&extents);
+            let balls: Vec<Option<Ball>> = balls.map(|(tile, all)| all.ball_of(tile)).collect();
+            let around = extents.iter().copied().fold(Extent::EMPTY, Extent::and);
+            asked.enter(around.ball_of_all(&balls));
+            for (((tile, extent), ball), at) in tiles.iter().zip(&extents).zip(&balls).zip(block) {
                 if !extent.is_empty() {
-                    self.weigh(tile, extent.ball().as_ref(), asked, seen);
+                    self.weigh(tile, ball.as_ref(), asked, seen);
                     then(*at, seen)?;
                 }
             }
@@ -58,8 +61,10 @@ impl Engine<'_> {
     fn weigh(&self, tile: &Tile, ball: Option<&Ball>, asked: &mut Asked, seen: &mut Seen) {
         let mut within = asked.first(ball);
         loop {
-            let views = asked.views(self.frame, ball, within).iter();
-            self.score(views.map(|&i| i as usize), within as f32, tile, seen);
+            let views = asked.views(self.frame, ball, within);
+            let scored = self.score(views, within as f32, tile, seen);
+            let scored = views[..scored].iter().map(|(_, view)| *view);
+            self.frame.tally.note(scored);
             let reach = seen.weigh(&self.frame.options);
             let wanted = (0..LANES).filter(|&k| tile.s[k] >= 0.0);
             match asked.settles(within, wanted.map(|k| reach[k]).fold(0.0, f32::max)) {
@@ -70,20 +75,30 @@ impl Engine<'_> {
     }
 
     /// Of some source views those that see something of a tile and differ there by `within` or less,
-    /// and by what they differ.
+    /// and by what they differ. Of each it is known how much it differs at least; they are in order by that. How
+    /// many there were until no further one could count.
     pub(super) fn score(
         &self,
-        views: impl Iterator<Item = usize>,
+        views: &[(f32, u32)],
         within: f32,
         tile: &Tile,
         seen: &mut Seen,
-    ) {
+    ) -> usize {
         seen.clear();
-        for source_idx in views {
+        let is_there = std::array::from_fn(|k| tile.s[k] >= 0.0);
+        let mut check = FIRST_ASKED;
+        for (asked, &(least, view)) in views.iter().enumerate() {
+            if asked >= check && self.frame.may_skip() {
+                if seen.is_enough(&self.frame.options, least / MARGIN as f32, &is_there) {
+                    return asked;
+                }
+                check = asked + THEN_ASKED;
+            }
+            let source_idx = view as usize;
             let source = self.source(source_idx);
             let (sight, term) = seen.next();
             let diff = source.difference(tile);
-            let little = |k: usize| (tile.s[k] >= 0.0) & !(diff[k] > within);
+            let little = |k: usize| is_there[k] & !(diff[k] > within);
             if !any(little) || !source.see(tile, sight) {
                 continue;
             }
@@ -92,5 +107,6 @@ impl Engine<'_> {
             term.a = sight.a;
             seen.keep(source_idx);
         }
+        views.len()
     }
 }

@@ -48,6 +48,11 @@ const PLACES: [[usize; 2]; LANES] = {
     places
 };
 
+/// Source views that are asked about a tile before it is seen whether others may count, and again
+/// after so many more.
+const FIRST_ASKED: usize = 6;
+const THEN_ASKED: usize = 2;
+
 /// The engine, with what it keeps between frames.
 #[derive(Debug, Default)]
 pub struct Cpu {

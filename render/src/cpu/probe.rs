@@ -22,6 +22,7 @@ pub(crate) fn colors(
 ) -> Result<Vec<Vec4>, PhotoError> {
     let rays = RayMap::of(&frame.desired);
     let engine = Engine::new(frame, &rays);
+    let views: Vec<(f32, u32)> = frame.taking_part().map(|i| (0.0, i as u32)).collect();
     let mut all = Vec::new();
     let mut seen = Seen::default();
     for pixels in pixels.chunks(LANES) {
@@ -32,7 +33,7 @@ pub(crate) fn colors(
                 tile.set(k, ray, plane);
             }
         }
-        engine.score(frame.taking_part(), f32::INFINITY, &tile, &mut seen);
+        engine.score(&views, f32::INFINITY, &tile, &mut seen);
         seen.weigh(&frame.options);
         let mut color = [Vec4::ZERO; LANES];
         let mut sum: Lane = [0.0; LANES];

@@ -1,7 +1,7 @@
 //! Frames of the triangulated field.
 
 use super::lanes::{LANES, Lane, each, vectorised};
-use super::{BAND, Engine, PLACES, Seen, TILE, draw, put, tiles_of_band};
+use super::{BAND, Engine, FIRST_ASKED, PLACES, Seen, THEN_ASKED, TILE, draw, put, tiles_of_band};
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
@@ -152,7 +152,11 @@ impl Part {
             // the least.
             let mut least = u32::MAX;
             for k in 0..LANES {
-                let bits = if self.covers[k] { of[k].to_bits() } else { u32::MAX };
+                let bits = if self.covers[k] {
+                    of[k].to_bits()
+                } else {
+                    u32::MAX
+                };
                 least = least.min(bits);
             }
             f32::from_bits(least)
@@ -183,11 +187,6 @@ impl Part {
         }
     }
 }
-
-/// Source views that are asked about a tile before it is seen whether others may count, and again
-/// after so many more.
-const FIRST_ASKED: usize = 6;
-const THEN_ASKED: usize = 2;
 
 /// What a thread uses again for every tile that it draws of a triangulated field.
 #[derive(Default)]

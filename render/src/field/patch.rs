@@ -61,6 +61,7 @@ impl Patch {
             center,
             radius,
             sight: radius,
+            spread: crate::view_tree::Spread::UNKNOWN,
         })
     }
 

@@ -1,6 +1,6 @@
 //! Eight source views, or parts of the hierarchy, that are asked together.
 
-use super::{Ball, GROUP, Measure, SLACK};
+use super::{Ball, GROUP, Measure, SLACK, Spread};
 use glam::DVec3;
 use std::array::from_fn;
 
@@ -132,9 +132,30 @@ impl Group {
         }
     }
 
+    /// Takes over one of another group.
+    #[inline(always)]
+    pub(super) fn put(&mut self, lane: usize, from: &Self, of: usize) {
+        for axis in 0..3 {
+            self.center[axis][lane] = from.center[axis][of];
+            self.axis[axis][lane] = from.axis[axis][of];
+        }
+        for k in 0..2 {
+            self.spread[k][lane] = from.spread[k][of];
+        }
+        self.radius[lane] = from.radius[of];
+        self.footprint_ratio[lane] = from.footprint_ratio[of];
+        self.far[lane] = from.far[of];
+    }
+
     /// Which of them can differ by as little as is asked for and may see something.
     #[inline(always)]
     pub(super) fn may_matter(&self, query: &Query) -> [bool; GROUP] {
+        self.bounded(query).0
+    }
+
+    /// The same, and by how much each differs at least.
+    #[inline(always)]
+    pub(super) fn bounded(&self, query: &Query) -> ([bool; GROUP], [f32; GROUP]) {
         let (ball, here, by_here) = (&query.ball, query.here, query.by_here);
         // One after the other: arrays of arrays go to memory and back.
         let [cx, cy, cz] = ball.center.to_array();
@@ -147,27 +168,42 @@ impl Group {
         // 1. How little they can differ from the viewer: the angle at the ball's middle less what they
         // subtend. From elsewhere in the ball it differs by how much: the gradients of both the angle between viewer
         // and view and the logarithm of the ratio of their distances are as long as their distance over the
-        // product of the two.
+        // product of the two. Away from the viewer the angle's is only how far the view is from the line of
+        // sight, over the square of its distance: less is lost where it is known that points are about in one
+        // direction, and little aside: first away to where they are, then aside.
         let near = each(|i| distance[i] - own[i] - ball.radius);
         let least_here = here - ball.radius;
-        let vary = match ball.radius > 0.0 {
-            true => each(|i| ball.radius * self.far[i] / (near[i] * least_here) + SLACK),
-            false => [SLACK; GROUP],
-        };
         let p = each(|i| cy * z[i] - cz * y[i]);
         let q = each(|i| cz * x[i] - cx * z[i]);
         let r = each(|i| cx * y[i] - cy * x[i]);
         let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
-        let along = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
+        let (vary, turn) = match ball.radius > 0.0 {
+            true => {
+                let by_near = each(|i| 1.0 / near[i]);
+                let per_far = ball.radius / least_here;
+                let vary = each(|i| self.far[i] * (per_far * by_near[i]) + SLACK);
+                let Spread { aside, along } = ball.spread;
+                let turn = each(|i| {
+                    let off = (across[i] * by_here + own[i]) * by_near[i];
+                    (off * along + self.far[i] * aside) * by_near[i] + SLACK
+                });
+                (
+                    vary,
+                    each(|i| if turn[i] < vary[i] { turn[i] } else { vary[i] }),
+                )
+            }
+            false => ([SLACK; GROUP], [SLACK; GROUP]),
+        };
+        let towards = each(|i| cx * x[i] + cy * y[i] + cz * z[i]);
         let by_distance = each(|i| 1.0 / distance[i]);
         // At most the angle: its sine, or one where that is obtuse; where those are too little to tell,
         // a closer bound.
         let sine = each(|i| across[i] * (by_here * by_distance[i]));
         let angle = match query.most < SINES_TELL {
-            true => each(|i| if along[i] > 0.0 { sine[i] } else { 1.0 }),
-            false => each(|i| less_than_angle(sine[i], along[i] * (by_here * by_distance[i]))),
+            true => each(|i| if towards[i] > 0.0 { sine[i] } else { 1.0 }),
+            false => each(|i| less_than_angle(sine[i], towards[i] * (by_here * by_distance[i]))),
         };
-        let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - vary[i]);
+        let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - turn[i]);
         let measure = query.measure;
         let coarser = match measure.by_length {
             true => each(|i| near[i] - here - ball.radius),
@@ -191,7 +227,7 @@ impl Group {
         let before = each(|i| ax[i] * x[i] + ay[i] * y[i] + az[i] * z[i]);
 
         // 3. What is no number is kept.
-        let mut may = [false; GROUP];
+        let (mut may, mut bound) = ([false; GROUP], [0.0; GROUP]);
         for i in 0..GROUP {
             let is_around = !(near[i] > 0.0) | !(least_here > 0.0);
             let is_little = is_around | !(least[i] > query.most);
@@ -199,8 +235,9 @@ impl Group {
                 & (sum_sin[i] > 0.0)
                 & (before[i] < sum_cos[i] - SLACK * distance[i]);
             may[i] = is_little & !is_far;
+            bound[i] = if is_around { 0.0 } else { least[i] as f32 };
         }
-        may
+        (may, bound)
     }
 }
 
