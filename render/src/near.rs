@@ -44,8 +44,14 @@ impl Frame<'_> {
 
     /// The source views, in order, that may differ by `most` or less somewhere in a ball and may
     /// see something in sight of it; all that do are among them. All that take part where the ball
-    /// is `None`: at infinity.
+    /// is `None`: at infinity. They are about to be scored.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
+        self.find_within(ball, most, found);
+        self.tally.note(found.iter().copied());
+    }
+
+    /// The same, not all of which may be scored.
+    pub(crate) fn find_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
             Some(ball) => self.view_tree().within(ball, self.measure(), most, found),
             None => {
@@ -53,7 +59,6 @@ impl Frame<'_> {
                 found.extend(self.taking_part().map(|i| i as u32));
             }
         }
-        self.tally.note(found.iter().copied());
     }
 
     /// The same views, for parts of the ball to ask them.

@@ -18,6 +18,7 @@ pub(super) struct Asked {
     covered: f64,
     /// By how much those differ that the next tile may need.
     guess: f64,
+    /// What [`Self::views`] found, and room for it.
     views: Vec<(f32, u32)>,
     all: Vec<u32>,
 }
@@ -63,7 +64,7 @@ impl Asked {
                 self.known.within(tile, measure, within, &mut self.views);
             }
             _ => {
-                frame.views_within(tile, within, &mut self.all);
+                frame.find_within(tile, within, &mut self.all);
                 self.views.clear();
                 self.views.extend(self.all.iter().map(|view| (0.0, *view)));
             }

@@ -202,10 +202,12 @@ struct Scratch {
 /// What the triangles that cross a tile list.
 #[derive(Default)]
 struct Mentions {
-    /// The source view, which of the tile's parts has it, and the corners' values; view by view.
-    all: Vec<(u32, usize, [f32; 3])>,
+    /// Which of the tile's parts has a source view, and the corners' values; view by view.
+    all: Vec<(usize, [f32; 3])>,
     /// Those that may count, by the least difference.
     views: Vec<Mentioned>,
+    /// Of each part, which of the field's entries are yet to come.
+    next: Vec<Range<usize>>,
 }
 
 /// A source view that some triangle lists.
@@ -219,28 +221,47 @@ struct Mentioned {
 
 impl Mentions {
     fn of_parts(&mut self, parts: &[Part], field: &TriangulatedField) {
-        let Self { all, views } = self;
+        let Self { all, views, next } = self;
         all.clear();
-        for (i, part) in parts.iter().enumerate() {
-            let entries = field.entries_of(part.triangle_idx).iter();
-            all.extend(entries.map(|entry| (entry.source_idx, i, entry.values)));
-        }
-        all.sort_unstable_by_key(|(source_idx, part, _)| (*source_idx, *part));
         views.clear();
-        for of_view in all.chunk_by(|x, y| x.0 == y.0) {
-            let start = views.last().map_or(0, |v: &Mentioned| v.mentions.end);
-            let least = |(_, part, values): &(u32, usize, [f32; 3])| match parts[*part].bordered {
-                true => parts[*part].at_least(values),
-                false if values == &[0.0; 3] => f32::INFINITY,
-                false => -1.0,
-            };
+        next.clear();
+        next.extend(parts.iter().map(|part| {
+            let triangle = &field.triangles[part.triangle_idx];
+            let first = triangle.first_entry as usize;
+            first..first + triangle.entry_count as usize
+        }));
+        // Each triangle lists them in order.
+        let entry = |at: &Range<usize>| (!at.is_empty()).then(|| &field.entries[at.start]);
+        while let Some(source_idx) = next
+            .iter()
+            .filter_map(|at| Some(entry(at)?.source_idx))
+            .min()
+        {
+            let start = all.len();
+            let mut least = f32::INFINITY;
+            for (i, (at, part)) in next.iter_mut().zip(parts).enumerate() {
+                let Some(entry) = entry(at).filter(|entry| entry.source_idx == source_idx) else {
+                    continue;
+                };
+                at.start += 1;
+                let values = entry.values;
+                least = least.min(match part.bordered {
+                    true => part.at_least(&values),
+                    false if values == [0.0; 3] => f32::INFINITY,
+                    false => -1.0,
+                });
+                all.push((i, values));
+            }
+            if least == f32::INFINITY {
+                all.truncate(start);
+                continue;
+            }
             views.push(Mentioned {
-                source_idx: of_view[0].0 as usize,
-                least: of_view.iter().map(least).fold(f32::INFINITY, f32::min),
-                mentions: start..start + of_view.len(),
+                source_idx: source_idx as usize,
+                least,
+                mentions: start..all.len(),
             });
         }
-        views.retain(|view| view.least < f32::INFINITY);
         views.sort_by(|x, y| x.least.total_cmp(&y.least));
     }
 
@@ -259,7 +280,7 @@ impl Mentions {
         vectorised(
             #[inline(always)]
             || {
-                for (_, part, [v0, v1, v2]) in &self.all[view.mentions.clone()] {
+                for (part, [v0, v1, v2]) in &self.all[view.mentions.clone()] {
                     let part = &parts[*part];
                     let values = match part.bordered {
                         true => &mut into.diff,

@@ -50,7 +50,7 @@ pub struct TriangulatedField {
 pub struct FieldTriangle {
     /// Indices of vertices.
     pub corners: [u32; 3],
-    /// Index of its first entry.
+    /// Index of its first entry; they are in order of the source views.
     pub first_entry: u32,
     /// How many entries it has; at most [`MAX_LISTED`].
     pub entry_count: u32,
