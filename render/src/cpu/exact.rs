@@ -13,6 +13,9 @@ use image::RgbaImage;
 /// Tiles that ask for source views together, first: from the top of a band to its bottom.
 const TILES_OF_BLOCK: usize = 4 * BAND / TILE[1];
 
+/// More than what f32 takes off an angle, in radians.
+const NOISE: f32 = 1e-6;
+
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     let engine = Engine::new(frame, rays);
@@ -89,7 +92,8 @@ impl Engine<'_> {
         let mut check = FIRST_ASKED;
         for (asked, &(least, view)) in views.iter().enumerate() {
             if asked >= check && self.frame.may_skip() {
-                if seen.is_enough(&self.frame.options, least / MARGIN as f32, &is_there) {
+                let least = least / MARGIN as f32 - NOISE;
+                if seen.is_enough(&self.frame.options, least, &is_there) {
                     return asked;
                 }
                 check = asked + THEN_ASKED;

@@ -145,6 +145,7 @@ impl Part {
         }
     }
 
+    /// Finds what is least of the shares.
     #[inline(always)]
     fn find_least(&mut self) {
         let least = |of: &Lane| {

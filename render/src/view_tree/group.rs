@@ -153,7 +153,7 @@ impl Group {
         self.bounded(query).0
     }
 
-    /// The same, and by how much each differs at least.
+    /// The same, and by how much each differs at least: by nothing where that is no number.
     #[inline(always)]
     pub(super) fn bounded(&self, query: &Query) -> ([bool; GROUP], [f32; GROUP]) {
         let (ball, here, by_here) = (&query.ball, query.here, query.by_here);
@@ -235,7 +235,8 @@ impl Group {
                 & (sum_sin[i] > 0.0)
                 & (before[i] < sum_cos[i] - SLACK * distance[i]);
             may[i] = is_little & !is_far;
-            bound[i] = if is_around { 0.0 } else { least[i] as f32 };
+            let is_bound = !is_around & (least[i] > 0.0);
+            bound[i] = if is_bound { least[i] as f32 } else { 0.0 };
         }
         (may, bound)
     }
