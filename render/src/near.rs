@@ -46,12 +46,6 @@ impl Frame<'_> {
     /// see something in sight of it; all that do are among them. All that take part where the ball
     /// is `None`: at infinity. They are about to be scored.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
-        self.find_within(ball, most, found);
-        self.tally.note(found.iter().copied());
-    }
-
-    /// The same, not all of which may be scored.
-    pub(crate) fn find_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
             Some(ball) => self.view_tree().within(ball, self.measure(), most, found),
             None => {
@@ -59,9 +53,10 @@ impl Frame<'_> {
                 found.extend(self.taking_part().map(|i| i as u32));
             }
         }
+        self.tally.note(found.iter().copied());
     }
 
-    /// The same views, for parts of the ball to ask them.
+    /// The same views, for parts of the ball to ask them: who scores some says so.
     pub(crate) fn views_around(&self, ball: &Ball, most: f64, found: &mut Around) {
         self.view_tree().around(ball, self.measure(), most, found);
     }

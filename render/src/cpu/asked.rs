@@ -4,7 +4,7 @@ use super::lanes::{LANES, vectorised};
 use super::source::Tile;
 use crate::frame::Frame;
 use crate::near::wider;
-use crate::view_tree::{Around, Ball, Spread};
+use crate::view_tree::{Apart, Around, Ball};
 use glam::{DVec3, Vec3};
 
 /// For a thread: what it knows of the source views that the tiles of a block of pixels need. What it
@@ -18,15 +18,20 @@ pub(super) struct Asked {
     covered: f64,
     /// By how much those differ that the next tile may need.
     guess: f64,
-    /// What [`Self::views`] found, and room for it.
     views: Vec<(f32, u32)>,
-    all: Vec<u32>,
 }
 
 /// Over what a tile needed, for rounding to f32.
-pub(super) const MARGIN: f64 = 1.001;
+const MARGIN: f64 = 1.001;
 /// And for the next tile.
 const ROOM: f64 = 1.1;
+/// What rounding to f32 is taken to lower an angle by, in radians, however small.
+const NOISE: f32 = 1e-6;
+
+/// What a difference may be in f32 that is at least so much.
+pub(super) fn in_f32(least: f32) -> f32 {
+    least / MARGIN as f32 - NOISE
+}
 
 impl Asked {
     /// Forgets what it knows: for the first block of some.
@@ -53,22 +58,23 @@ impl Asked {
         tile: Option<&Ball>,
         within: f64,
     ) -> &[(f32, u32)] {
-        match (&self.around, tile) {
-            (Some(around), Some(tile)) => {
-                if within > self.covered {
-                    // With room for what its other tiles need.
-                    self.covered = ROOM * within;
-                    frame.views_around(around, self.covered, &mut self.known);
-                }
-                let measure = frame.measure();
-                self.known.within(tile, measure, within, &mut self.views);
+        let Some(tile) = tile else {
+            self.views.clear();
+            let all = frame.taking_part().map(|i| (0.0, i as u32));
+            self.views.extend(all);
+            return &self.views;
+        };
+        match &self.around {
+            Some(around) if within > self.covered => {
+                // With room for what its other tiles need.
+                self.covered = ROOM * within;
+                frame.views_around(around, self.covered, &mut self.known);
             }
-            _ => {
-                frame.find_within(tile, within, &mut self.all);
-                self.views.clear();
-                self.views.extend(self.all.iter().map(|view| (0.0, *view)));
-            }
+            Some(_) => {}
+            None => frame.views_around(tile, within, &mut self.known),
         }
+        let measure = frame.measure();
+        self.known.within(tile, measure, within, &mut self.views);
         &self.views
     }
 
@@ -154,7 +160,7 @@ impl Extent {
             center,
             radius,
             sight: radius,
-            spread: Spread::UNKNOWN,
+            apart: Apart::UNKNOWN,
         })
     }
 
@@ -189,7 +195,7 @@ impl Extent {
         let chord = f64::from(f32::from_bits(chord)).sqrt() + ROUNDING;
         let along = f64::from(f32::from_bits(along)) + ROUNDING * (here + ball.radius);
         Some(Ball {
-            spread: Spread {
+            apart: Apart {
                 aside: more_than_angle(chord),
                 along,
             },
@@ -202,21 +208,21 @@ impl Extent {
         let ball = self.ball()?;
         let here = ball.center.length();
         let towards = ball.center / here;
-        let mut spread = Spread {
+        let mut apart = Apart {
             aside: 0.0,
             along: 0.0,
         };
         for tile in tiles.iter().flatten() {
             let there = tile.center.length();
             let chord = towards.distance(tile.center / there) + ROUNDING;
-            let aside = more_than_angle(chord) + tile.spread.aside;
-            let along = (here - there).abs() + tile.spread.along;
-            spread = Spread {
-                aside: spread.aside.max(aside),
-                along: spread.along.max(along),
+            let aside = more_than_angle(chord) + tile.apart.aside;
+            let along = (here - there).abs() + tile.apart.along;
+            apart = Apart {
+                aside: apart.aside.max(aside),
+                along: apart.along.max(along),
             };
         }
-        Some(Ball { spread, ..ball })
+        Some(Ball { apart, ..ball })
     }
 }
 
@@ -260,7 +266,7 @@ mod tests {
             let point = DVec3::new(x, y, z) / s;
             let distance = point.distance(ball.center);
             assert!(distance <= ball.radius && ball.radius < 3.0);
-            let Spread { aside, along } = ball.spread;
+            let Apart { aside, along } = ball.apart;
             let angle = point.angle_between(ball.center);
             assert!(angle <= aside && aside < 1.5, "{angle}, {aside}");
             let off = (point.length() - here).abs();
@@ -272,9 +278,9 @@ mod tests {
         let both = both.unwrap();
         assert!(both.radius > ball.radius);
         for point in [DVec3::new(3.0, 0.0, 1.0), DVec3::new(-0.3, 0.1, 1.0) / 0.25] {
-            assert!(point.angle_between(both.center) <= both.spread.aside);
+            assert!(point.angle_between(both.center) <= both.apart.aside);
             let off = (point.length() - both.center.length()).abs();
-            assert!(off <= both.spread.along && both.spread.along < 5.0);
+            assert!(off <= both.apart.along && both.apart.along < 5.0);
         }
     }
 

@@ -1,9 +1,9 @@
 //! Frames of the exact field.
 
-use super::asked::{Asked, Extent, MARGIN};
+use super::asked::{Asked, Extent, in_f32};
 use super::lanes::{LANES, any};
 use super::source::Tile;
-use super::{BAND, Engine, FIRST_ASKED, Seen, THEN_ASKED, TILE, draw, mark, put, tiles_of_band};
+use super::{BAND, Engine, Seen, TILE, draw, mark, put, tiles_of_band};
 use crate::frame::Frame;
 use crate::photos::PhotoError;
 use crate::rays::RayMap;
@@ -12,9 +12,6 @@ use image::RgbaImage;
 
 /// Tiles that ask for source views together, first: from the top of a band to its bottom.
 const TILES_OF_BLOCK: usize = 4 * BAND / TILE[1];
-
-/// More than what f32 takes off an angle, in radians.
-const NOISE: f32 = 1e-6;
 
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
@@ -88,15 +85,12 @@ impl Engine<'_> {
         seen: &mut Seen,
     ) -> usize {
         seen.clear();
+        let may_skip = self.frame.may_skip();
         let is_there = std::array::from_fn(|k| tile.s[k] >= 0.0);
-        let mut check = FIRST_ASKED;
         for (asked, &(least, view)) in views.iter().enumerate() {
-            if asked >= check && self.frame.may_skip() {
-                let least = least / MARGIN as f32 - NOISE;
-                if seen.is_enough(&self.frame.options, least, &is_there) {
-                    return asked;
-                }
-                check = asked + THEN_ASKED;
+            let least = in_f32(least);
+            if may_skip && seen.is_enough(asked, &self.frame.options, least, &is_there) {
+                return asked;
             }
             let source_idx = view as usize;
             let source = self.source(source_idx);

@@ -136,10 +136,18 @@ impl Seen {
         weights::weigh(&mut self.terms, &self.order, options)
     }
 
-    /// Whether, in the pixels that are `wanted`, views that differ by `least` or more would change no weight:
-    /// see [`weights::is_enough`].
-    fn is_enough(&self, options: &FieldOptions, least: f32, wanted: &[bool; LANES]) -> bool {
-        weights::is_enough(&self.terms, &self.order, options, least, wanted)
+    /// Whether, so many views having been asked, it is looked into and found that in the pixels that are `wanted`
+    /// views that differ by `least` or more would change no weight: see [`weights::is_enough`].
+    fn is_enough(
+        &self,
+        asked: usize,
+        options: &FieldOptions,
+        least: f32,
+        wanted: &[bool; LANES],
+    ) -> bool {
+        asked >= FIRST_ASKED
+            && (asked - FIRST_ASKED).is_multiple_of(THEN_ASKED)
+            && weights::is_enough(&self.terms, &self.order, options, least, wanted)
     }
 
     /// Adds the terms' weights to what the sights are worth.

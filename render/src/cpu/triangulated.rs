@@ -1,7 +1,7 @@
 //! Frames of the triangulated field.
 
 use super::lanes::{LANES, Lane, each, vectorised};
-use super::{BAND, Engine, FIRST_ASKED, PLACES, Seen, THEN_ASKED, TILE, draw, put, tiles_of_band};
+use super::{BAND, Engine, PLACES, Seen, TILE, draw, put, tiles_of_band};
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
@@ -73,13 +73,9 @@ pub(super) fn draw_field(
             // triangle, with the mask, a term of the blend. Of the latter the views that
             // differ least come first, as far as they leave room for more.
             seen.clear();
-            let mut check = FIRST_ASKED;
             for (asked, view) in mentions.views().iter().enumerate() {
-                if asked >= check && view.least >= 0.0 && may_skip {
-                    if seen.is_enough(&frame.options, view.least, &is_bordered) {
-                        break;
-                    }
-                    check = asked + THEN_ASKED;
+                if may_skip && seen.is_enough(asked, &frame.options, view.least, &is_bordered) {
+                    break;
                 }
                 let (sight, term) = seen.next();
                 if !engine.source(view.source_idx).see(&tile, sight) {

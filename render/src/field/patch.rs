@@ -3,7 +3,7 @@
 use super::vertex::Vertex;
 use crate::cpu::lanes::vectorised;
 use crate::frame::{Frame, FrameSource, ProxyPoint};
-use crate::view_tree::{self, Ball};
+use crate::view_tree::{Apart, Ball};
 use crate::visibility::{DistanceMap, TOLERANCE, visible};
 use calibrate::{Distortion, Pixel};
 use glam::{DVec2, DVec3};
@@ -61,7 +61,7 @@ impl Patch {
             center,
             radius,
             sight: radius,
-            spread: view_tree::Spread::UNKNOWN,
+            apart: Apart::UNKNOWN,
         })
     }
 

@@ -1,6 +1,6 @@
 //! Eight source views, or parts of the hierarchy, that are asked together.
 
-use super::{Ball, GROUP, Measure, SLACK, Spread};
+use super::{Apart, Ball, GROUP, Measure, SLACK};
 use glam::DVec3;
 use std::array::from_fn;
 
@@ -182,7 +182,7 @@ impl Group {
                 let by_near = each(|i| 1.0 / near[i]);
                 let per_far = ball.radius / least_here;
                 let vary = each(|i| self.far[i] * (per_far * by_near[i]) + SLACK);
-                let Spread { aside, along } = ball.spread;
+                let Apart { aside, along } = ball.apart;
                 let turn = each(|i| {
                     let off = (across[i] * by_here + own[i]) * by_near[i];
                     (off * along + self.far[i] * aside) * by_near[i] + SLACK
