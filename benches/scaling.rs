@@ -1,5 +1,5 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact --json FILE --gpu]`;
+//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact --frames N --json FILE --gpu]`;
 //! see README.md.
 
 use calibrate::View;
@@ -38,6 +38,9 @@ struct Args {
     /// Only one stage, over and over, for profiles
     #[arg(long, value_parser = ["field", "cpu", "exact"])]
     alone: Option<String>,
+    /// How often it is repeated
+    #[arg(long, default_value_t = 40, requires = "alone")]
+    frames: usize,
     /// Also draw with whatever graphics driver there is
     #[arg(long)]
     gpu: bool,
@@ -82,7 +85,7 @@ fn main() {
                 let lumigraph = lumigraph(kind, count, PHOTO);
                 let desired = desired(kind, size);
                 if let Some(stage) = &args.alone {
-                    alone(stage, kind.name(), &lumigraph, &desired);
+                    alone(stage, args.frames, kind.name(), &lumigraph, &desired);
                     continue;
                 }
                 lines.push(measure(kind.name(), &lumigraph, &desired, &mut gpu));
@@ -169,8 +172,7 @@ fn measure(
 }
 
 /// Prints the time of one stage, over and over, for profiles: the median, and the least CPU time.
-fn alone(stage: &str, kind: &str, lumigraph: &Lumigraph, desired: &View) {
-    const FRAMES: u32 = 40;
+fn alone(stage: &str, frames: usize, kind: &str, lumigraph: &Lumigraph, desired: &View) {
     let Method::Triangulated { cells_across } = Method::TRIANGULATED else {
         unreachable!("the default method is triangulated")
     };
@@ -185,7 +187,7 @@ fn alone(stage: &str, kind: &str, lumigraph: &Lumigraph, desired: &View) {
         (ms(cpu), ms(wall))
     };
     work();
-    let mut times: Vec<(f64, f64)> = (0..FRAMES).map(|_| work()).collect();
+    let mut times: Vec<(f64, f64)> = (0..frames.max(1)).map(|_| work()).collect();
     times.sort_by(|x, y| x.0.total_cmp(&y.0));
     let ((least, _), (cpu, wall)) = (times[0], times[times.len() / 2]);
     let size = format!("{} × {}", desired.width, desired.height);

@@ -137,6 +137,32 @@ impl FieldOptions {
             Blend::Consistent => threshold_of(|i| Some((*diffs.get(i)?, 1.0)), self.full_weight()),
         }
     }
+
+    /// Whether [`Self::threshold_of_seen`] of these is `most` or less, and others that differ by as much or more
+    /// could not even share where they tie. (It may say no where it is.)
+    pub(crate) fn is_threshold_of_seen_within(
+        &self,
+        diffs: impl Iterator<Item = f64>,
+        most: f64,
+    ) -> bool {
+        // What rounding may take.
+        const MARGIN: f64 = 1e-12;
+        if !(most > SAME_RAY) {
+            return false;
+        }
+        let (mut sum, mut count, mut nearer) = (0.0, 0, 0);
+        for diff in diffs.filter(|diff| *diff <= most) {
+            sum += 1.0 - diff / most;
+            count += 1;
+            nearer += usize::from(diff < most);
+        }
+        let suffice = match self.blend {
+            Blend::Paper => nearer >= self.k,
+            // The threshold is where the sum is so much, and the sum grows with it.
+            Blend::Consistent => sum >= self.full_weight() * (1.0 + MARGIN),
+        };
+        suffice || count > MAX_CONTRIBUTORS
+    }
 }
 
 fn contributors(
@@ -177,4 +203,52 @@ fn threshold_of(sorted: impl Fn(usize) -> Option<(f64, f64)>, m: f64) -> f64 {
         }
     }
     limit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where those that differ least suffice, all others change no weight.
+    #[test]
+    fn views_that_suffice_have_the_weights_that_all_have() {
+        let mut state = 1_u32;
+        let mut random = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        let mut sufficed = [0; 2];
+        for round in 0..4_000 {
+            // Some share the ray, many differ alike.
+            let steps = 1 + random(60);
+            let mut all: Vec<Candidate> = (0..1 + random(60) as usize)
+                .map(|source_idx| Candidate {
+                    source_idx,
+                    diff: f64::from(random(steps)) * 0.01 + 1e-13 * f64::from(random(2)),
+                    fov: 1.0,
+                    mask: 1.0,
+                })
+                .collect();
+            all.sort_by_key(|c| (c.diff.to_bits(), c.source_idx));
+            for (kind, blend_by) in [Blend::Consistent, Blend::Paper].into_iter().enumerate() {
+                let options = FieldOptions {
+                    blend: blend_by,
+                    k: 1 + random(16) as usize,
+                    ..FieldOptions::default()
+                };
+                let weights = blend(&all, &options);
+                for n in 1..all.len() {
+                    let (first, next) = (&all[..n], all[n].diff);
+                    let diffs = || first.iter().map(|c| c.diff);
+                    if options.is_threshold_of_seen_within(diffs(), next) {
+                        sufficed[kind] += 1;
+                        assert_eq!(blend(first, &options), weights, "{round} {n} {options:?}");
+                        let mut diffs: Vec<f64> = diffs().collect();
+                        assert!(options.threshold_of_seen(&mut diffs) <= next, "{round} {n}");
+                    }
+                }
+            }
+        }
+        assert!(sufficed.iter().all(|count| *count > 1_000), "{sufficed:?}");
+    }
 }

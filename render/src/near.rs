@@ -1,6 +1,6 @@
 //! The exact field at a point of the proxy, from the source views that can count there.
 
-use crate::blend::{Candidate, Contributor, blend};
+use crate::blend::{Candidate, Contributor, SAME_RAY, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::options::Resolution;
 use crate::reference::candidate;
@@ -19,6 +19,18 @@ pub(crate) struct Near {
     pub of_views: Vec<(f64, Option<Pixel>)>,
     /// Radians. No view that differs by more has a weight at the point.
     pub within: f64,
+    /// The distance.
+    pub sight: f64,
+    /// What `within` need have been; zero where nothing is known of it.
+    pub reach: f64,
+}
+
+impl Near {
+    /// For a point nearby, of the difference that matters there. `None` where this one does not tell: at
+    /// infinity, and where a view has the very ray.
+    pub(crate) fn guess(&self) -> Option<f64> {
+        (self.reach > SAME_RAY).then_some(MARGIN * self.reach)
+    }
 }
 
 /// From one guess to the next, and the last.
@@ -56,6 +68,19 @@ impl Frame<'_> {
         self.tally.note(found.iter().copied());
     }
 
+    /// The same views; those that may differ least come first. They are about to be scored.
+    pub(crate) fn views_by_least(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
+        let Some(ball) = ball else {
+            return self.views_within(ball, most, found);
+        };
+        let (mut around, mut by_least) = (Around::default(), Vec::new());
+        self.views_around(ball, most, &mut around);
+        around.within(ball, self.measure(), most, &mut by_least);
+        found.clear();
+        found.extend(by_least.into_iter().map(|(_, i)| i));
+        self.tally.note(found.iter().copied());
+    }
+
     /// The same views, for parts of the ball to ask them: who scores some says so.
     pub(crate) fn views_around(&self, ball: &Ball, most: f64, found: &mut Around) {
         self.view_tree().around(ball, self.measure(), most, found);
@@ -75,20 +100,19 @@ impl Frame<'_> {
     ///
     /// Views are asked for within a difference. Where those found make a threshold within it,
     /// others cannot count, as they could only lower it; else they are asked for again.
-    pub(crate) fn near(&self, point: &ProxyPoint, sight: f64, guess: &mut f64) -> Near {
+    pub(crate) fn near(&self, point: &ProxyPoint, sight: f64, guess: f64) -> Near {
         let ball = Ball::around(point, sight);
         let mut near = Near {
-            within: if ball.is_some() {
-                *guess
-            } else {
-                f64::INFINITY
-            },
+            within: if ball.is_some() { guess } else { f64::INFINITY },
+            sight,
             ..Near::default()
         };
         loop {
             self.views_within(ball.as_ref(), near.within, &mut near.views);
             near.candidates.clear();
             near.of_views.clear();
+            near.of_views.reserve(near.views.len());
+            near.candidates.reserve(near.views.len());
             for &i in &near.views {
                 let source_idx = i as usize;
                 let pixel = self.project(source_idx, point);
@@ -100,7 +124,7 @@ impl Frame<'_> {
             let reach = self.options.reach(&near.candidates);
             if reach <= near.within {
                 if ball.is_some() && reach < f64::INFINITY {
-                    *guess = MARGIN * reach;
+                    near.reach = reach;
                 }
                 return near;
             }
@@ -115,7 +139,7 @@ impl Frame<'_> {
     /// The exact blending field at a proxy point, as [`crate::reference::blend_at`] has it, without
     /// asking all source views.
     pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
-        let near = self.near(point, 0.0, &mut self.first_guess());
+        let near = self.near(point, 0.0, self.first_guess());
         blend(&near.candidates, &self.options)
     }
 }

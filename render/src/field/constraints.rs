@@ -40,17 +40,19 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         Some(Epipole {
             own: candidate_at(frame, source_idx, &point)?,
             distance: center.length(),
-            cell: [cell.y, cell.x].map(|index| index as i64),
+            cell: cell.y as u32 * (grid.columns + 1) + cell.x as u32,
             point,
             at,
         })
     };
-    let mut epipoles: Vec<Epipole> = (0..frame.sources.len())
-        .into_par_iter()
-        .filter_map(epipole)
-        .collect();
-    epipoles.sort_by(Epipole::order);
-    let of_cell = |epipoles: &[Epipole]| {
+    let sources = (0..frame.sources.len()).into_par_iter();
+    let epipoles: Vec<Epipole> = sources.filter_map(epipole).collect();
+    let mut places: Vec<(u32, u32)> = epipoles.iter().map(|e| e.cell).zip(0..).collect();
+    places.sort_unstable();
+    let of_cell = |places: &[(u32, u32)]| {
+        let epipoles = places.iter().map(|(_, i)| &epipoles[*i as usize]);
+        let mut epipoles: Vec<&Epipole> = epipoles.collect();
+        epipoles.sort_unstable_by(|x, y| x.order(y));
         let mut nearer = Vec::new();
         let strong = epipoles
             .iter()
@@ -58,7 +60,7 @@ pub(super) fn epipole_vertices(frame: &Frame<'_>, grid: Grid) -> Vec<(usize, DVe
         let few = strong.take(EPIPOLES_PER_CELL);
         few.map(|e| (e.own.source_idx, e.at)).collect::<Vec<_>>()
     };
-    let by_cell: Vec<&[Epipole]> = epipoles.chunk_by(|x, y| x.cell == y.cell).collect();
+    let by_cell: Vec<&[(u32, u32)]> = places.chunk_by(|x, y| x.0 == y.0).collect();
     by_cell.into_par_iter().flat_map_iter(of_cell).collect()
 }
 
@@ -67,19 +69,18 @@ struct Epipole {
     own: Candidate,
     /// Of the view from the viewer.
     distance: f64,
-    /// Row and column.
-    cell: [i64; 2],
+    /// Row by row. On the image's right border it is one of its own.
+    cell: u32,
     point: ProxyPoint,
     at: DVec2,
 }
 
 impl Epipole {
-    /// Cell by cell, the view that differs least first; of those on the line of sight, the nearest.
+    /// The view that differs least first; of those on the line of sight, the nearest.
     fn order(&self, other: &Self) -> Ordering {
         let diff = |epipole: &Self| epipole.own.diff.max(SAME_RAY);
-        self.cell
-            .cmp(&other.cell)
-            .then_with(|| diff(self).total_cmp(&diff(other)))
+        diff(self)
+            .total_cmp(&diff(other))
             .then_with(|| self.distance.total_cmp(&other.distance))
             .then_with(|| self.own.source_idx.cmp(&other.own.source_idx))
     }

@@ -1,16 +1,17 @@
 //! Which source views a triangle carries, and with what.
 
+use super::known::{ByLeast, Known, NOWHERE, known};
 use super::patch::Patch;
 use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
+use crate::blend::Contributor;
 use crate::frame::{Frame, ProxyPoint};
 use crate::near::Near;
-use crate::options::MAX_CONTRIBUTORS;
 use crate::surface::{FacetMap, Surface};
 use crate::view_tree::Ball;
 use calibrate::Pixel;
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Pixels by which a triangle must clear a border to be on one side of it. Edges that are
 /// straight in the desired image are not quite so in a photo.
@@ -19,16 +20,12 @@ const CLEARANCE_PX: f64 = 2.0;
 /// How much of a view's weight may come or go between a triangle's corners.
 const TURNOVER: f64 = 0.5;
 
-/// How many views see all of a triangle, by their differences at its corners. Of those that differ alike,
-/// as photos from one place do, the first decide: one more than may contribute, as its difference caps the
-/// threshold.
-type Crowds = HashMap<[u64; 3], usize>;
+/// Views that are looked at in full before it is asked whether those suffice, and before it is asked again.
+const FIRST: usize = 6;
+const NEXT: usize = 2;
 
-/// With fewer views nobody looks for crowds.
-const MANY: usize = 128;
-
-/// A source view's difference at a triangle's corner, and where its photo has that.
-type AtCorner = (f64, Option<Pixel>);
+/// So many are looked at sooner than sorted, where nothing can hide what they see.
+const FEW: usize = 48;
 
 /// The source views of one triangle.
 pub(super) struct List {
@@ -73,7 +70,7 @@ impl List {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.point) else {
             // The lens ends inside the triangle. With nothing known beyond, only what the
             // other corners say counts.
-            return Self::of_weights(corners);
+            return Self::of_weights(frame, corners);
         };
 
         // 1. The views that may matter: where the corners' differences bound the threshold, all
@@ -82,10 +79,11 @@ impl List {
             frame,
             corners,
             points: [a, b, c],
+            reaches: reaches([a, b, c]),
             patch: OnceCell::new(),
             asked: OnceCell::new(),
         };
-        let mut listed = triangle.known();
+        let mut listed = triangle.seen();
         let mut bounds = triangle.bounds(&listed);
         if (0..3).any(|c| bounds[c] > corners[c].near.within) {
             // What was not known may matter.
@@ -117,8 +115,8 @@ impl List {
             stays
         });
         let bordered = listed.iter().any(|view| view.sees == Sees::Part);
-        if !bordered && !weights_turn_over(corners) {
-            return Self::of_weights(corners);
+        if !bordered && !weights_turn_over(frame, corners) {
+            return Self::of_weights(frame, corners);
         }
         if listed.len() > MAX_LISTED {
             // More borders than there is room for: the nearest of each part of the triangle
@@ -148,23 +146,19 @@ impl List {
     }
 
     /// The union of the corners' contributors, with their weights.
-    fn of_weights(corners: [&Vertex; 3]) -> Self {
-        let mut listed: Vec<usize> = corners
-            .iter()
-            .flat_map(|c| c.weights.iter().map(|w| w.source_idx))
-            .collect();
+    fn of_weights(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
+        let weights = corners.map(|corner| corner.weights(frame));
+        let all = weights.iter().flat_map(|weights| weights.iter());
+        let mut listed: Vec<usize> = all.map(|w| w.source_idx).collect();
         listed.sort_unstable();
         listed.dedup();
-        let weight = |corner: &Vertex, i: usize| {
-            corner
-                .weights
-                .iter()
-                .find(|w| w.source_idx == i)
-                .map_or(0.0, |w| w.weight as f32)
+        let weight = |weights: &[Contributor], i: usize| {
+            let own = weights.iter().find(|w| w.source_idx == i);
+            own.map_or(0.0, |w| w.weight as f32)
         };
         let entry = |i: usize| FieldEntry {
             source_idx: i as u32,
-            values: corners.map(|c| weight(c, i)),
+            values: weights.map(|weights| weight(weights, i)),
         };
         let mut entries: Vec<FieldEntry> = listed.into_iter().map(entry).collect();
         if entries.len() > MAX_LISTED {
@@ -183,19 +177,34 @@ impl List {
 /// Whether some view's weight differs so much between corners that it is no linear function:
 /// at an epipole a view has all the weight, and where another is nearly on the line of sight,
 /// too, it has lost it within a pixel. Differences are linear there.
-fn weights_turn_over(corners: [&Vertex; 3]) -> bool {
-    let weight = |corner: &Vertex, source_idx: usize| {
-        let own = corner.weights.iter().find(|w| w.source_idx == source_idx);
+fn weights_turn_over(frame: &Frame<'_>, corners: [&Vertex; 3]) -> bool {
+    let weights = corners.map(|corner| corner.weights(frame));
+    let weight = |weights: &[Contributor], source_idx: usize| {
+        let own = weights.iter().find(|w| w.source_idx == source_idx);
         own.map_or(0.0, |w| w.weight)
     };
     let least = |i: usize| {
-        corners
-            .map(|c| weight(c, i))
+        weights
+            .map(|w| weight(w, i))
             .into_iter()
             .fold(1.0, f64::min)
     };
-    let mut all = corners.iter().flat_map(|c| &c.weights);
+    let mut all = weights.iter().flat_map(|weights| weights.iter());
     all.any(|w| w.weight - least(w.source_idx) > TURNOVER)
+}
+
+/// How far a triangle reaches from each corner, in the world; infinitely far where one is at infinity.
+fn reaches(points: [ProxyPoint; 3]) -> [f64; 3] {
+    let [a, b, c] = points.map(|p| p.ray / p.inverse_distance);
+    let sides = [a.distance(b), b.distance(c), c.distance(a)];
+    let [ab, bc, ca] = sides.map(|side| {
+        if side.is_finite() {
+            side
+        } else {
+            f64::INFINITY
+        }
+    });
+    [ab.max(ca), ab.max(bc), bc.max(ca)]
 }
 
 /// A triangle of the image plane, with what is worked out about it when needed.
@@ -204,6 +213,8 @@ struct Triangle<'a> {
     corners: [&'a Vertex; 3],
     /// Those of the corners.
     points: [ProxyPoint; 3],
+    /// How far it reaches from each, in the world.
+    reaches: [f64; 3],
     patch: OnceCell<Patch>,
     asked: OnceCell<Vec<Near>>,
 }
@@ -214,31 +225,52 @@ impl Triangle<'_> {
             .get_or_init(|| Patch::new(self.frame, self.corners))
     }
 
-    /// The source views that the corners know of, in order, and how they see the triangle.
-    fn known(&self) -> Vec<Listed> {
+    /// How those that the corners know of see the triangle, in the order of the views; without those that
+    /// differ by so much that the others tell of them that they cannot contribute.
+    fn seen(&self) -> Vec<Listed> {
         let nears = self.corners.map(|corner| &corner.near);
-        let mut next = [0; 3];
-        let mut listed = Vec::with_capacity(nears.iter().map(|n| n.views.len()).sum());
-        let mut crowds = (listed.capacity() > MANY).then(Crowds::default);
-        // The least of all that come next.
-        while let Some(&i) = (0..3).filter_map(|c| nears[c].views.get(next[c])).min() {
-            let known = [0, 1, 2].map(|c| {
-                let is_known = nears[c].views.get(next[c]) == Some(&i);
-                next[c] += usize::from(is_known);
-                is_known.then(|| nears[c].of_views[next[c] - 1])
-            });
-            let Some(crowds) = &mut crowds else {
-                listed.push(self.listed(i as usize, known));
-                continue;
-            };
-            let view = self.measured(i as usize, known);
-            let alike = crowds.entry(view.diffs.map(f64::to_bits)).or_insert(0);
-            if *alike <= MAX_CONTRIBUTORS {
-                *alike += usize::from(view.sees == Sees::All);
-                listed.push(view);
-            }
+        // What a corner does not know of, but may see some of the triangle, differs by more there.
+        let others = [0, 1, 2].map(|c| match self.is_told_of_all(c) {
+            true => nears[c].within,
+            false => 0.0,
+        });
+        let known = known(nears, others);
+        let listed = |view: Known| self.listed(view.source_idx as usize, view.places);
+        let is_much = self.frame.lumigraph.visibility.is_some() || known.len() > FEW;
+        if !(is_much && self.frame.may_skip()) {
+            return known.into_iter().map(listed).collect();
         }
-        listed
+        let mut all_listed = Vec::with_capacity(MAX_LISTED);
+        // The differences of those that see all of it.
+        let mut seeing_all = Vec::with_capacity(MAX_LISTED);
+        for (view, asked) in ByLeast::of(known).zip(0..) {
+            let is_time = asked >= FIRST && (asked - FIRST).is_multiple_of(NEXT);
+            if is_time && self.is_enough(&seeing_all, view.least) {
+                break;
+            }
+            let view = listed(view);
+            if view.sees == Sees::All {
+                seeing_all.push(view.diffs);
+            }
+            all_listed.push(view);
+        }
+        all_listed.sort_unstable_by_key(|view| view.source_idx);
+        all_listed
+    }
+
+    /// Whether the threshold is `least` or less at each corner, and no more than the corner has told of.
+    fn is_enough(&self, all: &[[f64; 3]], least: f64) -> bool {
+        let options = &self.frame.options;
+        (0..3).all(|c| {
+            let most = least.min(self.corners[c].near.within);
+            options.is_threshold_of_seen_within(all.iter().map(|diffs| diffs[c]), most)
+        })
+    }
+
+    /// Whether a corner has told of all views that see some of the triangle and differ by no more than it was
+    /// asked for: those in sight of it.
+    fn is_told_of_all(&self, c: usize) -> bool {
+        self.reaches[c] <= self.corners[c].near.sight
     }
 
     /// Adds source views that are not listed yet, in order.
@@ -247,15 +279,19 @@ impl Triangle<'_> {
         for i in others.into_iter().map(|i| i as usize) {
             let before = listed[..known].binary_search_by_key(&i, |view| view.source_idx);
             if before.is_err() {
-                listed.push(self.measured(i, [None; 3]));
+                listed.push(self.measured(i));
             }
         }
         listed.sort_unstable_by_key(|view| view.source_idx);
     }
 
-    /// How a source view sees the triangle; with what is known of it at the corners.
-    fn listed(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> Listed {
+    /// How a source view sees the triangle; with what the corners know of it, if they do.
+    fn listed(&self, source_idx: usize, places: [u32; 3]) -> Listed {
         let frame = self.frame;
+        let known = [0, 1, 2].map(|c| {
+            let of_views = &self.corners[c].near.of_views;
+            of_views.get(places[c] as usize).copied()
+        });
         let pixels = [0, 1, 2].map(|c| {
             let project = || frame.project(source_idx, &self.points[c]);
             known[c].map_or_else(project, |(_, pixel)| pixel)
@@ -265,13 +301,15 @@ impl Triangle<'_> {
             source_idx,
             sees: self.how_it_is_seen(source_idx, pixels),
             diffs: known.map(|at| at.map_or(f64::INFINITY, |(diff, _)| diff)),
-            unsure: [0, 1, 2].map(|c| known[c].is_none() && !pixels[c].is_some_and(is_in_image)),
+            unsure: [0, 1, 2].map(|c| {
+                known[c].is_none() && !self.is_told_of_all(c) && !pixels[c].is_some_and(is_in_image)
+            }),
         }
     }
 
-    /// The same with all of its differences.
-    fn measured(&self, source_idx: usize, known: [Option<AtCorner>; 3]) -> Listed {
-        let mut view = self.listed(source_idx, known);
+    /// The same of one that they don't know, with all of its differences.
+    fn measured(&self, source_idx: usize) -> Listed {
+        let mut view = self.listed(source_idx, [NOWHERE; 3]);
         self.measure(&mut view);
         view
     }
@@ -295,30 +333,28 @@ impl Triangle<'_> {
         }
     }
 
-    /// What counts at points spread over the triangle.
-    fn asked(&self) -> &[Near] {
-        self.asked.get_or_init(|| self.ask(self.patch().points()))
+    /// What there is to know at points spread over the triangle, its corners among them.
+    fn asked(&self) -> impl Iterator<Item = &Near> {
+        let between = self
+            .asked
+            .get_or_init(|| self.ask(self.patch().inner(), 0.0));
+        self.corners
+            .iter()
+            .map(|corner| &corner.near)
+            .chain(between)
     }
 
-    /// What counts at points of the triangle, with the views in sight of them.
-    fn ask(&self, points: impl Iterator<Item = ProxyPoint>) -> Vec<Near> {
+    /// What there is to know at points of the triangle, and which views may see something within a distance of
+    /// them.
+    fn ask(&self, points: impl Iterator<Item = ProxyPoint>, sight: f64) -> Vec<Near> {
         let within = self.corners.map(|corner| corner.near.within);
         let mut guess = within.into_iter().fold(self.frame.first_guess(), f64::max);
-        let sight = 0.5 * (0..3).map(|c| self.reach(c)).fold(0.0, f64::max);
-        let near = |point| self.frame.near(&point, sight, &mut guess);
+        let near = |point| {
+            let near = self.frame.near(&point, sight, guess);
+            guess = near.guess().unwrap_or(guess);
+            near
+        };
         points.map(near).collect()
-    }
-
-    /// How far the triangle reaches from a corner, in the world.
-    fn reach(&self, c: usize) -> f64 {
-        let places = self.points.map(|p| p.ray / p.inverse_distance);
-        let others = [(c + 1) % 3, (c + 2) % 3];
-        let far = others.map(|other| places[c].distance(places[other]));
-        if far.iter().all(|far| far.is_finite()) {
-            far[0].max(far[1])
-        } else {
-            f64::INFINITY
-        }
     }
 
     /// Those that see all of a triangle bound the threshold at each corner from above.
@@ -340,25 +376,43 @@ impl Triangle<'_> {
         if bounds.contains(&f64::INFINITY) && frame.view_tree().is_large() {
             // Borders anywhere: what the corners and points between them need, all of it may.
             if frame.lumigraph.visibility.is_some() {
-                // Where a surface can hide a part of itself it may jump between them.
-                let most = self.asked().iter().map(|near| near.within);
-                let most = most.fold(0.0, f64::max);
-                frame.views_within(self.patch().ball().as_ref(), most, &mut views);
-                views.extend(self.asked().iter().flat_map(|near| &near.views));
-            } else {
-                let nears = self.ask(self.patch().between());
-                views.extend(nears.iter().flat_map(|near| &near.views));
+                return self.counting();
             }
+            let sight = 0.5 * self.reaches.into_iter().fold(0.0, f64::max);
+            let nears = self.ask(self.patch().between(), sight);
+            views.extend(nears.iter().flat_map(|near| &near.views));
         } else {
             let mut found = Vec::new();
             for c in (0..3).filter(|&c| bounds[c] > self.corners[c].near.within) {
-                let ball = Ball::around(&self.points[c], self.reach(c));
+                let ball = Ball::around(&self.points[c], self.reaches[c]);
                 frame.views_within(ball.as_ref(), bounds[c], &mut found);
                 views.extend_from_slice(&found);
             }
         }
         views.sort_unstable();
         views.dedup();
+        views
+    }
+
+    /// The source views that count at some of the points, in order. As a surface that can hide a part of itself
+    /// may jump between them, others may count there: of these as many as there is room for, that may differ
+    /// least.
+    fn counting(&self) -> Vec<u32> {
+        let frame = self.frame;
+        let candidates = self.asked().flat_map(|near| &near.candidates);
+        let counting = candidates.filter(|c| c.mask > 0.0);
+        let mut views: Vec<u32> = counting.map(|c| c.source_idx as u32).collect();
+        views.sort_unstable();
+        views.dedup();
+        let room = MAX_LISTED.saturating_sub(views.len());
+        if room > 0 {
+            let most = self.asked().map(|near| near.within).fold(0.0, f64::max);
+            let mut others = Vec::new();
+            frame.views_by_least(self.patch().ball().as_ref(), most, &mut others);
+            others.retain(|i| views.binary_search(i).is_err());
+            views.extend(others.into_iter().take(room));
+            views.sort_unstable();
+        }
         views
     }
 
@@ -374,7 +428,7 @@ impl Triangle<'_> {
         // Few pixels may have been moved, between all that are asked.
         let mut seen: BTreeSet<usize> = self.moved_to(map).collect();
         if !seen.is_empty() || self.patch().is_moved {
-            let candidates = self.asked().iter().flat_map(|near| &near.candidates);
+            let candidates = self.asked().flat_map(|near| &near.candidates);
             seen.extend(candidates.map(|c| c.source_idx));
         }
         seen.into_iter().collect()
@@ -401,9 +455,9 @@ impl Triangle<'_> {
             ranks.extend(self.moved_to(map).map(|source_idx| (source_idx, 0)));
         }
         for near in self.asked() {
-            let candidates = near.candidates.iter().filter(|c| is_listed(c.source_idx));
-            let mut seeing: Vec<(f64, usize)> =
-                candidates.map(|c| (c.diff, c.source_idx)).collect();
+            let seeing = near.candidates.iter().filter(|c| c.mask > 0.0);
+            let seeing = seeing.filter(|c| is_listed(c.source_idx));
+            let mut seeing: Vec<(f64, usize)> = seeing.map(|c| (c.diff, c.source_idx)).collect();
             seeing.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
             for (rank, (_, i)) in seeing.into_iter().enumerate() {
                 let best = ranks.entry(i).or_insert(rank);

@@ -12,6 +12,7 @@
 //! interpolating weights and feathering each pixel still cost 5 to 20 dB near borders.)
 
 mod constraints;
+mod known;
 mod list;
 mod patch;
 mod vertex;
@@ -119,18 +120,44 @@ impl TriangulatedField {
             f64::from(width) / f64::from(grid.columns),
             f64::from(height) / f64::from(grid.rows),
         );
-        // A vertex' guess is the one before's, in runs that do not depend on the threads: lists
-        // are made of what was found, and what was asked for decides that, too.
+        // Of the grid's corners each takes the one before's guess, in runs that do not depend on the
+        // threads: lists are made of what was found, and what was asked for decides that, too.
         let of_run = |(run, is_used): (&[DVec2], &[bool])| {
             let mut guess = frame.first_guess();
             let of_vertex = |(at, is_used): (&DVec2, &bool)| match is_used {
-                true => Vertex::new(frame, *at, cell, &mut guess),
+                true => {
+                    let vertex = Vertex::new(frame, *at, cell, guess);
+                    guess = vertex.near.guess().unwrap_or(guess);
+                    vertex
+                }
                 false => Vertex::unused(*at),
             };
             run.iter().zip(is_used).map(of_vertex).collect::<Vec<_>>()
         };
-        let runs = plane.vertices.par_chunks(RUN).zip(is_used.par_chunks(RUN));
-        let vertices: Vec<Vertex> = runs.flat_map_iter(of_run).collect();
+        let [columns, rows] = [grid.columns, grid.rows].map(|cells| cells as usize);
+        let corners = (columns + 1) * (rows + 1);
+        let (of_grid, others) = plane.vertices.split_at(corners);
+        let runs = of_grid.par_chunks(RUN).zip(is_used.par_chunks(RUN));
+        let of_grid: Vec<Vertex> = runs.flat_map_iter(of_run).collect();
+        // All others take that of the corner nearest to them.
+        let of_other = |(at, is_used): (&DVec2, &bool)| match is_used {
+            true => {
+                let nearest = (*at / cell).round();
+                let column = (nearest.x as usize).min(columns);
+                let row = (nearest.y as usize).min(rows);
+                let known = of_grid[row * (columns + 1) + column].near.guess();
+                Vertex::new(
+                    frame,
+                    *at,
+                    cell,
+                    known.unwrap_or_else(|| frame.first_guess()),
+                )
+            }
+            false => Vertex::unused(*at),
+        };
+        let others = others.par_iter().zip(&is_used[corners..]).map(of_other);
+        let others: Vec<Vertex> = others.collect();
+        let vertices: Vec<Vertex> = of_grid.into_iter().chain(others).collect();
 
         // 4. What each triangle needs.
         let lists: Vec<List> = visible

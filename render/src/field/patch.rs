@@ -41,6 +41,13 @@ impl Patch {
         self.points.iter().flatten().copied()
     }
 
+    /// Of these, all but the corners.
+    pub(super) fn inner(&self) -> impl Iterator<Item = ProxyPoint> {
+        let is_corner = |k: usize| [at(0, 0), at(STEPS, 0), at(0, STEPS)].contains(&k);
+        let points = self.points.iter().zip(0..);
+        points.filter_map(move |(point, k)| point.filter(|_| !is_corner(k)))
+    }
+
     /// Of these, one amid each side and some amid the triangle.
     pub(super) fn between(&self) -> impl Iterator<Item = ProxyPoint> {
         let amid = [(2, 0), (0, 2), (2, 2), (1, 1), (1, 2), (2, 1)];

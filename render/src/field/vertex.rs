@@ -7,6 +7,7 @@ use crate::planted::{Fault, is_planted};
 use crate::surface::{NO_FACET, Surface};
 use calibrate::Pixel;
 use glam::DVec2;
+use std::sync::OnceLock;
 
 /// How far short of the plane's horizon vertices on it are evaluated: the sine of the angle.
 const SHORT_OF_HORIZON: f64 = 1e-6;
@@ -19,8 +20,8 @@ pub(super) struct Vertex {
     pub(super) point: Option<ProxyPoint>,
     /// The source views that matter there, and in about the triangles around it.
     pub(super) near: Near,
-    /// The exact blend, by source view.
-    pub(super) weights: Vec<Contributor>,
+    /// Made when first asked for.
+    weights: OnceLock<Vec<Contributor>>,
 }
 
 impl Vertex {
@@ -30,13 +31,13 @@ impl Vertex {
             at,
             point: None,
             near: Near::default(),
-            weights: Vec::new(),
+            weights: OnceLock::new(),
         }
     }
 
     /// The triangles around it are about the size of a `cell`, in pixels. The guess is of the
     /// difference that matters; see [`Frame::near`].
-    pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: &mut f64) -> Self {
+    pub(super) fn new(frame: &Frame<'_>, at: DVec2, cell: DVec2, guess: f64) -> Self {
         let seen_at = match is_planted(Fault::ShiftedField) {
             true => at + DVec2::new(0.5, 0.0),
             false => at,
@@ -48,9 +49,15 @@ impl Vertex {
         Self {
             at,
             point,
-            weights: blend(&near.candidates, &frame.options),
+            weights: OnceLock::new(),
             near,
         }
+    }
+
+    /// The exact blend, by source view.
+    pub(super) fn weights(&self, frame: &Frame<'_>) -> &[Contributor] {
+        self.weights
+            .get_or_init(|| blend(&self.near.candidates, &frame.options))
     }
 }
 
