@@ -17,7 +17,8 @@ use std::sync::{Arc, OnceLock};
 pub struct Held<'a> {
     store: &'a PhotoStore,
     finest: usize,
-    photos: Vec<OnceLock<Result<Arc<Pyramid>, PhotoError>>>,
+    /// Small, as there is room for all that the store has.
+    photos: Vec<OnceLock<Result<Arc<Pyramid>, Box<PhotoError>>>>,
     /// Whether the store is told how many were sampled.
     counted: bool,
 }
@@ -57,9 +58,12 @@ impl<'a> Held<'a> {
     /// # Errors
     /// As [`PhotoStore::get`].
     pub fn get(&self, source_idx: usize) -> Result<&Pyramid, PhotoError> {
-        let photo = self.photos[source_idx]
-            .get_or_init(|| self.store.get_from_level(source_idx, self.finest));
-        photo.as_ref().map(Arc::as_ref).map_err(Clone::clone)
+        let get = || self.store.get_from_level(source_idx, self.finest);
+        let photo = self.photos[source_idx].get_or_init(|| get().map_err(Box::new));
+        photo
+            .as_ref()
+            .map(Arc::as_ref)
+            .map_err(|e| e.as_ref().clone())
     }
 }
 

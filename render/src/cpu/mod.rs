@@ -168,8 +168,8 @@ impl Seen {
 /// What all pixels of a frame share.
 struct Engine<'a> {
     frame: &'a Frame<'a>,
-    /// Each made when first asked for.
-    sources: Vec<OnceLock<Source>>,
+    /// Each made when first asked for: of many photos a frame mostly needs few.
+    sources: Vec<OnceLock<Box<Source>>>,
     rays: &'a RayMap,
 }
 
@@ -184,7 +184,8 @@ impl<'a> Engine<'a> {
     }
 
     fn source(&self, source_idx: usize) -> &Source {
-        self.sources[source_idx].get_or_init(|| Source::new(self.frame, source_idx))
+        let new = || Box::new(Source::new(self.frame, source_idx));
+        self.sources[source_idx].get_or_init(new)
     }
 
     /// The rays of a tile and where they meet the proxy, where that is wanted. It begins at a pixel, and
