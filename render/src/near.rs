@@ -25,6 +25,15 @@ pub(crate) struct Near {
     pub reach: f64,
 }
 
+/// Source views that are asked before it is seen whether others may count, and again after so many more.
+const FIRST_ASKED: usize = 6;
+const THEN_ASKED: usize = 2;
+
+/// Whether to see, once so many were asked, whether others may count.
+pub(crate) fn is_time_to_see(asked: usize) -> bool {
+    asked >= FIRST_ASKED && (asked - FIRST_ASKED).is_multiple_of(THEN_ASKED)
+}
+
 impl Near {
     /// For a point nearby, of the difference that matters there. `None` where this one does not tell: at
     /// infinity, and where a view has the very ray.
@@ -68,7 +77,7 @@ impl Frame<'_> {
         self.tally.note(found.iter().copied());
     }
 
-    /// The same views; those that may differ least come first. They are about to be scored.
+    /// The same views; those that may differ least come first. They are counted as scored, whoever is.
     pub(crate) fn views_by_least(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         let Some(ball) = ball else {
             return self.views_within(ball, most, found);

@@ -18,6 +18,7 @@ use crate::RenderError;
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
+use crate::near::is_time_to_see;
 use crate::options::{FieldOptions, Method};
 use crate::photos::PhotoError;
 use crate::rays::{RayCache, RayMap};
@@ -47,11 +48,6 @@ const PLACES: [[usize; 2]; LANES] = {
     }
     places
 };
-
-/// Source views that are asked about a tile before it is seen whether others may count, and again
-/// after so many more.
-const FIRST_ASKED: usize = 6;
-const THEN_ASKED: usize = 2;
 
 /// The engine, with what it keeps between frames.
 #[derive(Debug, Default)]
@@ -145,8 +141,7 @@ impl Seen {
         least: f32,
         wanted: &[bool; LANES],
     ) -> bool {
-        asked >= FIRST_ASKED
-            && (asked - FIRST_ASKED).is_multiple_of(THEN_ASKED)
+        is_time_to_see(asked)
             && weights::is_enough(&self.terms, &self.order, options, least, wanted)
     }
 

@@ -6,7 +6,7 @@ use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
 use crate::blend::Contributor;
 use crate::frame::{Frame, ProxyPoint};
-use crate::near::Near;
+use crate::near::{Near, is_time_to_see};
 use crate::surface::{FacetMap, Surface};
 use crate::view_tree::Ball;
 use calibrate::Pixel;
@@ -19,10 +19,6 @@ const CLEARANCE_PX: f64 = 2.0;
 
 /// How much of a view's weight may come or go between a triangle's corners.
 const TURNOVER: f64 = 0.5;
-
-/// Views that are looked at in full before it is asked whether those suffice, and before it is asked again.
-const FIRST: usize = 6;
-const NEXT: usize = 2;
 
 /// So many are looked at sooner than sorted, where nothing can hide what they see.
 const FEW: usize = 48;
@@ -49,7 +45,7 @@ struct Listed {
     /// By corner: its difference there; infinite while it is not known.
     diffs: [f64; 3],
     /// Of those that are not known, which may be within what the corner was asked for: it has told of all
-    /// that are and have it in their images, and maybe of no others.
+    /// that are and have it in their images, or in sight where that is all of the triangle.
     unsure: [bool; 3],
 }
 
@@ -244,8 +240,7 @@ impl Triangle<'_> {
         // The differences of those that see all of it.
         let mut seeing_all = Vec::with_capacity(MAX_LISTED);
         for (view, asked) in ByLeast::of(known).zip(0..) {
-            let is_time = asked >= FIRST && (asked - FIRST).is_multiple_of(NEXT);
-            if is_time && self.is_enough(&seeing_all, view.least) {
+            if is_time_to_see(asked) && self.is_enough(&seeing_all, view.least) {
                 break;
             }
             let view = listed(view);
@@ -394,9 +389,9 @@ impl Triangle<'_> {
         views
     }
 
-    /// The source views that count at some of the points, in order. As a surface that can hide a part of itself
-    /// may jump between them, others may count there: of these as many as there is room for, that may differ
-    /// least.
+    /// The source views that see some of the points and may count there, in order. As a surface that can hide a
+    /// part of itself may jump between them, others may count there: of these as many as there is room for, that
+    /// may differ least.
     fn counting(&self) -> Vec<u32> {
         let frame = self.frame;
         let candidates = self.asked().flat_map(|near| &near.candidates);

@@ -37,7 +37,7 @@ impl Patch {
     }
 
     /// The points at which there is something.
-    pub(super) fn points(&self) -> impl Iterator<Item = ProxyPoint> {
+    fn points(&self) -> impl Iterator<Item = ProxyPoint> {
         self.points.iter().flatten().copied()
     }
 
