@@ -1,5 +1,5 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact --frames N --json FILE --gpu]`;
+//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact|gpu --frames N --json FILE --gpu]`;
 //! see README.md.
 
 use calibrate::View;
@@ -36,7 +36,7 @@ struct Args {
     #[arg(long, value_delimiter = ',', default_values_t = [960, 1920])]
     widths: Vec<u32>,
     /// Only one stage, over and over, for profiles
-    #[arg(long, value_parser = ["field", "cpu", "exact"])]
+    #[arg(long, value_parser = ["field", "cpu", "exact", "gpu"])]
     alone: Option<String>,
     /// How often it is repeated
     #[arg(long, default_value_t = 40, requires = "alone")]
@@ -54,7 +54,8 @@ struct Args {
 
 fn main() {
     let args = Args::parse();
-    let mut gpu = args.gpu.then(Gpu::open).and_then(Result::ok);
+    let with_gpu = args.gpu || args.alone.as_deref() == Some("gpu");
+    let mut gpu = with_gpu.then(Gpu::open).and_then(Result::ok);
 
     println!(
         "CPU ms / wall ms, median of {REPEATS}; photos of {} × {}; dB of the triangulated \
@@ -85,7 +86,14 @@ fn main() {
                 let lumigraph = lumigraph(kind, count, PHOTO);
                 let desired = desired(kind, size);
                 if let Some(stage) = &args.alone {
-                    alone(stage, args.frames, kind.name(), &lumigraph, &desired);
+                    alone(
+                        stage,
+                        args.frames,
+                        kind.name(),
+                        &lumigraph,
+                        &desired,
+                        &mut gpu,
+                    );
                     continue;
                 }
                 lines.push(measure(kind.name(), &lumigraph, &desired, &mut gpu));
@@ -172,7 +180,14 @@ fn measure(
 }
 
 /// Prints the time of one stage, over and over, for profiles: the median, and the least CPU time.
-fn alone(stage: &str, frames: usize, kind: &str, lumigraph: &Lumigraph, desired: &View) {
+fn alone(
+    stage: &str,
+    frames: usize,
+    kind: &str,
+    lumigraph: &Lumigraph,
+    desired: &View,
+    gpu: &mut Option<Gpu>,
+) {
     let Method::Triangulated { cells_across } = Method::TRIANGULATED else {
         unreachable!("the default method is triangulated")
     };
@@ -182,6 +197,10 @@ fn alone(stage: &str, frames: usize, kind: &str, lumigraph: &Lumigraph, desired:
         let (cpu, wall) = timed(|| match stage {
             "field" => drop(TriangulatedField::new(&frame, cells_across).expect("it fits")),
             "exact" => drop(cpu.render(&frame, Method::Exact).expect("made up")),
+            "gpu" => {
+                let gpu = gpu.as_mut().expect("there is a driver");
+                drop(gpu.render(&frame, Method::TRIANGULATED).expect("made up"));
+            }
             _ => drop(cpu.render(&frame, Method::TRIANGULATED).expect("made up")),
         });
         (ms(cpu), ms(wall))

@@ -2,35 +2,25 @@
 // The Rust twin of each function has the same name in `render/src/cpu/`.
 
 struct Params {
-    // Inverse distance along a ray: dot(plane, ray); where `facets` is 0.
+    // Inverse distance along a ray: dot(plane, ray); where all pixels see one plane.
     plane: vec3f,
-    // 1 where the rays come from the table, 0 for a pinhole.
-    rays_in_table: u32,
+    beta: f32,
     // Pinhole: ray.xy = (pixel - ray_offset) * ray_scale.
     ray_scale: vec2f,
     ray_offset: vec2f,
+    // IMAGE of every source view, where they are the same.
+    image: vec4f,
     // Photos' array, in texels.
     array_size: vec2f,
-    size: vec2u,
-    source_count: u32,
-    desired_by_distance: u32,
-    beta: f32,
-    full_weight: f32,
-    k: u32,
-    // See BLEND_* and RESOLUTION_*.
-    blend: u32,
-    resolution: u32,
-    plane_seen: u32,
-    exposures_differ: u32,
-    // 1 where times add to the differences.
-    timed: u32,
-    // 1 where each pixel sees a plane of its own.
-    facets: u32,
-    // The photos' mip level that is the finest of their array.
-    finest: f32,
     // The pixels whose photos are marked.
     part_origin: vec2u,
     part_size: vec2u,
+    full_weight: f32,
+    k: u32,
+    // The photos' mip level that is the finest of their array.
+    finest: f32,
+    // 1 where all pixels see one plane, 0 where none sees anything.
+    plane_seen: f32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -43,17 +33,13 @@ const TRANSPARENT: f32 = 0.25;
 const SMALLEST_THRESHOLD: f32 = 1e-30;
 const INFINITY: f32 = 3e38;
 
-const BLEND_CONSISTENT = 0u;
-const BLEND_PAPER = 1u;
-const RESOLUTION_RATIO = 0u;
-const RESOLUTION_LENGTH = 1u;
-
 // A source view is SOURCE_TEXELS texels of a texture (`Source` of layout.rs): software
 // drivers fetch texels many pixels at a time, and buffers one number of one pixel at a time.
 const SOURCE_TEXELS = 13u;
 const SOURCES_PER_ROW = 128u;
 // Rows of the rotation from the desired camera's frame; w: the translation. All are scaled
-// so that a patch of the proxy at equal depth in both cameras covers equally many pixels.
+// so that a patch of the proxy at equal depth in both cameras covers equally many pixels. A
+// pinhole's are those of its matrix, times the rotation: they lead to pixels.
 const X_AXIS = 0u;
 const Y_AXIS = 1u;
 const Z_AXIS = 2u;
@@ -71,26 +57,42 @@ const IMAGE = 6u;
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
-// rgb.
+// rgb; w: how many source views there are.
 const EXPOSURE = 9u;
 // Prism terms by r^2, and by r^4.
 const PRISM = 10u;
 // Shear and horizon of a sensor that is tilted or skewed (`Sensor` of sensor.rs).
 const SENSOR = 11u;
 // Layer of the masks' array, negative without a mask; what its time adds to its difference;
-// layer of the distance maps' array, negative without one; what turns the inverse of a scaled
+// layer of the distance maps' array, negative without one; what turns the inverse of a
 // distance into the map's units.
 const REST = 12u;
 
-// The one kind of lens that all source views have; negative where they differ. Set when a
-// pipeline is made, so that no pixel pays for lenses that are not there.
+// What a frame's pixels have in common is set when a pipeline is made (`Special` of layout.rs),
+// so that none pays for what is not there.
+
+// The one kind of lens that all source views have; negative where they differ.
 override COMMON_LENS: f32 = -1.0;
-
-// Whether any source view has an ignore mask. Set likewise.
+// Whether all source views have the same IMAGE.
+override SAME_IMAGES: bool = false;
+// Whether any source view has an ignore mask.
 override MASKED: bool = false;
-
-// Whether the proxy can hide a part of itself. Set likewise.
+// Whether the proxy can hide a part of itself.
 override OCCLUDED: bool = false;
+// Whether each pixel sees a plane of its own.
+override FACETS: bool = false;
+// Whether the rays come from the table: the desired lens is not a pinhole.
+override RAYS_IN_TABLE: bool = false;
+// Whether levels of detail go by the distance from the desired camera, for a wide lens.
+override BY_DISTANCE: bool = false;
+// Whether any photo is made brighter or darker.
+override EXPOSED: bool = false;
+// Whether times add to the differences.
+override TIMED: bool = false;
+// The paper's blend, of a fixed number of source views.
+override BLEND_OF_PAPER: bool = false;
+// The resolution penalty by lengths.
+override RESOLUTION_BY_LENGTH: bool = false;
 
 const LENS_PINHOLE: f32 = 0.0;
 const LENS_RATIONAL: f32 = 1.0;
@@ -109,12 +111,13 @@ const LENS_INVERSE_RADIAL: f32 = 10.0;
 const LENS_TILTED: f32 = 11.0;
 const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
-// A buffer of uniforms would do, but where shaders branch on those lavapipe makes and keeps a
-// shader of its own for every frame: 1 to 2 MB each.
-@group(0) @binding(0) var<storage, read> params: Params;
+// Nothing may branch on these alone, nor may loops end by them: lavapipe makes and keeps a shader of
+// its own for every value, 1 to 2 MB each. (From a storage buffer it reads one number of one pixel at a
+// time.)
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
-// The plane that each pixel sees; w: 1 where there is one.
+// The plane that each pixel sees, where they differ; w: 1 where there is one.
 @group(0) @binding(3) var planes: texture_2d<f32>;
 // As large as the photos' array; a single texel where nothing is masked.
 @group(0) @binding(4) var masks: texture_2d_array<f32>;
@@ -135,7 +138,7 @@ struct Sight {
     depth: f32,
     // Squared radius, or theta for a fisheye; beyond the lens' limit the pixel means nothing.
     reach: f32,
-    // 1/distance, scaled as the axes are; only where something can hide the point.
+    // 1/distance; only where something can hide the point.
     inverse_distance: f32,
 }
 
@@ -156,7 +159,7 @@ fn angle(y: f32, x: f32) -> f32 {
 
 // The ray through a pixel's centre; z = 1 where the lens allows. Zero where there is none.
 fn ray_through(pixel: vec2u) -> vec3f {
-    if params.rays_in_table == 1u {
+    if RAYS_IN_TABLE {
         return textureLoad(rays, pixel, 0).xyz;
     }
     return vec3f((vec2f(pixel) + 0.5 - params.ray_offset) * params.ray_scale, 1.0);
@@ -177,10 +180,15 @@ fn rational(source_idx: u32, n: vec2f, r2: f32, full: bool) -> vec2f {
 
 // The plane of the proxy seen at a pixel; w is 0 where there is none.
 fn plane_at(pixel: vec2u) -> vec4f {
-    if params.facets == 1u {
+    if FACETS {
         return textureLoad(planes, pixel, 0);
     }
-    return vec4f(params.plane, f32(params.plane_seen));
+    return vec4f(params.plane, params.plane_seen);
+}
+
+// The inverse distance along a ray to the plane it meets; negative where there is none.
+fn inverse_distance(plane: vec4f, ray: vec3f) -> f32 {
+    return select(-1.0, dot(plane.xyz, ray), plane.w > 0.0);
 }
 
 // What a rarer lens makes of a point of its camera's frame.
@@ -340,9 +348,16 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
     }
     var sight = Sight(vec2f(0.0), 0.0, 0.0, 0.0);
     if OCCLUDED {
-        sight.inverse_distance = s / length(p);
+        sight.inverse_distance = s / length(ray - s * source_data(source_idx, CENTER).xyz);
     }
     var bent: vec2f;
+    if lens == LENS_PINHOLE {
+        if p.z > 0.0 {
+            sight.pixel = p.xy / p.z;
+            sight.depth = p.z;
+        }
+        return sight;
+    }
     if lens == LENS_FISHEYE {
         let radius = length(p.xy);
         let theta = angle(radius, p.z);
@@ -369,11 +384,8 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
             return sight;
         }
         let n = p.xy / p.z;
-        bent = n;
-        if lens != LENS_PINHOLE {
-            sight.reach = dot(n, n);
-            bent = rational(source_idx, n, sight.reach, lens == LENS_RATIONAL);
-        }
+        sight.reach = dot(n, n);
+        bent = rational(source_idx, n, sight.reach, lens == LENS_RATIONAL);
         sight.depth = p.z;
     }
     let pinhole = source_data(source_idx, PINHOLE);
@@ -384,7 +396,10 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
 // fovBlend: 0 where the photo does not see the point. On the photo's very edge a view
 // counts where there is no other.
 fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
-    let image = source_data(source_idx, IMAGE);
+    var image = params.image;
+    if !SAME_IMAGES {
+        image = source_data(source_idx, IMAGE);
+    }
     let to_border = min(sight.pixel, image.xy - sight.pixel);
     let border = min(to_border.x, to_border.y);
     if sight.depth <= 0.0 || sight.reach > image.w || border < 0.0 {
@@ -398,10 +413,10 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
 const LEVEL_BIAS: f32 = 0.25;
 
 fn level_of_detail(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> f32 {
-    let here = select(ray.z, length(ray), params.desired_by_distance == 1u);
+    let here = select(ray.z, length(ray), BY_DISTANCE);
     let ratio = here / sight.depth;
     var area = ratio * ratio * ratio;
-    if params.facets == 1u {
+    if FACETS {
         // With one plane for all this is in the axes' scale.
         area *= abs(1.0 - dot(plane, source_data(source_idx, CENTER).xyz));
     }
@@ -470,7 +485,7 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
     let towards = dot(ray, c);
     let ray_squared = dot(ray, ray);
     var resolution: f32;
-    if params.resolution == RESOLUTION_LENGTH {
+    if RESOLUTION_BY_LENGTH {
         let squares = s * dot(c, c) - 2.0 * towards;
         resolution = squares / (length(ray - s * c) + sqrt(ray_squared));
     } else {
@@ -480,7 +495,7 @@ fn difference(source_idx: u32, ray: vec3f, s: f32) -> f32 {
             / (g * sqrt(max(1.0 + excess, 0.0)) + 1.0);
     }
     var ang = angle(across, ray_squared - s * towards);
-    if params.timed == 1u {
+    if TIMED {
         ang += source_data(source_idx, REST).y;
     }
     return ang + params.beta * max(resolution, 0.0);
@@ -496,13 +511,13 @@ struct Mix {
 fn exposed(color: vec4f, exposure: vec4f) -> vec4f {
     let white = max(color.a, 1e-9);
     let share = clamp((color.a - color) / ((1.0 - SHOULDER) * white), vec4f(0.0), vec4f(1.0));
-    return color + (exposure - 1.0) * color * share;
+    return color + (vec4f(exposure.rgb, 1.0) - 1.0) * color * share;
 }
 
 fn add(mix: ptr<function, Mix>, share: f32, color: vec4f, source_idx: u32) {
     // `trust` of frame.rs.
     let weight = share * (TRANSPARENT + (1.0 - TRANSPARENT) * color.a);
-    if params.exposures_differ == 1u {
+    if EXPOSED {
         (*mix).color += weight * exposed(color, source_data(source_idx, EXPOSURE));
     } else {
         (*mix).color += weight * color;

@@ -14,7 +14,8 @@ struct Nearest {
 
 fn nearest_sources(ray: vec3f, s: f32, plane: vec3f) -> Nearest {
     var nearest: Nearest;
-    for (var i = 0u; i < params.source_count; i++) {
+    let source_count = u32(source_data(0u, EXPOSURE).w);
+    for (var i = 0u; i < source_count; i++) {
         let a = relevance(i, see(i, ray, s), ray, plane);
         if a <= 0.0 {
             continue;
@@ -43,7 +44,7 @@ fn nearest_sources(ray: vec3f, s: f32, plane: vec3f) -> Nearest {
 }
 
 fn threshold(nearest: ptr<function, Nearest>) -> f32 {
-    if params.blend == BLEND_PAPER {
+    if BLEND_OF_PAPER {
         let nth = min(params.k, (*nearest).count);
         return max((*nearest).diff[nth - 1u], SMALLEST_THRESHOLD);
     }
@@ -76,7 +77,7 @@ fn weigh(nearest: ptr<function, Nearest>) -> u32 {
     for (var n = 0u; n < count; n++) {
         let diff = (*nearest).diff[n];
         var relevance = nearness(diff, t);
-        if params.blend == BLEND_CONSISTENT {
+        if !BLEND_OF_PAPER {
             relevance /= max(diff, SAME_RAY);
         }
         let weight = (*nearest).a[n] * relevance;
@@ -96,7 +97,7 @@ fn weigh(nearest: ptr<function, Nearest>) -> u32 {
     for (var n = 0u; n < count; n++) {
         let diff = (*nearest).diff[n];
         var relevance = nearness(diff, t);
-        if params.blend == BLEND_CONSISTENT {
+        if !BLEND_OF_PAPER {
             relevance /= max(diff, SAME_RAY);
         }
         (*nearest).a[n] *= relevance;

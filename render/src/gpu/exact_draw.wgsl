@@ -14,8 +14,8 @@ fn whole_image(@builtin(vertex_index) vertex_idx: u32) -> @builtin(position) vec
 fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let ray = ray_through(vec2u(position.xy));
     let plane = plane_at(vec2u(position.xy));
-    let s = dot(plane.xyz, ray);
-    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
+    let s = inverse_distance(plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     var nearest = nearest_sources(ray, s, plane.xyz);

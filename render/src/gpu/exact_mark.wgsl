@@ -10,8 +10,8 @@ fn mark(@builtin(global_invocation_id) within: vec3u) {
     let pixel = params.part_origin + within.xy;
     let ray = ray_through(pixel);
     let plane = plane_at(pixel);
-    let s = dot(plane.xyz, ray);
-    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
+    let s = inverse_distance(plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
         return;
     }
     var nearest = nearest_sources(ray, s, plane.xyz);

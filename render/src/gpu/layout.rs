@@ -7,7 +7,7 @@ use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
 use crate::surface::Surface;
 use bytemuck::{Pod, Zeroable};
-use calibrate::Distortion;
+use calibrate::{Distortion, Lens};
 use glam::DVec3;
 
 /// `Params` of common.wgsl.
@@ -15,25 +15,20 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Params {
     pub plane: [f32; 3],
-    pub rays_in_table: u32,
+    pub beta: f32,
     pub ray_scale: [f32; 2],
     pub ray_offset: [f32; 2],
+    /// Of any source view.
+    pub image: [f32; 4],
     pub array_size: [f32; 2],
-    pub size: [u32; 2],
-    pub source_count: u32,
-    pub desired_by_distance: u32,
-    pub beta: f32,
-    pub full_weight: f32,
-    pub k: u32,
-    pub blend: u32,
-    pub resolution: u32,
-    pub plane_seen: u32,
-    pub exposures_differ: u32,
-    pub timed: u32,
-    pub facets: u32,
-    pub finest: f32,
     pub part_origin: [u32; 2],
     pub part_size: [u32; 2],
+    pub full_weight: f32,
+    pub k: u32,
+    pub finest: f32,
+    pub plane_seen: f32,
+    /// A struct's size is a multiple of its alignment.
+    pub rest: [u32; 2],
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -47,22 +42,23 @@ pub(crate) struct Source {
     pub lens: [f32; 4],
     /// k₃ to k₆.
     pub lens_rest: [f32; 4],
-    pub size: [f32; 2],
-    pub inverse_feather: f32,
-    pub limit: f32,
+    /// Size, inverse feather, the lens' limit.
+    pub image: [f32; 4],
     pub kind: f32,
     pub layer: f32,
     pub footprint_excess: f32,
     pub wide: f32,
     pub center: [f32; 4],
-    pub exposure: [f32; 4],
+    pub exposure: [f32; 3],
+    /// How many source views there are; their table says, when it is made.
+    pub count: f32,
     pub prism: [f32; 4],
     pub shear: [f32; 2],
     pub horizon: [f32; 2],
     pub mask_layer: f32,
     pub time_penalty: f32,
     pub distance_layer: f32,
-    /// What turns the inverse of a scaled distance into the distance map's units.
+    /// What turns the inverse of a distance into the distance map's units.
     pub distance_scale: f32,
 }
 
@@ -109,31 +105,18 @@ impl Params {
         let lens = frame.desired.lens;
         Self {
             plane: common_plane(frame).as_vec3().to_array(),
-            rays_in_table: u32::from(lens.distortion() != Distortion::None),
+            beta: frame.options.beta as f32,
             ray_scale: (1.0 / lens.focal).as_vec2().to_array(),
             ray_offset: lens.principal.as_vec2().to_array(),
+            image: frame.sources.first().map_or([0.0; 4], image),
             array_size: array_size.map(|v| v as f32),
-            size: [frame.desired.width, frame.desired.height],
-            source_count: frame.taking_part().count() as u32,
-            desired_by_distance: u32::from(lens.is_wide()),
-            beta: frame.options.beta as f32,
-            full_weight: frame.options.full_weight() as f32,
-            k: frame.options.k as u32,
-            blend: match frame.options.blend {
-                Blend::Consistent => 0,
-                Blend::Paper => 1,
-            },
-            resolution: match frame.options.resolution {
-                Resolution::Footprint | Resolution::Distance => 0,
-                Resolution::Length => 1,
-            },
-            plane_seen: u32::from(frame.surface != Surface::Nothing),
-            exposures_differ: u32::from(frame.exposures_differ()),
-            timed: u32::from(frame.sources.iter().any(|s| s.time_penalty > 0.0)),
-            facets: u32::from(matches!(frame.surface, Surface::Facets(_))),
-            finest: finest as f32,
             part_origin: part.origin,
             part_size: part.size,
+            full_weight: frame.options.full_weight() as f32,
+            k: frame.options.k as u32,
+            finest: finest as f32,
+            plane_seen: f32::from(u8::from(frame.surface != Surface::Nothing)),
+            rest: [0; 2],
         }
     }
 }
@@ -152,77 +135,70 @@ impl Source {
         // but nothing is seen from there.
         let area = frame.area_scale(source_idx, common_plane(frame));
         let scale = area.clamp(1e-12, 1e12).cbrt().recip();
-        let axis = |r: usize| {
-            let row = source.rotation.row(r).extend(source.translation[r]);
-            (row * scale).as_vec4().to_array()
-        };
+        let axis = |r: usize| source.rotation.row(r).extend(source.translation[r]) * scale;
+        let mut axes = [axis(0), axis(1), axis(2)];
+        if source.lens.distortion() == Distortion::None {
+            let Lens {
+                focal, principal, ..
+            } = source.lens;
+            axes[0] = axes[0] * focal.x + axes[2] * principal.x;
+            axes[1] = axes[1] * focal.y + axes[2] * principal.y;
+        }
         let g = source.footprint_ratio;
-        let limit = source.lens.limit();
         let f = |v: f64| v as f32;
         let none = [0.0; 4];
-        let (lens, lens_rest, prism, limit) = match source.lens.distortion() {
-            Distortion::None => (none, none, none, f64::INFINITY),
-            Distortion::Rational { k, p } => (
-                [k[0], k[1], p[0], p[1]],
-                [k[2], k[3], k[4], k[5]],
-                none,
-                limit * limit,
-            ),
+        let (lens, lens_rest, prism) = match source.lens.distortion() {
+            Distortion::None | Distortion::Equirectangular => (none, none, none),
+            Distortion::Rational { k, p } => {
+                ([k[0], k[1], p[0], p[1]], [k[2], k[3], k[4], k[5]], none)
+            }
             Distortion::Tilted { k, p, s, .. } => (
                 [k[0], k[1], p[0], p[1]],
                 [k[2], k[3], k[4], k[5]],
                 [s[0], s[2], s[1], s[3]],
-                limit * limit,
             ),
             Distortion::Fisheye { k } | Distortion::SkewedFisheye { k, .. } => {
-                ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], none, limit)
+                ([k[0], k[1], 0.0, 0.0], [k[2], k[3], 0.0, 0.0], none)
             }
             Distortion::ThinPrismFisheye { k, p, s } => (
                 [k[0], k[1], p[0], p[1]],
                 [k[2], k[3], 0.0, 0.0],
                 [s[0], s[1], 0.0, 0.0],
-                limit,
             ),
             // Its tangential terms are numbered the other way round.
             Distortion::RadTanThinPrismFisheye { k, p, s } => (
                 [k[0], k[1], p[1], p[0]],
                 [k[2], k[3], k[4], k[5]],
                 [s[0], s[2], s[1], s[3]],
-                limit,
             ),
             Distortion::Fov { omega } => {
                 let omega = omega.abs();
                 let lens = [2.0 * (0.5 * omega).tan(), 1.0 / omega, 0.0, 0.0];
-                (lens, none, none, limit)
+                (lens, none, none)
             }
             Distortion::Division { k } | Distortion::InverseRadial { k } => {
-                ([k, 0.0, 0.0, 0.0], none, none, limit)
+                ([k, 0.0, 0.0, 0.0], none, none)
             }
             Distortion::Eucm { alpha, beta } => {
-                let cotangent = limit.cos() / limit.sin();
-                ([alpha, beta, cotangent, 0.0], none, none, limit)
+                let limit = source.lens.limit();
+                ([alpha, beta, limit.cos() / limit.sin(), 0.0], none, none)
             }
-            Distortion::Equirectangular => (none, none, none, limit),
         };
         let (focal, sensor) = focal_and_sensor(&source.lens);
         Self {
-            axes: [axis(0), axis(1), axis(2)],
+            axes: axes.map(|axis| axis.as_vec4().to_array()),
             focal: focal.as_vec2().to_array(),
             principal: source.lens.principal.as_vec2().to_array(),
             lens: lens.map(f),
             lens_rest: lens_rest.map(f),
-            size: source.size.map(f),
-            inverse_feather: f(1.0 / source.feather_px.max(1e-9)),
-            limit: f(limit.min(1e30)),
+            image: image(source),
             kind: lens_kind(source.lens.distortion()),
             layer: photo.unwrap_or(0) as f32,
             footprint_excess: f(g * g - 1.0),
             wide: f32::from(u8::from(source.lens.is_wide())),
             center: source.center.as_vec3().extend(f(g)).to_array(),
-            exposure: DVec3::from_array(source.exposure)
-                .as_vec3()
-                .extend(1.0)
-                .to_array(),
+            exposure: source.exposure.map(f),
+            count: 0.0,
             prism: prism.map(f),
             shear: sensor.map_or([0.0; 2], |sensor| sensor.shear.as_vec2().to_array()),
             horizon: sensor.map_or([0.0; 2], |sensor| sensor.horizon.as_vec2().to_array()),
@@ -231,10 +207,23 @@ impl Source {
             distance_layer: distances.map_or(-1.0, |layer| layer as f32),
             distance_scale: distances.map_or(0.0, |_| {
                 let visibility = frame.lumigraph.visibility.as_ref();
-                visibility.map_or(0.0, |v| f(scale / v.map(source_idx).unit))
+                visibility.map_or(0.0, |v| f(1.0 / v.map(source_idx).unit))
             }),
         }
     }
+}
+
+/// IMAGE of common.wgsl.
+fn image(source: &FrameSource) -> [f32; 4] {
+    let limit = source.lens.limit();
+    let limit = match source.lens.distortion() {
+        Distortion::None => f64::INFINITY,
+        Distortion::Rational { .. } | Distortion::Tilted { .. } => limit * limit,
+        _ => limit,
+    };
+    let [width, height] = source.size;
+    let inverse_feather = 1.0 / source.feather_px.max(1e-9);
+    [width, height, inverse_feather, limit.min(1e30)].map(|v| v as f32)
 }
 
 /// The plane that all pixels see; zero where there are many.
@@ -245,45 +234,67 @@ fn common_plane(frame: &Frame<'_>) -> DVec3 {
     }
 }
 
-/// What shaders are specialised to.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What shaders are specialised to: the constants that common.wgsl names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Special {
     /// The kind of lens that all source views have, if it is one; as the shaders number
     /// them.
-    pub common_lens: Option<f32>,
-    /// Whether any source view has an ignore mask.
-    pub masked: bool,
-    /// Whether the proxy can hide a part of itself.
-    pub occluded: bool,
+    common_lens: Option<u8>,
+    same_images: bool,
+    masked: bool,
+    occluded: bool,
+    facets: bool,
+    rays_in_table: bool,
+    by_distance: bool,
+    exposed: bool,
+    timed: bool,
+    blend_of_paper: bool,
+    resolution_by_length: bool,
 }
 
 impl Special {
     pub(crate) fn of(frame: &Frame<'_>) -> Self {
-        let mut kinds = frame.sources.iter().map(|s| lens_kind(s.lens.distortion()));
+        // Lenses' numbers are small and whole.
+        let mut kinds = frame
+            .sources
+            .iter()
+            .map(|s| lens_kind(s.lens.distortion()) as u8);
         let first = kinds.next();
+        let desired = frame.desired.lens;
         Self {
             common_lens: first.filter(|first| kinds.all(|kind| kind == *first)),
+            same_images: frame
+                .sources
+                .iter()
+                .all(|s| image(s) == image(&frame.sources[0])),
             masked: frame.lumigraph.photos.any_masked(),
             occluded: frame.lumigraph.visibility.is_some(),
+            facets: matches!(frame.surface, Surface::Facets(_)),
+            rays_in_table: desired.distortion() != Distortion::None,
+            by_distance: desired.is_wide(),
+            exposed: frame.exposures_differ(),
+            timed: frame.sources.iter().any(|s| s.time_penalty > 0.0),
+            blend_of_paper: frame.options.blend == Blend::Paper,
+            resolution_by_length: frame.options.resolution == Resolution::Length,
         }
     }
 
     /// The shaders' constants.
-    pub(super) fn constants(self) -> [(&'static str, f64); 3] {
-        let lens = f64::from(self.common_lens.unwrap_or(-1.0));
+    pub(super) fn constants(self) -> [(&'static str, f64); 11] {
         let flag = |set: bool| f64::from(u8::from(set));
         [
-            ("COMMON_LENS", lens),
+            ("COMMON_LENS", self.common_lens.map_or(-1.0, f64::from)),
+            ("SAME_IMAGES", flag(self.same_images)),
             ("MASKED", flag(self.masked)),
             ("OCCLUDED", flag(self.occluded)),
+            ("FACETS", flag(self.facets)),
+            ("RAYS_IN_TABLE", flag(self.rays_in_table)),
+            ("BY_DISTANCE", flag(self.by_distance)),
+            ("EXPOSED", flag(self.exposed)),
+            ("TIMED", flag(self.timed)),
+            ("BLEND_OF_PAPER", flag(self.blend_of_paper)),
+            ("RESOLUTION_BY_LENGTH", flag(self.resolution_by_length)),
         ]
-    }
-
-    /// Different for each.
-    pub(super) fn key(self) -> (u32, bool, bool) {
-        // Lenses' numbers are small and whole; those of views that differ share one more.
-        let lens = self.common_lens.map_or(u32::MAX, |lens| lens as u32);
-        (lens, self.masked, self.occluded)
     }
 }
 

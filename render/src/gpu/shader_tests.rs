@@ -92,9 +92,8 @@ fn params_lie_where_the_shaders_read_them() {
         };
     }
     let expected = offsets!(
-        plane rays_in_table ray_scale ray_offset array_size size source_count
-        desired_by_distance beta full_weight k blend resolution plane_seen exposures_differ timed
-        facets finest part_origin part_size
+        plane beta ray_scale ray_offset image array_size part_origin part_size full_weight k finest
+        plane_seen
     );
     for shader in SHADERS {
         let (found, size) = members(&parse(shader), "Params");
@@ -120,7 +119,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
             ("Z_AXIS", offset_of!(Source, axes) + 2 * TEXEL),
             ("CENTER", offset_of!(Source, center)),
             ("PINHOLE", offset_of!(Source, focal)),
-            ("IMAGE", offset_of!(Source, size)),
+            ("IMAGE", offset_of!(Source, image)),
             ("LENS", offset_of!(Source, lens)),
             ("LENS_REST", offset_of!(Source, lens_rest)),
             ("KIND", offset_of!(Source, kind)),
@@ -134,9 +133,8 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     }
     // What shares a texel, by component.
     let within = |field: usize, texel: usize| (field - texel) / size_of::<f32>();
-    let image = offset_of!(Source, size);
-    assert_eq!(within(offset_of!(Source, inverse_feather), image), 2);
-    assert_eq!(within(offset_of!(Source, limit), image), 3);
+    let exposure = offset_of!(Source, exposure);
+    assert_eq!(within(offset_of!(Source, count), exposure), 3);
     let kind = offset_of!(Source, kind);
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
@@ -195,10 +193,6 @@ fn shared_numbers_are_the_same() {
         for (name, value) in [
             ("CONTRIBUTORS", MAX_CONTRIBUTORS as f64),
             ("SAME_RAY", f64::from(SAME_RAY as f32)),
-            ("BLEND_CONSISTENT", 0.0),
-            ("BLEND_PAPER", 1.0),
-            ("RESOLUTION_RATIO", 0.0),
-            ("RESOLUTION_LENGTH", 1.0),
             ("LEVEL_BIAS", crate::LEVEL_BIAS),
             ("SHOULDER", crate::frame::SHOULDER),
             ("TRANSPARENT", crate::frame::TRANSPARENT),

@@ -69,8 +69,10 @@ impl Gpu {
             Order::AsGiven => frame.taking_part().collect(),
             Order::ByLayer => photos.by_layer(),
         };
-        let sources: Vec<Source> = listed.into_iter().map(source).collect();
-        let params = self.buffer("params", &[params], wgpu::BufferUsages::STORAGE);
+        let mut sources: Vec<Source> = listed.into_iter().map(source).collect();
+        let count = sources.len() as f32;
+        sources.iter_mut().for_each(|source| source.count = count);
+        let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
         let sources = self.table(
             "sources",
             bytemuck::cast_slice(&sources),

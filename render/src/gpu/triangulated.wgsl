@@ -45,8 +45,8 @@ fn entry(entry_idx: u32) -> vec4f {
 fn triangle(in: Corner) -> @location(0) vec4f {
     let ray = ray_through(vec2u(in.position.xy));
     let plane = plane_at(vec2u(in.position.xy));
-    let s = dot(plane.xyz, ray);
-    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
+    let s = inverse_distance(plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     var mix = Mix(vec4f(0.0), 0.0);
@@ -83,8 +83,8 @@ struct Terms {
 fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     let ray = ray_through(vec2u(in.position.xy));
     let plane = plane_at(vec2u(in.position.xy));
-    let s = dot(plane.xyz, ray);
-    if s < 0.0 || plane.w == 0.0 || all(ray == vec3f(0.0)) {
+    let s = inverse_distance(plane, ray);
+    if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     let first = in.list.x;
@@ -92,6 +92,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     var terms: Terms;
     var count = 0u;
     var nearest = INFINITY;
+    var sums = vec2f(0.0);
     for (var i = first; i < first + in.list.y; i++) {
         let listed = entry(i);
         let source_idx = u32(listed.x);
@@ -100,6 +101,7 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         if a > 0.0 {
             let diff = without_noise(dot(in.shares, listed.yzw));
             nearest = min(nearest, diff);
+            sums += a * vec2f(1.0, diff);
             terms.diff[count] = diff;
             terms.a[count] = a;
             terms.texel[count] = vec3f(sight.pixel, level_of_detail(source_idx, sight, ray, plane.xyz));
@@ -111,12 +113,12 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     // 2. Their weights and colours.
-    let t = max(threshold(&terms, count), SMALLEST_THRESHOLD);
+    let t = max(threshold(&terms, count, sums), SMALLEST_THRESHOLD);
     var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
         let diff = terms.diff[n];
         var weight = terms.a[n] * nearness(diff, t);
-        if params.blend == BLEND_CONSISTENT {
+        if !BLEND_OF_PAPER {
             weight /= max(diff, SAME_RAY);
         }
         // Where the nearest is as far as the threshold, all are tied.
@@ -130,33 +132,34 @@ fn bordered_triangle(in: Corner) -> @location(0) vec4f {
     return resolve(mix);
 }
 
-fn threshold(terms: ptr<function, Terms>, count: u32) -> f32 {
-    if params.blend == BLEND_PAPER {
+// `all_sums`: of a and of a times the difference, over all terms.
+fn threshold(terms: ptr<function, Terms>, count: u32, all_sums: vec2f) -> f32 {
+    if BLEND_OF_PAPER {
         return nth_smallest(terms, count, params.k);
     }
     // Newton's method in 1/t, from above; it lands on the root (see weights.rs).
     var t = INFINITY;
-    var contributors = 0u;
+    var sums = all_sums;
+    var contributors = count;
     for (var step = 0u; step <= count; step++) {
-        var sum_a = 0.0;
-        var sum_a_diff = 0.0;
-        contributors = 0u;
-        for (var n = 0u; n < count; n++) {
-            let a = (*terms).a[n];
-            if (*terms).diff[n] < t {
-                sum_a += a;
-                sum_a_diff += a * (*terms).diff[n];
-                contributors++;
-            }
-        }
-        if sum_a <= params.full_weight {
+        if sums.x <= params.full_weight {
             break;
         }
-        let next = max(sum_a_diff / (sum_a - params.full_weight), SMALLEST_THRESHOLD);
+        let next = max(sums.y / (sums.x - params.full_weight), SMALLEST_THRESHOLD);
         if next >= t {
             break;
         }
         t = next;
+        sums = vec2f(0.0);
+        contributors = 0u;
+        for (var n = 0u; n < count; n++) {
+            let a = (*terms).a[n];
+            let diff = (*terms).diff[n];
+            if diff < t {
+                sums += a * vec2f(1.0, diff);
+                contributors++;
+            }
+        }
     }
     if contributors > CONTRIBUTORS {
         t = min(t, nth_smallest(terms, count, CONTRIBUTORS + 1u));

@@ -1,5 +1,6 @@
+use super::super::groups::Rect;
 use super::super::{Gpu, target};
-use super::{SOURCE_ROW, Source, lens_kind};
+use super::{Params, SOURCE_ROW, Source, lens_kind};
 use crate::frame::every_lens::{self, TOLERANCE_PX};
 use crate::frame::{Frame, depth_for_area};
 use glam::{DVec3, Vec3};
@@ -12,6 +13,7 @@ struct Projector<'a> {
     gpu: &'a Gpu,
     module: wgpu::ShaderModule,
     layouts: [wgpu::BindGroupLayout; 2],
+    params: wgpu::Buffer,
     sources: wgpu::TextureView,
 }
 
@@ -34,11 +36,12 @@ impl<'a> Projector<'a> {
                     entries: &entries,
                 })
         };
-        let storage = |read_only| wgpu::BindingType::Buffer {
-            ty: BufferBindingType::Storage { read_only },
+        let buffer = |ty| wgpu::BindingType::Buffer {
+            ty,
             has_dynamic_offset: false,
             min_binding_size: None,
         };
+        let storage = |read_only| buffer(BufferBindingType::Storage { read_only });
         let table = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Float { filterable: false },
             view_dimension: wgpu::TextureViewDimension::D2,
@@ -53,9 +56,14 @@ impl<'a> Projector<'a> {
                     source: wgpu::ShaderSource::Wgsl(SHADER.into()),
                 }),
             layouts: [
-                layout(&[(1, table)]),
+                layout(&[(0, buffer(BufferBindingType::Uniform)), (1, table)]),
                 layout(&[(0, storage(true)), (1, storage(false))]),
             ],
+            params: gpu.buffer(
+                "params",
+                &[Params::of(frame, [1; 2], 0, Rect::whole(0, 0))],
+                BufferUsages::UNIFORM,
+            ),
             sources: gpu.table("sources", bytemuck::cast_slice(&sources), SOURCE_ROW),
         }
     }
@@ -97,7 +105,8 @@ impl<'a> Projector<'a> {
             })
         };
         let sources = BindingResource::TextureView(&self.sources);
-        let first = group(first, &[entry(1, sources)]);
+        let params = self.params.as_entire_binding();
+        let first = group(first, &[entry(0, params), entry(1, sources)]);
         let (read, written) = (input.as_entire_binding(), output.as_entire_binding());
         let second = group(second, &[entry(0, read), entry(1, written)]);
         let readback = target::readback_buffer(device, output.size());
