@@ -43,7 +43,7 @@ const SOURCES_PER_ROW = 128u;
 const X_AXIS = 0u;
 const Y_AXIS = 1u;
 const Z_AXIS = 2u;
-// Focal lengths, principal point.
+// Focal lengths, principal point, for all other lenses.
 const PINHOLE = 3u;
 // k1, k2, p1, p2; of a fisheye k1, k2. FOV: 2 tan(omega / 2), 1 / omega. Division and
 // inverse radial: k. EUCM: alpha, beta, and z over the radius at its limit.

@@ -7,7 +7,7 @@ use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
 use crate::surface::Surface;
 use bytemuck::{Pod, Zeroable};
-use calibrate::{Distortion, Lens};
+use calibrate::Distortion;
 use glam::DVec3;
 
 /// `Params` of common.wgsl.
@@ -138,9 +138,7 @@ impl Source {
         let axis = |r: usize| source.rotation.row(r).extend(source.translation[r]) * scale;
         let mut axes = [axis(0), axis(1), axis(2)];
         if source.lens.distortion() == Distortion::None {
-            let Lens {
-                focal, principal, ..
-            } = source.lens;
+            let (focal, principal) = (source.lens.focal, source.lens.principal);
             axes[0] = axes[0] * focal.x + axes[2] * principal.x;
             axes[1] = axes[1] * focal.y + axes[2] * principal.y;
         }
@@ -260,13 +258,12 @@ impl Special {
             .iter()
             .map(|s| lens_kind(s.lens.distortion()) as u8);
         let first = kinds.next();
+        let mut images = frame.sources.iter().map(image);
+        let first_image = images.next();
         let desired = frame.desired.lens;
         Self {
             common_lens: first.filter(|first| kinds.all(|kind| kind == *first)),
-            same_images: frame
-                .sources
-                .iter()
-                .all(|s| image(s) == image(&frame.sources[0])),
+            same_images: images.all(|image| Some(image) == first_image),
             masked: frame.lumigraph.photos.any_masked(),
             occluded: frame.lumigraph.visibility.is_some(),
             facets: matches!(frame.surface, Surface::Facets(_)),

@@ -79,13 +79,7 @@ impl Pipelines {
         let shader = |(name, parts): (&str, &[&str])| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(
-                    std::env::var("HACK_DIR")
-                        .ok()
-                        .and_then(|d| std::fs::read_to_string(format!("{d}/{name}.wgsl")).ok())
-                        .unwrap_or(parts.concat())
-                        .into(),
-                ),
+                source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
             })
         };
         Self {
