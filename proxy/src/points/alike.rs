@@ -3,6 +3,7 @@
 use super::{Node, SparsePoint};
 use calibrate::View;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// How many of the source views most like the desired one give their points.
 const VIEWS: usize = 6;
@@ -24,6 +25,12 @@ const CELLS: usize = 16;
 const RIM: f64 = 0.1;
 /// What points are worth at a corner of the picture though they are at the opposite one.
 const ELSEWHERE: f64 = 0.05;
+
+/// Points that are asked one after the other.
+const PART: usize = 4096;
+
+/// By corner of the picture, then by source view; and by source view in all.
+type Likeness = (Vec<Vec<f64>>, Vec<f64>);
 
 /// A source view of all that are most like the desired one has a weight, 0…1, at each corner of
 /// its picture; between them weights are bilinear. One corner may show what the views most like the
@@ -97,9 +104,11 @@ impl Alike {
         // 2. How like each view is, at each corner and in all.
         let corners = Lattice::new(reach, 1);
         let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
-        let mut likeness = vec![vec![0.0; sources.len()]; corners.corner_count()];
-        let mut in_all = vec![0.0; sources.len()];
-        for (node, point) in in_sight {
+        let nothing = || {
+            let of_corners = vec![vec![0.0; sources.len()]; corners.corner_count()];
+            (of_corners, vec![0.0; sources.len()])
+        };
+        let add = |(likeness, in_all): &mut Likeness, (node, point): &(Node, &SparsePoint)| {
             let others = cells.around(node).map(|(c, share)| share * crowd[c]);
             let worth = cells.in_sight(node) / others.into_iter().sum::<f64>().max(1.0);
             let here = point.position - center;
@@ -112,6 +121,20 @@ impl Alike {
                 for (corner, share) in around {
                     likeness[corner][i] += share * own;
                 }
+            }
+        };
+        // The same parts, and sums, on any number of threads.
+        let of_part = |part: &[(Node, &SparsePoint)]| {
+            let mut sums = nothing();
+            part.iter().for_each(|seen| add(&mut sums, seen));
+            sums
+        };
+        let parts: Vec<Likeness> = in_sight.par_chunks(PART).map(of_part).collect();
+        let (mut likeness, mut in_all) = nothing();
+        for (of_corners, all) in &parts {
+            let sums = likeness.iter_mut().zip(of_corners);
+            for (sums, part) in sums.chain([(&mut in_all, all)]) {
+                sums.iter_mut().zip(part).for_each(|(sum, own)| *sum += own);
             }
         }
 

@@ -4,10 +4,8 @@
 //! many points may come into sight at once that hardly count yet.
 
 use super::Node;
-use super::chart::Chart;
 use super::nearest::{Nearest, Neighbour};
 use glam::{DMat2, DVec2};
-use rayon::prelude::*;
 
 /// What the shares of a point's neighbours add up to, as far as there are enough of them.
 const NEIGHBOURS: f64 = 8.0;
@@ -30,21 +28,24 @@ fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// Takes out those that stick out of all their neighbours, and those that lie behind what is around
+/// Without those that stick out of all their neighbours, and those that lie behind what is around
 /// them: points of another side of a building, say, that only views from there observe.
-pub(super) fn drop_odd(chart: &mut Chart) {
-    change(chart, |node, nearest| {
+pub(super) fn without_odd(nodes: &[Node]) -> Vec<Node> {
+    let nearest = Nearest::new(nodes);
+    let mut nodes = nearest.changed(|node, asked| {
         // Among those that count as much: what counts little is not measured by what counts more.
-        let near = nearest.around(node.chart(), node.weight, NEIGHBOURS);
+        let near = nearest.around(node.chart(), node.weight, NEIGHBOURS, asked);
         Node {
-            weight: node.weight * evenness(&node, &near),
+            weight: node.weight * evenness(&node, near),
             ..node
         }
     });
+    nodes.retain(|node| node.weight > 0.0);
+    nodes
 }
 
 /// How much a point, 0…1, is where its neighbours let it be.
-fn evenness(node: &Node, near: &[Neighbour<'_>]) -> f64 {
+fn evenness<'a>(node: &Node, near: impl Iterator<Item = Neighbour<'a>>) -> f64 {
     let own = node.inverse_distance;
     let (mut all, mut as_near, mut as_far, mut hiding) = (0.0, 0.0, 0.0, 0.0);
     for Neighbour { node, share, .. } in near {
@@ -62,19 +63,22 @@ fn evenness(node: &Node, near: &[Neighbour<'_>]) -> f64 {
 }
 
 /// Brings what is there only in part to where the surface would about be without it.
-pub(super) fn fade(chart: &mut Chart) {
-    change(chart, |node, nearest| {
+pub(super) fn faded(nodes: &[Node]) -> Vec<Node> {
+    let nearest = Nearest::new(nodes);
+    nearest.changed(|node, asked| {
         if node.weight >= 1.0 {
             return node;
         }
-        let near = nearest.around(node.chart(), 1.0, NEIGHBOURS);
+        let near: Vec<_> = nearest
+            .around(node.chart(), 1.0, NEIGHBOURS, asked)
+            .collect();
         let without = without(&near).unwrap_or(node.inverse_distance);
         let inverse_distance = without + node.weight * (node.inverse_distance - without);
         Node {
             inverse_distance,
             ..node
         }
-    });
+    })
 }
 
 /// The inverse distance at a place of the plane that fits its neighbours best.
@@ -104,14 +108,4 @@ fn without(near: &[Neighbour<'_>]) -> Option<f64> {
     let slope = (spread + DMat2::from_diagonal(DVec2::splat(flat))).inverse() * slope;
     let here = mean - slope.dot(middle);
     Some(here.clamp(mean / BEYOND, mean * BEYOND))
-}
-
-/// Changes all nodes at once.
-fn change(chart: &mut Chart, changed: impl Fn(Node, &Nearest<'_>) -> Node + Sync) {
-    let indexed = chart.indexed();
-    let nodes: Vec<Node> = indexed.iter().map(|(_, node)| *node).collect();
-    let nearest = Nearest::new(&nodes);
-    let of = |(index, node): (usize, Node)| (index, changed(node, &nearest));
-    let changed: Vec<(usize, Node)> = indexed.into_par_iter().map(of).collect();
-    chart.change(changed);
 }

@@ -16,9 +16,9 @@ use alike::Alike;
 pub(crate) use alike::{EASY_ANGLE, unlikeness};
 use calibrate::{Pixel, View};
 use chart::{Chart, distinct};
-use clean::{drop_odd, fade};
+use clean::{faded, without_odd};
 use glam::{DVec2, DVec3};
-use nearest::Nearest;
+use nearest::{Asked, Nearest};
 
 /// A sparse point and who sees it.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +80,7 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
 
     // 2. Those that the views most like this one observe.
     let alike = Alike::new(center, reach, sources, &in_sight);
-    let mut nodes: Vec<Node> = in_sight
+    let nodes: Vec<Node> = in_sight
         .iter()
         .map(|(node, point)| Node {
             weight: alike.weight(node, point),
@@ -88,17 +88,18 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         })
         .filter(|node| node.weight > 0.0)
         .collect();
-    nodes = distinct(nodes);
-    let mut chart = Chart::new(nodes)?;
-    drop_odd(&mut chart);
-    fade(&mut chart);
-    let left: Vec<Node> = chart.left().collect();
-    if left.len() < 3 {
+    let nodes = without_odd(&distinct(nodes));
+    if nodes.len() < 3 {
         return None;
     }
+    // What fades stays where it is in the chart.
+    let (chart, mut nodes) = rayon::join(|| Chart::new(&nodes), || faded(&nodes));
+    let mut chart = chart?;
 
     // 3. Anchors, at the distance of the points nearest to them.
-    let nearest = Nearest::new(&left);
+    let nearest = Nearest::new(&nodes);
+    let mut asked = Asked::default();
+    let mut anchors = Vec::with_capacity(ANCHORS);
     for k in 0..ANCHORS {
         let turn = std::f64::consts::TAU * (k as f64 + 0.5) / ANCHORS as f64;
         let across = DVec2::from_angle(turn) * reach.sin();
@@ -109,17 +110,19 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         };
         // By the inverse squares of their distances.
         let (mut sum, mut shares) = (0.0, 0.0);
-        for near in nearest.around(anchor.chart(), 1.0, ANCHORED_TO) {
+        for near in nearest.around(anchor.chart(), 1.0, ANCHORED_TO, &mut asked) {
             let share = near.share / near.offset.length_squared();
             sum += share * near.node.inverse_distance;
             shares += share;
         }
         anchor.inverse_distance = sum / shares;
-        chart.insert(anchor)?;
+        chart.insert(&anchor, nodes.len() + k)?;
+        anchors.push(anchor);
     }
+    nodes.extend(anchors);
 
     // 4. Straight behind is the chart's infinity: with it the triangulation closes.
-    let (mut nodes, mut triangles, rim) = chart.into_triangles();
+    let (mut triangles, rim) = chart.triangles();
     let behind = Node {
         direction: DVec3::NEG_Z,
         inverse_distance: nodes[nodes.len() - 1].inverse_distance,
