@@ -26,7 +26,9 @@ const RIM: f64 = 0.1;
 /// What points are worth at a corner of the picture though they are at the opposite one.
 const ELSEWHERE: f64 = 0.05;
 
-/// Points that are asked one after the other.
+/// Points are asked in so many parts at most, as each has sums of its own for all views, and so many at least one
+/// after the other.
+const PARTS: usize = 16;
 const PART: usize = 4096;
 
 /// By corner of the picture, then by source view; and by source view in all.
@@ -129,7 +131,8 @@ impl Alike {
             part.iter().for_each(|seen| add(&mut sums, seen));
             sums
         };
-        let parts: Vec<Likeness> = in_sight.par_chunks(PART).map(of_part).collect();
+        let size = in_sight.len().div_ceil(PARTS).max(PART);
+        let parts: Vec<Likeness> = in_sight.par_chunks(size).map(of_part).collect();
         let (mut likeness, mut in_all) = nothing();
         for (of_corners, all) in &parts {
             let sums = likeness.iter_mut().zip(of_corners);

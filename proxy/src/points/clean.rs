@@ -32,24 +32,24 @@ fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
 /// them: points of another side of a building, say, that only views from there observe.
 pub(super) fn without_odd(nodes: &[Node]) -> Vec<Node> {
     let nearest = Nearest::new(nodes);
-    let mut nodes = nearest.changed(|node, asked| {
+    let mut left = nearest.changed(|node, asked| {
         // Among those that count as much: what counts little is not measured by what counts more.
         let near = nearest.around(node.chart(), node.weight, NEIGHBOURS, asked);
         Node {
-            weight: node.weight * evenness(&node, near),
+            weight: node.weight * evenness(&node, nodes, near),
             ..node
         }
     });
-    nodes.retain(|node| node.weight > 0.0);
-    nodes
+    left.retain(|node| node.weight > 0.0);
+    left
 }
 
 /// How much a point, 0…1, is where its neighbours let it be.
-fn evenness<'a>(node: &Node, near: impl Iterator<Item = Neighbour<'a>>) -> f64 {
+fn evenness(node: &Node, nodes: &[Node], near: impl Iterator<Item = Neighbour>) -> f64 {
     let own = node.inverse_distance;
     let (mut all, mut as_near, mut as_far, mut hiding) = (0.0, 0.0, 0.0, 0.0);
-    for Neighbour { node, share, .. } in near {
-        let ratio = node.inverse_distance / own;
+    for Neighbour { index, share, .. } in near {
+        let ratio = nodes[index].inverse_distance / own;
         all += share;
         as_near += share * (1.0 - smoothstep(SPIKE, 1.0 / ratio));
         as_far += share * (1.0 - smoothstep(SPIKE, ratio));
@@ -62,9 +62,8 @@ fn evenness<'a>(node: &Node, near: impl Iterator<Item = Neighbour<'a>>) -> f64 {
     as_near * as_far * (1.0 - smoothstep(HIDING, hiding / all))
 }
 
-/// Brings what is there only in part to where the surface would about be without it.
-pub(super) fn faded(nodes: &[Node]) -> Vec<Node> {
-    let nearest = Nearest::new(nodes);
+/// Brings what is there only in part to where the surface would about be without it. `nearest` is of the nodes.
+pub(super) fn faded(nodes: &[Node], nearest: &Nearest<'_>) -> Vec<Node> {
     nearest.changed(|node, asked| {
         if node.weight >= 1.0 {
             return node;
@@ -72,7 +71,7 @@ pub(super) fn faded(nodes: &[Node]) -> Vec<Node> {
         let near: Vec<_> = nearest
             .around(node.chart(), 1.0, NEIGHBOURS, asked)
             .collect();
-        let without = without(&near).unwrap_or(node.inverse_distance);
+        let without = without(nodes, &near).unwrap_or(node.inverse_distance);
         let inverse_distance = without + node.weight * (node.inverse_distance - without);
         Node {
             inverse_distance,
@@ -82,12 +81,13 @@ pub(super) fn faded(nodes: &[Node]) -> Vec<Node> {
 }
 
 /// The inverse distance at a place of the plane that fits its neighbours best.
-fn without(near: &[Neighbour<'_>]) -> Option<f64> {
+fn without(nodes: &[Node], near: &[Neighbour]) -> Option<f64> {
+    let inverse_distance = |near: &Neighbour| nodes[near.index].inverse_distance;
     // 1. Their mean.
     let (mut all, mut mean, mut middle) = (0.0, 0.0, DVec2::ZERO);
     for near in near {
         all += near.share;
-        mean += near.share * near.node.inverse_distance;
+        mean += near.share * inverse_distance(near);
         middle += near.share * near.offset;
     }
     if !(all > 0.0) {
@@ -99,7 +99,7 @@ fn without(near: &[Neighbour<'_>]) -> Option<f64> {
     for near in near {
         let off = near.offset - middle;
         spread += near.share * DMat2::from_cols(off.x * off, off.y * off);
-        slope += near.share * (near.node.inverse_distance - mean) * off;
+        slope += near.share * (inverse_distance(near) - mean) * off;
     }
     let flat = FLAT * (spread.x_axis.x + spread.y_axis.y);
     if !(flat > 0.0) {

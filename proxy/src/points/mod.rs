@@ -93,11 +93,11 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         return None;
     }
     // What fades stays where it is in the chart.
-    let (chart, mut nodes) = rayon::join(|| Chart::new(&nodes), || faded(&nodes));
+    let nearest = Nearest::new(&nodes);
+    let (chart, mut faded) = rayon::join(|| Chart::new(&nodes), || faded(&nodes, &nearest));
     let mut chart = chart?;
 
     // 3. Anchors, at the distance of the points nearest to them.
-    let nearest = Nearest::new(&nodes);
     let mut asked = Asked::default();
     let mut anchors = Vec::with_capacity(ANCHORS);
     for k in 0..ANCHORS {
@@ -112,14 +112,15 @@ pub fn facets(desired: &View, sources: &[View], points: &[SparsePoint]) -> Optio
         let (mut sum, mut shares) = (0.0, 0.0);
         for near in nearest.around(anchor.chart(), 1.0, ANCHORED_TO, &mut asked) {
             let share = near.share / near.offset.length_squared();
-            sum += share * near.node.inverse_distance;
+            sum += share * faded[near.index].inverse_distance;
             shares += share;
         }
         anchor.inverse_distance = sum / shares;
         chart.insert(&anchor, nodes.len() + k)?;
         anchors.push(anchor);
     }
-    nodes.extend(anchors);
+    faded.extend(anchors);
+    let mut nodes = faded;
 
     // 4. Straight behind is the chart's infinity: with it the triangulation closes.
     let (mut triangles, rim) = chart.triangles();

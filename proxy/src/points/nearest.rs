@@ -24,8 +24,9 @@ pub(super) struct Nearest<'a> {
 
 /// A node near a place.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Neighbour<'a> {
-    pub(super) node: &'a Node,
+pub(super) struct Neighbour {
+    /// Which node.
+    pub(super) index: usize,
     /// From the place, in the chart.
     pub(super) offset: DVec2,
     /// How much it is there, times what falls from 1 at the place to 0 where neighbours end.
@@ -117,12 +118,12 @@ impl<'a> Nearest<'a> {
         weight: f64,
         shares: f64,
         asked: &'s mut Asked,
-    ) -> impl Iterator<Item = Neighbour<'a>> + use<'s, 'a> {
+    ) -> impl Iterator<Item = Neighbour> + use<'s, 'a> {
         let end = self.meet(at, weight, shares, asked);
         asked.squared = end;
         let met = asked.met.drain(..).filter(move |met| met.squared < end);
         met.map(move |met| Neighbour {
-            node: &self.nodes[self.order[met.at as usize] as usize],
+            index: self.order[met.at as usize] as usize,
             offset: self.places[met.at as usize] - at,
             share: met.part * (1.0 - met.squared / end),
         })

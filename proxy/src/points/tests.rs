@@ -306,7 +306,10 @@ fn points_that_hardly_count_change_hardly_anything() {
     });
     let with: Vec<Node> = wall.iter().copied().chain(crowd).collect();
     let with = distinct(with);
-    let [alone, with] = [&wall, &with].map(|nodes| faded(&without_odd(nodes)));
+    let [alone, with] = [&wall, &with].map(|nodes| {
+        let nodes = without_odd(nodes);
+        faded(&nodes, &Nearest::new(&nodes))
+    });
     // Some are gone.
     let weight = |nodes: &[Node], node: &Node| {
         let own = nodes.iter().find(|n| n.direction == node.direction);
