@@ -3,7 +3,7 @@
 use crate::lumigraph::SourceView;
 use calibrate::{Pixel, View};
 use half::f16;
-use proxy::{Proxy, Solid};
+use proxy::{Proxy, Rays, Solid};
 use rayon::prelude::*;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -46,6 +46,8 @@ pub struct Visibility {
     id: u64,
     solid: Arc<Solid>,
     views: Vec<View>,
+    /// Those of the first view, which as a rule has the lens that all have.
+    rays: Option<Rays>,
     maps: Vec<OnceLock<DistanceMap>>,
 }
 
@@ -63,6 +65,7 @@ impl Visibility {
                 id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
                 solid: Arc::clone(solid),
                 views: sources.iter().map(|s| s.view.clone()).collect(),
+                rays: sources.first().and_then(|s| DistanceMap::rays(&s.view)),
                 maps: sources.iter().map(|_| OnceLock::new()).collect(),
             }),
             _ => None,
@@ -71,7 +74,15 @@ impl Visibility {
 
     /// The map of a source view.
     pub fn map(&self, source_idx: usize) -> &DistanceMap {
-        self.maps[source_idx].get_or_init(|| DistanceMap::new(&self.solid, &self.views[source_idx]))
+        self.maps[source_idx].get_or_init(|| {
+            let (view, first) = (&self.views[source_idx], &self.views[0]);
+            let alike = |view: &View| (view.lens, view.width, view.height);
+            if alike(view) == alike(first) {
+                DistanceMap::new(&self.solid, view, self.rays.as_ref())
+            } else {
+                DistanceMap::new(&self.solid, view, DistanceMap::rays(view).as_ref())
+            }
+        })
     }
 }
 
@@ -83,19 +94,25 @@ impl fmt::Debug for Visibility {
 }
 
 impl DistanceMap {
-    /// Finds what each texel sees: by scanning for a pinhole, else by a ray.
-    pub fn new(solid: &Solid, view: &View) -> Self {
+    /// The rays of a view's texels, where they all look ahead.
+    pub fn rays(view: &View) -> Option<Rays> {
+        Rays::reduced(view, REDUCTION)
+    }
+
+    /// Finds what each texel sees: by scanning along the [`Self::rays`], else ray by ray.
+    pub fn new(solid: &Solid, view: &View, rays: Option<&Rays>) -> Self {
         let size = [view.width, view.height].map(|side| side.div_ceil(REDUCTION));
         let [width, height] = size.map(|side| side as usize);
-        let scan = solid.scan(view, REDUCTION);
+        let scan = rays.map(|rays| (rays, solid.scan_along(view, rays)));
         let center = view.center();
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let inverse_distance = |x: usize, y: usize| {
+            if let Some((rays, scan)) = &scan {
+                let ray = rays.at(x, y)?.extend(1.0);
+                return Some(scan.inverse_depth[y * width + x] / ray.length());
+            }
             let at = |i: usize| (i as f64 + 0.5) * f64::from(REDUCTION);
             let ray = view.lens.unproject(Pixel::new(at(x), at(y)))?;
-            if let Some(scan) = &scan {
-                return Some(scan.inverse_depth[y * width + x] * ray.z / ray.length());
-            }
             let hit = solid.first_hit(center, world_from_camera * ray)?;
             Some(1.0 / (hit.along * ray.length()))
         };

@@ -8,6 +8,7 @@ use calibrate::View;
 use image::RgbaImage;
 use proxy::dense::{DensePoints, Matching};
 use proxy::{Proxy, Solid};
+use rayon::prelude::*;
 use render::{FieldOptions, Frame, Lumigraph, Method, Visibility, cpu, score};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -41,7 +42,7 @@ pub(super) struct Trials<'a> {
     lumigraph: Lumigraph,
     matching: Option<Matching>,
     /// Of dense points, without each judge.
-    dense: BTreeMap<usize, CarvedPoints>,
+    dense: Vec<CarvedPoints>,
     /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
     cutout: Option<Option<Cutout>>,
     /// And without the judges of each fold.
@@ -114,7 +115,7 @@ impl<'a> Trials<'a> {
             judges,
             lumigraph,
             matching: None,
-            dense: BTreeMap::new(),
+            dense: Vec::new(),
             cutout: None,
             bounds: BTreeMap::new(),
         })
@@ -185,20 +186,23 @@ impl<'a> Trials<'a> {
         Ok(CarvedPoints::new(&self.views(None), points, sparse.len()))
     }
 
-    /// Dense points without a judge.
+    /// Dense points without each judge, all found at once: much of it takes one thread each.
     fn dense_without(&mut self, judge: usize) -> Result<&CarvedPoints, SceneError> {
-        if !self.dense.contains_key(&judge) {
-            let Judge {
-                source_idx, name, ..
-            } = &self.judges[judge];
-            let (gone, mut fewer) = (*source_idx, self.without.clone());
-            fewer.insert(name.clone());
-            let sparse = self.scene.sparse_points(&fewer, &self.names);
-            let points = self.matching()?.points(&sparse, Some(gone));
-            let surface = CarvedPoints::new(&self.views(Some(gone)), points, sparse.len());
-            self.dense.insert(judge, surface);
+        if self.dense.is_empty() {
+            let judges: Vec<usize> = self.judges.iter().map(|j| j.source_idx).collect();
+            self.matching()?.compare(&judges);
+            let (trials, matching) = (&*self, self.matching.as_ref());
+            let find = |judge: &Judge| {
+                let (gone, mut fewer) = (judge.source_idx, trials.without.clone());
+                fewer.insert(judge.name.clone());
+                let sparse = trials.scene.sparse_points(&fewer, &trials.names);
+                let points = matching?.points(&sparse, Some(gone));
+                let views = trials.views(Some(gone));
+                Some(CarvedPoints::new(&views, points, sparse.len()))
+            };
+            self.dense = self.judges.par_iter().filter_map(find).collect();
         }
-        Ok(&self.dense[&judge])
+        Ok(&self.dense[judge])
     }
 
     /// The photos' views. That of one which was never taken is where another is: a camera's place
@@ -295,12 +299,12 @@ impl<'a> Trials<'a> {
         Ok(())
     }
 
-    fn matching(&mut self) -> Result<&Matching, SceneError> {
+    fn matching(&mut self) -> Result<&mut Matching, SceneError> {
         if self.matching.is_none() {
             self.matching = Some(self.scene.matching(self.without)?);
         }
         self.matching
-            .as_ref()
+            .as_mut()
             .ok_or_else(|| unfit("no photos to compare"))
     }
 

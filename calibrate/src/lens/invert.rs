@@ -112,27 +112,28 @@ pub(super) fn invert_on_disc(
     map: impl Fn(DVec2) -> (DVec2, DMat2),
 ) -> Option<DVec2> {
     // 1. Newton's steps, halved while they do not help.
-    let residual = |x: DVec2| map(x).0 - value;
     let mut x = start;
-    let mut error = residual(x).length();
+    let (mut mapped, mut jacobian) = map(x);
+    let mut error = (mapped - value).length();
     for _ in 0..MAX_STEPS {
-        let (mapped, jacobian) = map(x);
         if jacobian.determinant() == 0.0 {
             return None;
         }
         let mut step = jacobian.inverse() * (value - mapped);
-        let mut next_error = residual(x + step).length();
+        let mut next = map(x + step);
+        let off = |next: &(DVec2, DMat2)| (next.0 - value).length();
         let mut halvings = 0;
-        while !(next_error <= error) && halvings < 30 {
+        while !(off(&next) <= error) && halvings < 30 {
             step *= 0.5;
-            next_error = residual(x + step).length();
+            next = map(x + step);
             halvings += 1;
         }
-        if !(next_error <= error) {
+        if !(off(&next) <= error) {
             break;
         }
         x += step;
-        error = next_error;
+        error = off(&next);
+        (mapped, jacobian) = next;
         if step.length() <= STEP_TOLERANCE * (1.0 + x.length()) {
             break;
         }
@@ -140,6 +141,6 @@ pub(super) fn invert_on_disc(
     // 2. Believe it only where it gives the value, on the near side of the fold.
     let found = error <= RESIDUAL_TOLERANCE * (1.0 + value.length())
         && x.length() <= limit
-        && map(x).1.determinant() > 0.0;
+        && jacobian.determinant() > 0.0;
     found.then_some(x)
 }

@@ -114,7 +114,10 @@ fn in_front(star: &Star<'_>, towards: DVec3, sigma: f64, votes: &Votes) {
             soft(along * length, sigma)
         }
         .max(before);
-        votes.free[walk.at as usize].fetch_add(cost - before, Relaxed);
+        // Nothing, but close to the point.
+        if cost > before {
+            votes.free[walk.at as usize].fetch_add(cost - before, Relaxed);
+        }
         if ends {
             return;
         }
@@ -153,8 +156,22 @@ struct Star<'a> {
     vertex: u32,
     center: DVec3,
     tetrahedra: Vec<u32>,
+    /// Of each, in the same order, the facet across from the vertex.
+    facets: Vec<Facet>,
     /// Which vertex last gathered a tetrahedron, plus one.
     seen: Vec<u32>,
+}
+
+/// The facet of a tetrahedron across from one of its corners.
+#[derive(Clone, Copy)]
+struct Facet {
+    /// That corner, 0 to 3.
+    opposite: usize,
+    /// The others, and where they lie from it.
+    vertices: [u32; 3],
+    corners: [DVec3; 3],
+    /// The normals of the planes through it and each two of them in turn.
+    sides: [DVec3; 3],
 }
 
 impl<'a> Star<'a> {
@@ -164,6 +181,7 @@ impl<'a> Star<'a> {
             vertex: INFINITE,
             center: DVec3::ZERO,
             tetrahedra: Vec::new(),
+            facets: Vec::new(),
             seen: vec![0; delaunay.finite],
         }
     }
@@ -186,6 +204,21 @@ impl<'a> Star<'a> {
                 }
             }
         }
+        let facet = |&t: &u32| {
+            let all = self.delaunay.tetrahedra[t as usize];
+            let opposite = all.iter().position(|&v| v == vertex).unwrap_or(0);
+            let vertices = OTHERS[opposite].map(|k| all[k]);
+            let place = |v: u32| vector(self.delaunay.sites[v as usize]) - self.center;
+            let [a, b, c] = vertices.map(place);
+            Facet {
+                opposite,
+                vertices,
+                corners: [a, b, c],
+                sides: [a.cross(b), b.cross(c), c.cross(a)],
+            }
+        };
+        self.facets.clear();
+        self.facets.extend(self.tetrahedra.iter().map(facet));
     }
 
     /// The median length of the edges to other points; of all edges where there is none.
@@ -229,24 +262,17 @@ fn side(a: DVec3, b: DVec3, ray: DVec3) -> f64 {
 
 impl<'a> Walk<'a> {
     fn start(star: &Star<'a>, ray: DVec3) -> Option<Self> {
-        let delaunay = star.delaunay;
-        star.tetrahedra.iter().find_map(|&at| {
-            let all = delaunay.tetrahedra[at as usize];
-            let exit = all.iter().position(|&v| v == star.vertex)?;
-            let facet = OTHERS[exit].map(|k| all[k]);
-            let corners = facet.map(|v| vector(delaunay.sites[v as usize]) - star.center);
-            let [a, b, c] = corners;
-            let through =
-                side(a, b, ray) >= 0.0 && side(b, c, ray) >= 0.0 && side(c, a, ray) >= 0.0;
-            through.then_some(Self {
-                delaunay,
-                origin: star.center,
-                ray,
-                at,
-                exit,
-                facet,
-                corners,
-            })
+        let mut all = star.tetrahedra.iter().zip(&star.facets);
+        let through = |facet: &Facet| facet.sides.iter().all(|side| side.dot(ray) >= 0.0);
+        let (&at, facet) = all.find(|(_, facet)| through(facet))?;
+        Some(Self {
+            delaunay: star.delaunay,
+            origin: star.center,
+            ray,
+            at,
+            exit: facet.opposite,
+            facet: facet.vertices,
+            corners: facet.corners,
         })
     }
 

@@ -13,6 +13,8 @@ mod neighbours;
 mod small;
 mod smooth;
 mod sweep;
+mod warp;
+mod windows;
 
 use crate::{Solid, SparsePoint};
 use calibrate::View;
@@ -21,7 +23,7 @@ use neighbours::Affinity;
 use rayon::prelude::*;
 use small::SmallPhoto;
 use std::borrow::Cow;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Points, and the names of the views that their `seen_by` counts.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,7 +73,9 @@ pub fn densify(
     photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
     options: &DenseOptions,
 ) -> Vec<SparsePoint> {
-    Matching::new(views, sparse, photo, options).points(sparse, None)
+    let mut matching = Matching::new(views, sparse, photo, options);
+    matching.compare(&[]);
+    matching.points(sparse, None)
 }
 
 /// Photos made ready to be compared, and the depths found so far: to ask for the points that
@@ -84,8 +88,14 @@ pub struct Matching {
     neighbours: Vec<Vec<usize>>,
     /// The inverse depths to try.
     ranges: Vec<Option<[f64; 2]>>,
-    /// With all photos, each when first needed.
-    maps: Vec<OnceLock<Option<DepthMap>>>,
+    /// Of each photo, those found so far.
+    maps: Vec<Vec<Found>>,
+}
+
+/// A photo's depths, and the neighbours that tell them.
+struct Found {
+    neighbours: Vec<usize>,
+    map: Option<DepthMap>,
 }
 
 impl Matching {
@@ -107,22 +117,39 @@ impl Matching {
             neighbours: affinity.neighbours(|i| photos[i].is_some()),
             affinity,
             ranges: neighbours::depth_ranges(&photos, sparse),
-            maps: photos.iter().map(|_| OnceLock::new()).collect(),
+            maps: photos.iter().map(|_| Vec::new()).collect(),
             photos,
         }
+    }
+
+    /// Finds the depths of all photos, and what they would be without one of the given ones or
+    /// another: together they take less than one after the other, and points can be asked for
+    /// at once.
+    pub fn compare(&mut self, without: &[usize]) {
+        let gone: Vec<(usize, Vec<Vec<usize>>)> = without
+            .iter()
+            .map(|&gone| (gone, self.neighbours_without(gone)))
+            .collect();
+        let of_photo = |i: usize| {
+            let mut choices = vec![self.neighbours[i].clone()];
+            for (gone, neighbours) in &gone {
+                if *gone != i && !choices.contains(&neighbours[i]) {
+                    choices.push(neighbours[i].clone());
+                }
+            }
+            self.find(i, choices)
+        };
+        let photos = (0..self.photos.len()).into_par_iter();
+        self.maps = photos.map(of_photo).collect();
     }
 
     /// The given points, and those that the photos agree on between them, or that all but
     /// one of them do. Without it, only the range of depths that are tried remembers it.
     pub fn points(&self, sparse: &[SparsePoint], without: Option<usize>) -> Vec<SparsePoint> {
         // 1. Which photos to compare.
-        let of_all = &self.neighbours;
         let neighbours = match without {
-            Some(gone) => {
-                let usable = |i: usize| self.photos[i].is_some() && i != gone;
-                Cow::Owned(self.affinity.neighbours(usable))
-            }
-            None => Cow::Borrowed(of_all),
+            Some(gone) => Cow::Owned(self.neighbours_without(gone)),
+            None => Cow::Borrowed(&self.neighbours),
         };
 
         // 2. Their depths.
@@ -130,12 +157,15 @@ impl Matching {
             .into_par_iter()
             .map(|i| {
                 if without == Some(i) {
-                    None
-                } else if neighbours[i] == of_all[i] {
-                    let map = self.maps[i].get_or_init(|| self.map(i, &of_all[i]));
-                    map.as_ref().map(Cow::Borrowed)
-                } else {
-                    self.map(i, &neighbours[i]).map(Cow::Owned)
+                    return None;
+                }
+                let known = self.maps[i].iter().find(|f| f.neighbours == neighbours[i]);
+                match known {
+                    Some(found) => found.map.as_ref().map(Cow::Borrowed),
+                    None => {
+                        let found = self.find(i, vec![neighbours[i].clone()]).pop()?;
+                        found.map.map(Cow::Owned)
+                    }
                 }
             })
             .collect();
@@ -152,14 +182,29 @@ impl Matching {
         points
     }
 
-    fn map(&self, i: usize, neighbours: &[usize]) -> Option<DepthMap> {
-        let reference = self.photos[i].as_ref()?;
-        let others: Vec<&SmallPhoto> = neighbours
-            .iter()
-            .filter_map(|&j| self.photos[j].as_ref())
-            .collect();
-        let costs = sweep::costs(reference, &others, self.ranges[i]?)?;
-        Some(smooth::depths(reference, &costs))
+    fn neighbours_without(&self, gone: usize) -> Vec<Vec<usize>> {
+        let usable = |i: usize| self.photos[i].is_some() && i != gone;
+        self.affinity.neighbours(usable)
+    }
+
+    /// A photo's depths by each choice of neighbours.
+    fn find(&self, i: usize, choices: Vec<Vec<usize>>) -> Vec<Found> {
+        let mut maps: Vec<Option<DepthMap>> = choices.iter().map(|_| None).collect();
+        if let (Some(reference), Some(range)) = (&self.photos[i], self.ranges[i]) {
+            let (kept, some): (Vec<usize>, Vec<Vec<usize>>) = choices
+                .iter()
+                .enumerate()
+                .filter(|(_, choice)| !choice.is_empty())
+                .map(|(k, choice)| (k, choice.clone()))
+                .unzip();
+            sweep::costs(reference, &self.photos, &some, range, |k, costs| {
+                maps[kept[k]] = Some(smooth::depths(reference, &costs));
+            });
+        }
+        let found = choices.into_iter().zip(maps);
+        found
+            .map(|(neighbours, map)| Found { neighbours, map })
+            .collect()
     }
 }
 

@@ -26,6 +26,10 @@ pub(super) struct SmallPhoto {
     pub(super) grays: Vec<f32>,
     /// Whether a pixel shows anything.
     pub(super) used: Vec<bool>,
+    /// The grays of a pixel (in the lowest byte), the next one, and those below them, 1…255: what
+    /// lies between them takes one look. A neighbour that shows nothing, or that there is none of,
+    /// counts as the pixel itself; 0 where the pixel shows nothing.
+    pub(super) quads: Vec<u32>,
 }
 
 impl SmallPhoto {
@@ -91,6 +95,7 @@ impl SmallPhoto {
             focal,
             rotation: view.camera_from_world.matrix(),
             center: view.center(),
+            quads: quads(&grays, &used, width),
             grays,
             used,
         })
@@ -116,6 +121,25 @@ impl SmallPhoto {
         let ray = DVec3::new(at(x, self.width), at(y, self.height), 1.0);
         self.center + self.rotation.transpose() * (ray / inverse_depth)
     }
+}
+
+/// See [`SmallPhoto::quads`].
+fn quads(grays: &[f32], used: &[bool], width: usize) -> Vec<u32> {
+    let byte = |i: usize| (grays[i] + 128.0).round().clamp(1.0, 255.0) as u32;
+    let of = |i: usize| {
+        if !used[i] {
+            return 0;
+        }
+        let right = usize::from(!(i + 1).is_multiple_of(width));
+        let below = if i + width < grays.len() { width } else { 0 };
+        let or_own = |j: usize| byte(if used[j] { j } else { i });
+        let around = [i, i + right, i + below, i + below + right];
+        around
+            .into_iter()
+            .enumerate()
+            .fold(0, |quad, (k, j)| quad | or_own(j) << (8 * k))
+    };
+    (0..grays.len()).map(of).collect()
 }
 
 /// Bilinear gray and alpha.

@@ -1,7 +1,10 @@
 //! Costs of depths: a photo compared with its neighbours over a sweep of planes.
 
 use super::small::SmallPhoto;
-use glam::{DMat3, DVec3, Vec4};
+use super::warp::Warp;
+use super::windows::{WINDOW, Windows};
+use pulp::Arch;
+use std::collections::BTreeMap;
 
 /// Costs of a photo's pixels at a number of inverse depths, evenly spaced.
 pub(super) struct Costs {
@@ -13,9 +16,6 @@ pub(super) struct Costs {
     pub(super) costs: Vec<u8>,
 }
 
-/// Half the side of the windows that are compared, in pixels.
-const RADIUS: usize = 2;
-const WINDOW: usize = 2 * RADIUS + 1;
 /// Depths tried.
 const LEAST_DEPTHS: f64 = 32.0;
 const MOST_DEPTHS: f64 = 128.0;
@@ -24,242 +24,299 @@ const NOISE: f32 = 4.0;
 /// The share of a window that a neighbour must show. What it does not show counts as gray, which
 /// spoils little: with whole windows only, photos' borders tell less (−0.5 dB on desk-sweep).
 const LEAST_SEEN: f32 = 0.3;
-/// The cost of what a neighbour does not show.
+/// The cost of what a neighbour does not show, and of what is no better.
 const UNSEEN: f32 = 0.6;
+/// Planes between which costs are turned from image by image to pixel by pixel: one by one, each
+/// cost would touch a cache line of its own.
+const AT_ONCE: usize = 16;
+/// So many choices of neighbours share a sweep: each takes a byte for each pixel and plane.
+const MOST_CHOICES: usize = 4;
 
-/// The costs between two inverse depths; `None` without neighbours.
+/// The costs of a photo's depths between two inverse depths, for some choices of neighbours, none of
+/// which is empty. `found` is given each choice's index, and its costs, in some order.
+///
+/// What choices have in common is compared once, where they try the same depths.
 pub(super) fn costs(
     reference: &SmallPhoto,
-    others: &[&SmallPhoto],
+    photos: &[Option<SmallPhoto>],
+    choices: &[Vec<usize>],
     [nearest_to_zero, greatest]: [f64; 2],
-) -> Option<Costs> {
-    if others.is_empty() {
-        return None;
-    }
+    mut found: impl FnMut(usize, Costs),
+) {
     // 1. Steps of about one pixel in the neighbour that moves most but one.
-    let mut shifts: Vec<f64> = others
-        .iter()
-        .map(|other| reference.focal * (other.center - reference.center).length())
-        .collect();
-    shifts.sort_by(|a, b| b.total_cmp(a));
-    let shift = shifts[1.min(shifts.len() - 1)];
     let range = greatest - nearest_to_zero;
-    let count = (range * shift).clamp(LEAST_DEPTHS, MOST_DEPTHS).round() as usize;
-    let step = range / (count - 1) as f64;
-
-    // 2. Plane after plane.
-    let pixels = reference.width * reference.height;
-    let own = Moments::of(reference);
-    let mut costs = vec![0_u8; pixels * count];
-    let mut best = vec![[0.0_f32; 2]; pixels];
-    let mut scratch = Scratch::new(reference);
-    for plane in 0..count {
-        let inverse_depth = nearest_to_zero + step * plane as f64;
-        best.fill([UNSEEN; 2]);
-        for other in others {
-            scratch.compare(reference, other, &own, inverse_depth, &mut best);
-        }
-        for (pixel, [first, second]) in best.iter().enumerate() {
-            let cost = if others.len() > 1 {
-                0.5 * (first + second)
-            } else {
-                *first
-            };
-            costs[pixel * count + plane] = (255.0 * cost.clamp(0.0, 1.0)) as u8;
-        }
-    }
-    Some(Costs {
-        first: nearest_to_zero,
-        step,
-        count,
-        costs,
-    })
-}
-
-/// Means over the window around each pixel.
-struct Moments {
-    mean: Vec<f32>,
-    variance: Vec<f32>,
-}
-
-impl Moments {
-    fn of(photo: &SmallPhoto) -> Self {
-        let mut grays: Vec<Vec4> = photo
-            .grays
-            .iter()
-            .map(|g| Vec4::new(*g, g * g, 0.0, 0.0))
+    let count_of = |choice: &Vec<usize>| {
+        let others = choice.iter().filter_map(|&j| photos[j].as_ref());
+        let mut shifts: Vec<f64> = others
+            .map(|other| reference.focal * (other.center - reference.center).length())
             .collect();
-        Rows::new(photo.width).box_mean(&mut grays);
-        Self {
-            mean: grays.iter().map(|g| g.x).collect(),
-            variance: grays.iter().map(|g| g.y - g.x * g.x).collect(),
-        }
-    }
-}
-
-/// What comparing needs room for: per pixel the neighbour's gray, its square, its product
-/// with the reference's, and 1 where the neighbour shows it.
-struct Scratch {
-    warped: Vec<Vec4>,
-    rows: Rows,
-}
-
-impl Scratch {
-    fn new(photo: &SmallPhoto) -> Self {
-        Self {
-            warped: vec![Vec4::ZERO; photo.width * photo.height],
-            rows: Rows::new(photo.width),
-        }
+        shifts.sort_by(|a, b| b.total_cmp(a));
+        let shift = shifts[1.min(shifts.len() - 1)];
+        (range * shift).clamp(LEAST_DEPTHS, MOST_DEPTHS).round() as usize
+    };
+    let mut of_count: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (i, choice) in choices.iter().enumerate() {
+        of_count.entry(count_of(choice)).or_default().push(i);
     }
 
-    /// Compares with one neighbour at one plane, and keeps each pixel's best two costs.
-    fn compare(
-        &mut self,
-        reference: &SmallPhoto,
-        other: &SmallPhoto,
-        own: &Moments,
-        inverse_depth: f64,
-        best: &mut [[f32; 2]],
-    ) {
-        self.warp(reference, other, inverse_depth);
-        self.rows.box_mean(&mut self.warped);
-        for (i, best) in best.iter_mut().enumerate() {
-            let [mean, square, product, seen] = self.warped[i].to_array();
-            if seen < LEAST_SEEN {
-                continue;
-            }
-            let variance = square - mean * mean + NOISE;
-            let covariance = product - mean * own.mean[i];
-            let correlation = covariance / (variance * (own.variance[i] + NOISE)).sqrt();
-            let cost = 0.5 * (1.0 - correlation);
-            if cost < best[0] {
-                *best = [cost, best[0]];
-            } else if cost < best[1] {
-                best[1] = cost;
-            }
-        }
-    }
-
-    /// The neighbour as the reference would see it if all lay on a plane.
-    fn warp(&mut self, reference: &SmallPhoto, other: &SmallPhoto, inverse_depth: f64) {
-        // x' ~ R x + t·w for the ray x through a pixel, z = 1.
-        let rotation = other.rotation * reference.rotation.transpose();
-        let translation = other.rotation * (reference.center - other.center);
-        let half = |side: usize| side as f64 / 2.0;
-        let from_pixel = DMat3::from_cols(
-            DVec3::X / reference.focal,
-            DVec3::Y / reference.focal,
-            DVec3::new(
-                (0.5 - half(reference.width)) / reference.focal,
-                (0.5 - half(reference.height)) / reference.focal,
-                1.0,
-            ),
-        );
-        let plane = DMat3::from_cols(DVec3::ZERO, DVec3::ZERO, translation * inverse_depth);
-        // Both matrices act on rays with z = 1, so the third column takes the translation.
-        let to_pixel = DMat3::from_cols(
-            DVec3::X * other.focal,
-            DVec3::Y * other.focal,
-            DVec3::new(half(other.width) - 0.5, half(other.height) - 0.5, 1.0),
-        );
-        let h = to_pixel * (rotation + plane) * from_pixel;
-        let (right, bottom) = ((other.width - 1) as f32, (other.height - 1) as f32);
-        let [hx, hz] = [h.x_axis.as_vec3(), h.z_axis.as_vec3()];
-        for y in 0..reference.height {
-            let start = (h.y_axis * y as f64).as_vec3() + hz;
-            let row = y * reference.width;
-            for x in 0..reference.width {
-                let p = start + hx * x as f32;
-                let (u, v) = (p.x / p.z, p.y / p.z);
-                // A little beyond its border the photo repeats itself, so that windows on it
-                // count.
-                let (near_u, near_v) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
-                let beyond = (u - near_u).abs().max((v - near_v).abs());
-                if !(p.z > 0.0 && beyond <= RADIUS as f32) {
-                    self.warped[row + x] = Vec4::ZERO;
-                    continue;
-                }
-                let (u, v) = (near_u, near_v);
-                let (left, top) = (u as usize, v as usize);
-                let (fx, fy) = (u - left as f32, v - top as f32);
-                let at = top * other.width + left;
-                let over = usize::from(left + 1 < other.width);
-                let under = if top + 1 < other.height {
-                    other.width
-                } else {
-                    0
+    // 2. Some planes after the other.
+    for (count, alike) in of_count {
+        let step = range / (count - 1) as f64;
+        for some in alike.chunks(MOST_CHOICES) {
+            let choices: Vec<&[usize]> = some.iter().map(|&i| &choices[i][..]).collect();
+            let mut comparison = Comparison::new(reference, photos, &choices);
+            let costs = comparison.sweep(count, |plane| nearest_to_zero + step * plane as f64);
+            for (&i, costs) in some.iter().zip(costs) {
+                let costs = Costs {
+                    first: nearest_to_zero,
+                    step,
+                    count,
+                    costs,
                 };
-                let g = &other.grays;
-                let upper = g[at] + fx * (g[at + over] - g[at]);
-                let lower = g[at + under] + fx * (g[at + under + over] - g[at + under]);
-                let gray = upper + fy * (lower - upper);
-                let seen = f32::from(u8::from(other.used[at]));
-                let own = reference.grays[row + x];
-                self.warped[row + x] = Vec4::new(gray, gray * gray, gray * own, seen);
+                found(i, costs);
             }
         }
     }
 }
 
-/// Room for means over windows.
-struct Rows {
-    width: usize,
-    /// Sums of a row up to each pixel.
-    sums: Vec<Vec4>,
-    /// Sums of the window's rows, by column, and the rows themselves.
-    column: Vec<Vec4>,
-    kept: Vec<Vec4>,
+/// A photo, its neighbours, and room to compare them row after row.
+struct Comparison<'a> {
+    reference: &'a SmallPhoto,
+    others: Vec<&'a SmallPhoto>,
+    /// Which of the others each choice has.
+    choices: Vec<Vec<usize>>,
+    /// Of the window around each of the reference's pixels: the mean of its grays, and 1 over
+    /// their deviation.
+    means: Vec<f32>,
+    sharpness: Vec<f32>,
+    /// 1 over how many columns of a window lie in the image.
+    columns: Vec<f32>,
+    /// By neighbour: of its grays, their squares, their products with the reference's, and 1
+    /// where it shows anything.
+    windows: Vec<Windows<4>>,
+    sums: [Vec<f32>; 4],
+    /// By neighbour, of a row.
+    costs: Vec<Vec<f32>>,
+    /// A row's least costs, and the least but one.
+    best: [Vec<f32>; 2],
 }
 
-impl Rows {
-    fn new(width: usize) -> Self {
-        Self {
-            width,
-            sums: vec![Vec4::ZERO; width + 1],
-            column: vec![Vec4::ZERO; width],
-            kept: vec![Vec4::ZERO; width * WINDOW],
+impl<'a> Comparison<'a> {
+    fn new(
+        reference: &'a SmallPhoto,
+        photos: &'a [Option<SmallPhoto>],
+        choices: &[&[usize]],
+    ) -> Self {
+        let mut all: Vec<usize> = choices.concat();
+        all.sort_unstable();
+        all.dedup();
+        all.retain(|&j| photos[j].is_some());
+        let within_all = |choice: &&[usize]| -> Vec<usize> {
+            let places = choice.iter().filter_map(|j| all.binary_search(j).ok());
+            places.collect()
+        };
+        let width = reference.width;
+        let row = || vec![0.0; width];
+        let own = Self {
+            reference,
+            others: all.iter().filter_map(|&j| photos[j].as_ref()).collect(),
+            choices: choices.iter().map(within_all).collect(),
+            means: vec![0.0; reference.grays.len()],
+            sharpness: vec![0.0; reference.grays.len()],
+            columns: (0..width).map(|x| 1.0 / within(x, width) as f32).collect(),
+            windows: all.iter().map(|_| Windows::new(width)).collect(),
+            sums: [row(), row(), row(), row()],
+            costs: all.iter().map(|_| row()).collect(),
+            best: [row(), row()],
+        };
+        // A closure that gives away what it has can be called but once; others are called through
+        // a function that is not compiled for wide vectors.
+        Arch::new().dispatch(
+            #[inline(always)]
+            move || own.described(),
+        )
+    }
+
+    /// With the reference's own windows.
+    #[inline(always)]
+    fn described(mut self) -> Self {
+        let (width, height) = (self.reference.width, self.reference.height);
+        let mut windows = Windows::<2>::new(width);
+        for y in 0..height + WINDOW / 2 {
+            match self.reference.grays.chunks_exact(width).nth(y) {
+                Some(row) => windows.enter(
+                    #[inline(always)]
+                    |[grays, squares]| {
+                        grays.copy_from_slice(row);
+                        for (square, gray) in squares.iter_mut().zip(row) {
+                            *square = gray * gray;
+                        }
+                    },
+                ),
+                None => windows.enter_nothing(),
+            }
+            let Some(y) = y.checked_sub(WINDOW / 2) else {
+                continue;
+            };
+            let [sums, squares, ..] = &mut self.sums;
+            windows.sums([sums, squares]);
+            let rows = 1.0 / within(y, height) as f32;
+            let means = &mut self.means[y * width..][..width];
+            let sharpness = &mut self.sharpness[y * width..][..width];
+            for x in 0..width {
+                let share = rows * self.columns[x];
+                let mean = sums[x] * share;
+                means[x] = mean;
+                let variance = (squares[x] * share - mean * mean).max(0.0) + NOISE;
+                sharpness[x] = 1.0 / variance.sqrt();
+            }
+        }
+        self
+    }
+
+    /// For each choice the costs at so many planes, pixel by pixel.
+    fn sweep(&mut self, count: usize, inverse_depth: impl Fn(usize) -> f64) -> Vec<Vec<u8>> {
+        let pixels = self.reference.grays.len();
+        let each = self.choices.len();
+        let mut costs = vec![vec![0_u8; pixels * count]; each];
+        let mut planes = vec![vec![0_u8; pixels * AT_ONCE.min(count)]; each];
+        for first in (0..count).step_by(AT_ONCE) {
+            let depths = AT_ONCE.min(count - first);
+            for plane in 0..depths {
+                let out = planes
+                    .iter_mut()
+                    .map(|planes| &mut planes[plane * pixels..][..pixels]);
+                self.plane(inverse_depth(first + plane), &mut out.collect::<Vec<_>>());
+            }
+            for (costs, planes) in costs.iter_mut().zip(&planes) {
+                for (pixel, costs) in costs.chunks_exact_mut(count).enumerate() {
+                    let costs = costs[first..][..depths].iter_mut();
+                    let planes = planes[pixel..].iter().step_by(pixels);
+                    costs.zip(planes).for_each(|(cost, plane)| *cost = *plane);
+                }
+            }
+        }
+        costs
+    }
+
+    /// The costs of all pixels at one plane, for each choice: the mean over the two neighbours that
+    /// agree best.
+    fn plane(&mut self, inverse_depth: f64, out: &mut [&mut [u8]]) {
+        let warps: Vec<Warp<'_>> = self
+            .others
+            .iter()
+            .map(|other| Warp::new(self.reference, other, inverse_depth))
+            .collect();
+        Arch::new().dispatch(
+            #[inline(always)]
+            move || self.rows(warps, out),
+        );
+    }
+
+    #[inline(always)]
+    fn rows(&mut self, warps: Vec<Warp<'_>>, out: &mut [&mut [u8]]) {
+        let (width, height) = (self.reference.width, self.reference.height);
+        self.windows.iter_mut().for_each(Windows::clear);
+        for y in 0..height + WINDOW / 2 {
+            let own = self.reference.grays.chunks_exact(width).nth(y);
+            for (windows, warp) in self.windows.iter_mut().zip(&warps) {
+                match own {
+                    Some(own) => windows.enter(
+                        #[inline(always)]
+                        |channels| warp.row(y, own, channels),
+                    ),
+                    None => windows.enter_nothing(),
+                }
+            }
+            if let Some(y) = y.checked_sub(WINDOW / 2) {
+                self.row(y, out);
+            }
         }
     }
 
-    /// The mean over the window around each pixel, which the image's border cuts.
-    fn box_mean(&mut self, values: &mut [Vec4]) {
-        let width = self.width;
-        let height = values.len() / width;
-        self.column.fill(Vec4::ZERO);
-        for y in 0..height + RADIUS {
-            // 1. A row leaves the window, and the next one enters it, summed along.
-            let slot = (y % WINDOW) * width;
-            let kept = &mut self.kept[slot..][..width];
-            if y >= WINDOW {
-                self.column
-                    .iter_mut()
-                    .zip(kept.iter())
-                    .for_each(|(s, v)| *s -= *v);
+    /// One row of them.
+    #[inline(always)]
+    fn row(&mut self, y: usize, out: &mut [&mut [u8]]) {
+        let width = self.reference.width;
+        let rows = 1.0 / within(y, self.reference.height) as f32;
+        let own = y * width..(y + 1) * width;
+        for (windows, costs) in self.windows.iter().zip(&mut self.costs) {
+            let [grays, squares, products, seen] = &mut self.sums;
+            windows.sums([grays, squares, products, seen]);
+            correlate(
+                [grays, squares, products, seen],
+                [
+                    &self.means[own.clone()],
+                    &self.sharpness[own.clone()],
+                    &self.columns,
+                ],
+                rows,
+                costs,
+            );
+        }
+        let [first, second] = &mut self.best;
+        for (choice, out) in self.choices.iter().zip(out) {
+            first.fill(UNSEEN);
+            second.fill(UNSEEN);
+            for &other in choice {
+                add(&self.costs[other], first, second);
             }
-            if y < height {
-                let row = &values[y * width..][..width];
-                for (x, value) in row.iter().enumerate() {
-                    self.sums[x + 1] = self.sums[x] + *value;
-                }
-                for (x, kept) in kept.iter_mut().enumerate() {
-                    let (from, to) = (x.saturating_sub(RADIUS), (x + RADIUS + 1).min(width));
-                    *kept = (self.sums[to] - self.sums[from]) / (to - from) as f32;
-                }
-                self.column
-                    .iter_mut()
-                    .zip(kept.iter())
-                    .for_each(|(s, v)| *s += *v);
-            }
-            // 2. The row in its middle.
-            if y >= RADIUS {
-                let middle = y - RADIUS;
-                let rows = (middle + RADIUS + 1).min(height) - middle.saturating_sub(RADIUS);
-                let out = &mut values[middle * width..][..width];
-                let share = 1.0 / rows as f32;
-                out.iter_mut()
-                    .zip(&self.column)
-                    .for_each(|(o, s)| *o = *s * share);
+            let seconds: &[f32] = if choice.len() == 1 { first } else { second };
+            let out = out[own.clone()].iter_mut();
+            for ((out, first), second) in out.zip(&first[..]).zip(seconds) {
+                let cost = 0.5 * (first + second);
+                *out = nearest(255.0 * cost.clamp(0.0, 1.0));
             }
         }
     }
+}
+
+/// A neighbour's costs along a row.
+#[inline(always)]
+fn correlate(
+    [grays, squares, products, seen]: [&[f32]; 4],
+    [means, sharpness, columns]: [&[f32]; 3],
+    rows: f32,
+    costs: &mut [f32],
+) {
+    let width = costs.len();
+    let (grays, squares, products) = (&grays[..width], &squares[..width], &products[..width]);
+    let (seen, means, sharpness) = (&seen[..width], &means[..width], &sharpness[..width]);
+    let columns = &columns[..width];
+    for x in 0..width {
+        let share = rows * columns[x];
+        let mean = grays[x] * share;
+        let variance = (squares[x] * share - mean * mean).max(0.0) + NOISE;
+        let covariance = products[x] * share - mean * means[x];
+        let correlation = covariance * sharpness[x] / variance.sqrt();
+        let enough = seen[x] * share >= LEAST_SEEN;
+        costs[x] = if enough {
+            0.5 * (1.0 - correlation)
+        } else {
+            UNSEEN
+        };
+    }
+}
+
+/// Adds costs to the best two.
+#[inline(always)]
+fn add(costs: &[f32], first: &mut [f32], second: &mut [f32]) {
+    let width = costs.len();
+    let (first, second) = (&mut first[..width], &mut second[..width]);
+    for x in 0..width {
+        second[x] = second[x].min(first[x].max(costs[x]));
+        first[x] = first[x].min(costs[x]);
+    }
+}
+
+/// How many of a window's pixels lie in a row of so many, around one of them.
+fn within(middle: usize, length: usize) -> usize {
+    (middle + WINDOW / 2 + 1).min(length) - middle.saturating_sub(WINDOW / 2)
+}
+
+/// The whole number nearest to 0 ≤ x ≤ 255. (A cast says what becomes of any other number, too,
+/// and is done one by one.)
+#[inline(always)]
+fn nearest(x: f32) -> u8 {
+    (x + 8_388_608.0).to_bits() as u8
 }

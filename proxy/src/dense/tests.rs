@@ -135,8 +135,12 @@ fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
     let views: Vec<View> = (0..9).map(view).collect();
     let sparse = sparse(&solid);
     let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
-    let matching = Matching::new(&views, &sparse, |i| Some(photos[i].clone()), &options);
+    let mut matching = Matching::new(&views, &sparse, |i| Some(photos[i].clone()), &options);
     assert!(matching.points(&sparse, None).len() > sparse.len() + 100);
+    let gone = [0, 4, 8];
+    let one_by_one = gone.map(|gone| matching.points(&sparse, Some(gone)));
+    matching.compare(&gone);
+    assert!(one_by_one == gone.map(|gone| matching.points(&sparse, Some(gone))));
     for gone in [0, 4, 8] {
         let seen_by_rest = |shift: bool| -> Vec<SparsePoint> {
             let rest = |p: &SparsePoint| SparsePoint {

@@ -62,10 +62,7 @@ impl Solid {
     /// triangles as [`Solid::first_hit`]'s, but for ties of rounding: of triangles at one depth
     /// the first. `None` where some pixel looks aside or back.
     pub fn scan(&self, view: &View, reduction: u32) -> Option<Scan> {
-        let step = f64::from(reduction).recip();
-        let lens = view.lens.scaled(step, step);
-        let size = [view.width, view.height].map(|side| side.div_ceil(reduction));
-        Some(self.scan_along(view, &Rays::of(&lens, size.into())?))
+        Some(self.scan_along(view, &Rays::reduced(view, reduction)?))
     }
 
     /// [`Self::scan`] along rays of the view's camera.

@@ -1,6 +1,6 @@
 //! Where pixels' rays meet the plane before the camera.
 
-use calibrate::{Distortion, Lens, Pixel};
+use calibrate::{Distortion, Lens, Pixel, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -98,6 +98,14 @@ impl Rays {
             rays.bent = Some(Bent::of(lens, size)?);
         }
         Some(rays)
+    }
+
+    /// Of a view's picture reduced so many times: the pixel in column i and row j looks along the ray
+    /// of the view's pixel ((i + ½)·reduction, (j + ½)·reduction).
+    pub fn reduced(view: &View, reduction: u32) -> Option<Self> {
+        let step = f64::from(reduction).recip();
+        let size = [view.width, view.height].map(|side| side.div_ceil(reduction));
+        Self::of(&view.lens.scaled(step, step), size.into())
     }
 
     /// Where the ray of a pixel's centre meets the plane z = 1; `None` where the lens has none.

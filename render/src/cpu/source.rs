@@ -98,6 +98,16 @@ impl<T: Scalar> Sight<T> {
 /// to be seen beside any.
 pub(crate) const EDGE: f32 = 1e-12;
 
+/// A row of a source's transform applied to a tile's points.
+#[inline(always)]
+fn turned<T: Scalar>(tile: &Tile<T>, row: [T; 3], translation: T) -> Lane<T> {
+    let [a, b, c] = row;
+    each(
+        #[inline(always)]
+        |k| a * tile.x[k] + b * tile.y[k] + c * tile.z[k] + translation * tile.s[k],
+    )
+}
+
 impl<T: Scalar> Source<T> {
     pub(crate) fn new(frame: &Frame<'_>, source_idx: usize) -> Self {
         let source = &frame.sources[source_idx];
@@ -136,10 +146,9 @@ impl<T: Scalar> Source<T> {
         let [zero, one] = [0.0, 1.0].map(T::of);
         let [rx, ry, rz] = self.rotation;
         let [tx, ty, tz] = self.translation;
-        let turn = |r: [T; 3], t: T| {
-            each(|k| r[0] * tile.x[k] + r[1] * tile.y[k] + r[2] * tile.z[k] + t * tile.s[k])
-        };
-        let (x, y, z) = (turn(rx, tx), turn(ry, ty), turn(rz, tz));
+        let x = turned(tile, rx, tx);
+        let y = turned(tile, ry, ty);
+        let z = turned(tile, rz, tz);
 
         // 1. Through the lens.
         let (u, v) = self.lens.project(&x, &y, &z);
@@ -182,8 +191,10 @@ impl<T: Scalar> Source<T> {
             },
         );
         if self.occluded {
-            sight.inverse_distance =
-                each(|k| tile.s[k] / (x[k].squared() + y[k].squared() + z[k].squared()).sqrt());
+            sight.inverse_distance = each(
+                #[inline(always)]
+                |k| tile.s[k] / (x[k].squared() + y[k].squared() + z[k].squared()).sqrt(),
+            );
         }
         (sight.u, sight.v) = (u, v);
         true
