@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 use proxy::{Facets, Kept, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
 use std::cell::OnceCell;
+use std::ops::Range;
 
 /// What each pixel of the desired view looks at: a plane, by its vector q (a ray v meets
 /// it at v / s with s = q · v), in the desired camera's frame.
@@ -86,6 +87,25 @@ impl Surface {
             Self::Nothing => None,
             Self::Plane(q) => Some(*q),
             Self::Facets(map) => map.plane_of(map.facet_at(pixel)),
+        }
+    }
+
+    /// q at the centres of all pixels of a rectangle, where it is one.
+    #[inline]
+    pub(crate) fn plane_of_all(&self, columns: Range<usize>, rows: Range<usize>) -> Option<DVec3> {
+        match self {
+            Self::Nothing => None,
+            Self::Plane(q) => Some(*q),
+            Self::Facets(map) => {
+                let width = map.size[0] as usize;
+                let first = map.facet_of[rows.start * width + columns.start];
+                let is_one = |row: usize| {
+                    let row = &map.facet_of[row * width..][columns.clone()];
+                    row.iter()
+                        .fold(true, |is_one, &facet| is_one & (facet == first))
+                };
+                rows.into_iter().all(is_one).then(|| map.plane_of(first))?
+            }
         }
     }
 

@@ -35,7 +35,13 @@ pub(crate) fn each<T: Scalar>(f: impl Fn(usize) -> T) -> Lane<T> {
 pub(crate) fn any(holds: impl Fn(usize) -> bool) -> bool {
     vectorised(
         #[inline(always)]
-        || (0..LANES).fold(false, |any, k| any | holds(k)),
+        || {
+            let mut any = false;
+            for k in 0..LANES {
+                any |= holds(k);
+            }
+            any
+        },
     )
 }
 

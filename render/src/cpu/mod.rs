@@ -186,9 +186,36 @@ impl<'a> Engine<'a> {
     /// The rays of a tile and where they meet the proxy, where that is wanted. It begins at a pixel, and
     /// may reach out of the picture, where nothing is.
     fn tile(&self, [x0, y0]: [usize; 2], wanted: impl Fn(usize) -> bool) -> Tile {
-        let mut tile = Tile::nothing();
         let desired = &self.frame.desired;
         let (width, height) = (desired.width as usize, desired.height as usize);
+        // Most see one plane.
+        let (columns, rows) = (x0..x0 + TILE[0], y0..y0 + TILE[1]);
+        if columns.end <= width
+            && rows.end <= height
+            && let RayMap::Pinhole { scale, offset } = self.rays
+            && (0..LANES).all(&wanted)
+            && let Some(plane) = self.frame.surface.plane_of_all(columns, rows)
+        {
+            return vectorised(
+                #[inline(always)]
+                || {
+                    let [x, y] = [(x0, 0), (y0, 1)].map(
+                        #[inline(always)]
+                        |(first, axis)| {
+                            each(
+                                #[inline(always)]
+                                |k| {
+                                    let at = (first + PLACES[k][axis]) as u32;
+                                    ((f64::from(at) + offset[axis]) * scale[axis]) as f32
+                                },
+                            )
+                        },
+                    );
+                    Tile::of_plane(x, y, plane)
+                },
+            );
+        }
+        let mut tile = Tile::nothing();
         for (k, [x, y]) in PLACES.into_iter().enumerate() {
             let (x, y) = (x0 + x, y0 + y);
             if x < width && y < height && wanted(k) {

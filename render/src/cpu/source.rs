@@ -33,6 +33,23 @@ impl<T: Scalar> Tile<T> {
         }
     }
 
+    /// Of pixels whose rays are (x, y, 1), and that see one plane of the proxy.
+    #[inline(always)]
+    pub(crate) fn of_plane(x: Lane<T>, y: Lane<T>, plane: DVec3) -> Self {
+        let [qx, qy, qz] = plane.to_array().map(T::rounded);
+        let one = T::of(1.0);
+        Self {
+            s: each(
+                #[inline(always)]
+                |k| qx * x[k] + qy * y[k] + qz * one,
+            ),
+            x,
+            y,
+            z: [one; LANES],
+            q: [[qx; LANES], [qy; LANES], [qz; LANES]],
+        }
+    }
+
     /// Lets a pixel see a plane of the proxy along its ray.
     #[inline(always)]
     pub(crate) fn set(&mut self, k: usize, [x, y, z]: [T; 3], plane: DVec3) {
