@@ -29,15 +29,27 @@ pub(crate) fn ray_of(lens: &Lens, pixel: Pixel) -> Option<DVec3> {
 /// they are needed; any other lens has them in a table, inverted in f64.
 #[derive(Debug)]
 pub(crate) enum RayMap {
-    Pinhole {
-        scale: [f64; 2],
-        offset: [f64; 2],
-    },
+    Pinhole(Pinhole),
     /// Row by row; NaN where the lens has no ray.
     Table {
         width: usize,
         rays: Vec<[f32; 4]>,
     },
+}
+
+/// What takes a pinhole's pixels to z = 1, across and down.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pinhole {
+    scale: [f64; 2],
+    offset: [f64; 2],
+}
+
+impl Pinhole {
+    /// Where rays through the centres of a column (axis 0) or a row (axis 1) are at z = 1.
+    #[inline(always)]
+    pub(crate) fn at(&self, axis: usize, pixel: usize) -> f32 {
+        ((f64::from(pixel as u32) + self.offset[axis]) * self.scale[axis]) as f32
+    }
 }
 
 impl RayMap {
@@ -46,7 +58,7 @@ impl RayMap {
         if lens.distortion() == Distortion::None {
             let scale = [1.0 / lens.focal.x, 1.0 / lens.focal.y];
             let offset = [0.5 - lens.principal.x, 0.5 - lens.principal.y];
-            return Self::Pinhole { scale, offset };
+            return Self::Pinhole(Pinhole { scale, offset });
         }
         let width = view.width as usize;
         let count = width * view.height as usize;
@@ -64,11 +76,7 @@ impl RayMap {
     #[inline]
     pub(crate) fn ray(&self, column: usize, row: usize) -> Option<[f32; 3]> {
         match self {
-            Self::Pinhole { scale, offset } => {
-                let x = (column as f64 + offset[0]) * scale[0];
-                let y = (row as f64 + offset[1]) * scale[1];
-                Some([x as f32, y as f32, 1.0])
-            }
+            Self::Pinhole(pinhole) => Some([pinhole.at(0, column), pinhole.at(1, row), 1.0]),
             Self::Table { width, rays } => {
                 let [x, y, z, _] = rays[row * width + column];
                 (!x.is_nan()).then_some([x, y, z])

@@ -190,17 +190,17 @@ impl<'a> Trials<'a> {
     fn dense_without(&mut self, judge: usize) -> Result<&CarvedPoints, SceneError> {
         if self.dense.is_empty() {
             let judges: Vec<usize> = self.judges.iter().map(|j| j.source_idx).collect();
-            self.matching()?.compare(&judges);
-            let (trials, matching) = (&*self, self.matching.as_ref());
+            let mut matching = self.take_matching()?;
+            matching.compare(&judges);
             let find = |judge: &Judge| {
-                let (gone, mut fewer) = (judge.source_idx, trials.without.clone());
+                let (gone, mut fewer) = (judge.source_idx, self.without.clone());
                 fewer.insert(judge.name.clone());
-                let sparse = trials.scene.sparse_points(&fewer, &trials.names);
-                let points = matching?.points(&sparse, Some(gone));
-                let views = trials.views(Some(gone));
-                Some(CarvedPoints::new(&views, points, sparse.len()))
+                let sparse = self.scene.sparse_points(&fewer, &self.names);
+                let points = matching.points(&sparse, Some(gone));
+                CarvedPoints::new(&self.views(Some(gone)), points, sparse.len())
             };
-            self.dense = self.judges.par_iter().filter_map(find).collect();
+            self.dense = self.judges.par_iter().map(find).collect();
+            self.matching = Some(matching);
         }
         Ok(&self.dense[judge])
     }
@@ -299,13 +299,16 @@ impl<'a> Trials<'a> {
         Ok(())
     }
 
-    fn matching(&mut self) -> Result<&mut Matching, SceneError> {
-        if self.matching.is_none() {
-            self.matching = Some(self.scene.matching(self.without)?);
+    fn matching(&mut self) -> Result<&Matching, SceneError> {
+        let matching = self.take_matching()?;
+        Ok(self.matching.insert(matching))
+    }
+
+    fn take_matching(&mut self) -> Result<Matching, SceneError> {
+        match self.matching.take() {
+            Some(matching) => Ok(matching),
+            None => self.scene.matching(self.without),
         }
-        self.matching
-            .as_mut()
-            .ok_or_else(|| unfit("no photos to compare"))
     }
 
     /// PSNR of a judge's picture, in dB.

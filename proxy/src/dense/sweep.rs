@@ -1,7 +1,7 @@
 //! Costs of depths: a photo compared with its neighbours over a sweep of planes.
 
 use super::small::SmallPhoto;
-use super::warp::Warp;
+use super::warp::{Warp, nearest};
 use super::windows::{WINDOW, Windows};
 use pulp::Arch;
 use std::collections::BTreeMap;
@@ -265,7 +265,7 @@ impl<'a> Comparison<'a> {
             let out = out[own.clone()].iter_mut();
             for ((out, first), second) in out.zip(&first[..]).zip(seconds) {
                 let cost = 0.5 * (first + second);
-                *out = nearest(255.0 * cost.clamp(0.0, 1.0));
+                *out = nearest(255.0 * cost.clamp(0.0, 1.0)) as u8;
             }
         }
     }
@@ -312,11 +312,4 @@ fn add(costs: &[f32], first: &mut [f32], second: &mut [f32]) {
 /// How many of a window's pixels lie in a row of so many, around one of them.
 fn within(middle: usize, length: usize) -> usize {
     (middle + WINDOW / 2 + 1).min(length) - middle.saturating_sub(WINDOW / 2)
-}
-
-/// The whole number nearest to 0 ≤ x ≤ 255. (A cast says what becomes of any other number, too,
-/// and is done one by one.)
-#[inline(always)]
-fn nearest(x: f32) -> u8 {
-    (x + 8_388_608.0).to_bits() as u8
 }

@@ -93,7 +93,7 @@ impl<'a> Warp<'a> {
             inside[k] = (z > 0.0) & (beyond <= BEYOND);
             let (left, top) = (near_u.floor(), near_v.floor());
             (fx[k], fy[k]) = (near_u - left, near_v - top);
-            at[k] = integer(top) * stride + integer(left);
+            at[k] = nearest(top) * stride + nearest(left);
         }
         // 2. The four pixels around each.
         let mut quads = [0_u32; LANES];
@@ -115,10 +115,10 @@ impl<'a> Warp<'a> {
     }
 }
 
-/// A whole number from 0 to 2²³ − 1 as an integer. (A cast says what becomes of any other number,
-/// too, and is done one by one.)
+/// The whole number nearest to 0 ≤ x < 2²³. (A cast says what becomes of any other number, too, and is
+/// done one by one.)
 #[inline(always)]
-fn integer(x: f32) -> i32 {
+pub(super) fn nearest(x: f32) -> i32 {
     const SHIFT: f32 = 8_388_608.0;
     (x + SHIFT).to_bits().wrapping_sub(SHIFT.to_bits()) as i32
 }

@@ -188,11 +188,11 @@ impl<'a> Engine<'a> {
     fn tile(&self, [x0, y0]: [usize; 2], wanted: impl Fn(usize) -> bool) -> Tile {
         let desired = &self.frame.desired;
         let (width, height) = (desired.width as usize, desired.height as usize);
-        // Most see one plane.
+        // Where all see one plane no pixel is asked alone.
         let (columns, rows) = (x0..x0 + TILE[0], y0..y0 + TILE[1]);
         if columns.end <= width
             && rows.end <= height
-            && let RayMap::Pinhole { scale, offset } = self.rays
+            && let RayMap::Pinhole(pinhole) = self.rays
             && (0..LANES).all(&wanted)
             && let Some(plane) = self.frame.surface.plane_of_all(columns, rows)
         {
@@ -204,10 +204,7 @@ impl<'a> Engine<'a> {
                         |(first, axis)| {
                             each(
                                 #[inline(always)]
-                                |k| {
-                                    let at = (first + PLACES[k][axis]) as u32;
-                                    ((f64::from(at) + offset[axis]) * scale[axis]) as f32
-                                },
+                                |k| pinhole.at(axis, first + PLACES[k][axis]),
                             )
                         },
                     );
