@@ -130,8 +130,8 @@ impl Bars {
             Event::PhotosAreClose => {
                 self.end();
                 say!(
-                    "note: no two photos see the scene at the angle that COLMAP asks for; it \
-                     tries closer ones"
+                    "note: COLMAP could begin with no two photos that see the scene at the angle \
+                     it asks for; it tries closer ones"
                 );
             }
             Event::Progress { step, done, total } => {

@@ -306,27 +306,30 @@ fn other_photos_or_options_start_over() {
 
 #[test]
 fn photos_that_lie_close_are_placed_at_the_second_try() {
-    let none = "  => No good initial image pair found.\n";
-    let mut bench = Bench::new();
-    bench.write("say-mapper", none);
-    bench.write("help-mapper", "--Mapper.init_min_tri_angle arg (=16)");
-    bench.write("fail-mapper", "");
-    bench.run().unwrap();
-    let calls = bench.calls();
-    assert_eq!(calls.len(), 4, "{calls:?}");
-    assert_eq!(
-        calls[3],
-        calls[2].clone() + " --Mapper.init_min_tri_angle 4"
-    );
-    assert!(bench.events.contains(&Event::PhotosAreClose));
-
-    // Not where COLMAP had a pair, or cannot be told.
-    for (said, help) in [
-        (MAPPING_LOG.to_owned() + none, "--Mapper.init_min_tri_angle"),
-        (none.to_owned(), "--Mapper.num_threads"),
-    ] {
+    let none = "  => No good initial image pair found.\n".to_owned();
+    // Where it began with a pair that led nowhere, too.
+    for said in [none.clone(), MAPPING_LOG.to_owned() + &none] {
         let mut bench = Bench::new();
         bench.write("say-mapper", &said);
+        bench.write("help-mapper", "--Mapper.init_min_tri_angle arg (=16)");
+        bench.write("fail-mapper", "");
+        bench.run().unwrap();
+        let calls = bench.calls();
+        assert_eq!(calls.len(), 4, "{calls:?}");
+        assert_eq!(
+            calls[3],
+            calls[2].clone() + " --Mapper.init_min_tri_angle 4"
+        );
+        assert!(bench.events.contains(&Event::PhotosAreClose));
+    }
+
+    // Not where COLMAP failed for another reason, or cannot be told.
+    for (said, help) in [
+        (MAPPING_LOG, "--Mapper.init_min_tri_angle"),
+        (none.as_str(), "--Mapper.num_threads"),
+    ] {
+        let mut bench = Bench::new();
+        bench.write("say-mapper", said);
         bench.write("help-mapper", help);
         bench.write("fail-mapper", "");
         bench.run().unwrap_err();

@@ -99,10 +99,10 @@ pub(super) fn tried(log: &str) -> BTreeSet<u32> {
     ids
 }
 
-/// Whether the mapper placed no photo as it found no two to begin with.
+/// Whether the mapper gave up for want of two photos to begin with, or of two more where those it
+/// began with led nowhere.
 pub(super) fn found_no_pair(log: &str) -> bool {
-    let no_pair = |line: &str| line.contains("No good initial image pair found");
-    tried(log).is_empty() && messages(log).any(no_pair)
+    messages(log).any(|line| line.contains("No good initial image pair found"))
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ pub enum Event {
     StartingOver,
     /// An earlier run finished this step.
     Finished(Step),
-    /// No two photos lie far enough apart to begin with by COLMAP's measure: photos are
+    /// No two photos that lie far enough apart by COLMAP's measure did to begin with: photos are
     /// placed once more, from a pair that may be closer.
     PhotosAreClose,
     /// A step is so far.

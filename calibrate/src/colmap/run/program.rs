@@ -149,7 +149,9 @@ impl<'a> Program<'a> {
             }
         }
 
-        // 2. It runs; the mapper a second time where no photos lie far enough apart for it.
+        // 2. It runs; the mapper a second time where it placed none and had no more photos far enough apart
+        // to begin with: closer ones may do. (Even of photos that it places mostly it gives up its first pair
+        // now and then, as what it does depends on its threads.)
         let mut ran = self.run_once(step, &arguments.words, report);
         if let (Step::Mapping, Err(ToolError::Failed { .. })) = (step, &ran)
             && self.found_no_pair()?
@@ -192,7 +194,7 @@ impl<'a> Program<'a> {
             .run(words, &self.work.join(step.log()), &mut on_line)
     }
 
-    /// Whether the mapper gave up as no two photos suit it to begin with.
+    /// Whether the mapper gave up as no two photos, or no two more, suit it to begin with.
     fn found_no_pair(&self) -> Result<bool, RunError> {
         let path = self.work.join(Step::Mapping.log());
         let said = fs::read(&path).map_err(io_error(path, "read"))?;
