@@ -15,8 +15,8 @@ use proxy::{
 };
 use proxy::{carve, tunnel};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
 
 /// Proxies that can be fitted to a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,8 +141,9 @@ impl Scene {
             Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without),
             Kind::CarvedDense => {
-                let surface = self.dense_surface(kind, without)?;
-                surface.surface(self.bound(without)?)
+                let (surface, note) = self.dense_surface(kind, without)?;
+                let fitted = surface.surface(self.bound(without)?)?;
+                Ok(Fitted { note, ..fitted })
             }
         }
     }
@@ -257,10 +258,11 @@ impl Scene {
     }
 
     fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        let surface = self.dense_surface(Kind::Dense, without)?;
+        let (surface, note) = self.dense_surface(Kind::Dense, without)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
-        Ok(surface.dense(names, self.bound(without)?))
+        let fitted = surface.dense(names, self.bound(without)?);
+        Ok(Fitted { note, ..fitted })
     }
 
     /// The hull that bounds what is made of points, where photos are cut out.
@@ -272,24 +274,44 @@ impl Scene {
         &self,
         kind: Kind,
         without: &BTreeSet<String>,
-    ) -> Result<CarvedPoints, SceneError> {
+    ) -> Result<(CarvedPoints, Option<String>), SceneError> {
         self.needs_points(kind)?;
         let (views, sparse) = self.sparse(without)?;
-        let points = self.matching(without)?.points(&sparse, None);
-        Ok(CarvedPoints::new(&views, points, sparse.len()))
+        let (matching, note) = self.matching(without)?;
+        let points = matching.points(&sparse, None);
+        Ok((CarvedPoints::new(&views, points, sparse.len()), note))
     }
 
-    /// The photos but those of the given names, ready to be compared.
-    pub(super) fn matching(&self, without: &BTreeSet<String>) -> Result<Matching, SceneError> {
+    /// The photos but those of the given names, ready to be compared, with what sensors measured of
+    /// them; and what is to be said of depth maps that cannot be used.
+    pub(super) fn matching(
+        &self,
+        without: &BTreeSet<String>,
+    ) -> Result<(Matching, Option<String>), SceneError> {
         let sources = self.sources(without)?;
         let (views, sparse) = self.sparse(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
-        Ok(Matching::new(
-            &views,
-            &sparse,
-            photo,
-            &DenseOptions::default(),
-        ))
+        let maps = self.depth_maps(without)?;
+        let noise = (0..views.len())
+            .any(|i| maps.has(i))
+            .then(|| maps.noise(|i| views[i].clone()));
+        let unusable = Mutex::new(BTreeMap::new());
+        let depth = |i: usize| {
+            let noise = noise.as_ref().filter(|_| maps.has(i))?;
+            let believed = noise.clone().and_then(|n| maps.believed(i, &views[i], n));
+            let note = |error| unusable.lock().map(|mut all| all.insert(i, error));
+            believed.map_err(note).ok()
+        };
+        let options = DenseOptions::default();
+        let matching = Matching::new(&views, &sparse, photo, depth, &options);
+        let unusable = unusable.into_inner().unwrap_or_default();
+        let note = unusable
+            .first_key_value()
+            .map(|(_, first)| match unusable.len() {
+                1 => format!("a depth map is left out: {first}"),
+                count => format!("{count} depth maps are left out, the first as: {first}"),
+            });
+        Ok((matching, note))
     }
 }
 

@@ -41,6 +41,8 @@ pub(super) struct Trials<'a> {
     /// Whose proxy changes with what is on trial.
     lumigraph: Lumigraph,
     matching: Option<Matching>,
+    /// Of the depth maps that it cannot use.
+    matching_note: Option<String>,
     /// Of dense points, without each judge.
     dense: Vec<CarvedPoints>,
     /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
@@ -115,6 +117,7 @@ impl<'a> Trials<'a> {
             judges,
             lumigraph,
             matching: None,
+            matching_note: None,
             dense: Vec::new(),
             cutout: None,
             bounds: BTreeMap::new(),
@@ -171,13 +174,17 @@ impl<'a> Trials<'a> {
     /// The dense points of all photos, which are half known where they were on trial.
     pub(super) fn dense(&mut self) -> Result<Fitted, SceneError> {
         let within = self.bound_of_all()?;
-        Ok(self.dense_of_all()?.dense(self.names.clone(), within))
+        let fitted = self.dense_of_all()?.dense(self.names.clone(), within);
+        let note = self.matching_note.clone();
+        Ok(Fitted { note, ..fitted })
     }
 
     /// The surface carved out of them.
     pub(super) fn carved_dense(&mut self) -> Result<Fitted, SceneError> {
         let within = self.bound_of_all()?;
-        self.dense_of_all()?.surface(within)
+        let fitted = self.dense_of_all()?.surface(within)?;
+        let note = self.matching_note.clone();
+        Ok(Fitted { note, ..fitted })
     }
 
     fn dense_of_all(&mut self) -> Result<CarvedPoints, SceneError> {
@@ -307,7 +314,11 @@ impl<'a> Trials<'a> {
     fn take_matching(&mut self) -> Result<Matching, SceneError> {
         match self.matching.take() {
             Some(matching) => Ok(matching),
-            None => self.scene.matching(self.without),
+            None => {
+                let (matching, note) = self.scene.matching(self.without)?;
+                self.matching_note = note;
+                Ok(matching)
+            }
         }
     }
 

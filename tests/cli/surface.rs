@@ -112,6 +112,20 @@ fn meshes_go_out_and_come_in() {
 }
 
 #[test]
+fn dense_points_do_without_depth_maps_that_are_damaged() {
+    let folder = with("wall");
+    let map = folder.path().join("wall/depth/0001.png");
+    let whole = std::fs::read(&map).unwrap();
+    std::fs::write(&map, &whole[..whole.len() / 2]).unwrap();
+    for (kind, file) in [("dense", "p.json"), ("carved-dense", "p.ply")] {
+        let ran = lumigraph(folder.path(), &format!("proxy wall {kind} -o {file}")).ok();
+        let said = "note: a depth map is left out: cannot decode wall/depth/0001.png: ";
+        assert!(ran.stderr.contains(said), "{kind}: {}", ran.stderr);
+        assert!(folder.path().join(file).exists());
+    }
+}
+
+#[test]
 fn what_a_scene_has_no_means_for_is_told() {
     let folder = with("wall");
     std::fs::remove_dir_all(folder.path().join("wall/depth")).unwrap();

@@ -17,6 +17,8 @@ const BLOCKS: f64 = 0.03;
 const OUTVOTED: usize = 3;
 /// How many others must agree, where there are so many.
 const OTHERS: usize = 2;
+/// That a sensor measured a depth counts as so many photos that agree on it.
+const MEASURED: usize = 1;
 
 /// A point that a photo and some of its neighbours agree on.
 struct Agreed {
@@ -25,10 +27,12 @@ struct Agreed {
     cell: usize,
 }
 
-/// Points about `spacing` pixels apart in each photo.
+/// Points about `spacing` pixels apart in each photo. `maps` are what comparing photos says, `measured`
+/// what sensors do.
 pub(super) fn points(
     photos: &[Option<SmallPhoto>],
     maps: &[Option<&DepthMap>],
+    measured: &[Option<&[f32]>],
     neighbours: &[Vec<usize>],
     spacing: u32,
 ) -> Vec<SparsePoint> {
@@ -44,7 +48,7 @@ pub(super) fn points(
     }
     let agreed: Vec<Vec<Agreed>> = (0..photos.len())
         .into_par_iter()
-        .map(|i| of_photo(i, photos, maps, &related[i], spacing))
+        .map(|i| of_photo(i, photos, maps, measured[i], &related[i], spacing))
         .collect();
 
     // Of points that several photos have only the first stays.
@@ -91,23 +95,27 @@ fn alike(a: f64, b: f64) -> bool {
     (a - b).abs() <= AGREE * a.max(b)
 }
 
-/// One point for each cell of a photo in which there is any, that nearest to its middle.
+/// One point for each cell of a photo in which there is any, that nearest to its middle: one that
+/// photos agree on, else one that was measured.
 fn of_photo(
     i: usize,
     photos: &[Option<SmallPhoto>],
     maps: &[Option<&DepthMap>],
+    measured: Option<&[f32]>,
     related: &[usize],
     spacing: usize,
 ) -> Vec<Agreed> {
-    let (Some(photo), Some(map)) = (&photos[i], maps[i]) else {
+    let Some(photo) = &photos[i] else {
         return Vec::new();
     };
     let with_maps: Vec<(usize, &SmallPhoto, &DepthMap)> = related
         .iter()
         .filter_map(|&j| Some((j, photos[j].as_ref()?, maps[j]?)))
         .collect();
+    // Where there is nobody to agree with, nothing is agreed on.
     let needed = OTHERS.min(with_maps.len());
-    if needed == 0 {
+    let compared = maps[i].filter(|_| needed > 0);
+    if compared.is_none() && measured.is_none() {
         return Vec::new();
     }
     let agrees = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
@@ -140,14 +148,16 @@ fn of_photo(
         photo.width.div_ceil(spacing),
         photo.height.div_ceil(spacing),
     );
-    let in_cell = |cell: usize| {
+    // The first pixel of a cell of which enough others agree with what it says; what is said counts as the voices
+    // of `own` photos.
+    let in_cell = |cell: usize, inverse_depths: &[f32], needed: usize, own: usize| {
         let (left, top) = (cell % columns * spacing, cell / columns * spacing);
         order.iter().find_map(|&(dx, dy)| {
             let (x, y) = (left + dx, top + dy);
             if x >= photo.width || y >= photo.height {
                 return None;
             }
-            let inverse = f64::from(map.inverse_depths[y * photo.width + x]);
+            let inverse = f64::from(inverse_depths[y * photo.width + x]);
             if inverse <= 0.0 {
                 return None;
             }
@@ -160,7 +170,7 @@ fn of_photo(
             if seen_by.len() < needed || !position.is_finite() {
                 return None;
             }
-            if objections(position) > OUTVOTED * seen_by.len() {
+            if objections(position) > OUTVOTED * (seen_by.len() + own) {
                 return None;
             }
             seen_by.push(i as u32);
@@ -172,5 +182,10 @@ fn of_photo(
             })
         })
     };
-    (0..columns * rows).filter_map(in_cell).collect()
+    let of_cell = |cell: usize| {
+        let agreed = || in_cell(cell, &compared?.inverse_depths, needed, 0);
+        let measured = || in_cell(cell, measured?, 0, MEASURED);
+        agreed().or_else(measured)
+    };
+    (0..columns * rows).filter_map(of_cell).collect()
 }

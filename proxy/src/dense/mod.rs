@@ -6,9 +6,10 @@
 //! neighbours count, so that what one of them does not see spoils nothing), the costs are
 //! smoothed along eight directions (Hirschmüller 2008), and a depth stays where photos agree
 //! on it. What remains becomes points like the sparse ones, a few pixels apart, each with the
-//! views that agree on it.
+//! views that agree on it. Where they agree on nothing a depth counts that a sensor measured.
 
 mod consistent;
+mod measured;
 mod neighbours;
 mod small;
 mod smooth;
@@ -65,15 +66,21 @@ struct DepthMap {
 /// The sparse points, and the points that photos agree on between them.
 ///
 /// `photo` gives a photo by its view's index, of any size, transparent where it is not to be
-/// used; `None` where it cannot be had. Photos without neighbours that share points with
-/// them add nothing.
+/// used; `None` where it cannot be had. `depth` gives what a sensor measured of it, if anything: one
+/// over the depths along z (world units) of all its view's pixels, row by row, zero where unknown, as
+/// [`crate::depth::believed`] has them. Photos without either, or without neighbours that share points
+/// with them, add nothing of it.
+///
+/// # Panics
+/// A depth map has not as many pixels as its view.
 pub fn densify(
     views: &[View],
     sparse: &[SparsePoint],
     photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
+    depth: impl Fn(usize) -> Option<Vec<f32>> + Sync,
     options: &DenseOptions,
 ) -> Vec<SparsePoint> {
-    let mut matching = Matching::new(views, sparse, photo, options);
+    let mut matching = Matching::new(views, sparse, photo, depth, options);
     matching.compare(&[]);
     matching.points(sparse, None)
 }
@@ -83,6 +90,8 @@ pub fn densify(
 pub struct Matching {
     spacing: u32,
     photos: Vec<Option<SmallPhoto>>,
+    /// Of each photo, if a sensor measured any: the inverse depths of its pixels; zero where unknown.
+    measured: Vec<Option<Vec<f32>>>,
     affinity: Affinity,
     /// Of each photo, with all of them.
     neighbours: Vec<Vec<usize>>,
@@ -100,17 +109,26 @@ struct Found {
 
 impl Matching {
     /// See [`densify`], which takes the same.
+    ///
+    /// # Panics
+    /// As that.
     pub fn new(
         views: &[View],
         sparse: &[SparsePoint],
         photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
+        depth: impl Fn(usize) -> Option<Vec<f32>> + Sync,
         options: &DenseOptions,
     ) -> Self {
-        let indices = 0..views.len();
+        let indices = (0..views.len()).into_par_iter();
         let photos: Vec<Option<SmallPhoto>> = indices
-            .into_par_iter()
+            .clone()
             .map(|i| SmallPhoto::new(&views[i], &photo(i)?, options.long_side))
             .collect();
+        let measured = indices.map(|i| {
+            let photo = photos[i].as_ref()?;
+            Some(measured::reduced(photo, &views[i], &depth(i)?))
+        });
+        let measured = measured.collect();
         let affinity = Affinity::new(views, sparse);
         Self {
             spacing: options.spacing,
@@ -119,6 +137,7 @@ impl Matching {
             ranges: neighbours::depth_ranges(&photos, sparse),
             maps: photos.iter().map(|_| Vec::new()).collect(),
             photos,
+            measured,
         }
     }
 
@@ -144,7 +163,8 @@ impl Matching {
     }
 
     /// The given points, and those that the photos agree on between them, or that all but
-    /// one of them do. Without it, only the range of depths that are tried remembers it.
+    /// one of them do, with what sensors measured where they don't. Without it, only the range of
+    /// depths that are tried remembers it.
     pub fn points(&self, sparse: &[SparsePoint], without: Option<usize>) -> Vec<SparsePoint> {
         // 1. Which photos to compare.
         let neighbours = match without {
@@ -170,12 +190,15 @@ impl Matching {
             })
             .collect();
         let maps: Vec<Option<&DepthMap>> = maps.iter().map(|map| map.as_deref()).collect();
+        let measured = |i: usize| self.measured[i].as_deref().filter(|_| without != Some(i));
+        let measured: Vec<Option<&[f32]>> = (0..self.photos.len()).map(measured).collect();
 
         // 3. What they agree on.
         let mut points = sparse.to_vec();
         points.extend(consistent::points(
             &self.photos,
             &maps,
+            &measured,
             &neighbours,
             self.spacing,
         ));

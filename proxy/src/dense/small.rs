@@ -79,8 +79,7 @@ impl SmallPhoto {
         let mut used = vec![false; width * height];
         for y in 0..height {
             for x in 0..width {
-                let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / focal;
-                let ray = DVec3::new(at(x, width), at(y, height), 1.0);
+                let ray = ray([x, y], [width, height], focal);
                 let Some(pixel) = view.lens.project(ray).filter(|p| view.contains(*p)) else {
                     continue;
                 };
@@ -115,12 +114,21 @@ impl SmallPhoto {
         inside.then(|| y as usize * self.width + x as usize)
     }
 
+    /// The ray of a pixel's centre in the camera's frame, at z = 1.
+    pub(super) fn ray(&self, x: usize, y: usize) -> DVec3 {
+        ray([x, y], [self.width, self.height], self.focal)
+    }
+
     /// The point at an inverse depth behind a pixel's centre.
     pub(super) fn point(&self, x: usize, y: usize, inverse_depth: f64) -> DVec3 {
-        let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / self.focal;
-        let ray = DVec3::new(at(x, self.width), at(y, self.height), 1.0);
-        self.center + self.rotation.transpose() * (ray / inverse_depth)
+        self.center + self.rotation.transpose() * (self.ray(x, y) / inverse_depth)
     }
+}
+
+/// See [`SmallPhoto::ray`].
+fn ray([x, y]: [usize; 2], [width, height]: [usize; 2], focal: f64) -> DVec3 {
+    let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / focal;
+    DVec3::new(at(x, width), at(y, height), 1.0)
 }
 
 /// See [`SmallPhoto::quads`].

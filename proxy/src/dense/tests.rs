@@ -58,6 +58,18 @@ fn photo(solid: &Solid, view: &View) -> RgbaImage {
     })
 }
 
+/// One over the depths of all pixels.
+fn depth(solid: &Solid, view: &View) -> Vec<f32> {
+    let world_from_camera = view.camera_from_world.rotation.conjugate();
+    let inverse = |i: u32| {
+        let at = Pixel::center_of(i % view.width, i / view.width);
+        let ray = view.lens.unproject(at).unwrap();
+        let ray = world_from_camera * (ray / ray.z);
+        (1.0 / solid.first_hit(view.center(), ray).unwrap().along) as f32
+    };
+    (0..view.width * view.height).map(inverse).collect()
+}
+
 /// A few points on the surfaces, seen by all.
 fn sparse(solid: &Solid) -> Vec<SparsePoint> {
     let point = |x: i32, y: i32| {
@@ -76,7 +88,13 @@ fn found(options: &DenseOptions) -> (Solid, Vec<SparsePoint>, usize) {
     let solid = scene();
     let views: Vec<View> = (0..9).map(view).collect();
     let sparse = sparse(&solid);
-    let points = densify(&views, &sparse, |i| Some(photo(&solid, &views[i])), options);
+    let points = densify(
+        &views,
+        &sparse,
+        |i| Some(photo(&solid, &views[i])),
+        |_| None,
+        options,
+    );
     (solid, points, sparse.len())
 }
 
@@ -135,7 +153,15 @@ fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
     let views: Vec<View> = (0..9).map(view).collect();
     let sparse = sparse(&solid);
     let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
-    let mut matching = Matching::new(&views, &sparse, |i| Some(photos[i].clone()), &options);
+    // Two that go were measured, and one that stays.
+    let measured = |i: usize| [0, 3, 4].contains(&i).then(|| depth(&solid, &views[i]));
+    let mut matching = Matching::new(
+        &views,
+        &sparse,
+        |i| Some(photos[i].clone()),
+        measured,
+        &options,
+    );
     assert!(matching.points(&sparse, None).len() > sparse.len() + 100);
     let gone = [0, 4, 8];
     let one_by_one = gone.map(|gone| matching.points(&sparse, Some(gone)));
@@ -157,13 +183,87 @@ fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
         let left: Vec<usize> = (0..9).filter(|&i| i != gone as usize).collect();
         let fewer: Vec<View> = left.iter().map(|&i| views[i].clone()).collect();
         let photo = |i: usize| Some(photos[left[i]].clone());
-        let mut never = densify(&fewer, &seen_by_rest(true), photo, &options);
+        let depth = |i: usize| measured(left[i]);
+        let mut never = densify(&fewer, &seen_by_rest(true), photo, depth, &options);
         for i in never.iter_mut().flat_map(|p| &mut p.seen_by) {
             *i += u32::from(*i >= gone);
         }
         let without = matching.points(&seen_by_rest(false), Some(gone as usize));
         assert!(without == never, "{gone}");
     }
+}
+
+/// How far points are from the surfaces, in parts of their depth.
+fn errors(solid: &Solid, points: &[SparsePoint]) -> Vec<f64> {
+    let error = |p: &SparsePoint| {
+        let i = p.seen_by[0] as usize;
+        let center = view(i).center();
+        let hit = solid.first_hit(center, p.position - center).unwrap();
+        (hit.along - 1.0).abs()
+    };
+    points.iter().map(error).collect()
+}
+
+#[test]
+fn what_was_measured_counts_where_photos_agree_on_nothing() {
+    let options = DenseOptions {
+        long_side: 96,
+        spacing: 4,
+    };
+    let solid = scene();
+    let views: Vec<View> = (0..9).map(view).collect();
+    let sparse = sparse(&solid);
+    let count = sparse.len();
+    let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
+    let of_blank = |i: usize| (i == 4).then(|| depth(&solid, &views[i]));
+    // 1. A photo that nobody can be compared with: all that it sees is known.
+    let alone = |i: usize| (i == 4).then(|| blank.clone());
+    let points = densify(&views, &sparse, alone, of_blank, &options);
+    let of_it = &points[count..];
+    assert_eq!(of_it.len(), 24 * 18);
+    assert!(of_it.iter().all(|p| p.seen_by == [4]));
+    // What lies on the board's rim by the nearest pixel is not all on it by its centre.
+    let off = errors(&solid, of_it).into_iter().filter(|e| *e > 0.01);
+    let off = off.count();
+    assert!(off < 12, "{off}");
+    // 2. Photos that show what they see agree, and what was measured adds what they don't; one that is a
+    // third off adds nothing, as the others see through it.
+    let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
+    let with = |depth: &(dyn Fn(usize) -> Option<Vec<f32>> + Sync)| {
+        densify(
+            &views,
+            &sparse,
+            |i| Some(photos[i].clone()),
+            depth,
+            &options,
+        )
+    };
+    let (without, right) = (with(&|_| None), with(&|i| Some(depth(&solid, &views[i]))));
+    assert!(
+        right.len() > without.len(),
+        "{} {}",
+        right.len(),
+        without.len()
+    );
+    let wrong = |i: usize| {
+        let nearer = depth(&solid, &views[i]).into_iter().map(|d| 1.5 * d);
+        (i == 4).then(|| nearer.collect())
+    };
+    let by_all = |points: &[SparsePoint]| {
+        let far = errors(&solid, points).into_iter().filter(|e| *e > 0.2);
+        far.count()
+    };
+    let (none, some) = (by_all(&without), by_all(&with(&wrong)));
+    assert!(some <= none + 2, "{none} {some}");
+}
+
+#[test]
+#[should_panic(expected = "a depth for each pixel")]
+fn a_depth_map_of_another_size_is_no_depth_map() {
+    let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
+    let depth = |_| Some(vec![0.25; 96 * 72]);
+    let options = DenseOptions::default();
+    densify(&[view(0)], &[], |_| Some(blank.clone()), depth, &options);
 }
 
 #[test]
@@ -180,23 +280,35 @@ fn photos_that_tell_nothing_add_nothing() {
     let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
     let clear = RgbaImage::new(192, 144);
     // None to be had, transparent ones, one view alone, no points.
-    assert_eq!(densify(&views, &points, |_| None, &options), points);
     assert_eq!(
-        densify(&views, &points, |_| Some(clear.clone()), &options),
+        densify(&views, &points, |_| None, |_| None, &options),
         points
     );
     assert_eq!(
-        densify(&views[..1], &[], |_| Some(blank.clone()), &options),
+        densify(&views, &points, |_| Some(clear.clone()), |_| None, &options),
+        points
+    );
+    assert_eq!(
+        densify(
+            &views[..1],
+            &[],
+            |_| Some(blank.clone()),
+            |_| None,
+            &options
+        ),
         []
     );
-    assert_eq!(densify(&views, &[], |_| Some(blank.clone()), &options), []);
-    assert_eq!(densify(&[], &[], |_| None, &options), []);
+    assert_eq!(
+        densify(&views, &[], |_| Some(blank.clone()), |_| None, &options),
+        []
+    );
+    assert_eq!(densify(&[], &[], |_| None, |_| None, &options), []);
     // Points at no place, or where the cameras are.
     let odd = [DVec3::NAN, DVec3::INFINITY, views[0].center(), DVec3::NEG_Z];
     let odd = odd.map(|position| SparsePoint {
         position,
         seen_by: vec![0, 1, 2, 3],
     });
-    let points = densify(&views, &odd, |_| Some(blank.clone()), &options);
+    let points = densify(&views, &odd, |_| Some(blank.clone()), |_| None, &options);
     assert!(points[4..].iter().all(|p| p.position.is_finite()));
 }

@@ -10,7 +10,7 @@ use calibrate::{Distortion, Lens, View};
 use capture::DepthMap;
 use glam::{DVec2, DVec3};
 use image::GrayImage;
-use proxy::depth::{self, DepthError, DepthNoise};
+use proxy::depth::{self, DepthNoise};
 use proxy::interior::{Interior, Portal, Region, SemicircleView, clip};
 use rayon::prelude::*;
 use std::fmt;
@@ -38,11 +38,11 @@ impl DepthMaps {
         }
     }
 
-    /// How noisy those are that can be decoded.
+    /// How noisy those are that can be decoded. `view` gives a source view's camera.
     ///
     /// # Errors
     /// They say nothing, or what is wrong with the first if none can be decoded.
-    fn noise(&self, view: impl Fn(usize) -> View) -> Result<DepthNoise, String> {
+    pub fn noise(&self, view: impl Fn(usize) -> View) -> Result<DepthNoise, String> {
         let found = self.noise.get_or_init(|| {
             let with: Vec<usize> = (0..self.has.len()).filter(|i| self.has[*i]).collect();
             let mut first_error = None;
@@ -66,6 +66,26 @@ impl DepthMaps {
             noise.map_err(|error| first_error.unwrap_or_else(|| error.to_string()))
         });
         found.clone()
+    }
+
+    /// Whether a source view has one.
+    pub fn has(&self, source_idx: usize) -> bool {
+        self.has[source_idx]
+    }
+
+    /// The inverse depths of one that neighbours confirm: see [`depth::believed`].
+    ///
+    /// # Errors
+    /// It cannot be decoded, or does not fit its view.
+    pub fn believed(
+        &self,
+        source_idx: usize,
+        view: &View,
+        noise: DepthNoise,
+    ) -> Result<Vec<f32>, String> {
+        let map = (self.load)(source_idx)?;
+        let inverse = depth::believed(view, &map, noise, MAX_SLANT);
+        inverse.map_err(|error| error.to_string())
     }
 }
 
@@ -136,7 +156,7 @@ pub(super) fn photographed(
     };
     // 1. Who may see it.
     let mut ranked: Vec<(bool, f64, usize)> = (0..sources.len())
-        .filter(|i| maps.has[*i])
+        .filter(|i| maps.has(*i))
         .filter_map(|i| {
             let view = &sources[i].view;
             let is_beyond = before(portal, place, view.center()) < 0.0;
@@ -280,11 +300,7 @@ fn image(
 ) -> Result<Option<Reference>, Unusable> {
     // 1. The depths that neighbours confirm.
     let view = lumigraph.sources[source_idx].view.clone();
-    let believed = |map: DepthMap| {
-        let inverse = depth::believed(&view, &map, noise, MAX_SLANT);
-        inverse.map_err(|e: DepthError| e.to_string())
-    };
-    let inverse = (maps.load)(source_idx).and_then(believed);
+    let inverse = maps.believed(source_idx, &view, noise);
     let inverse = inverse.map_err(Unusable::DepthMap)?;
     // 2. In a camera without distortion, by the nearest pixels.
     let straight = View {
