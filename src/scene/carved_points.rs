@@ -16,6 +16,8 @@ pub(super) struct CarvedPoints {
     /// How many of them are sparse ones; they come first.
     sparse: usize,
     mesh: Result<Mesh, CarveError>,
+    /// What people should know of where they come from, if anything.
+    note: Option<String>,
 }
 
 /// Carving more points than this takes longer than a first picture may.
@@ -50,18 +52,25 @@ impl CarvedPoints {
             points,
             sparse,
             mesh,
+            note: None,
         }
+    }
+
+    /// The same, with something to say of where they come from.
+    pub(super) fn with_note(self, note: Option<String>) -> Self {
+        Self { note, ..self }
     }
 
     /// The points, of named views.
     pub(super) fn dense(self, names: Vec<String>, within: Option<Arc<Solid>>) -> Fitted {
-        let how = self.count();
+        let (how, note) = (self.count(), self.note);
         let dense = DensePoints {
             names,
             points: self.points,
             within,
         };
-        Fitted::new(Proxy::Dense(Arc::new(dense)), how)
+        let fitted = Fitted::new(Proxy::Dense(Arc::new(dense)), how);
+        Fitted { note, ..fitted }
     }
 
     /// The surface, within a hull if there is one.
@@ -71,8 +80,9 @@ impl CarvedPoints {
     pub(super) fn surface(self, within: Option<Arc<Solid>>) -> Result<Fitted, SceneError> {
         let how = format!("carved through {}", self.count());
         let mesh = self.mesh.map_err(unfit)?;
-        let kind = MeshKind::CarvedDense;
-        Ok(Fitted::mesh_within(kind, mesh, within, how))
+        let fitted = Fitted::mesh_within(MeshKind::CarvedDense, mesh, within, how);
+        let note = self.note;
+        Ok(Fitted { note, ..fitted })
     }
 
     /// The same, to be drawn once.

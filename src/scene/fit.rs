@@ -141,9 +141,8 @@ impl Scene {
             Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without),
             Kind::CarvedDense => {
-                let (surface, note) = self.dense_surface(kind, without)?;
-                let fitted = surface.surface(self.bound(without)?)?;
-                Ok(Fitted { note, ..fitted })
+                let surface = self.dense_surface(kind, without)?;
+                surface.surface(self.bound(without)?)
             }
         }
     }
@@ -258,11 +257,10 @@ impl Scene {
     }
 
     fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        let (surface, note) = self.dense_surface(Kind::Dense, without)?;
+        let surface = self.dense_surface(Kind::Dense, without)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
-        let fitted = surface.dense(names, self.bound(without)?);
-        Ok(Fitted { note, ..fitted })
+        Ok(surface.dense(names, self.bound(without)?))
     }
 
     /// The hull that bounds what is made of points, where photos are cut out.
@@ -274,12 +272,12 @@ impl Scene {
         &self,
         kind: Kind,
         without: &BTreeSet<String>,
-    ) -> Result<(CarvedPoints, Option<String>), SceneError> {
+    ) -> Result<CarvedPoints, SceneError> {
         self.needs_points(kind)?;
         let (views, sparse) = self.sparse(without)?;
         let (matching, note) = self.matching(without)?;
         let points = matching.points(&sparse, None);
-        Ok((CarvedPoints::new(&views, points, sparse.len()), note))
+        Ok(CarvedPoints::new(&views, points, sparse.len()).with_note(note))
     }
 
     /// The photos but those of the given names, ready to be compared, with what sensors measured of
@@ -292,12 +290,12 @@ impl Scene {
         let (views, sparse) = self.sparse(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
         let maps = self.depth_maps(without)?;
-        let noise = (0..views.len())
-            .any(|i| maps.has(i))
-            .then(|| maps.noise(|i| views[i].clone()));
+        let noise = maps.noise(|i| views[i].clone());
         let unusable = Mutex::new(BTreeMap::new());
         let depth = |i: usize| {
-            let noise = noise.as_ref().filter(|_| maps.has(i))?;
+            if !maps.has(i) {
+                return None;
+            }
             let believed = noise.clone().and_then(|n| maps.believed(i, &views[i], n));
             let note = |error| unusable.lock().map(|mut all| all.insert(i, error));
             believed.map_err(note).ok()

@@ -40,9 +40,8 @@ pub(super) struct Trials<'a> {
     judges: Vec<Judge>,
     /// Whose proxy changes with what is on trial.
     lumigraph: Lumigraph,
-    matching: Option<Matching>,
-    /// Of the depth maps that it cannot use.
-    matching_note: Option<String>,
+    /// With what is to be said of depth maps that it cannot use.
+    matching: Option<(Matching, Option<String>)>,
     /// Of dense points, without each judge.
     dense: Vec<CarvedPoints>,
     /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
@@ -117,7 +116,6 @@ impl<'a> Trials<'a> {
             judges,
             lumigraph,
             matching: None,
-            matching_note: None,
             dense: Vec::new(),
             cutout: None,
             bounds: BTreeMap::new(),
@@ -174,30 +172,28 @@ impl<'a> Trials<'a> {
     /// The dense points of all photos, which are half known where they were on trial.
     pub(super) fn dense(&mut self) -> Result<Fitted, SceneError> {
         let within = self.bound_of_all()?;
-        let fitted = self.dense_of_all()?.dense(self.names.clone(), within);
-        let note = self.matching_note.clone();
-        Ok(Fitted { note, ..fitted })
+        Ok(self.dense_of_all()?.dense(self.names.clone(), within))
     }
 
     /// The surface carved out of them.
     pub(super) fn carved_dense(&mut self) -> Result<Fitted, SceneError> {
         let within = self.bound_of_all()?;
-        let fitted = self.dense_of_all()?.surface(within)?;
-        let note = self.matching_note.clone();
-        Ok(Fitted { note, ..fitted })
+        self.dense_of_all()?.surface(within)
     }
 
     fn dense_of_all(&mut self) -> Result<CarvedPoints, SceneError> {
         let sparse = self.scene.sparse_points(self.without, &self.names);
-        let points = self.matching()?.points(&sparse, None);
-        Ok(CarvedPoints::new(&self.views(None), points, sparse.len()))
+        let taken = self.take_matching()?;
+        let (matching, note) = self.matching.insert(taken);
+        let (points, note) = (matching.points(&sparse, None), note.clone());
+        Ok(CarvedPoints::new(&self.views(None), points, sparse.len()).with_note(note))
     }
 
     /// Dense points without each judge, all found at once: much of it takes one thread each.
     fn dense_without(&mut self, judge: usize) -> Result<&CarvedPoints, SceneError> {
         if self.dense.is_empty() {
             let judges: Vec<usize> = self.judges.iter().map(|j| j.source_idx).collect();
-            let mut matching = self.take_matching()?;
+            let (mut matching, note) = self.take_matching()?;
             matching.compare(&judges);
             let find = |judge: &Judge| {
                 let (gone, mut fewer) = (judge.source_idx, self.without.clone());
@@ -207,7 +203,7 @@ impl<'a> Trials<'a> {
                 CarvedPoints::new(&self.views(Some(gone)), points, sparse.len())
             };
             self.dense = self.judges.par_iter().map(find).collect();
-            self.matching = Some(matching);
+            self.matching = Some((matching, note));
         }
         Ok(&self.dense[judge])
     }
@@ -306,19 +302,10 @@ impl<'a> Trials<'a> {
         Ok(())
     }
 
-    fn matching(&mut self) -> Result<&Matching, SceneError> {
-        let matching = self.take_matching()?;
-        Ok(self.matching.insert(matching))
-    }
-
-    fn take_matching(&mut self) -> Result<Matching, SceneError> {
+    fn take_matching(&mut self) -> Result<(Matching, Option<String>), SceneError> {
         match self.matching.take() {
             Some(matching) => Ok(matching),
-            None => {
-                let (matching, note) = self.scene.matching(self.without)?;
-                self.matching_note = note;
-                Ok(matching)
-            }
+            None => self.scene.matching(self.without),
         }
     }
 

@@ -84,10 +84,21 @@ fn sparse(solid: &Solid) -> Vec<SparsePoint> {
     places.filter_map(|(x, y)| point(x, y)).collect()
 }
 
-fn found(options: &DenseOptions) -> (Solid, Vec<SparsePoint>, usize) {
+/// What most tests are about: the scene, its views, and the points that all see.
+fn seen_by_nine() -> (Solid, Vec<View>, Vec<SparsePoint>) {
     let solid = scene();
-    let views: Vec<View> = (0..9).map(view).collect();
     let sparse = sparse(&solid);
+    (solid, (0..9).map(view).collect(), sparse)
+}
+
+/// Few pixels, which take little time.
+const SMALL: DenseOptions = DenseOptions {
+    long_side: 96,
+    spacing: 4,
+};
+
+fn found(options: &DenseOptions) -> (Solid, Vec<SparsePoint>, usize) {
+    let (solid, views, sparse) = seen_by_nine();
     let points = densify(
         &views,
         &sparse,
@@ -132,26 +143,16 @@ fn points_lie_on_the_surfaces_and_fill_the_views() {
 
 #[test]
 fn the_same_photos_give_the_same_points_on_any_number_of_threads() {
-    let options = DenseOptions {
-        long_side: 96,
-        spacing: 4,
-    };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.unwrap().install(|| found(&options).1)
+        pool.unwrap().install(|| found(&SMALL).1)
     };
     assert!(on(1) == on(3));
 }
 
 #[test]
 fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
-    let options = DenseOptions {
-        long_side: 96,
-        spacing: 4,
-    };
-    let solid = scene();
-    let views: Vec<View> = (0..9).map(view).collect();
-    let sparse = sparse(&solid);
+    let (options, (solid, views, sparse)) = (SMALL, seen_by_nine());
     let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
     // Two that go were measured, and one that stays.
     let measured = |i: usize| [0, 3, 4].contains(&i).then(|| depth(&solid, &views[i]));
@@ -206,13 +207,7 @@ fn errors(solid: &Solid, points: &[SparsePoint]) -> Vec<f64> {
 
 #[test]
 fn what_was_measured_counts_where_photos_agree_on_nothing() {
-    let options = DenseOptions {
-        long_side: 96,
-        spacing: 4,
-    };
-    let solid = scene();
-    let views: Vec<View> = (0..9).map(view).collect();
-    let sparse = sparse(&solid);
+    let (options, (solid, views, sparse)) = (SMALL, seen_by_nine());
     let count = sparse.len();
     let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
     let of_blank = |i: usize| (i == 4).then(|| depth(&solid, &views[i]));

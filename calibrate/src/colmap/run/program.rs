@@ -150,8 +150,8 @@ impl<'a> Program<'a> {
         }
 
         // 2. It runs; the mapper a second time where it placed none and had no more photos far enough apart
-        // to begin with: closer ones may do. (Even of photos that it places mostly it gives up its first pair
-        // now and then, as what it does depends on its threads.)
+        // to begin with: closer ones may do. (It has been seen to give up its first pair of photos that it
+        // places mostly.)
         let mut ran = self.run_once(step, &arguments.words, report);
         if let (Step::Mapping, Err(ToolError::Failed { .. })) = (step, &ran)
             && self.found_no_pair()?
