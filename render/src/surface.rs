@@ -7,6 +7,7 @@ use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::{Facets, Kept, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::ops::Range;
 
@@ -176,9 +177,32 @@ impl FacetMap {
         self.facet_of[row * width as usize + column]
     }
 
-    /// q at every pixel's centre, row by row.
-    pub(crate) fn planes(&self) -> impl Iterator<Item = Option<DVec3>> {
-        self.facet_of.iter().map(|&facet| self.plane_of(facet))
+    /// The vectors q of facets, and the facet at each pixel's centre; of many facets only those that are seen, by
+    /// other numbers, in the order of the pixels.
+    pub(crate) fn few_planes(&self) -> (Cow<'_, [DVec3]>, Cow<'_, [u32]>) {
+        /// So many cost nothing.
+        const FEW: usize = 4096;
+        if self.planes.len() <= FEW {
+            return (
+                self.planes.as_slice().into(),
+                self.facet_of.as_slice().into(),
+            );
+        }
+        let mut seen = Vec::new();
+        let mut number_of = vec![NO_FACET; self.planes.len()];
+        let renumber = |&facet: &u32| {
+            if facet == NO_FACET {
+                return NO_FACET;
+            }
+            let number = &mut number_of[facet as usize];
+            if *number == NO_FACET {
+                *number = seen.len() as u32;
+                seen.push(self.planes[facet as usize]);
+            }
+            *number
+        };
+        let facet_of: Vec<u32> = self.facet_of.iter().map(renumber).collect();
+        (seen.into(), facet_of.into())
     }
 
     fn plane_of(&self, facet: u32) -> Option<DVec3> {
@@ -328,5 +352,31 @@ impl FacetMap {
         };
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
         rows.concat()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn few_planes_are_those_that_are_seen(facets in vec(0_u32..6000, 20..=20), spare in 0_usize..6000) {
+            let planes: Vec<DVec3> = (0..6000 - spare).map(|i| DVec3::splat(i as f64)).collect();
+            let seen = |f: &u32| if (*f as usize) < planes.len() { *f } else { NO_FACET };
+            let map = FacetMap {
+                moved_from: planes.len() as u32,
+                facet_of: facets.iter().map(seen).collect(),
+                planes,
+                seers: Seers::default(),
+                size: [5, 4],
+            };
+            let (few, facet_of) = map.few_planes();
+            let of = |facet: &u32| few.get(*facet as usize).copied();
+            prop_assert!(facet_of.iter().map(of).eq(map.facet_of.iter().map(|f| map.plane_of(*f))));
+            prop_assert!(few.len() <= 4096);
+        }
     }
 }

@@ -21,6 +21,7 @@ struct Params {
     finest: f32,
     // 1 where all pixels see one plane, 0 where none sees anything.
     plane_seen: f32,
+    plane_row_bits: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -117,13 +118,16 @@ const LENS_SKEWED_FISHEYE: f32 = 12.0;
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var sources: texture_2d<f32>;
 @group(0) @binding(2) var rays: texture_2d<f32>;
-// The plane that each pixel sees, where they differ; w: 1 where there is one.
+// The planes that pixels see, where they differ, in rows of a power of two; w: 1 but for the first, which
+// is that of pixels that see none.
 @group(0) @binding(3) var planes: texture_2d<f32>;
 // As large as the photos' array; a single texel where nothing is masked.
 @group(0) @binding(4) var masks: texture_2d_array<f32>;
 @group(0) @binding(5) var mask_sampler: sampler;
 // Half as large as the photos' array; a single texel where nothing can be hidden.
 @group(0) @binding(6) var distances: texture_2d_array<f32>;
+// Which of the planes each pixel sees, counted from the second.
+@group(0) @binding(7) var facets: texture_2d<u32>;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
     let x = (source_idx % SOURCES_PER_ROW) * SOURCE_TEXELS + texel;
@@ -181,7 +185,10 @@ fn rational(source_idx: u32, n: vec2f, r2: f32, full: bool) -> vec2f {
 // The plane of the proxy seen at a pixel; w is 0 where there is none.
 fn plane_at(pixel: vec2u) -> vec4f {
     if FACETS {
-        return textureLoad(planes, pixel, 0);
+        // One more than the largest number is zero.
+        let facet = textureLoad(facets, pixel, 0).x + 1u;
+        let bits = params.plane_row_bits;
+        return textureLoad(planes, vec2u(facet & ((1u << bits) - 1u), facet >> bits), 0);
     }
     return vec4f(params.plane, params.plane_seen);
 }

@@ -1,5 +1,6 @@
 //! Which graphics device draws, and what is known of it.
 
+use super::ShadeBy;
 use crate::RenderError;
 use std::sync::{Arc, Mutex};
 use wgpu::{Backends, DownlevelFlags, Features, Limits};
@@ -16,6 +17,8 @@ pub struct DeviceLimits {
     pub buffer_bytes: Option<u64>,
     /// Bytes of a texture array of photos; making a larger one fails as if memory had run out.
     pub array_bytes: Option<u64>,
+    /// By what colours are computed; `None` for what is faster there.
+    pub shade_by: Option<ShadeBy>,
 }
 
 impl DeviceLimits {
@@ -225,8 +228,13 @@ fn missing_of(limits: &Limits, flags: DownlevelFlags) -> Vec<String> {
         ),
         (
             limits.max_sampled_textures_per_shader_stage,
-            7,
+            10,
             "textures at once",
+        ),
+        (
+            limits.max_storage_textures_per_shader_stage,
+            1,
+            "textures written at once",
         ),
         (limits.max_samplers_per_shader_stage, 2, "samplers at once"),
         (
@@ -239,7 +247,7 @@ fn missing_of(limits: &Limits, flags: DownlevelFlags) -> Vec<String> {
             64,
             "threads of a workgroup",
         ),
-        (limits.max_bind_groups, 2, "bind groups"),
+        (limits.max_bind_groups, 3, "bind groups"),
     ] {
         if has < needed {
             missing.push(format!("{what} ({has} of {needed})"));
@@ -306,6 +314,7 @@ mod tests {
             texture_side: Some(4096),
             buffer_bytes: Some(1 << 20),
             array_bytes: None,
+            shade_by: None,
         };
         let limits = asked.within(Limits::default());
         assert_eq!(limits.max_texture_array_layers, 256);

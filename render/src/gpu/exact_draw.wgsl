@@ -3,6 +3,17 @@
 @group(1) @binding(0) var photos: texture_2d_array<f32>;
 @group(1) @binding(1) var photo_sampler: sampler;
 
+@group(2) @binding(0) var picture: texture_storage_2d<r32uint, write>;
+
+@compute @workgroup_size(8, 8)
+fn draw(@builtin(global_invocation_id) within: vec3u) {
+    if any(within.xy >= params.part_size) {
+        return;
+    }
+    let pixel = params.part_origin + within.xy;
+    textureStore(picture, pixel, vec4u(pack4x8unorm(color(pixel))));
+}
+
 // One triangle that covers the image.
 @vertex
 fn whole_image(@builtin(vertex_index) vertex_idx: u32) -> @builtin(position) vec4f {
@@ -11,9 +22,13 @@ fn whole_image(@builtin(vertex_index) vertex_idx: u32) -> @builtin(position) vec
 }
 
 @fragment
-fn draw(@builtin(position) position: vec4f) -> @location(0) vec4f {
-    let ray = ray_through(vec2u(position.xy));
-    let plane = plane_at(vec2u(position.xy));
+fn draw_fragment(@builtin(position) position: vec4f) -> @location(0) u32 {
+    return pack4x8unorm(color(vec2u(position.xy)));
+}
+
+fn color(pixel: vec2u) -> vec4f {
+    let ray = ray_through(pixel);
+    let plane = plane_at(pixel);
     let s = inverse_distance(plane, ray);
     if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);

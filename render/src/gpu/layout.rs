@@ -27,8 +27,10 @@ pub(crate) struct Params {
     pub k: u32,
     pub finest: f32,
     pub plane_seen: f32,
+    /// Bits of a plane's number within a row of their table.
+    pub plane_row_bits: u32,
     /// A struct's size is a multiple of its alignment.
-    pub rest: [u32; 2],
+    pub rest: u32,
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -62,13 +64,18 @@ pub(crate) struct Source {
     pub distance_scale: f32,
 }
 
-/// `Corner`'s inputs of triangulated.wgsl.
+/// A vertex of seen.wgsl: in normalised device coordinates, y upwards.
+pub(crate) type Corner = [f32; 2];
+
+/// Two texels of triangulated.wgsl's triangles.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(crate) struct Corner {
-    /// In normalised device coordinates, y upwards.
-    pub at: [f32; 2],
-    pub list: [u32; 2],
+pub(crate) struct Triangle {
+    /// In pixels.
+    pub corners: [[f32; 2]; 3],
+    pub first_entry: u32,
+    /// Twice the number of entries, one more if it is bordered.
+    pub count_and_bordered: u32,
 }
 
 /// A texel of triangulated.wgsl's entries.
@@ -101,7 +108,13 @@ pub(super) const LENS_TILTED: f32 = 11.0;
 pub(super) const LENS_SKEWED_FISHEYE: f32 = 12.0;
 
 impl Params {
-    pub(crate) fn of(frame: &Frame<'_>, array_size: [u32; 2], finest: usize, part: Rect) -> Self {
+    pub(crate) fn of(
+        frame: &Frame<'_>,
+        array_size: [u32; 2],
+        finest: usize,
+        part: Rect,
+        plane_row_bits: u32,
+    ) -> Self {
         let lens = frame.desired.lens;
         Self {
             plane: common_plane(frame).as_vec3().to_array(),
@@ -116,7 +129,8 @@ impl Params {
             k: frame.options.k as u32,
             finest: finest as f32,
             plane_seen: f32::from(u8::from(frame.surface != Surface::Nothing)),
-            rest: [0; 2],
+            plane_row_bits,
+            rest: 0,
         }
     }
 }

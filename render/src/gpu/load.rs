@@ -3,6 +3,7 @@
 use super::groups::{self, Group, Most, Part, Rect};
 use super::layout::{self, Corner, Special};
 use super::photos::{Layers, Shortage};
+use super::pipelines::Pass;
 use super::room::{Content, Room, array_size};
 use super::{Gpu, tables, target};
 use crate::RenderError;
@@ -154,9 +155,10 @@ impl Gpu {
     fn most(&self, room: Room) -> Most {
         let corners = self.limits.max_buffer_size / size_of::<[Corner; 3]>() as u64;
         let rows = u64::from(self.limits.max_texture_dimension_2d);
+        let listed = rows * u64::from(layout::ENTRY_ROW) / 2;
         Most {
             sources: room.most as usize,
-            triangles: usize::try_from(corners.min(1 << 30)).unwrap_or(1 << 30),
+            triangles: usize::try_from(corners.min(listed).min(1 << 30)).unwrap_or(1 << 30),
             entries: usize::try_from(rows * u64::from(layout::ENTRY_ROW)).unwrap_or(usize::MAX),
         }
     }
@@ -174,20 +176,22 @@ impl Gpu {
         let zeros = vec![0_u32; frame.sources.len().max(1)];
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let used = self.buffer("used photos", &zeros, usage);
+        let special = Special::of(frame);
+        self.pipelines.ensure(&self.device, Pass::Mark, special);
         let own = self.pipelines.mark_group(&self.device, &used);
         let readback = target::readback_buffer(&self.device, used.size());
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(self.pipelines.mark(&self.device, Special::of(frame)));
+            pass.set_pipeline(self.pipelines.computing(Pass::Mark, special));
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
             let [width, height] = rect.size;
             pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
         }
         encoder.copy_buffer_to_buffer(&used, 0, &readback, 0, used.size());
-        self.queue.submit([encoder.finish()]);
-        let bytes = target::read(&self.device, &readback);
+        let submitted = self.queue.submit([encoder.finish()]);
+        let bytes = target::read(&self.device, &readback, readback.size(), submitted);
         self.trouble.take()?;
         let flags: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes?);
         let flagged = frame.taking_part().zip(flags);

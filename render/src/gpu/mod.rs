@@ -1,9 +1,11 @@
-//! The wgpu engine: the triangulated field in one draw, the exact field in another.
+//! The wgpu engine: frames of the triangulated or the exact field, several on their way at once.
 
 mod device;
+mod drawing;
 mod groups;
 mod layout;
 mod load;
+mod passes;
 mod photos;
 mod pipelines;
 mod raster;
@@ -16,28 +18,26 @@ mod timing;
 mod warp;
 
 pub use device::DeviceLimits;
+pub use drawing::{Drawing, Drawn};
 pub use load::Loaded;
+pub use pipelines::ShadeBy;
 pub use raster::GpuRaster;
 pub use warp::GpuWarp;
 
 use crate::RenderError;
-use crate::field::{FieldEntry, TriangulatedField};
+use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::options::Method;
 use crate::photos::PhotoStore;
 use crate::residency::Residency;
 use calibrate::Lens;
 use device::Trouble;
-use groups::{Part, Rect};
+use drawing::Slots;
 use image::RgbaImage;
-use layout::{Corner, Entry, Special};
 use photos::{Layers, Maker};
-use pipelines::{Pass, Pipelines};
+use pipelines::Pipelines;
 use std::fmt;
-use std::ops::Range;
 use std::time::Duration;
-use target::Target;
-use timing::Stopwatch;
 
 /// A graphics device with all that it keeps between frames: pipelines, photos, the last
 /// lens' rays and the picture's buffers.
@@ -63,20 +63,12 @@ pub struct Gpu {
     distances: Option<Layers>,
     no_layers: wgpu::TextureView,
     rays: Option<(Lens, [u32; 2], wgpu::TextureView)>,
-    target: Option<Target>,
+    slots: Slots,
     timestamps: bool,
     device_time: Option<Duration>,
     trouble: Trouble,
     /// See [`Self::lose`].
     gone: bool,
-}
-
-/// Which of a frame's passes.
-#[derive(Clone, Copy)]
-struct Turn<'a> {
-    pass_idx: usize,
-    /// Where the device tells the time.
-    stopwatch: Option<&'a Stopwatch>,
 }
 
 impl fmt::Debug for Gpu {
@@ -123,7 +115,11 @@ impl Gpu {
             // One more would be needed: see `Maker::layers_of_array`.
             limits.max_texture_array_layers -= 1;
         }
-        let pipelines = Pipelines::new(&device);
+        let shade_by = asked.shade_by.unwrap_or(match info.device_type {
+            wgpu::DeviceType::Cpu => ShadeBy::Fragments,
+            _ => ShadeBy::Workgroups,
+        });
+        let pipelines = Pipelines::new(&device, shade_by);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("photos"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -150,7 +146,7 @@ impl Gpu {
             distances: None,
             no_layers,
             rays: None,
-            target: None,
+            slots: Slots::default(),
             timestamps,
             device_time: None,
             trouble,
@@ -254,172 +250,6 @@ impl Gpu {
     ) -> Result<RgbaImage, RenderError> {
         let loaded = self.load(frame, Some(field))?;
         self.draw(frame, Some(field), &loaded)
-    }
-
-    /// Draws a frame, or the field of it, that was loaded before.
-    ///
-    /// # Errors
-    /// As [`Self::render`].
-    pub fn draw(
-        &mut self,
-        frame: &Frame<'_>,
-        field: Option<&TriangulatedField>,
-        loaded: &Loaded,
-    ) -> Result<RgbaImage, RenderError> {
-        let picture = self.try_draw(frame, field, loaded);
-        self.told(picture)
-    }
-
-    fn try_draw(
-        &mut self,
-        frame: &Frame<'_>,
-        field: Option<&TriangulatedField>,
-        loaded: &Loaded,
-    ) -> Result<RgbaImage, RenderError> {
-        self.device_time = None;
-        let tables = self.tables(frame)?;
-        let (width, height) = (frame.desired.width, frame.desired.height);
-        if self
-            .target
-            .as_ref()
-            .is_none_or(|t| t.size != [width, height])
-        {
-            let most_bytes = self.limits.max_buffer_size;
-            self.target = Some(Target::new(&self.device, width, height, most_bytes));
-        }
-        let stopwatch = self
-            .timestamps
-            .then(|| Stopwatch::new(&self.device, loaded.groups.len()));
-        for (pass_idx, group) in loaded.groups.iter().enumerate() {
-            let turn = Turn {
-                pass_idx,
-                stopwatch: stopwatch.as_ref(),
-            };
-            self.bring(frame, loaded.room, &group.sources)?;
-            match (&group.part, field) {
-                (Part::Triangles(range), Some(field)) => {
-                    self.draw_triangles(frame, &tables, field, range.clone(), turn)?;
-                }
-                (Part::Pixels(rect), _) => self.draw_pixels(frame, &tables, *rect, turn)?,
-                (Part::Triangles(_), None) => {}
-            }
-        }
-        let target = self.target.as_ref().expect("made above");
-        let picture = target.read(&self.device, &self.queue)?;
-        if let Some(stopwatch) = stopwatch {
-            self.device_time = stopwatch.read(&self.device, &self.queue)?;
-        }
-        Ok(picture)
-    }
-
-    /// Draws some of a field's triangles with photos that are on the device.
-    fn draw_triangles(
-        &mut self,
-        frame: &Frame<'_>,
-        tables: &tables::Tables,
-        field: &TriangulatedField,
-        range: Range<usize>,
-        turn: Turn<'_>,
-    ) -> Result<(), RenderError> {
-        let shared = self.shared_group(frame, tables, load::Order::ByLayer, Rect::whole(0, 0))?;
-        let photos = self.photos.as_ref().expect("brought before");
-        let mut entries: Vec<Entry> = Vec::new();
-        let mut corners: [Vec<Corner>; 2] = Default::default();
-        let size = [frame.desired.width as f32, frame.desired.height as f32];
-        for triangle_idx in range {
-            let triangle = &field.triangles[triangle_idx];
-            let list = [entries.len() as u32, triangle.entry_count];
-            let entry = |e: &FieldEntry| Entry {
-                source_idx: photos.layer(e.source_idx as usize).unwrap_or(0) as f32,
-                values: e.values,
-            };
-            entries.extend(field.entries_of(triangle_idx).iter().map(entry));
-            corners[usize::from(triangle.bordered)].extend(triangle.corners.map(|i| {
-                let [x, y] = field.vertices[i as usize].as_vec2().to_array();
-                Corner {
-                    at: [x / size[0] * 2.0 - 1.0, y / size[1] * -2.0 + 1.0],
-                    list,
-                }
-            }));
-        }
-        let [plain, bordered] = &corners;
-        let buffers = [plain, bordered]
-            .map(|corners| self.buffer("corners", corners, wgpu::BufferUsages::VERTEX));
-        let entries = self.table("entries", bytemuck::cast_slice(&entries), layout::ENTRY_ROW);
-        let own =
-            self.pipelines
-                .triangulated_group(&self.device, &photos.view, &self.sampler, &entries);
-        let special = Special::of(frame);
-        for pass in [Pass::Triangles, Pass::BorderedTriangles] {
-            self.pipelines.ensure(&self.device, pass, special);
-        }
-        self.pass(turn, |pass, pipelines| {
-            pass.set_bind_group(0, &shared, &[]);
-            pass.set_bind_group(1, &own, &[]);
-            pass.set_pipeline(pipelines.get(Pass::Triangles, special));
-            pass.set_vertex_buffer(0, buffers[0].slice(..));
-            pass.draw(0..plain.len() as u32, 0..1);
-            pass.set_pipeline(pipelines.get(Pass::BorderedTriangles, special));
-            pass.set_vertex_buffer(0, buffers[1].slice(..));
-            pass.draw(0..bordered.len() as u32, 0..1);
-        });
-        self.trouble.take()
-    }
-
-    /// Draws a part of the exact field with photos that are on the device.
-    fn draw_pixels(
-        &mut self,
-        frame: &Frame<'_>,
-        tables: &tables::Tables,
-        rect: Rect,
-        turn: Turn<'_>,
-    ) -> Result<(), RenderError> {
-        let shared = self.shared_group(frame, tables, load::Order::AsGiven, rect)?;
-        let photos = self.photos.as_ref().expect("brought before");
-        let own = self
-            .pipelines
-            .exact_group(&self.device, &photos.view, &self.sampler);
-        let special = Special::of(frame);
-        self.pipelines.ensure(&self.device, Pass::Exact, special);
-        self.pass(turn, |pass, pipelines| {
-            let ([x, y], [width, height]) = (rect.origin, rect.size);
-            pass.set_scissor_rect(x, y, width, height);
-            pass.set_pipeline(pipelines.get(Pass::Exact, special));
-            pass.set_bind_group(0, &shared, &[]);
-            pass.set_bind_group(1, &own, &[]);
-            pass.draw(0..3, 0..1);
-        });
-        self.trouble.take()
-    }
-
-    /// One render pass over the picture, which the first of a frame clears.
-    fn pass(&self, turn: Turn<'_>, record: impl FnOnce(&mut wgpu::RenderPass<'_>, &Pipelines)) {
-        let Some(target) = &self.target else { return };
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("frame"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target.view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: match turn.pass_idx {
-                            0 => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                            _ => wgpu::LoadOp::Load,
-                        },
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                timestamp_writes: turn.stopwatch.map(Stopwatch::of_pass),
-                ..Default::default()
-            });
-            record(&mut pass, &self.pipelines);
-        }
-        if let Some(stopwatch) = turn.stopwatch {
-            stopwatch.keep(&mut encoder, turn.pass_idx);
-        }
-        self.queue.submit([encoder.finish()]);
     }
 
     fn maker(&self) -> Maker<'_> {

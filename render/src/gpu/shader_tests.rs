@@ -1,6 +1,6 @@
 //! The shaders, and the Rust side of every struct and number that they share.
 
-use super::layout::{self, Corner, ENTRY_ROW, Entry, Params, SOURCE_ROW, Source};
+use super::layout::{self, Corner, ENTRY_ROW, Entry, Params, SOURCE_ROW, Source, Triangle};
 use super::pipelines::SHADERS;
 use crate::blend::SAME_RAY;
 use crate::field::MAX_LISTED;
@@ -15,6 +15,11 @@ fn parse((name, parts): (&str, &[&str])) -> Module {
     let source = parts.concat();
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)))
+}
+
+/// Whether it begins with common.wgsl.
+fn has_common((_, parts): &(&str, &[&str])) -> bool {
+    parts.len() > 1
 }
 
 fn shader(name: &str) -> Module {
@@ -67,11 +72,19 @@ fn every_shader_is_valid() {
 #[test]
 fn every_entry_point_that_pipelines_name_exists() {
     for (name, expected) in [
+        ("seen", &["corner", "number"][..]),
         (
             "triangulated",
-            &["corner", "triangle", "bordered_triangle"][..],
+            &[
+                "corner",
+                "number",
+                "plain",
+                "plain_fragment",
+                "bordered",
+                "bordered_fragment",
+            ],
         ),
-        ("exact_draw", &["whole_image", "draw"]),
+        ("exact_draw", &["draw", "whole_image", "draw_fragment"]),
         ("exact_mark", &["mark"]),
     ] {
         let module = shader(name);
@@ -94,8 +107,9 @@ fn params_lie_where_the_shaders_read_them() {
     let expected = offsets!(
         plane beta ray_scale ray_offset image array_size part_origin part_size full_weight k finest
         plane_seen
+        plane_row_bits
     );
-    for shader in SHADERS {
+    for shader in SHADERS.into_iter().filter(has_common) {
         let (found, size) = members(&parse(shader), "Params");
         assert_eq!(found, expected, "{}", shader.0);
         assert_eq!(size, size_of::<Params>(), "{}", shader.0);
@@ -105,7 +119,7 @@ fn params_lie_where_the_shaders_read_them() {
 #[test]
 fn a_source_is_the_texels_that_the_shaders_name() {
     const TEXEL: usize = size_of::<[f32; 4]>();
-    for shader in SHADERS {
+    for shader in SHADERS.into_iter().filter(has_common) {
         let constants = constants(&parse(shader));
         let texels = constants["SOURCE_TEXELS"] as usize;
         assert_eq!(size_of::<Source>(), texels * TEXEL);
@@ -155,29 +169,13 @@ fn corners_and_entries_are_what_the_shaders_take() {
     assert_eq!(size_of::<Entry>(), size_of::<[f32; 4]>());
     assert_eq!(offset_of!(Entry, source_idx), 0);
     assert_eq!(offset_of!(Entry, values), size_of::<f32>());
-    // Vertex attributes follow each other without gaps: two floats, two integers.
-    let entry = module.entry_points.iter().find(|e| e.name == "corner");
-    let inputs: Vec<(u32, &TypeInner)> = entry
-        .unwrap()
-        .function
-        .arguments
-        .iter()
-        .filter_map(|argument| match argument.binding {
-            Some(naga::Binding::Location { location, .. }) => {
-                Some((location, &module.types[argument.ty].inner))
-            }
-            _ => None,
-        })
-        .collect();
-    let pair = |scalar| TypeInner::Vector {
-        size: naga::VectorSize::Bi,
-        scalar,
-    };
-    let expected = [pair(naga::Scalar::F32), pair(naga::Scalar::U32)];
-    assert_eq!(inputs, [(0, &expected[0]), (1, &expected[1])]);
-    assert_eq!(offset_of!(Corner, at), 0);
-    assert_eq!(offset_of!(Corner, list), 8);
-    assert_eq!(size_of::<Corner>(), 16);
+    // A triangle is two: its corners, then two integers.
+    assert_eq!(size_of::<Triangle>(), 2 * size_of::<[u32; 4]>());
+    assert_eq!(offset_of!(Triangle, corners), 0);
+    assert_eq!(offset_of!(Triangle, first_entry), 24);
+    assert_eq!(offset_of!(Triangle, count_and_bordered), 28);
+    assert_eq!(ENTRY_ROW % 2, 0);
+    assert_eq!(size_of::<Corner>(), 8);
 }
 
 #[test]
@@ -188,7 +186,7 @@ fn shared_numbers_are_the_same() {
         let exact = constants(&shader(name));
         assert_eq!(exact["LISTED"] as usize, MAX_CONTRIBUTORS + 1, "{name}");
     }
-    for shader in SHADERS {
+    for shader in SHADERS.into_iter().filter(has_common) {
         let constants = constants(&parse(shader));
         for (name, value) in [
             ("CONTRIBUTORS", MAX_CONTRIBUTORS as f64),

@@ -11,10 +11,15 @@ use crate::rays::RayMap;
 use crate::surface::Surface;
 use wgpu::util::DeviceExt;
 
+/// Four numbers a texel.
+const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
 /// The tables that all parts of a frame share.
 pub(super) struct Tables {
-    rays: wgpu::TextureView,
-    planes: wgpu::TextureView,
+    pub rays: wgpu::TextureView,
+    pub planes: wgpu::TextureView,
+    pub facets: wgpu::TextureView,
+    plane_row_bits: u32,
 }
 
 impl Gpu {
@@ -38,9 +43,13 @@ impl Gpu {
                 frame.sources.len()
             )));
         }
+        let plane_row_bits = side.ilog2();
+        let [planes, facets] = self.planes(frame, plane_row_bits)?;
         Ok(Tables {
             rays: self.rays(frame),
-            planes: self.planes(frame),
+            planes,
+            facets,
+            plane_row_bits,
         })
     }
 
@@ -56,7 +65,13 @@ impl Gpu {
         self.bring_beside(frame, order)?;
         let photos = self.photos.as_ref().expect("brought before");
         let (masks, distances) = (self.masks.as_ref(), self.distances.as_ref());
-        let params = Params::of(frame, photos.size, photos.finest, rect);
+        let params = Params::of(
+            frame,
+            photos.size,
+            photos.finest,
+            rect,
+            tables.plane_row_bits,
+        );
         let source = |i| {
             let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
             Source::of(
@@ -73,18 +88,14 @@ impl Gpu {
         let count = sources.len() as f32;
         sources.iter_mut().for_each(|source| source.count = count);
         let params = self.buffer("params", &[params], wgpu::BufferUsages::UNIFORM);
-        let sources = self.table(
-            "sources",
-            bytemuck::cast_slice(&sources),
-            layout::SOURCE_ROW,
-        );
+        let sources = bytemuck::cast_slice(&sources);
+        let sources = self.table("sources", FLOATS, sources, layout::SOURCE_ROW);
         let view = |layers: Option<&'_ Layers>| layers.map_or(&self.no_layers, |l| &l.view).clone();
         Ok(self.pipelines.shared_group(
             &self.device,
             &params,
             &sources,
-            &tables.rays,
-            &tables.planes,
+            tables,
             &view(masks),
             &self.sampler,
             &view(distances),
@@ -115,24 +126,45 @@ impl Gpu {
         view
     }
 
-    /// The plane that each pixel sees; a single texel where all see the same.
-    fn planes(&self, frame: &Frame<'_>) -> wgpu::TextureView {
+    /// The planes that pixels see, after that of none, and which of them each pixel sees; a single texel
+    /// each where all see the same.
+    fn planes(
+        &self,
+        frame: &Frame<'_>,
+        row_bits: u32,
+    ) -> Result<[wgpu::TextureView; 2], RenderError> {
         let Surface::Facets(map) = &frame.surface else {
-            return self.texels("planes", 1, 1, &[[0.0; 4]]);
+            let planes = self.texels("planes", 1, 1, &[[0.0; 4]]);
+            return Ok([planes, self.numbers("facets", 1, 1, &[0])]);
         };
-        let texels: Vec<[f32; 4]> = map
-            .planes()
-            .map(|plane| plane.map_or([0.0; 4], |q| q.as_vec3().extend(1.0).to_array()))
-            .collect();
-        self.texels("planes", frame.desired.width, frame.desired.height, &texels)
+        let (planes, facet_of) = map.few_planes();
+        let (row, side) = (1 << row_bits, self.limits.max_texture_dimension_2d);
+        if planes.len() >= row as usize * side as usize {
+            return Err(RenderError::Gpu(format!(
+                "a picture of {} facets is more than this device draws; use --device cpu or a smaller --size",
+                planes.len()
+            )));
+        }
+        let seen = planes.iter().map(|q| q.as_vec3().extend(1.0).to_array());
+        let texels: Vec<[f32; 4]> = std::iter::once([0.0; 4]).chain(seen).collect();
+        let (width, height) = (frame.desired.width, frame.desired.height);
+        let facets = self.numbers("facets", width, height, &facet_of);
+        let texels = bytemuck::cast_slice(&texels);
+        Ok([self.table("planes", FLOATS, texels, row), facets])
     }
 
     /// A list of texels as a texture of rows of `row` texels; never empty.
-    pub(super) fn table(&self, label: &str, texels: &[[f32; 4]], row: u32) -> wgpu::TextureView {
+    pub(super) fn table(
+        &self,
+        label: &str,
+        format: wgpu::TextureFormat,
+        texels: &[[u32; 4]],
+        row: u32,
+    ) -> wgpu::TextureView {
         let height = (texels.len() as u32).div_ceil(row).max(1);
         let mut texels = texels.to_vec();
-        texels.resize((row * height) as usize, [0.0; 4]);
-        self.texels(label, row, height, &texels)
+        texels.resize((row * height) as usize, [0; 4]);
+        self.texture(label, [row, height], format, bytemuck::cast_slice(&texels))
     }
 
     fn texels(
@@ -141,6 +173,26 @@ impl Gpu {
         width: u32,
         height: u32,
         texels: &[[f32; 4]],
+    ) -> wgpu::TextureView {
+        self.texture(label, [width, height], FLOATS, bytemuck::cast_slice(texels))
+    }
+
+    fn numbers(&self, label: &str, width: u32, height: u32, numbers: &[u32]) -> wgpu::TextureView {
+        let format = wgpu::TextureFormat::R32Uint;
+        self.texture(
+            label,
+            [width, height],
+            format,
+            bytemuck::cast_slice(numbers),
+        )
+    }
+
+    fn texture(
+        &self,
+        label: &str,
+        [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
+        bytes: &[u8],
     ) -> wgpu::TextureView {
         let descriptor = wgpu::TextureDescriptor {
             label: Some(label),
@@ -152,12 +204,11 @@ impl Gpu {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Float,
+            format,
             usage: wgpu::TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         };
         let order = wgpu::util::TextureDataOrder::LayerMajor;
-        let bytes = bytemuck::cast_slice(texels);
         let texture = self
             .device
             .create_texture_with_data(&self.queue, &descriptor, order, bytes);

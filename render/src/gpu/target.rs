@@ -1,7 +1,8 @@
 //! The picture on the device, and the way back.
 
 use crate::RenderError;
-use image::RgbaImage;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 /// A picture to draw into and the buffer it is read back through, as many rows at a time as
 /// that takes.
@@ -17,33 +18,15 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// `most_bytes` are those of a buffer.
-    pub(crate) fn new(device: &wgpu::Device, width: u32, height: u32, most_bytes: u64) -> Self {
-        let format = super::pipelines::PICTURE_FORMAT;
-        Self::of(device, format, [width, height], most_bytes)
-    }
-
-    /// A picture of any format whose texels are read one by one.
-    pub(crate) fn of(
+    /// A picture for some usages besides passes. `most_bytes` are those of a buffer.
+    pub(crate) fn new(
         device: &wgpu::Device,
         format: wgpu::TextureFormat,
         [width, height]: [u32; 2],
+        usage: wgpu::TextureUsages,
         most_bytes: u64,
     ) -> Self {
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("picture"),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = texture(device, format, [width, height], usage);
         let view = texture.create_view(&Default::default());
         let bytes_per_pixel = format.block_copy_size(None).unwrap_or(4);
         let bytes_per_row =
@@ -61,57 +44,135 @@ impl Target {
         }
     }
 
-    /// Waits for the device and reads the picture.
-    pub(crate) fn read(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-    ) -> Result<RgbaImage, RenderError> {
+    /// Tells the device to copy rows from `y` on, as many as are read at a time, to where they are read.
+    pub(crate) fn copy(&self, encoder: &mut wgpu::CommandEncoder, y: u32) {
         let [width, height] = self.size;
-        let pixels = self.read_bytes(device, queue)?;
-        Ok(RgbaImage::from_raw(width, height, pixels).expect("one row each"))
+        let rows = self.rows.min(height - y);
+        encoder.copy_texture_to_buffer(
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { x: 0, y, z: 0 },
+                ..self.texture.as_image_copy()
+            },
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.readback,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(self.bytes_per_row),
+                    rows_per_image: Some(rows),
+                },
+            },
+            wgpu::Extent3d {
+                width,
+                height: rows,
+                depth_or_array_layers: 1,
+            },
+        );
     }
 
-    /// Waits for the device and reads the pixels, row by row.
-    pub(crate) fn read_bytes(
+    /// Asks for the rows that a submission copies.
+    pub(crate) fn ask(&self, submitted: wgpu::SubmissionIndex) -> Arrival {
+        Arrival::of(&self.readback, self.readback.size(), submitted)
+    }
+
+    /// Waits for the first rows and for all that follow, and gives each row's bytes to `take`.
+    pub(crate) fn read_rows(
         &self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
-    ) -> Result<Vec<u8>, RenderError> {
+        first: Arrival,
+        mut take: impl FnMut(&[u8]),
+    ) -> Result<(), RenderError> {
         let [width, height] = self.size;
         let row_bytes = width as usize * self.bytes_per_pixel as usize;
-        let mut pixels = Vec::with_capacity(row_bytes * height as usize);
-        for y in (0..height).step_by(self.rows as usize) {
+        let mut arrival = first;
+        let mut y = 0;
+        loop {
             let rows = self.rows.min(height - y);
-            let mut encoder = device.create_command_encoder(&Default::default());
-            encoder.copy_texture_to_buffer(
-                wgpu::TexelCopyTextureInfo {
-                    origin: wgpu::Origin3d { x: 0, y, z: 0 },
-                    ..self.texture.as_image_copy()
-                },
-                wgpu::TexelCopyBufferInfo {
-                    buffer: &self.readback,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset: 0,
-                        bytes_per_row: Some(self.bytes_per_row),
-                        rows_per_image: Some(rows),
-                    },
-                },
-                wgpu::Extent3d {
-                    width,
-                    height: rows,
-                    depth_or_array_layers: 1,
-                },
-            );
-            queue.submit([encoder.finish()]);
-            let bytes = read(device, &self.readback)?;
+            arrival.wait(device)?;
+            let bytes = mapped(&self.readback, self.readback.size())?;
             let padded = bytes.chunks_exact(self.bytes_per_row as usize);
-            for row in padded.take(rows as usize) {
-                pixels.extend_from_slice(&row[..row_bytes]);
+            padded
+                .take(rows as usize)
+                .for_each(|row| take(&row[..row_bytes]));
+            drop(bytes);
+            self.readback.unmap();
+            y += rows;
+            if y >= height {
+                return Ok(());
             }
+            let mut encoder = device.create_command_encoder(&Default::default());
+            self.copy(&mut encoder, y);
+            arrival = self.ask(queue.submit([encoder.finish()]));
         }
-        Ok(pixels)
     }
+}
+
+/// A picture that passes write, for some usages more.
+pub(crate) fn texture(
+    device: &wgpu::Device,
+    format: wgpu::TextureFormat,
+    [width, height]: [u32; 2],
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    })
+}
+
+/// Bytes of a buffer that were asked for.
+#[derive(Debug)]
+pub(crate) struct Arrival {
+    answer: Receiver<Result<(), wgpu::BufferAsyncError>>,
+    submitted: wgpu::SubmissionIndex,
+}
+
+impl Arrival {
+    /// Asks for so many bytes of a buffer, a multiple of four, as a submission leaves them.
+    pub(crate) fn of(buffer: &wgpu::Buffer, bytes: u64, submitted: wgpu::SubmissionIndex) -> Self {
+        let (sender, answer) = channel();
+        buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
+            // The receiver may be gone with the drawing that it was for.
+            let _ = sender.send(result);
+        });
+        Self { answer, submitted }
+    }
+
+    /// Waits for the device, but for nothing that it was told later.
+    pub(crate) fn wait(self, device: &wgpu::Device) -> Result<(), RenderError> {
+        let polled = device.poll(wgpu::PollType::Wait {
+            submission_index: Some(self.submitted),
+            timeout: None,
+        });
+        polled.map_err(|e| failed(e.to_string()))?;
+        // The device has called back by now, or another thread that waits is about to; unless it is gone.
+        let answer = self.answer.recv_timeout(MOST_PATIENCE);
+        answer
+            .map_err(|_| failed("the device does not answer".to_owned()))?
+            .map_err(|e| failed(e.to_string()))
+    }
+}
+
+/// A callback comes at once after what it waits for, unless the device is gone.
+const MOST_PATIENCE: Duration = Duration::from_secs(10);
+
+fn failed(what: String) -> RenderError {
+    RenderError::Gpu(format!("reading back failed: {what}"))
+}
+
+fn mapped(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, RenderError> {
+    let view = buffer.get_mapped_range(..bytes);
+    view.map_err(|e| failed(e.to_string()))
 }
 
 pub(crate) fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
@@ -123,35 +184,25 @@ pub(crate) fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer 
     })
 }
 
-/// Waits for the device and reads a buffer.
-pub(crate) fn read(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
-    read_first(device, buffer, buffer.size())
-}
-
 /// Waits for the device and reads so many bytes of a buffer, a multiple of four.
-pub(crate) fn read_first(
+pub(crate) fn read(
     device: &wgpu::Device,
     buffer: &wgpu::Buffer,
     bytes: u64,
+    submitted: wgpu::SubmissionIndex,
 ) -> Result<Vec<u8>, RenderError> {
-    let failed = |what: String| RenderError::Gpu(format!("reading back failed: {what}"));
-    let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
-        // The receiver waits below; if it is gone there is no one to tell.
-        let _ = sender.send(result);
-    });
-    device
-        .poll(wgpu::PollType::wait_indefinitely())
-        .map_err(|e| failed(e.to_string()))?;
-    // The device has called back by now, unless it is gone.
-    receiver
-        .try_recv()
-        .map_err(|_| failed("the device does not answer".to_owned()))?
-        .map_err(|e| failed(e.to_string()))?;
-    let bytes = buffer
-        .get_mapped_range(..bytes)
-        .map_err(|e| failed(e.to_string()))?
-        .to_vec();
+    arrived(device, buffer, bytes, Arrival::of(buffer, bytes, submitted))
+}
+
+/// Waits for bytes of a buffer that were asked for.
+pub(crate) fn arrived(
+    device: &wgpu::Device,
+    buffer: &wgpu::Buffer,
+    bytes: u64,
+    arrival: Arrival,
+) -> Result<Vec<u8>, RenderError> {
+    arrival.wait(device)?;
+    let read = mapped(buffer, bytes)?.to_vec();
     buffer.unmap();
-    Ok(bytes)
+    Ok(read)
 }

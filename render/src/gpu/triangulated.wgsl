@@ -11,24 +11,40 @@ const LISTED = 32u;
 @group(1) @binding(2) var entries: texture_2d<f32>;
 const ENTRIES_PER_ROW = 1024u;
 
-struct Corner {
-    @builtin(position) position: vec4f,
-    // The corners' shares.
-    @location(0) shares: vec3f,
-    // First entry, and how many.
-    @location(1) @interpolate(flat) list: vec2u,
+// Two texels a triangle: its corners in pixels, then its first entry, and twice how many, one more if
+// it is bordered.
+@group(1) @binding(3) var triangles: texture_2d<u32>;
+// Of the same size: one more than the triangle that each pixel sees (see seen.wgsl), and the picture.
+@group(2) @binding(0) var seen: texture_2d<u32>;
+@group(2) @binding(1) var picture: texture_storage_2d<r32uint, write>;
+
+// A triangle at a pixel.
+struct Listed {
+    // The corners' shares of the pixel.
+    shares: vec3f,
+    first: u32,
+    end: u32,
+    bordered: bool,
 }
 
-@vertex
-fn corner(
-    @builtin(vertex_index) vertex_idx: u32,
-    // In normalised device coordinates: not every device lets this stage read buffers.
-    @location(0) at: vec2f,
-    @location(1) list: vec2u,
-) -> Corner {
-    let which = vertex_idx % 3u;
-    let shares = vec3f(vec3u(0u, 1u, 2u) == vec3u(which));
-    return Corner(vec4f(at, 0.0, 1.0), shares, list);
+fn listed_at(pixel: vec2u, number: u32) -> Listed {
+    let at = 2u * (number - 1u);
+    let row = at / ENTRIES_PER_ROW;
+    let column = at % ENTRIES_PER_ROW;
+    let one = textureLoad(triangles, vec2u(column, row), 0);
+    let other = textureLoad(triangles, vec2u(column + 1u, row), 0);
+    // From the pixel's centre.
+    let center = vec2f(pixel) + 0.5;
+    let a = bitcast<vec2f>(one.xy) - center;
+    let b = bitcast<vec2f>(one.zw) - center;
+    let c = bitcast<vec2f>(other.xy) - center;
+    let areas = vec3f(b.x * c.y - b.y * c.x, c.x * a.y - c.y * a.x, a.x * b.y - a.y * b.x);
+    // A triangle is drawn a little aside of where it is: what is outside of it is on its border.
+    let turned = select(areas, -areas, areas.x + areas.y + areas.z < 0.0);
+    let inside = max(turned, vec3f(0.0));
+    let all = inside.x + inside.y + inside.z;
+    let shares = select(vec3f(1.0, 0.0, 0.0), inside / all, all > 0.0);
+    return Listed(shares, other.z, other.z + (other.w >> 1u), (other.w & 1u) == 1u);
 }
 
 fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, texel: vec3f) {
@@ -41,18 +57,38 @@ fn entry(entry_idx: u32) -> vec4f {
     return textureLoad(entries, vec2u(entry_idx % ENTRIES_PER_ROW, entry_idx / ENTRIES_PER_ROW), 0);
 }
 
+@compute @workgroup_size(8, 8)
+fn plain(@builtin(global_invocation_id) at: vec3u) {
+    if any(at.xy >= textureDimensions(seen)) {
+        return;
+    }
+    let number = textureLoad(seen, at.xy, 0).x;
+    if number == 0u {
+        return;
+    }
+    let listed = listed_at(at.xy, number);
+    if !listed.bordered {
+        textureStore(picture, at.xy, vec4u(pack4x8unorm(plain_color(at.xy, listed))));
+    }
+}
+
 @fragment
-fn triangle(in: Corner) -> @location(0) vec4f {
-    let ray = ray_through(vec2u(in.position.xy));
-    let plane = plane_at(vec2u(in.position.xy));
+fn plain_fragment(it: Corner) -> @location(0) u32 {
+    let pixel = vec2u(it.position.xy);
+    return pack4x8unorm(plain_color(pixel, listed_at(pixel, it.triangle + 1u)));
+}
+
+fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
+    let ray = ray_through(pixel);
+    let plane = plane_at(pixel);
     let s = inverse_distance(plane, ray);
     if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
     var mix = Mix(vec4f(0.0), 0.0);
-    for (var i = in.list.x; i < in.list.x + in.list.y; i++) {
+    for (var i = it.first; i < it.end; i++) {
         let listed = entry(i);
-        let weight = dot(in.shares, listed.yzw);
+        let weight = dot(it.shares, listed.yzw);
         if weight <= 0.0 {
             continue;
         }
@@ -79,27 +115,46 @@ struct Terms {
 // Where the border of a photo or a mask crosses the triangle: interpolated differences, the
 // pixel's own fovBlend and mask, and the blend of the exact field. A pipeline of its own, because software
 // drivers pay for its arrays in every pixel.
+@compute @workgroup_size(8, 8)
+fn bordered(@builtin(global_invocation_id) at: vec3u) {
+    if any(at.xy >= textureDimensions(seen)) {
+        return;
+    }
+    let number = textureLoad(seen, at.xy, 0).x;
+    if number == 0u {
+        return;
+    }
+    let listed = listed_at(at.xy, number);
+    if listed.bordered {
+        textureStore(picture, at.xy, vec4u(pack4x8unorm(bordered_color(at.xy, listed))));
+    }
+}
+
 @fragment
-fn bordered_triangle(in: Corner) -> @location(0) vec4f {
-    let ray = ray_through(vec2u(in.position.xy));
-    let plane = plane_at(vec2u(in.position.xy));
+fn bordered_fragment(it: Corner) -> @location(0) u32 {
+    let pixel = vec2u(it.position.xy);
+    return pack4x8unorm(bordered_color(pixel, listed_at(pixel, it.triangle + 1u)));
+}
+
+fn bordered_color(pixel: vec2u, it: Listed) -> vec4f {
+    let ray = ray_through(pixel);
+    let plane = plane_at(pixel);
     let s = inverse_distance(plane, ray);
     if s < 0.0 || all(ray == vec3f(0.0)) {
         return vec4f(0.0);
     }
-    let first = in.list.x;
     // 1. Who sees the point.
     var terms: Terms;
     var count = 0u;
     var nearest = INFINITY;
     var sums = vec2f(0.0);
-    for (var i = first; i < first + in.list.y; i++) {
+    for (var i = it.first; i < it.end; i++) {
         let listed = entry(i);
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
         let a = relevance(source_idx, sight, ray, plane.xyz);
         if a > 0.0 {
-            let diff = without_noise(dot(in.shares, listed.yzw));
+            let diff = without_noise(dot(it.shares, listed.yzw));
             nearest = min(nearest, diff);
             sums += a * vec2f(1.0, diff);
             terms.diff[count] = diff;

@@ -7,7 +7,7 @@ use common::{METHODS, assert_close, pinhole};
 use glam::DVec3;
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use proxy::{Plane, Proxy};
-use render::gpu::{DeviceLimits, Gpu};
+use render::gpu::{DeviceLimits, Gpu, ShadeBy};
 use render::{
     Engine, FieldOptions, Frame, Lumigraph, Method, PhotoStore, Prepared, RenderError, SourceView,
     cpu,
@@ -110,6 +110,16 @@ fn pictures_do_not_depend_on_what_a_device_holds() {
             buffer_bytes: Some(1 << 15),
             ..DeviceLimits::default()
         },
+        DeviceLimits {
+            shade_by: Some(ShadeBy::Fragments),
+            array_layers: Some(12),
+            ..DeviceLimits::default()
+        },
+        DeviceLimits {
+            shade_by: Some(ShadeBy::Workgroups),
+            array_layers: Some(12),
+            ..DeviceLimits::default()
+        },
     ] {
         let mut small = open(limits).unwrap();
         for (method, expected) in METHODS.into_iter().zip(&all) {
@@ -127,6 +137,40 @@ fn pictures_do_not_depend_on_what_a_device_holds() {
             assert_eq!((took.level_cap, took.capped_frames), (0, 0));
             if limits.buffer_bytes.is_none() || method != Method::Exact {
                 assert!(most_parts > 1, "{method:?}, {limits:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn frames_in_flight_are_what_they_are_one_by_one() {
+    let shot = shot();
+    let lumigraph = shot.lumigraph();
+    // With few layers the photos of a frame make room for the next's while it is drawn.
+    for array_layers in [None, Some(12)] {
+        let limits = DeviceLimits {
+            array_layers,
+            ..DeviceLimits::default()
+        };
+        let Some(mut gpu) = open(limits) else {
+            return;
+        };
+        for method in METHODS {
+            let frames = path().map(|view| frame(&lumigraph, &view));
+            let alone = frames
+                .each_ref()
+                .map(|frame| gpu.render(frame, method).unwrap());
+            let drawings = frames.each_ref().map(|frame| {
+                let prepared = Prepared::new(frame, method).unwrap();
+                let loaded = gpu.load(frame, prepared.field()).unwrap();
+                gpu.begin(frame, prepared.field(), &loaded).unwrap()
+            });
+            // The last first, each on a thread of its own.
+            let mut picture = RgbaImage::default();
+            for (drawing, alone) in drawings.into_iter().zip(&alone).rev() {
+                let read = || drawing.finish_into(&mut picture).unwrap();
+                std::thread::scope(|scope| scope.spawn(read).join().unwrap());
+                assert!(picture == *alone, "{method:?}, {limits:?}");
             }
         }
     }

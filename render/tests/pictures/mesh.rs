@@ -7,6 +7,7 @@ use common::{METHODS, Shot, assert_close, by_all, pinhole, psnr, psnr_covered, u
 use glam::{DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Mesh, MeshKind, Proxy, Solid};
+use render::gpu::{DeviceLimits, Gpu, ShadeBy};
 use render::{
     FieldOptions, Frame, Lumigraph, Method, PhotoStore, SourceView, Visibility, cpu, reference,
 };
@@ -164,6 +165,62 @@ fn every_engine_draws_the_same_picture() {
             let db = psnr(&unmoved(&frame, &picture), &unmoved(&frame, &exact));
             println!("{name}, {engine}, triangulated against exact: {db:.1} dB");
             assert!(db >= 40.0, "{name}, {engine}: {db} dB");
+        }
+    }
+}
+
+/// The wall as so many squares, a little bent.
+fn bent_wall(across: u32) -> Mesh {
+    let side = across + 1;
+    let at = |i: u32| {
+        let [x, y] = [i % side, i / side].map(|k| f64::from(k) / f64::from(across) * 2.0 - 1.0);
+        DVec3::new(
+            6.0 * x,
+            4.0 * y,
+            4.0 + 0.2 * (5.0 * x).sin() * (4.0 * y).cos(),
+        )
+    };
+    let square = |i: u32| {
+        let [a, b, c, d] = [i, i + 1, i + side + 1, i + side];
+        [[a, b, c], [a, c, d]]
+    };
+    let corners = (0..across * side).filter(|i| i % side < across);
+    Mesh {
+        positions: (0..side * side).map(at).collect(),
+        triangles: corners.flat_map(square).collect(),
+    }
+}
+
+#[test]
+fn colours_by_fragments_and_by_workgroups_have_the_same_bytes() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let open = |shade_by| {
+        let limits = DeviceLimits {
+            shade_by: Some(shade_by),
+            ..DeviceLimits::default()
+        };
+        Gpu::open_within(limits).unwrap()
+    };
+    let [mut fragments, mut workgroups] = [ShadeBy::Fragments, ShadeBy::Workgroups].map(open);
+    // Of few facets, and of more than pixels.
+    for mesh in [pillar(), bent_wall(200)] {
+        let lumigraph = lumigraph(mesh, MeshKind::Mesh);
+        for (name, view) in desired_views() {
+            // No multiple of a workgroup's side.
+            let desired = View {
+                width: 157,
+                height: 117,
+                ..view
+            };
+            let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+            for method in METHODS {
+                let [a, b] = [&mut fragments, &mut workgroups]
+                    .map(|gpu| gpu.render(&frame, method).unwrap());
+                assert!(a.pixels().any(|p| p.0[3] > 0), "{name}");
+                assert!(a == b, "{name}, {method:?}");
+            }
         }
     }
 }

@@ -61,10 +61,15 @@ impl<'a> Projector<'a> {
             ],
             params: gpu.buffer(
                 "params",
-                &[Params::of(frame, [1; 2], 0, Rect::whole(0, 0))],
+                &[Params::of(frame, [1; 2], 0, Rect::whole(0, 0), 0)],
                 BufferUsages::UNIFORM,
             ),
-            sources: gpu.table("sources", bytemuck::cast_slice(&sources), SOURCE_ROW),
+            sources: gpu.table(
+                "sources",
+                wgpu::TextureFormat::Rgba32Float,
+                bytemuck::cast_slice(&sources),
+                SOURCE_ROW,
+            ),
         }
     }
 
@@ -119,8 +124,8 @@ impl<'a> Projector<'a> {
             pass.dispatch_workgroups((points.len() as u32).div_ceil(64), 1, 1);
         }
         encoder.copy_buffer_to_buffer(&output, 0, &readback, 0, output.size());
-        gpu.queue.submit([encoder.finish()]);
-        let bytes = target::read(device, &readback);
+        let submitted = gpu.queue.submit([encoder.finish()]);
+        let bytes = target::read(device, &readback, readback.size(), submitted);
         gpu.trouble.take().unwrap();
         bytemuck::pod_collect_to_vec(&bytes.unwrap())
     }

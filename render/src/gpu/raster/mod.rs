@@ -11,7 +11,7 @@ mod tables;
 use super::DeviceLimits;
 use super::GpuWarp;
 use super::device::{self, Opened};
-use super::target::Target as Picture;
+use super::target::{Target as Picture, texture};
 use crate::RenderError;
 use crate::interior::{Pinhole, Runs, Target, Window};
 use bytemuck::{Pod, Zeroable};
@@ -206,18 +206,21 @@ impl GpuRaster {
             pass.set_pipeline(&pipelines.shade);
             pass.draw(0..3, 0..1);
         }
-        queue.submit([encoder.finish()]);
+        frame.drawn.copy(&mut encoder, 0);
+        let submitted = queue.submit([encoder.finish()]);
         self.opened.trouble.take()?;
         // 4. The way back.
-        let bytes = frame.drawn.read_bytes(device, queue)?;
+        let arrival = frame.drawn.ask(submitted);
         into.clear(width, height);
-        let pixels = bytes.as_chunks::<8>().0.iter();
-        for ((pixel, color), depth) in pixels.zip(&mut into.color).zip(&mut into.inverse_depth) {
-            let [r, g, b, a, depth_bits @ ..] = *pixel;
-            *color = [r, g, b, a];
-            *depth = f32::from_le_bytes(depth_bits);
-        }
-        Ok(())
+        let (colors, depths) = (into.color.iter_mut(), into.inverse_depth.iter_mut());
+        let mut pixels = colors.zip(depths);
+        frame.drawn.read_rows(device, queue, arrival, |row| {
+            for (pixel, (color, depth)) in row.as_chunks::<8>().0.iter().zip(&mut pixels) {
+                let [r, g, b, a, depth_bits @ ..] = *pixel;
+                *color = [r, g, b, a];
+                *depth = f32::from_le_bytes(depth_bits);
+            }
+        })
     }
 
     fn camera(&self, camera: &Pinhole, row_bits: u32) -> Camera {
@@ -285,27 +288,15 @@ fn pass<'a>(
 
 impl FrameTextures {
     fn new(device: &wgpu::Device, size: [u32; 2], most_bytes: u64) -> Self {
+        use wgpu::TextureUsages as Usages;
         let texture = |format, usage| {
-            let texture = device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("seen"),
-                size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            });
+            let texture = texture(device, format, size, usage);
             texture.create_view(&Default::default())
         };
         Self {
-            drawn: Picture::of(device, DRAWN, size, most_bytes),
-            seen: texture(SEEN, wgpu::TextureUsages::TEXTURE_BINDING),
-            depth: texture(DEPTH, wgpu::TextureUsages::empty()),
+            drawn: Picture::new(device, DRAWN, size, Usages::COPY_SRC, most_bytes),
+            seen: texture(SEEN, Usages::TEXTURE_BINDING),
+            depth: texture(DEPTH, Usages::empty()),
         }
     }
 }

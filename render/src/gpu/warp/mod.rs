@@ -8,7 +8,7 @@
 use super::DeviceLimits;
 use super::device::{self, Opened};
 use super::pipelines::group;
-use super::target::{read_first, readback_buffer};
+use super::target::{read, readback_buffer};
 use crate::RenderError;
 use crate::interior::{Pinhole, Target, Window};
 use crate::ldi::{Clipped, FreeCost, FreeOptions, Layered, Projection, Sizes, bounds, fill};
@@ -279,11 +279,11 @@ impl GpuWarp {
         encoder.copy_buffer_to_buffer(&room.words, 0, &room.shown, 0, shown);
         let count_at = 4 * PIXEL_WORDS * pixels;
         encoder.copy_buffer_to_buffer(&room.words, count_at, &room.shown, shown, 4);
-        queue.submit([encoder.finish()]);
+        let submitted = queue.submit([encoder.finish()]);
         self.opened.trouble.take()?;
 
         // 3. The way back.
-        let mut shown = read_first(device, &room.shown, shown + 4)?;
+        let mut shown = read(device, &room.shown, shown + 4, submitted)?;
         let end = (4 * SHOWN_WORDS * pixels) as usize;
         let drawn: [u8; 4] = shown[end..end + 4].try_into().expect("four bytes");
         cost.drawn = u32::from_le_bytes(drawn) as usize;
