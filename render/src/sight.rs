@@ -1,7 +1,7 @@
 //! The proxy moved to where photos can see it.
 
 use crate::frame::FrameSource;
-use crate::surface::{FacetMap, NO_FACET};
+use crate::surface::{FacetMap, NO_FACET, each_run};
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::Rays;
@@ -77,8 +77,8 @@ impl Seers {
 /// made of, or on a dome. A guess that photos can answer paints what they show there, and
 /// not nothing. (Of house-walk's held-out pixels that are 2 to 4 %, black before.)
 ///
-/// Pixels are asked one by one only where no photo has all that a tile shows, nor all that is seen of
-/// a facet there.
+/// Pixels are asked one by one only where no photo has all that is seen of a facet; where facets are small,
+/// or rays bend, only in tiles of which none has all that they show.
 ///
 /// `rays` are the desired view's, where they are known.
 pub(crate) fn within_sight(
@@ -123,6 +123,13 @@ struct Known {
 
 impl Known {
     fn of(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Self {
+        // Large facets are asked alone, which mostly is enough.
+        if rays.are_straight() && map.planes.len() * TILE * TILE <= map.facet_of.len() {
+            return Self {
+                facets: facets_seen_whole(map, rays, sources, &Self::default()),
+                ..Self::default()
+            };
+        }
         let mut known = Self {
             across: (map.size[0] as usize).div_ceil(TILE),
             tiles: tiles_seen_whole(map, rays, sources),
@@ -132,11 +139,29 @@ impl Known {
         known
     }
 
-    /// The pixels of a row in one tile after the other, but for tiles that are known to be seen.
-    fn rest_of_row(&self, y: usize, width: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+    /// The runs of pixels of a row that see one facet and that are not known to be seen, in tiles or, where
+    /// none was asked, in the whole row.
+    fn rest_of_row(&self, row: &[u32], y: usize) -> Vec<Range<usize>> {
+        let mut rest = Vec::new();
+        let mut add = |pixels: Range<usize>, facet| {
+            if facet != NO_FACET && !self.has_facet(facet) {
+                rest.push(pixels);
+            }
+        };
+        if self.tiles.is_empty() {
+            each_run(row, add);
+            return rest;
+        }
         let tile = y / TILE * self.across;
-        let tiles = (0..width.div_ceil(TILE)).filter(move |i| !self.has_tile(tile + i));
-        tiles.map(move |i| i * TILE..((i + 1) * TILE).min(width))
+        let tiles = (0..row.len().div_ceil(TILE)).filter(|i| !self.has_tile(tile + i));
+        for first in tiles.map(|i| i * TILE) {
+            let mut start = first;
+            for run in row[first..(first + TILE).min(row.len())].chunk_by(|a, b| a == b) {
+                add(start..start + run.len(), run[0]);
+                start += run.len();
+            }
+        }
+        rest
     }
 
     fn has_tile(&self, tile: usize) -> bool {
@@ -213,6 +238,9 @@ fn has_all<const N: usize>(
     }
 }
 
+/// Pixels of a run that are asked together where no photo has all of it.
+const PART: usize = 32;
+
 /// What is moved, row by row. What is known to be seen is skipped.
 fn moved(
     map: &FacetMap,
@@ -238,52 +266,45 @@ fn moved(
         // The view that saw the last pixel mostly sees the next.
         let mut last = 0;
         let mut moved = Vec::new();
-        for pixels in known.rest_of_row(y, width).flat_map(|part| runs(row, part)) {
-            if row[pixels.start] == NO_FACET || known.has_facet(row[pixels.start]) {
+        // What a run along straight rays sees lies on a line.
+        let is_seen = |pixels: &Range<usize>, last: &mut usize| {
+            let ends = || Some([looks(pixels.start)?, looks(pixels.end - 1)?]);
+            is_straight && ends().is_some_and(|ends| has_all(sources, last, &ends))
+        };
+        for run in known.rest_of_row(row, y) {
+            if is_seen(&run, &mut last) {
                 continue;
             }
-            // What they see lies on a line.
-            if is_straight
-                && let Some(source) = sources.get(last)
-                && let (Some(a), Some(b)) = (looks(pixels.start), looks(pixels.end - 1))
-                && has_well_inside(source, &[a, b])
-            {
-                continue;
-            }
-            for x in pixels {
-                let Some((ray, s)) = looks(x) else { continue };
-                let mut seen = |s: f64| {
-                    let hint = sources.get(last).filter(|source| sees(source, ray, s));
-                    let found = hint.map_or_else(|| first(ray, s), |_| Some(last));
-                    last = found.unwrap_or(last);
-                    found.is_some()
-                };
-                if !(s >= 0.0) || seen(s) {
+            let parts = run.clone().step_by(PART);
+            for part in parts.map(|x| x..(x + PART).min(run.end)) {
+                if run.len() > PART && is_seen(&part, &mut last) {
                     continue;
                 }
-                let nearest = nearest_seen(s, &mut seen);
-                if let Some((s, source_idx)) = nearest.and_then(|s| Some((s, first(ray, s)?))) {
-                    moved.push(Moved {
-                        x,
-                        plane: ray * (s / ray.length_squared()),
-                        source_idx: source_idx as u32,
-                    });
+                for x in part {
+                    let Some((ray, s)) = looks(x) else { continue };
+                    let mut seen = |s: f64| {
+                        let hint = sources.get(last).filter(|source| sees(source, ray, s));
+                        let found = hint.map_or_else(|| first(ray, s), |_| Some(last));
+                        last = found.unwrap_or(last);
+                        found.is_some()
+                    };
+                    if !(s >= 0.0) || seen(s) {
+                        continue;
+                    }
+                    let nearest = nearest_seen(s, &mut seen);
+                    if let Some((s, source_idx)) = nearest.and_then(|s| Some((s, first(ray, s)?))) {
+                        moved.push(Moved {
+                            x,
+                            plane: ray * (s / ray.length_squared()),
+                            source_idx: source_idx as u32,
+                        });
+                    }
                 }
             }
         }
         moved
     };
     (0..height).into_par_iter().map(of_row).collect()
-}
-
-/// Parts of a row whose pixels see one facet.
-fn runs(row: &[u32], pixels: Range<usize>) -> impl Iterator<Item = Range<usize>> + '_ {
-    let mut next = pixels.start;
-    row[pixels].chunk_by(|a, b| a == b).map(move |run| {
-        let first = next;
-        next += run.len();
-        first..next
-    })
 }
 
 /// For each facet, whether some source view has all that pixels of tiles that are not known yet see
@@ -297,40 +318,36 @@ fn facets_seen_whole(
 ) -> Vec<bool> {
     // 1. The rectangles.
     let width = map.size[0] as usize;
-    let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let of_row = |(y, row): (usize, &[u32])| {
         let of_run = |pixels: Range<usize>| {
             let facet = row[pixels.start];
             let ends = [pixels.start, pixels.end - 1];
             // A pixel without a ray sees nothing.
             let at = |x: usize| rays.at(x, y);
-            let grown = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
             let bounds = if rays.are_straight() {
-                ends.into_iter().filter_map(at).fold(none, grown)
+                ends.into_iter().filter_map(at).fold(NO_BOX, grown)
             } else {
-                pixels.filter_map(at).fold(none, grown)
+                pixels.filter_map(at).fold(NO_BOX, grown)
             };
             (facet, bounds)
         };
-        let parts = known.rest_of_row(y, width);
-        let runs = parts.flat_map(|part| runs(row, part));
+        let runs = known.rest_of_row(row, y).into_iter();
         runs.map(of_run).collect::<Vec<_>>()
     };
     let rows = map.facet_of.par_chunks(width.max(1)).enumerate();
     let runs: Vec<Vec<(u32, (DVec2, DVec2))>> = rows.map(of_row).collect();
-    let mut boxes = vec![none; map.planes.len()];
+    let mut boxes = vec![NO_BOX; map.planes.len()];
     for (facet, (least, most)) in runs.into_iter().flatten() {
-        if facet != NO_FACET {
-            let all = &mut boxes[facet as usize];
-            *all = (all.0.min(least), all.1.max(most));
-        }
+        let all = &mut boxes[facet as usize];
+        *all = (all.0.min(least), all.1.max(most));
     }
 
-    // 2. Facets beside one another are mostly seen by the same.
+    // 2. Whether they are seen.
     let mut whole = vec![false; boxes.len()];
     let facets = boxes.par_chunks(FACETS).zip(map.planes.par_chunks(FACETS));
     let work = whole.par_chunks_mut(FACETS).zip(facets);
     work.for_each(|(whole, (boxes, planes))| {
+        // Facets beside one another are mostly seen by the same.
         let mut last = 0;
         for ((whole, (least, most)), plane) in whole.iter_mut().zip(boxes).zip(planes) {
             if !(least.x <= most.x) {
@@ -347,6 +364,14 @@ fn facets_seen_whole(
         }
     });
     whole
+}
+
+/// A rectangle of nothing.
+const NO_BOX: (DVec2, DVec2) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+
+/// A rectangle with a point more.
+fn grown((least, most): (DVec2, DVec2), p: DVec2) -> (DVec2, DVec2) {
+    (least.min(p), most.max(p))
 }
 
 /// Facets that are asked one after the other.

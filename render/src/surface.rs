@@ -23,6 +23,30 @@ pub enum Surface {
     Facets(FacetMap),
 }
 
+/// Calls `each(pixels, facet)` for the runs of pixels of a row that see one facet.
+pub(crate) fn each_run(row: &[u32], mut each: impl FnMut(Range<usize>, u32)) {
+    let Some(mut facet) = row.first().copied() else {
+        return;
+    };
+    let mut start = 0;
+    for (i, pixels) in row.chunks(BLOCK).enumerate() {
+        let goes_on = |same, other: &u32| same & (*other == facet);
+        if pixels.iter().fold(true, goes_on) {
+            continue;
+        }
+        for (x, &other) in (i * BLOCK..).zip(pixels) {
+            if other != facet {
+                each(start..x, facet);
+                (start, facet) = (x, other);
+            }
+        }
+    }
+    each(start..row.len(), facet);
+}
+
+/// Pixels that are compared together.
+const BLOCK: usize = 32;
+
 /// No facet.
 pub const NO_FACET: u32 = Scan::NOTHING;
 
@@ -322,8 +346,8 @@ impl FacetMap {
         let triangles = (0..solid.triangle_count()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
         if let Some(rays) = rays {
-            let scan = solid.scan_along(desired, rays);
-            return Self::of_pixels(planes, scan.triangle_of, desired);
+            let facet_of = solid.triangles_along(desired, rays);
+            return Self::of_pixels(planes, facet_of, desired);
         }
         let world_from_camera = rotation.conjugate();
         let facet_of = Self::found(desired, |ray, _| {
@@ -362,6 +386,19 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn runs_are_what_neighbours_share(lengths in vec((0_u32..4, 1_usize..90), 0..12)) {
+            let row: Vec<u32> = lengths.iter().flat_map(|(f, n)| vec![*f; *n]).collect();
+            let mut found = Vec::new();
+            each_run(&row, |pixels, facet| found.push((pixels, facet)));
+            let mut next = 0;
+            let expected = row.chunk_by(|a, b| a == b).map(|run| {
+                next += run.len();
+                (next - run.len()..next, run[0])
+            });
+            prop_assert!(found.iter().cloned().eq(expected));
+        }
+
         #[test]
         fn few_planes_are_those_that_are_seen(facets in vec(0_u32..6000, 20..=20), spare in 0_usize..6000) {
             let planes: Vec<DVec3> = (0..6000 - spare).map(|i| DVec3::splat(i as f64)).collect();

@@ -67,6 +67,27 @@ impl Solid {
 
     /// [`Self::scan`] along rays of the view's camera.
     pub fn scan_along(&self, view: &View, rays: &Rays) -> Scan {
+        let mut scan = Scan::of(self.prepared(view, rays), rays);
+        if let Some(hull) = self.within() {
+            let kept = hull.keep(view, rays, &scan.inverse_depth);
+            scan.keep(&kept, self.mesh().triangles.len() as u32);
+        }
+        scan
+    }
+
+    /// The triangles of [`Self::scan_along`] alone.
+    pub fn triangles_along(&self, view: &View, rays: &Rays) -> Vec<u32> {
+        if self.within().is_some() {
+            return self.scan_along(view, rays).triangle_of;
+        }
+        let [width, height] = rays.size;
+        let mut triangle_of = vec![0; width * height];
+        draw_all(&self.prepared(view, rays), rays, &mut triangle_of, None);
+        triangle_of
+    }
+
+    /// The triangles that rays may meet.
+    fn prepared(&self, view: &View, rays: &Rays) -> Vec<Prepared> {
         let plane_from_world =
             rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
@@ -80,13 +101,7 @@ impl Solid {
             is_seen.then(|| Prepared::new(i as u32, &sides, inverse_depth, rays))?
         };
         let triangles = (0..self.mesh().triangles.len()).into_par_iter();
-        let triangles = triangles.with_min_len(256).filter_map(prepare).collect();
-        let mut scan = Scan::of(triangles, rays);
-        if let Some(hull) = self.within() {
-            let kept = hull.keep(view, rays, &scan.inverse_depth);
-            scan.keep(&kept, self.mesh().triangles.len() as u32);
-        }
-        scan
+        triangles.with_min_len(256).filter_map(prepare).collect()
     }
 }
 
@@ -129,32 +144,13 @@ impl Scan {
     /// Of triangles in order.
     fn of(triangles: Vec<Prepared>, rays: &Rays) -> Self {
         let [width, height] = rays.size;
-        let bands = by_bands(triangles.iter().map(|triangle| &triangle.rows), height);
         let mut scan = Self {
             width,
-            triangle_of: vec![Self::NOTHING; width * height],
+            triangle_of: vec![0; width * height],
             inverse_depth: vec![0.0; width * height],
         };
-        let pixels = (BAND * width).max(1);
-        let ids = scan.triangle_of.par_chunks_mut(pixels);
-        let depths = scan.inverse_depth.par_chunks_mut(pixels);
-        let work = ids.zip(depths).zip(&bands).enumerate();
-        work.for_each(|(band_idx, ((ids, depths), band))| {
-            let first = band_idx * BAND;
-            for &i in band {
-                let triangle = &triangles[i as usize];
-                let end = triangle.rows.end.min(first + ids.len() / width);
-                for row in triangle.rows.start.max(first)..end {
-                    let at = (row - first) * width;
-                    let pixels = at..at + width;
-                    let (ids, depths) = (&mut ids[pixels.clone()], &mut depths[pixels]);
-                    match &rays.bent {
-                        None => triangle.draw(row, ids, depths),
-                        Some(bent) => triangle.draw_bent(row, bent, ids, depths),
-                    }
-                }
-            }
-        });
+        let depths = Some(scan.inverse_depth.as_mut_slice());
+        draw_all(&triangles, rays, &mut scan.triangle_of, depths);
         scan
     }
 
@@ -172,6 +168,89 @@ impl Scan {
             };
         }
     }
+}
+
+/// Which triangle each pixel sees first, over whatever is there; and the inverse depths, over zeros.
+fn draw_all(triangles: &[Prepared], rays: &Rays, ids: &mut [u32], depths: Option<&mut [f64]>) {
+    let [width, height] = rays.size;
+    let bands = by_bands(triangles.iter().map(|triangle| &triangle.rows), height);
+    let pixels = (BAND * width).max(1);
+    let draw = |(band_idx, ids): (usize, &mut [u32]), mut depths: Option<&mut [f64]>| {
+        // 1. What each row meets, triangle by triangle.
+        let first = band_idx * BAND;
+        let mut rows: [Vec<Span>; BAND] = Default::default();
+        for &i in &bands[band_idx] {
+            let triangle = &triangles[i as usize];
+            let end = triangle.rows.end.min(first + ids.len() / width);
+            for row in triangle.rows.start.max(first)..end {
+                let columns = match &rays.bent {
+                    None => triangle.columns_in(row, width),
+                    Some(_) => triangle.columns.clone(),
+                };
+                if !columns.is_empty() {
+                    rows[row - first].push((columns.start as u32, columns.end as u32, i));
+                }
+            }
+        }
+        // 2. What is nearest.
+        let mut own = match &depths {
+            None => vec![0.0; width],
+            Some(_) => Vec::new(),
+        };
+        for (i, (spans, ids)) in rows.iter_mut().zip(ids.chunks_mut(width)).enumerate() {
+            let row = first + i;
+            ids.fill(Scan::NOTHING);
+            let alone = rays.bent.is_none() && are_apart(spans, triangles, row, width);
+            let depths = match &mut depths {
+                Some(depths) => &mut depths[i * width..(i + 1) * width],
+                None if alone => {
+                    for (start, end, i) in spans {
+                        ids[*start as usize..*end as usize]
+                            .fill(triangles[*i as usize].triangle_idx);
+                    }
+                    continue;
+                }
+                None => {
+                    own.fill(0.0);
+                    own.as_mut_slice()
+                }
+            };
+            for (start, end, i) in spans {
+                let triangle = &triangles[*i as usize];
+                match &rays.bent {
+                    None => triangle.draw(row, *start as usize..*end as usize, ids, depths),
+                    Some(bent) => triangle.draw_bent(row, bent, ids, depths),
+                }
+            }
+        }
+    };
+    let ids = ids.par_chunks_mut(pixels).enumerate();
+    match depths {
+        None => ids.for_each(|ids| draw(ids, None)),
+        Some(depths) => {
+            let both = ids.zip(depths.par_chunks_mut(pixels));
+            both.for_each(|(ids, depths)| draw(ids, Some(depths)));
+        }
+    }
+}
+
+/// Columns of a row from … to before, and which triangle's.
+type Span = (u32, u32, u32);
+
+/// Whether each pixel of a pinhole's row is in one span at most, all in front: then nothing need be
+/// compared. Not asked where spans are many, for they are short.
+fn are_apart(spans: &[Span], triangles: &[Prepared], row: usize, width: usize) -> bool {
+    const PIXELS: usize = 16;
+    if spans.len() * PIXELS > width {
+        return false;
+    }
+    let mut columns: Vec<[u32; 2]> = spans.iter().map(|(start, end, _)| [*start, *end]).collect();
+    columns.sort_unstable();
+    let is_in_front = |(start, end, i): &Span| {
+        let mut ends = [*start, *end - 1].into_iter();
+        ends.all(|column| triangles[*i as usize].inverse_depth_at(row, column as usize) > 0.0)
+    };
+    columns.windows(2).all(|two| two[0][1] <= two[1][0]) && spans.iter().all(is_in_front)
 }
 
 /// Which triangles, given by the rows they reach, reach which bands: their indices, in order.
@@ -300,7 +379,8 @@ impl Prepared {
                 return 0..0;
             }
         }
-        least as usize..most.max(0.0) as usize
+        let end = most.max(0.0) as usize;
+        (least as usize).min(end)..end
     }
 
     /// Calls `put(column, 1/z)` for all pixels of a row that look at it or, where the viewer is
@@ -327,16 +407,18 @@ impl Prepared {
         }
     }
 
-    /// Draws it over what is farther in a row.
-    fn draw(&self, row: usize, ids: &mut [u32], depths: &mut [f64]) {
-        let y = row as f64 + 0.5;
-        let Range { start, end } = self.columns_in(row, ids.len());
-        if start >= end {
-            return;
-        }
-        let rest = self.inverse_depth.y * y + self.inverse_depth.z;
+    /// 1/z at the centre of a pinhole's pixel.
+    fn inverse_depth_at(&self, row: usize, column: usize) -> f64 {
+        let rest = self.inverse_depth.y * (row as f64 + 0.5) + self.inverse_depth.z;
+        self.inverse_depth.x * (column as f64 + 0.5) + rest
+    }
+
+    /// Draws columns of a pinhole's row over what is farther.
+    fn draw(&self, row: usize, columns: Range<usize>, ids: &mut [u32], depths: &mut [f64]) {
+        let rest = self.inverse_depth.y * (row as f64 + 0.5) + self.inverse_depth.z;
         let slope = self.inverse_depth.x;
-        let pixels = ids[start..end].iter_mut().zip(&mut depths[start..end]);
+        let start = columns.start;
+        let pixels = ids[columns.clone()].iter_mut().zip(&mut depths[columns]);
         for (i, (id, depth)) in pixels.enumerate() {
             let here = slope * ((start + i) as f64 + 0.5) + rest;
             let is_nearer = here > *depth;
@@ -374,6 +456,9 @@ mod tests {
             assert_ne!(view.lens.distortion(), Distortion::None);
             return 0;
         };
+        // Without depths, which need not be compared everywhere, it is the same.
+        let rays = Rays::reduced(view, reduction).unwrap();
+        assert_eq!(solid.triangles_along(view, &rays), scan.triangle_of);
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let mut seen = 0;
         for (i, (&id, &s)) in scan.triangle_of.iter().zip(&scan.inverse_depth).enumerate() {
