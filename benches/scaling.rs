@@ -1,5 +1,5 @@
 //! A frame's time by stage against the number of photos: `cargo bench --bench scaling
-//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone field|cpu|exact|gpu --frames N --json FILE --gpu]`;
+//! [-- --photos N,N… --proxies NAME,NAME… --widths N,N… --alone frame|field|cpu|exact|gpu --frames N --json FILE --gpu]`;
 //! see README.md.
 
 use calibrate::View;
@@ -36,7 +36,7 @@ struct Args {
     #[arg(long, value_delimiter = ',', default_values_t = [960, 1920])]
     widths: Vec<u32>,
     /// Only one stage, over and over, for profiles
-    #[arg(long, value_parser = ["field", "cpu", "exact", "gpu"])]
+    #[arg(long, value_parser = ["frame", "field", "cpu", "exact", "gpu"])]
     alone: Option<String>,
     /// How often it is repeated
     #[arg(long, default_value_t = 40, requires = "alone")]
@@ -193,8 +193,10 @@ fn alone(
     };
     let mut cpu = Cpu::default();
     let mut work = || {
-        let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        let prepare = || Frame::new(lumigraph, desired.clone(), FieldOptions::default());
+        let frame = prepare();
         let (cpu, wall) = timed(|| match stage {
+            "frame" => drop(prepare()),
             "field" => drop(TriangulatedField::new(&frame, cells_across).expect("it fits")),
             "exact" => drop(cpu.render(&frame, Method::Exact).expect("made up")),
             "gpu" => {
