@@ -200,10 +200,9 @@ fn draw_all(triangles: &[Prepared], rays: &Rays, ids: &mut [u32], depths: Option
         for (i, (spans, ids)) in rows.iter_mut().zip(ids.chunks_mut(width)).enumerate() {
             let row = first + i;
             ids.fill(Scan::NOTHING);
-            let alone = rays.bent.is_none() && are_apart(spans, triangles, row, width);
             let depths = match &mut depths {
                 Some(depths) => &mut depths[i * width..(i + 1) * width],
-                None if alone => {
+                None if rays.bent.is_none() && are_apart(spans, triangles, row, width) => {
                     for (start, end, i) in spans {
                         ids[*start as usize..*end as usize]
                             .fill(triangles[*i as usize].triangle_idx);

@@ -2,6 +2,7 @@
 
 use super::groups::{self, Group, Most, Part, Rect};
 use super::layout::{self, Corner, Special};
+use super::passes::GROUP;
 use super::photos::{Layers, Shortage};
 use super::pipelines::Pass;
 use super::room::{Content, Room, array_size};
@@ -186,8 +187,8 @@ impl Gpu {
             pass.set_pipeline(self.pipelines.computing(Pass::Mark, special));
             pass.set_bind_group(0, &shared, &[]);
             pass.set_bind_group(1, &own, &[]);
-            let [width, height] = rect.size;
-            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+            let [x, y] = rect.size.map(|side| side.div_ceil(GROUP));
+            pass.dispatch_workgroups(x, y, 1);
         }
         encoder.copy_buffer_to_buffer(&used, 0, &readback, 0, used.size());
         let submitted = self.queue.submit([encoder.finish()]);

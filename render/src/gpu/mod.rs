@@ -214,7 +214,7 @@ impl Gpu {
         self.timestamps
     }
 
-    /// How long the device took to draw the last frame; `None` where it does not tell. Marking
+    /// How long the device took to draw the last frame that was waited for at once; `None` where it does not tell. Marking
     /// and uploading are not part of it.
     pub fn device_time(&self) -> Option<Duration> {
         self.device_time

@@ -29,7 +29,7 @@ impl Turn<'_> {
 }
 
 /// Pixels of a workgroup's side, as the shaders have it.
-const GROUP: u32 = 8;
+pub(super) const GROUP: u32 = 8;
 
 impl Gpu {
     /// Draws some of a field's triangles.

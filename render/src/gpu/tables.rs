@@ -5,6 +5,7 @@ use super::groups::Rect;
 use super::layout::{self, Params, Source};
 use super::load::Order;
 use super::photos::Layers;
+use super::target::flat;
 use crate::RenderError;
 use crate::frame::Frame;
 use crate::rays::RayMap;
@@ -190,24 +191,11 @@ impl Gpu {
     fn texture(
         &self,
         label: &str,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         format: wgpu::TextureFormat,
         bytes: &[u8],
     ) -> wgpu::TextureView {
-        let descriptor = wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        };
+        let descriptor = flat(label, format, size, wgpu::TextureUsages::TEXTURE_BINDING);
         let order = wgpu::util::TextureDataOrder::LayerMajor;
         let texture = self
             .device

@@ -111,11 +111,22 @@ impl Target {
 pub(crate) fn texture(
     device: &wgpu::Device,
     format: wgpu::TextureFormat,
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("picture"),
+    let usage = usage | wgpu::TextureUsages::RENDER_ATTACHMENT;
+    device.create_texture(&flat("picture", format, size, usage))
+}
+
+/// A texture of one layer and one level.
+pub(crate) fn flat(
+    label: &str,
+    format: wgpu::TextureFormat,
+    [width, height]: [u32; 2],
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureDescriptor<'_> {
+    wgpu::TextureDescriptor {
+        label: Some(label),
         size: wgpu::Extent3d {
             width,
             height,
@@ -125,9 +136,9 @@ pub(crate) fn texture(
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
+        usage,
         view_formats: &[],
-    })
+    }
 }
 
 /// Bytes of a buffer that were asked for.

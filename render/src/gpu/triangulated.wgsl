@@ -27,6 +27,14 @@ struct Listed {
     bordered: bool,
 }
 
+// The number that a pixel has; zero outside of the picture, too.
+fn number_at(pixel: vec2u) -> u32 {
+    if any(pixel >= textureDimensions(seen)) {
+        return 0u;
+    }
+    return textureLoad(seen, pixel, 0).x;
+}
+
 fn listed_at(pixel: vec2u, number: u32) -> Listed {
     let at = 2u * (number - 1u);
     let row = at / ENTRIES_PER_ROW;
@@ -59,10 +67,7 @@ fn entry(entry_idx: u32) -> vec4f {
 
 @compute @workgroup_size(8, 8)
 fn plain(@builtin(global_invocation_id) at: vec3u) {
-    if any(at.xy >= textureDimensions(seen)) {
-        return;
-    }
-    let number = textureLoad(seen, at.xy, 0).x;
+    let number = number_at(at.xy);
     if number == 0u {
         return;
     }
@@ -117,10 +122,7 @@ struct Terms {
 // drivers pay for its arrays in every pixel.
 @compute @workgroup_size(8, 8)
 fn bordered(@builtin(global_invocation_id) at: vec3u) {
-    if any(at.xy >= textureDimensions(seen)) {
-        return;
-    }
-    let number = textureLoad(seen, at.xy, 0).x;
+    let number = number_at(at.xy);
     if number == 0u {
         return;
     }

@@ -4,6 +4,7 @@
 //! that the eye can be subtracted before anything is rounded to 24.
 
 use crate::RenderError;
+use crate::gpu::target::flat;
 use glam::DVec3;
 use proxy::mesh::{Material, Model, Wrap};
 use rayon::prelude::*;
@@ -94,20 +95,9 @@ impl Tables<'_> {
             )));
         }
         let width = entries.len().clamp(1, row);
-        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(what),
-            size: wgpu::Extent3d {
-                width: width as u32,
-                height: rows as u32,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let size = [width as u32, rows as u32];
+        let texture = self.device.create_texture(&flat(what, format, size, usage));
         // Some rows at a time: each write goes through a buffer.
         let row_bytes = (row * WORDS * 4) as u64;
         let at_once = (self.most_bytes.min(1 << 26) / row_bytes).max(1) as usize;
