@@ -37,6 +37,9 @@ pub enum FileError {
     /// JSON is no place for a mesh.
     #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
     NoMesh(PathBuf),
+    /// PLY is for meshes.
+    #[error("{path}: a plane is written as .json (exact) or .glb", path = .0.display())]
+    NoPlane(PathBuf),
     /// What has no surface apart from a desired view cannot be looked at.
     #[error(
         "{path}: the {kind} proxy is made anew for every view and has no surface of its own \
@@ -51,6 +54,51 @@ pub enum FileError {
         path = .0.display()
     )]
     Extension(PathBuf),
+}
+
+/// What there is of a proxy without a desired view, which says what files hold it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A plane: .json or .glb.
+    Plane,
+    /// A mesh: .ply or .glb.
+    Mesh,
+    /// Nothing, as it is made anew for every view: .json.
+    PerView,
+}
+
+impl Form {
+    /// Of a proxy.
+    pub fn of(proxy: &Proxy) -> Self {
+        match proxy {
+            Proxy::Plane(_) => Self::Plane,
+            Proxy::Mesh(_) => Self::Mesh,
+            Proxy::ViewPlane | Proxy::Points { .. } | Proxy::Dense(_) => Self::PerView,
+        }
+    }
+
+    /// The extension of a file that holds it exactly.
+    pub fn exact_extension(self) -> &'static str {
+        match self {
+            Self::Mesh => "ply",
+            Self::Plane | Self::PerView => "json",
+        }
+    }
+
+    /// Whether [`write()`] writes a proxy of this form and kind to a file of that name: to be asked before a long
+    /// fit.
+    ///
+    /// # Errors
+    /// It does not; the message says what it writes.
+    pub fn check(self, path: &Path, kind: &'static str) -> Result<(), FileError> {
+        match (extension(path).as_str(), self) {
+            ("json", Self::Mesh) => Err(FileError::NoMesh(path.to_owned())),
+            ("ply", Self::Plane) => Err(FileError::NoPlane(path.to_owned())),
+            ("glb" | "ply", Self::PerView) => Err(FileError::NoSurface(path.to_owned(), kind)),
+            ("json" | "glb" | "ply", _) => Ok(()),
+            _ => Err(FileError::Extension(path.to_owned())),
+        }
+    }
 }
 
 /// What the files say. Unknown keys are kept out of the way, not refused.
@@ -320,18 +368,17 @@ pub fn write(
     shown_points_in_world: &[DVec3],
     cameras: &[(String, View)],
 ) -> Result<(), FileError> {
+    Form::of(proxy).check(path, proxy.kind())?;
     let json = |e| FileError::Json(path.to_owned(), e);
-    let no_surface = || FileError::NoSurface(path.to_owned(), proxy.kind());
+    let glb = |shown: &mesh::Mesh| {
+        let extras = serde_json::to_string(&Stored::of(proxy)).map_err(json)?;
+        mesh::to_glb(shown, cameras, Some(extras))
+            .map_err(|e| FileError::Glb(path.to_owned(), e.to_string()))
+    };
     let bytes = match (extension(path).as_str(), proxy) {
-        ("json", Proxy::Mesh(_)) => return Err(FileError::NoMesh(path.to_owned())),
-        ("json", Proxy::Dense(_) | Proxy::Points { within: Some(_) }) => {
-            serde_json::to_vec(&Stored::of(proxy)).map_err(json)?
-        }
-        ("json", _) => {
-            let text = serde_json::to_string_pretty(&Stored::of(proxy)).map_err(json)?;
-            (text + "\n").into_bytes()
-        }
-        ("ply", Proxy::Mesh(solid)) => {
+        ("glb", Proxy::Plane(plane)) => glb(&glb::quad(plane, shown_points_in_world))?,
+        ("glb", Proxy::Mesh(solid)) => glb(solid.mesh())?,
+        (_, Proxy::Mesh(solid)) => {
             let kind = solid.kind().name();
             let how = if hides_nothing(solid) {
                 HIDES_NOTHING
@@ -341,18 +388,13 @@ pub fn write(
             let comment = format!("{KIND_COMMENT}{kind}{how}");
             mesh::to_ply(solid.mesh(), solid.within().map(Solid::mesh), &comment)
         }
-        ("glb", Proxy::Mesh(_) | Proxy::Plane(_)) => {
-            let extras = serde_json::to_string(&Stored::of(proxy)).map_err(json)?;
-            let shown = match proxy {
-                Proxy::Plane(plane) => &glb::quad(plane, shown_points_in_world),
-                Proxy::Mesh(solid) => solid.mesh(),
-                _ => return Err(no_surface()),
-            };
-            mesh::to_glb(shown, cameras, Some(extras))
-                .map_err(|e| FileError::Glb(path.to_owned(), e.to_string()))?
+        (_, Proxy::Dense(_) | Proxy::Points { within: Some(_) }) => {
+            serde_json::to_vec(&Stored::of(proxy)).map_err(json)?
         }
-        ("glb" | "ply", _) => return Err(no_surface()),
-        _ => return Err(FileError::Extension(path.to_owned())),
+        _ => {
+            let text = serde_json::to_string_pretty(&Stored::of(proxy)).map_err(json)?;
+            (text + "\n").into_bytes()
+        }
     };
     write_whole(path, &bytes).map_err(|e| FileError::Io(path.to_owned(), e))
 }

@@ -33,7 +33,7 @@ pub use cloud::{CloudStatistics, isolated_points, statistics};
 pub use condition::ILL_CONDITIONED;
 pub use dense::DensePoints;
 pub use facets::Facets;
-pub use file::{FileError, parse, read, write};
+pub use file::{FileError, Form, parse, read, write};
 pub use fit::{FitBasis, FitError, PlaneFit, fit_plane};
 pub use mesh::Mesh;
 pub use plane::{Plane, PlaneError};

@@ -4,7 +4,7 @@ use super::Usage;
 use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
-use ::proxy::{MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
+use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::Context;
 use calibrate::{Pixel, View};
 use clap::ValueEnum;
@@ -12,13 +12,14 @@ use clap::builder::PossibleValue;
 use glam::{DMat4, DVec3};
 use lumigraph::scene::{Kind as Fit, Scene};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Fit the surface that carries rays to the photos, or give it by hand
 ///
 /// Without -o it becomes the scene's own. A .json file (.ply for meshes) holds it exactly; a
-/// .glb can be looked at elsewhere, with the cameras, and read back.
+/// .glb can be looked at elsewhere, with the cameras, and read back. What `auto` chooses goes
+/// beside FILE where such a file cannot hold it.
 ///
 ///     lumigraph proxy my-scene auto
 ///     lumigraph proxy my-scene carved -o carved.glb
@@ -129,6 +130,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         ))
         .into());
     }
+    if let Some(file) = &args.output {
+        check_written(args.kind, file)?;
+    }
     let without = args.hold_out.names(&scene)?;
     let (proxy, how, fitted_without) = match by_hand(args, &scene, &without)? {
         Some((proxy, how)) => (proxy, how, None),
@@ -143,6 +147,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let file = match &args.output {
         Some(file) => {
+            let file = &match args.kind {
+                Kind::Auto => file_for(file, &proxy),
+                Kind::Fitted(_) | Kind::Mesh => file.clone(),
+            };
             let points = scene.reconstruction.points.values();
             let shown: Vec<DVec3> = points.map(|p| p.position).collect();
             make_parent(file)?;
@@ -156,6 +164,35 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         file.display(),
         proxy_text(&proxy)
     ))
+}
+
+/// Whether a kind can be written to a file of that name, before it takes minutes to fit.
+fn check_written(kind: Kind, file: &Path) -> Result<(), FileError> {
+    match kind {
+        Kind::Fitted(fit) => fit.form().check(file, fit.name()),
+        Kind::Mesh => Form::Mesh.check(file, "mesh"),
+        // Of those that may be chosen some can.
+        Kind::Auto => match Form::Plane.check(file, "plane") {
+            Err(error @ FileError::Extension(_)) => Err(error),
+            _ => Ok(()),
+        },
+    }
+}
+
+/// Where what was chosen among all kinds is written: to the file that was asked for, or beside it where such files
+/// cannot hold it, so that the choice is not lost.
+fn file_for(file: &Path, proxy: &Proxy) -> PathBuf {
+    let form = Form::of(proxy);
+    let Err(error) = form.check(file, proxy.kind()) else {
+        return file.to_owned();
+    };
+    let beside = file.with_extension(form.exact_extension());
+    if beside.exists() {
+        // It was not asked for; writing says why the other cannot be.
+        return file.to_owned();
+    }
+    say!("note: {error}; it goes to {}", beside.display());
+    beside
 }
 
 /// Options that belong to other kinds of surface.

@@ -10,7 +10,7 @@ use proxy::dense::{DenseOptions, Matching};
 use proxy::depth;
 use proxy::hull::{self, Silhouette};
 use proxy::{
-    FitBasis, FitError, ILL_CONDITIONED, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint,
+    FitBasis, FitError, Form, ILL_CONDITIONED, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint,
     Tunnel,
 };
 use proxy::{carve, tunnel};
@@ -72,6 +72,17 @@ impl Kind {
             Self::Depth => "depth",
             Self::Dense => "dense",
             Self::CarvedDense => "carved-dense",
+        }
+    }
+
+    /// What there is of it without a desired view.
+    pub fn form(self) -> Form {
+        match self {
+            Self::Plane | Self::DominantPlane => Form::Plane,
+            Self::ViewPlane | Self::Points | Self::Dense => Form::PerView,
+            Self::Tunnel | Self::Hull | Self::Carved | Self::Depth | Self::CarvedDense => {
+                Form::Mesh
+            }
         }
     }
 

@@ -75,6 +75,55 @@ fn a_scene_keeps_any_kind_and_draws_from_it() {
 }
 
 #[test]
+fn files_that_cannot_hold_a_kind_are_refused_before_it_is_fitted() {
+    let folder = with("shelf");
+    // It has no masks for a hull, which fitting would say.
+    for (line, told) in [
+        ("hull -o h.json", "h.json: a mesh is written as .ply"),
+        ("hull -o h.obj", "h.obj: proxies are read from"),
+        ("points -o p.ply", "p.ply: the points proxy is made anew"),
+        ("plane -o p.ply", "p.ply: a plane is written as .json"),
+        ("auto -o p.obj", "p.obj: proxies are read from"),
+    ] {
+        let error = lumigraph(folder.path(), &format!("proxy shelf {line}")).error(1);
+        assert!(error.contains(told), "{line}: {error}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn what_is_chosen_among_all_kinds_is_written_beside_a_file_that_cannot_hold_it() {
+    let folder = with("shelf");
+    let written = |name: &str| {
+        let ran = lumigraph(folder.path(), &format!("proxy shelf auto -o {name}")).ok();
+        let (file, _) = ran.stdout.split_once(": ").unwrap();
+        assert!(folder.path().join(file).is_file(), "{}", ran.stdout);
+        assert_eq!(ran.stderr.contains("it goes to"), file != name);
+        file.to_owned()
+    };
+    let both = [written("a.ply"), written("b.json")];
+    // It is one kind, of which either or the other can hold it.
+    let expected = match both[0].as_str() {
+        "a.ply" => ["a.ply", "b.ply"],
+        _ => ["a.json", "b.json"],
+    };
+    assert_eq!(both, expected);
+    // What is there already is not written over unasked.
+    let (bad, there) = match both[0].as_str() {
+        "a.ply" => ("c.json", "c.ply"),
+        _ => ("c.ply", "c.json"),
+    };
+    std::fs::write(folder.path().join(there), "mine").unwrap();
+    let error = lumigraph(folder.path(), &format!("proxy shelf auto -o {bad}")).error(1);
+    assert!(
+        error.contains("is written as") || error.contains("made anew"),
+        "{error}"
+    );
+    let kept = std::fs::read(folder.path().join(there)).unwrap();
+    assert_eq!(kept, b"mine");
+}
+
+#[test]
 fn meshes_go_out_and_come_in() {
     let folder = with("shelf");
     lumigraph(folder.path(), "proxy shelf carved -o carved.glb").ok();
