@@ -1,6 +1,6 @@
 //! Which proxy suits a scene: decided by photos held out for it.
 
-use super::fit::{Fitted, Kind};
+use super::fit::{FEWEST_POINTS, Fitted, Kind};
 use super::trial::{Scores, Trials};
 use super::{Scene, SceneError};
 use proxy::Proxy;
@@ -111,13 +111,11 @@ impl Scene {
     fn may_have(&self, kind: Kind) -> bool {
         match kind {
             Kind::Plane => true,
-            Kind::DominantPlane
-            | Kind::ViewPlane
-            | Kind::Tunnel
-            | Kind::Points
-            | Kind::Carved
-            | Kind::Dense
-            | Kind::CarvedDense => self.reconstruction.points.len() >= 3,
+            Kind::DominantPlane | Kind::ViewPlane | Kind::Tunnel | Kind::Points | Kind::Carved => {
+                self.reconstruction.points.len() >= FEWEST_POINTS
+            }
+            // Photos are compared whatever there is of points.
+            Kind::Dense | Kind::CarvedDense => true,
             Kind::Hull => self.has_silhouettes(),
             Kind::Depth => self.photos.iter().any(|p| p.depth_map.is_some()),
         }

@@ -2,7 +2,7 @@
 //! by lines of sight.
 
 use super::SceneError;
-use super::fit::{Fitted, unfit};
+use super::fit::{FEWEST_POINTS, Fitted, unfit};
 use calibrate::View;
 use proxy::carve::{self, CarveError};
 use proxy::dense::DensePoints;
@@ -37,7 +37,8 @@ impl CarvedPoints {
     /// Of points as these views see them, so many of which, the first, are the sparse ones.
     pub(super) fn new(views: &[View], mut points: Vec<SparsePoint>, mut sparse: usize) -> Self {
         let options = carve::Options {
-            shell_points: sparse,
+            // Without any, those that were found have to say.
+            shell_points: if sparse > 0 { sparse } else { usize::MAX },
             ..carve::Options::default()
         };
         let surface = carve::surface(views, &points, &options);
@@ -54,6 +55,25 @@ impl CarvedPoints {
             mesh,
             note: None,
         }
+    }
+
+    /// The same of all photos of a scene.
+    ///
+    /// # Errors
+    /// There are too few for any surface.
+    pub(super) fn of_all(
+        views: &[View],
+        points: Vec<SparsePoint>,
+        sparse: usize,
+    ) -> Result<Self, SceneError> {
+        let count = points.len();
+        if count < FEWEST_POINTS {
+            return Err(unfit(format!(
+                "there are no sparse points, and photos agree on {count} places, too few for a surface; \
+                 try plane"
+            )));
+        }
+        Ok(Self::new(views, points, sparse))
     }
 
     /// The same, with something to say of where they come from.
@@ -97,6 +117,9 @@ impl CarvedPoints {
     fn count(&self) -> String {
         let count = self.points.len();
         let found = count - self.sparse;
+        if self.sparse == 0 {
+            return format!("{count} points that photos agree on");
+        }
         format!("{count} points, {found} of them found between the sparse ones")
     }
 }

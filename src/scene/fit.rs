@@ -18,6 +18,15 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
+/// Fewer sparse points tell nothing of where things are.
+pub(super) const FEWEST_POINTS: usize = 3;
+
+/// Without sparse points, how near and how far things are taken to be, in shares of how far that is which photos
+/// look at; where they look every way, of how far apart they were taken.
+const NEAREST: f64 = 1.0 / 3.0;
+const NEAREST_AROUND: f64 = 1.0 / 8.0;
+const FARTHEST: f64 = 20.0;
+
 /// Proxies that can be fitted to a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -152,7 +161,7 @@ impl Scene {
             Kind::Depth => self.fit_depth(without),
             Kind::Dense => self.fit_dense(without),
             Kind::CarvedDense => {
-                let surface = self.dense_surface(kind, without)?;
+                let surface = self.dense_surface(without)?;
                 surface.surface(self.bound(without)?)
             }
         }
@@ -177,7 +186,7 @@ impl Scene {
     fn needs_points(&self, kind: Kind) -> Result<(), SceneError> {
         if self.reconstruction.points.is_empty() {
             return Err(unfit(format!(
-                "the scene has no sparse points, which the {} proxy is made of; try plane",
+                "the scene has no sparse points, which the {} proxy is made of; try dense, carved-dense or plane",
                 kind.name()
             )));
         }
@@ -256,19 +265,47 @@ impl Scene {
     pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
         let rest = self.reconstruction.without_images(without);
         match proxy::fit_plane(&rest) {
-            Err(FitError::NoPoints) => {
-                let bounds = self.photos.iter().filter_map(|photo| {
-                    let bounds = photo.depth_bounds?;
-                    Some((photo.name.clone(), bounds))
-                });
-                Ok(proxy::plane_across_axes(&rest, &bounds.collect())?)
-            }
+            Err(FitError::NoPoints) => Ok(proxy::plane_across_axes(&rest, &self.depth_bounds())?),
             fit => Ok(fit?),
         }
     }
 
+    /// The nearest and the farthest depth of photos, where the calibration says so, by name.
+    fn depth_bounds(&self) -> BTreeMap<String, [f64; 2]> {
+        let photos = self.photos.iter();
+        let bounds = photos.filter_map(|photo| Some((photo.name.clone(), photo.depth_bounds?)));
+        bounds.collect()
+    }
+
+    /// Without sparse points, the inverse depths (1/z) between which to compare each photo but those of the given
+    /// names: as the calibration has them, else around how far that lies which all look at; where they look
+    /// every way, around how far they are from one another.
+    fn supposed_ranges(&self, without: &BTreeSet<String>) -> Result<Vec<[f64; 2]>, SceneError> {
+        let sources = self.sources(without)?;
+        let bounds = self.depth_bounds();
+        let rest = self.reconstruction.without_images(without);
+        let (distance, nearest) = match proxy::plane_across_axes(&rest, &bounds) {
+            Ok(fit) => (fit.distance, NEAREST),
+            Err(_) => (
+                spread(sources.iter().map(|(_, view)| view.center())),
+                NEAREST_AROUND,
+            ),
+        };
+        if !(distance > 0.0 && distance.is_finite()) {
+            return Err(unfit(
+                "the scene has no sparse points, and all photos were taken from one place, which tells \
+                 no depths",
+            ));
+        }
+        let range = |photo: &Photo| match bounds.get(&photo.name) {
+            Some([near, far]) => [1.0 / far, 1.0 / near],
+            None => [1.0 / (FARTHEST * distance), 1.0 / (nearest * distance)],
+        };
+        Ok(sources.iter().map(|(photo, _)| range(photo)).collect())
+    }
+
     fn fit_dense(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        let surface = self.dense_surface(Kind::Dense, without)?;
+        let surface = self.dense_surface(without)?;
         let sources = self.sources(without)?;
         let names = sources.iter().map(|(p, _)| p.name.clone()).collect();
         Ok(surface.dense(names, self.bound(without)?))
@@ -279,16 +316,11 @@ impl Scene {
         Ok(self.cutout(without, None)?.map(|cutout| cutout.hull))
     }
 
-    fn dense_surface(
-        &self,
-        kind: Kind,
-        without: &BTreeSet<String>,
-    ) -> Result<CarvedPoints, SceneError> {
-        self.needs_points(kind)?;
+    fn dense_surface(&self, without: &BTreeSet<String>) -> Result<CarvedPoints, SceneError> {
         let (views, sparse) = self.sparse(without)?;
         let (matching, note) = self.matching(without)?;
         let points = matching.points(&sparse, None);
-        Ok(CarvedPoints::new(&views, points, sparse.len()).with_note(note))
+        Ok(CarvedPoints::of_all(&views, points, sparse.len())?.with_note(note))
     }
 
     /// The photos but those of the given names, ready to be compared, with what sensors measured of
@@ -312,7 +344,13 @@ impl Scene {
             believed.map_err(note).ok()
         };
         let options = DenseOptions::default();
-        let matching = Matching::new(&views, &sparse, photo, depth, &options);
+        let matching = match sparse.len() < FEWEST_POINTS {
+            true => {
+                let ranges = self.supposed_ranges(without)?;
+                Matching::without_points(&views, &ranges, photo, depth, &options)
+            }
+            false => Matching::new(&views, &sparse, photo, depth, &options),
+        };
         let unusable = unusable.into_inner().unwrap_or_default();
         let note = unusable
             .first_key_value()
@@ -322,6 +360,18 @@ impl Scene {
             });
         Ok((matching, note))
     }
+}
+
+/// How far apart places are: how far half of them are from their middle, wherever a few may be.
+fn spread(places: impl Iterator<Item = DVec3> + Clone) -> f64 {
+    let middle_of = |values: &mut dyn Iterator<Item = f64>| {
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let middle = |axis: usize| middle_of(&mut places.clone().map(|place| place[axis]));
+    let middle = DVec3::new(middle(0), middle(1), middle(2));
+    middle_of(&mut places.map(|place| place.distance(middle)))
 }
 
 impl Fitted {

@@ -186,7 +186,7 @@ impl<'a> Trials<'a> {
         let taken = self.take_matching()?;
         let (matching, note) = self.matching.insert(taken);
         let (points, note) = (matching.points(&sparse, None), note.clone());
-        Ok(CarvedPoints::new(&self.views(None), points, sparse.len()).with_note(note))
+        Ok(CarvedPoints::of_all(&self.views(None), points, sparse.len())?.with_note(note))
     }
 
     /// Dense points without each judge, all found at once: much of it takes one thread each.

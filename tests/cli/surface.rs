@@ -75,6 +75,36 @@ fn a_scene_keeps_any_kind_and_draws_from_it() {
 }
 
 #[test]
+fn photos_without_sparse_points_are_compared() {
+    // 1. As nerfstudio's format has it: cameras and poses.
+    let folder = with("shelf");
+    let line = "export shelf --format transforms -o shelf/transforms.json";
+    lumigraph(folder.path(), line).ok();
+    std::fs::remove_dir_all(folder.path().join("shelf/sparse")).unwrap();
+    let ran = lumigraph(folder.path(), "evaluate shelf --every 4 --json").ok();
+    let proxy = ran.json()["proxy"].clone();
+    let trials = proxy["trials"].as_array().unwrap().clone();
+    let score = |kind: &str| {
+        let of_kind = trials.iter().filter(|t| t["kind"] == kind);
+        let scores = of_kind.filter_map(|t| t["psnr"].as_f64());
+        scores.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let best = score("dense").max(score("carved-dense"));
+    assert!(best > score("plane") + 1.0, "{proxy}");
+    assert!(
+        ["dense", "carved-dense"]
+            .iter()
+            .any(|kind| proxy["kind"] == *kind)
+    );
+    // 2. What is made of sparse points says what else there is.
+    let error = lumigraph(folder.path(), "proxy shelf points -o p.json").error(1);
+    assert!(
+        error.contains("no sparse points") && error.contains("try dense"),
+        "{error}"
+    );
+}
+
+#[test]
 fn files_that_cannot_hold_a_kind_are_refused_before_it_is_fitted() {
     let folder = with("shelf");
     // It has no masks for a hull, which fitting would say.

@@ -13,6 +13,7 @@ mod measured;
 mod neighbours;
 mod small;
 mod smooth;
+mod supposed;
 mod sweep;
 mod warp;
 mod windows;
@@ -139,6 +140,41 @@ impl Matching {
             photos,
             measured,
         }
+    }
+
+    /// The same where there are no sparse points: which photos go together, and the depths to try, are
+    /// found by comparing them once between two inverse depths (1/z, world units; the lesser first) each.
+    ///
+    /// # Panics
+    /// As [`densify`]; there are not as many ranges as views.
+    pub fn without_points(
+        views: &[View],
+        ranges: &[[f64; 2]],
+        photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
+        depth: impl Fn(usize) -> Option<Vec<f32>> + Sync,
+        options: &DenseOptions,
+    ) -> Self {
+        assert_eq!(views.len(), ranges.len(), "a range for each view");
+        // 1. Ready to be compared: photos are looked at once.
+        let mut matching = Self::new(views, &[], photo, depth, options);
+        // 2. As if all were seen that lies in the ranges.
+        let supposed = supposed::points(&matching.photos, ranges);
+        matching.go_together(views, &supposed);
+        let tried = matching.photos.iter().zip(ranges);
+        matching.ranges = tried.map(|(p, range)| p.as_ref().map(|_| *range)).collect();
+        // 3. By what they agree on.
+        matching.compare(&[]);
+        let found = matching.points(&[], None);
+        matching.go_together(views, &found);
+        matching.maps.iter_mut().for_each(Vec::clear);
+        matching
+    }
+
+    /// Which photos are to be compared, and between which depths, by points that they show.
+    fn go_together(&mut self, views: &[View], points: &[SparsePoint]) {
+        self.affinity = Affinity::new(views, points);
+        self.neighbours = self.affinity.neighbours(|i| self.photos[i].is_some());
+        self.ranges = neighbours::depth_ranges(&self.photos, points);
     }
 
     /// Finds the depths of all photos, and what they would be without one of the given ones or

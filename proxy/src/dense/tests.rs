@@ -151,6 +151,62 @@ fn the_same_photos_give_the_same_points_on_any_number_of_threads() {
 }
 
 #[test]
+fn photos_tell_where_things_are_without_sparse_points() {
+    let (solid, views, sparse) = seen_by_nine();
+    let options = DenseOptions {
+        long_side: 192,
+        spacing: 4,
+    };
+    let photo = |i: usize| Some(photo(&solid, &views[i]));
+    // What they look at is about 5 away: from a third of that to far beyond.
+    let ranges = [[0.01, 0.6]; 9];
+    let points = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let mut matching = Matching::without_points(&views, &ranges, photo, |_| None, &options);
+            matching.compare(&[]);
+            matching.points(&[], None)
+        })
+    };
+    let found = points(2);
+    let with = densify(&views, &sparse, photo, |_| None, &options);
+    // As many as between sparse points, about, and as near.
+    let between = &with[sparse.len()..];
+    assert!(
+        found.len() > between.len() * 9 / 10,
+        "{} of {}",
+        found.len(),
+        between.len()
+    );
+    let median = |points: &[SparsePoint]| {
+        let mut errors = errors(&solid, points);
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() / 2]
+    };
+    let (without, with) = (median(&found), median(between));
+    println!(
+        "{} points, off by {without:.4} (median; {with:.4} with sparse points)",
+        found.len()
+    );
+    assert!(without < 0.0055 && without < 1.2 * with, "{without} {with}");
+    assert!(points(1) == found);
+}
+
+#[test]
+fn where_photos_show_nothing_in_common_there_are_no_points() {
+    let (solid, views, _) = seen_by_nine();
+    let clear = |_: usize| Some(RgbaImage::new(192, 144));
+    let mut matching = Matching::without_points(&views, &[[0.01, 0.6]; 9], clear, |_| None, &SMALL);
+    matching.compare(&[]);
+    assert_eq!(matching.points(&[], None), []);
+    // One alone has nobody to compare with.
+    let one = |i: usize| (i == 4).then(|| photo(&solid, &views[i]));
+    let mut matching = Matching::without_points(&views, &[[0.01, 0.6]; 9], one, |_| None, &SMALL);
+    matching.compare(&[]);
+    assert_eq!(matching.points(&[], None), []);
+}
+
+#[test]
 fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
     let (options, (solid, views, sparse)) = (SMALL, seen_by_nine());
     let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
