@@ -37,8 +37,12 @@ impl CarvedPoints {
     /// Of points as these views see them, so many of which, the first, are the sparse ones.
     pub(super) fn new(views: &[View], mut points: Vec<SparsePoint>, mut sparse: usize) -> Self {
         let options = carve::Options {
-            // Without any, those that were found have to say.
-            shell_points: if sparse > 0 { sparse } else { usize::MAX },
+            // Of too few, those that were found have to say.
+            shell_points: if sparse >= FEWEST_POINTS {
+                sparse
+            } else {
+                usize::MAX
+            },
             ..carve::Options::default()
         };
         let surface = carve::surface(views, &points, &options);
@@ -69,7 +73,7 @@ impl CarvedPoints {
         let count = points.len();
         if count < FEWEST_POINTS {
             return Err(unfit(format!(
-                "there are no sparse points, and photos agree on {count} places, too few for a surface; \
+                "sparse points and what photos agree on are {count} points, too few for a surface; \
                  try plane"
             )));
         }
