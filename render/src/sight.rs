@@ -1,7 +1,8 @@
 //! The proxy moved to where photos can see it.
 
 use crate::frame::FrameSource;
-use crate::surface::{FacetMap, NO_FACET, each_run};
+use crate::surface::{FacetMap, NO_FACET};
+use crate::tiles::TILE;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::Rays;
@@ -27,9 +28,6 @@ fn sees(source: &FrameSource, ray: DVec3, s: f64) -> bool {
     let [width, height] = source.size;
     pixel.is_some_and(|p| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height)
 }
-
-/// Pixels along a side of a tile.
-const TILE: usize = 8;
 
 /// Which source views what was moved was moved to, by parts of the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,6 +86,9 @@ pub(crate) fn within_sight(
     sources: &[FrameSource],
 ) -> FacetMap {
     let known = rays.map_or_else(Known::default, |rays| Known::of(&map, rays, sources));
+    if known.is_all {
+        return map;
+    }
     let moved = moved(&map, desired, rays, sources, &known);
     if moved.iter().any(|row| !row.is_empty()) {
         map.seers = Seers::new(map.size.map(|side| side as usize));
@@ -96,6 +97,7 @@ pub(crate) fn within_sight(
     for (y, row) in moved.into_iter().enumerate() {
         for moved in row {
             map.seers.note((moved.x, y), moved.source_idx);
+            map.tiles.mix(moved.x, y);
             map.facet_of[y * width + moved.x] = map.planes.len() as u32;
             map.planes.push(moved.plane);
         }
@@ -119,58 +121,82 @@ struct Known {
     tiles: Vec<bool>,
     /// By facet: whether some source view has all that pixels of other tiles see of it.
     facets: Vec<bool>,
+    /// Whether that is true of all facets that these see.
+    is_all: bool,
 }
 
 impl Known {
     fn of(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Self {
         // Large facets are asked alone, which mostly is enough.
         if rays.are_straight() && map.planes.len() * TILE * TILE <= map.facet_of.len() {
+            let (facets, is_all) = facets_seen_whole(map, rays, sources, &Self::default());
             return Self {
-                facets: facets_seen_whole(map, rays, sources, &Self::default()),
+                facets,
+                is_all,
                 ..Self::default()
             };
         }
         let mut known = Self {
             across: (map.size[0] as usize).div_ceil(TILE),
             tiles: tiles_seen_whole(map, rays, sources),
-            facets: Vec::new(),
+            ..Self::default()
         };
-        known.facets = facets_seen_whole(map, rays, sources, &known);
+        (known.facets, known.is_all) = facets_seen_whole(map, rays, sources, &known);
         known
     }
 
-    /// The runs of pixels of a row that see one facet and that are not known to be seen, in tiles or, where
-    /// none was asked, in the whole row.
-    fn rest_of_row(&self, row: &[u32], y: usize) -> Vec<Range<usize>> {
-        let mut rest = Vec::new();
-        let mut add = |pixels: Range<usize>, facet| {
-            if facet != NO_FACET && !self.has_facet(facet) {
-                rest.push(pixels);
-            }
+    /// The tiles of one of their rows that are not known to be seen: their columns of pixels, and the facet that all
+    /// of these see, if it is one.
+    fn open_tiles(&self, map: &FacetMap, row: usize) -> Vec<(Range<usize>, Option<u32>)> {
+        let tiles = map.tiles.of_row(row, map.size[0] as usize);
+        let numbered = tiles.zip(row * self.across..);
+        let is_open = |((_, facet), tile): &((Range<usize>, Option<u32>), usize)| {
+            !self.has_tile(*tile) && facet.is_none_or(|facet| self.is_open(facet))
         };
-        if self.tiles.is_empty() {
-            each_run(row, add);
-            return rest;
-        }
-        let tile = y / TILE * self.across;
-        let tiles = (0..row.len().div_ceil(TILE)).filter(|i| !self.has_tile(tile + i));
-        for first in tiles.map(|i| i * TILE) {
-            let mut start = first;
-            for run in row[first..(first + TILE).min(row.len())].chunk_by(|a, b| a == b) {
-                add(start..start + run.len(), run[0]);
-                start += run.len();
+        numbered.filter(is_open).map(|(tile, _)| tile).collect()
+    }
+
+    /// The runs of pixels of a row that see one facet, which is not known to be seen, within tiles that are not
+    /// either.
+    fn open_runs(&self, row: &[u32], tiles: &[(Range<usize>, Option<u32>)]) -> Vec<Range<usize>> {
+        let mut open: Vec<Range<usize>> = Vec::new();
+        for (columns, _) in tiles {
+            let mut start = columns.start;
+            for run in runs(&row[columns.clone()]) {
+                let pixels = start..start + run.len();
+                start = pixels.end;
+                match open.last_mut() {
+                    _ if !self.is_open(run[0]) => {}
+                    Some(last) if last.end == pixels.start && row[last.start] == run[0] => {
+                        last.end = pixels.end;
+                    }
+                    _ => open.push(pixels),
+                }
             }
         }
-        rest
+        open
+    }
+
+    /// Whether a pixel sees something, which is not known to be seen by a source view.
+    fn is_open(&self, facet: u32) -> bool {
+        facet != NO_FACET && self.facets.get(facet as usize) != Some(&true)
     }
 
     fn has_tile(&self, tile: usize) -> bool {
         self.tiles.get(tile) == Some(&true)
     }
+}
 
-    fn has_facet(&self, facet: u32) -> bool {
-        self.facets.get(facet as usize) == Some(&true)
-    }
+/// The runs of equal numbers; mostly there is one.
+fn runs(row: &[u32]) -> impl Iterator<Item = &[u32]> {
+    let off = row.iter().fold(0, |off, facet| off | (facet ^ row[0]));
+    let (whole, parts) = if off == 0 {
+        (row, &row[..0])
+    } else {
+        (&row[..0], row)
+    };
+    let whole = Some(whole).filter(|row| !row.is_empty());
+    whole.into_iter().chain(parts.chunk_by(|a, b| a == b))
 }
 
 /// For each tile, whether some source view has all that its pixels see: all between the least and the
@@ -256,7 +282,7 @@ fn moved(
         Some(rays) => rays.at(x, y).map(|at| at.extend(1.0)),
         None => desired.lens.unproject(Pixel::center_of(x as u32, y as u32)),
     };
-    let of_row = |y: usize| {
+    let of_row = |y: usize, tiles: &[(Range<usize>, Option<u32>)]| {
         let row = &map.facet_of[y * width..(y + 1) * width];
         // The pixel's ray and the inverse distance of what it sees.
         let looks = |x: usize| {
@@ -271,7 +297,7 @@ fn moved(
             let ends = || Some([looks(pixels.start)?, looks(pixels.end - 1)?]);
             is_straight && ends().is_some_and(|ends| has_all(sources, last, &ends))
         };
-        for run in known.rest_of_row(row, y) {
+        for run in known.open_runs(row, tiles) {
             if is_seen(&run, &mut last) {
                 continue;
             }
@@ -304,42 +330,69 @@ fn moved(
         }
         moved
     };
-    (0..height).into_par_iter().map(of_row).collect()
+    let of_tiles = |tile_row: usize| {
+        let tiles = known.open_tiles(map, tile_row);
+        let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
+        rows.map(move |y| of_row(y, &tiles))
+    };
+    let tile_rows = (0..map.tiles.down()).into_par_iter();
+    tile_rows.flat_map_iter(of_tiles).collect()
 }
 
 /// For each facet, whether some source view has all that pixels of tiles that are not known yet see
 /// of it: then it has the part of the facet's plane before the smallest rectangle around their rays,
-/// in the plane z = 1.
+/// in the plane z = 1. And whether that is true of all that these pixels see.
 fn facets_seen_whole(
     map: &FacetMap,
     rays: &Rays,
     sources: &[FrameSource],
     known: &Known,
-) -> Vec<bool> {
+) -> (Vec<bool>, bool) {
     // 1. The rectangles.
-    let width = map.size[0] as usize;
-    let of_row = |(y, row): (usize, &[u32])| {
-        let of_run = |pixels: Range<usize>| {
-            let facet = row[pixels.start];
+    let [width, height] = map.size.map(|side| side as usize);
+    let of_run = |pixels: Range<usize>, y: usize| {
+        // A pixel without a ray sees nothing.
+        let at = |x: usize| rays.at(x, y);
+        if rays.are_straight() {
             let ends = [pixels.start, pixels.end - 1];
-            // A pixel without a ray sees nothing.
-            let at = |x: usize| rays.at(x, y);
-            let bounds = if rays.are_straight() {
-                ends.into_iter().filter_map(at).fold(NO_BOX, grown)
-            } else {
-                pixels.filter_map(at).fold(NO_BOX, grown)
-            };
-            (facet, bounds)
-        };
-        let runs = known.rest_of_row(row, y).into_iter();
-        runs.map(of_run).collect::<Vec<_>>()
+            ends.into_iter().filter_map(at).fold(NO_BOX, grown)
+        } else {
+            pixels.filter_map(at).fold(NO_BOX, grown)
+        }
     };
-    let rows = map.facet_of.par_chunks(width.max(1)).enumerate();
-    let runs: Vec<Vec<(u32, (DVec2, DVec2))>> = rows.map(of_row).collect();
+    let of_tiles = |tile_row: usize| {
+        let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
+        let mut boxes = Vec::new();
+        let (mixed, whole): (Vec<_>, Vec<_>) = known
+            .open_tiles(map, tile_row)
+            .into_iter()
+            .partition(|(_, facet)| facet.is_none());
+        for (columns, facet) in whole {
+            // Of straight rays the first and the last row are as far as any.
+            let step = if rays.are_straight() {
+                (rows.len() - 1).max(1)
+            } else {
+                1
+            };
+            let of_rows = rows
+                .clone()
+                .step_by(step)
+                .map(|y| of_run(columns.clone(), y));
+            boxes.extend(facet.map(|facet| (facet, of_rows.fold(NO_BOX, both))));
+        }
+        for y in rows {
+            let row = &map.facet_of[y * width..(y + 1) * width];
+            let runs = known.open_runs(row, &mixed).into_iter();
+            boxes.extend(runs.map(|run| (row[run.start], of_run(run, y))));
+        }
+        boxes
+    };
+    let tile_rows = (0..map.tiles.down()).into_par_iter();
+    let of_parts: Vec<(u32, Rectangle)> = tile_rows.flat_map_iter(of_tiles).collect();
     let mut boxes = vec![NO_BOX; map.planes.len()];
-    for (facet, (least, most)) in runs.into_iter().flatten() {
+    for (facet, of_part) in of_parts {
         let all = &mut boxes[facet as usize];
-        *all = (all.0.min(least), all.1.max(most));
+        *all = both(*all, of_part);
     }
 
     // 2. Whether they are seen.
@@ -363,14 +416,24 @@ fn facets_seen_whole(
             *whole = has_all(sources, &mut last, &corners);
         }
     });
-    whole
+    let is_open = |(whole, (least, most)): (&bool, &Rectangle)| !whole && least.x <= most.x;
+    let is_all = !whole.iter().zip(&boxes).any(is_open);
+    (whole, is_all)
 }
 
+/// Its least and its greatest coordinates.
+type Rectangle = (DVec2, DVec2);
+
 /// A rectangle of nothing.
-const NO_BOX: (DVec2, DVec2) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+const NO_BOX: Rectangle = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+
+/// The smallest around two.
+fn both(one: Rectangle, other: Rectangle) -> Rectangle {
+    (one.0.min(other.0), one.1.max(other.1))
+}
 
 /// A rectangle with a point more.
-fn grown((least, most): (DVec2, DVec2), p: DVec2) -> (DVec2, DVec2) {
+fn grown((least, most): Rectangle, p: DVec2) -> Rectangle {
     (least.min(p), most.max(p))
 }
 
@@ -444,13 +507,7 @@ mod tests {
 
     /// Every pixel sees the plane at a depth of 2.
     fn flat() -> FacetMap {
-        FacetMap {
-            planes: vec![DVec3::Z / 2.0],
-            facet_of: vec![0; 1600],
-            size: [40, 40],
-            moved_from: 1,
-            seers: Seers::default(),
-        }
+        FacetMap::of_pixels(vec![DVec3::Z / 2.0], vec![0; 1600], &view(0.0))
     }
 
     #[test]
@@ -533,17 +590,13 @@ mod tests {
                 })
                 .collect();
             let q = |(s, tilt): &(f64, [f64; 3])| (DVec3::Z + DVec3::from_array(*tilt)) * *s;
-            let map = FacetMap {
-                planes: planes.iter().map(q).collect(),
-                // Pieces of 8 × 7 pixels.
-                facet_of: (0..1600).map(|i| i % 40 / 8 + i / 40 / 7 * 5).collect(),
-                moved_from: 30,
-                ..flat()
-            };
+            // Pieces of 8 × 7 pixels.
+            let facet_of: Vec<u32> = (0..1600).map(|i| i % 40 / 8 + i / 40 / 7 * 5).collect();
+            let map = FacetMap::of_pixels(planes.iter().map(q).collect(), facet_of, &desired);
             if let Some(rays) = Rays::of(&desired.lens, (40, 40)) {
                 let all = super::within_sight(map.clone(), &desired, Some(&rays), &sources);
                 let known = Known::of(&map, &rays, &sources);
-                let facets = facets_seen_whole(&map, &rays, &sources, &Known::default());
+                let (facets, _) = facets_seen_whole(&map, &rays, &sources, &Known::default());
                 let one_by_one = moved(&map, &desired, None, &sources, &Known::default());
                 for (y, row) in one_by_one.iter().enumerate() {
                     for at in row {

@@ -3,6 +3,8 @@
 use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
 use crate::sight::{Seers, within_sight};
+use crate::spare::PixelNumbers;
+use crate::tiles::{FacetTiles, TILE};
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use proxy::{Facets, Kept, Plane, Proxy, Rays, Scan, Solid, fit_plane_for_view, points};
@@ -23,30 +25,6 @@ pub enum Surface {
     Facets(FacetMap),
 }
 
-/// Calls `each(pixels, facet)` for the runs of pixels of a row that see one facet.
-pub(crate) fn each_run(row: &[u32], mut each: impl FnMut(Range<usize>, u32)) {
-    let Some(mut facet) = row.first().copied() else {
-        return;
-    };
-    let mut start = 0;
-    for (i, pixels) in row.chunks(BLOCK).enumerate() {
-        let goes_on = |same, other: &u32| same & (*other == facet);
-        if pixels.iter().fold(true, goes_on) {
-            continue;
-        }
-        for (x, &other) in (i * BLOCK..).zip(pixels) {
-            if other != facet {
-                each(start..x, facet);
-                (start, facet) = (x, other);
-            }
-        }
-    }
-    each(start..row.len(), facet);
-}
-
-/// Pixels that are compared together.
-const BLOCK: usize = 32;
-
 /// No facet.
 pub const NO_FACET: u32 = Scan::NOTHING;
 
@@ -56,12 +34,23 @@ pub struct FacetMap {
     /// The facets' vectors q, in the desired camera's frame.
     pub planes: Vec<DVec3>,
     /// Row by row, the facet at each pixel's centre; [`NO_FACET`] where the lens has no ray.
-    pub facet_of: Vec<u32>,
+    pub facet_of: PixelNumbers,
     pub(crate) size: [u32; 2],
+    pub(crate) tiles: FacetTiles,
     /// From this facet on they are pixels' own, moved to where a photo has them.
     pub(crate) moved_from: u32,
     /// Which photos have what was moved.
     pub(crate) seers: Seers,
+}
+
+/// Which of some planes each pixel sees, in few numbers where facets are large.
+pub(crate) struct Packed<'a> {
+    /// The vectors q of facets; of many only those that are seen, in another order.
+    pub planes: Cow<'a, [DVec3]>,
+    /// For each pixel, row by row, the number of its plane, which is one more than its place, zero where it sees none.
+    /// By tiles: first one for each tile, row by row: twice the number of the plane that all of its pixels see. Where they differ, it is one more than twice the place
+    /// at which their numbers begin, row by row, as if all tiles were whole.
+    pub numbers: Vec<u32>,
 }
 
 impl Surface {
@@ -115,13 +104,16 @@ impl Surface {
         }
     }
 
-    /// q at the centres of all pixels of a rectangle, where it is one.
+    /// q at the centres of all pixels of a rectangle within a tile, where it is one.
     #[inline]
     pub(crate) fn plane_of_all(&self, columns: Range<usize>, rows: Range<usize>) -> Option<DVec3> {
         match self {
             Self::Nothing => None,
             Self::Plane(q) => Some(*q),
             Self::Facets(map) => {
+                if let Some(facet) = map.tiles.at(columns.start, rows.start) {
+                    return map.plane_of(facet);
+                }
                 let width = map.size[0] as usize;
                 let first = map.facet_of[rows.start * width + columns.start];
                 let is_one = |row: usize| {
@@ -163,15 +155,8 @@ impl FacetMap {
 
     /// Whether any pixel of a rectangle sees a facet.
     pub(crate) fn any_within(&self, least: DVec2, most: DVec2) -> bool {
-        let [width, height] = self.size;
-        let (x0, y0) = (least.x.max(0.0) as usize, least.y.max(0.0) as usize);
-        let beyond = |at: f64, side: u32| at.ceil().clamp(0.0, f64::from(side)) as usize;
-        let (x1, y1) = (beyond(most.x, width), beyond(most.y, height));
-        (y0..y1).any(|y| {
-            let row = y * width as usize;
-            let pixels = self.facet_of.get(row + x0..row + x1);
-            pixels.is_some_and(|pixels| pixels.iter().any(|&facet| facet != NO_FACET))
-        })
+        let size = self.size.map(|side| side as usize);
+        self.tiles.any_within(&self.facet_of, size, least, most)
     }
 
     /// The centre of the pixel nearest to a position, within so many columns and rows, that sees a
@@ -179,10 +164,11 @@ impl FacetMap {
     pub(crate) fn nearest(&self, pixel: Pixel, within: i64) -> Option<Pixel> {
         let [width, height] = self.size.map(i64::from);
         let (x, y) = (pixel.x.floor() as i64, pixel.y.floor() as i64);
+        let least = self.tiles.least_ring([x, y], within)?;
         let center = |x: i64, y: i64| Pixel::center_of(x as u32, y as u32);
         let far = |p: &Pixel| (p.x - pixel.x).powi(2) + (p.y - pixel.y).powi(2);
         // Ring by ring. One may hold what is nearer than the first found, but hardly.
-        (0..=within).find_map(|r| {
+        (least..=within).find_map(|r| {
             let ring = (-r..=r).flat_map(|i| [(i, -r), (i, r), (-r, i), (r, i)]);
             let inside = ring
                 .map(|(dx, dy)| (x + dx, y + dy))
@@ -201,32 +187,60 @@ impl FacetMap {
         self.facet_of[row * width as usize + column]
     }
 
-    /// The vectors q of facets, and the facet at each pixel's centre; of many facets only those that are seen, by
-    /// other numbers, in the order of the pixels.
-    pub(crate) fn few_planes(&self) -> (Cow<'_, [DVec3]>, Cow<'_, [u32]>) {
+    /// The same, as a device looks it up: by tiles or for each pixel.
+    pub(crate) fn packed(&self, by_tiles: bool) -> Packed<'_> {
         /// So many cost nothing.
         const FEW: usize = 4096;
-        if self.planes.len() <= FEW {
-            return (
-                self.planes.as_slice().into(),
-                self.facet_of.as_slice().into(),
-            );
-        }
+        let is_few = self.planes.len() <= FEW;
         let mut seen = Vec::new();
-        let mut number_of = vec![NO_FACET; self.planes.len()];
-        let renumber = |&facet: &u32| {
-            if facet == NO_FACET {
-                return NO_FACET;
+        let mut numbered = vec![0; if is_few { 0 } else { self.planes.len() }];
+        let mut number = |facet: u32| {
+            if is_few || facet == NO_FACET {
+                return facet.wrapping_add(1);
             }
-            let number = &mut number_of[facet as usize];
-            if *number == NO_FACET {
-                *number = seen.len() as u32;
+            let number = &mut numbered[facet as usize];
+            if *number == 0 {
                 seen.push(self.planes[facet as usize]);
+                *number = seen.len() as u32;
             }
             *number
         };
-        let facet_of: Vec<u32> = self.facet_of.iter().map(renumber).collect();
-        (seen.into(), facet_of.into())
+        let numbers = match by_tiles {
+            true => self.numbers_by_tiles(number),
+            false => self.facet_of.iter().map(|facet| number(*facet)).collect(),
+        };
+        Packed {
+            planes: if is_few {
+                self.planes.as_slice().into()
+            } else {
+                seen.into()
+            },
+            numbers,
+        }
+    }
+
+    /// See [`Packed::numbers`]; `number` is that of a facet's plane.
+    fn numbers_by_tiles(&self, mut number: impl FnMut(u32) -> u32) -> Vec<u32> {
+        let [width, height] = self.size.map(|side| side as usize);
+        let mut numbers = vec![0; self.tiles.iter().count()];
+        for (i, ([column, row], facet)) in self.tiles.iter().enumerate() {
+            if let Some(facet) = facet {
+                numbers[i] = 2 * number(facet);
+                continue;
+            }
+            let start = numbers.len();
+            numbers[i] = 2 * start as u32 + 1;
+            numbers.resize(start + TILE * TILE, 0);
+            let rows = numbers[start..].chunks_exact_mut(TILE);
+            for (y, numbers) in (row..height).zip(rows) {
+                let facets = &self.facet_of[y * width..(y + 1) * width][column..];
+                numbers
+                    .iter_mut()
+                    .zip(facets)
+                    .for_each(|(n, facet)| *n = number(*facet));
+            }
+        }
+        numbers
     }
 
     fn plane_of(&self, facet: u32) -> Option<DVec3> {
@@ -234,9 +248,15 @@ impl FacetMap {
     }
 
     /// Facets, and which of them each pixel's centre sees, row by row; [`NO_FACET`] for none.
-    pub(crate) fn of_pixels(planes: Vec<DVec3>, facet_of: Vec<u32>, desired: &View) -> Self {
+    pub(crate) fn of_pixels(
+        planes: Vec<DVec3>,
+        facet_of: impl Into<PixelNumbers>,
+        desired: &View,
+    ) -> Self {
+        let facet_of = facet_of.into();
         Self {
             moved_from: planes.len() as u32,
+            tiles: FacetTiles::of(&facet_of, desired.width as usize),
             planes,
             facet_of,
             seers: Seers::default(),
@@ -346,7 +366,9 @@ impl FacetMap {
         let triangles = (0..solid.triangle_count()).into_par_iter();
         let planes: Vec<DVec3> = triangles.map(plane).collect();
         if let Some(rays) = rays {
-            let facet_of = solid.triangles_along(desired, rays);
+            let mut facet_of =
+                PixelNumbers::of_any(desired.width as usize * desired.height as usize);
+            solid.triangles_along(desired, rays, &mut facet_of);
             return Self::of_pixels(planes, facet_of, desired);
         }
         let world_from_camera = rotation.conjugate();
@@ -382,38 +404,44 @@ impl FacetMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calibrate::{Lens, Rigid3};
     use proptest::collection::vec;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn runs_are_what_neighbours_share(lengths in vec((0_u32..4, 1_usize..90), 0..12)) {
-            let row: Vec<u32> = lengths.iter().flat_map(|(f, n)| vec![*f; *n]).collect();
-            let mut found = Vec::new();
-            each_run(&row, |pixels, facet| found.push((pixels, facet)));
-            let mut next = 0;
-            let expected = row.chunk_by(|a, b| a == b).map(|run| {
-                next += run.len();
-                (next - run.len()..next, run[0])
-            });
-            prop_assert!(found.iter().cloned().eq(expected));
-        }
-
-        #[test]
-        fn few_planes_are_those_that_are_seen(facets in vec(0_u32..6000, 20..=20), spare in 0_usize..6000) {
+        fn packed_planes_are_those_that_are_seen(
+            facets in vec(0_u32..6000, 20), spare in 0_usize..6000, [width, height] in [1_u32..30, 1_u32..30],
+        ) {
             let planes: Vec<DVec3> = (0..6000 - spare).map(|i| DVec3::splat(i as f64)).collect();
             let seen = |f: &u32| if (*f as usize) < planes.len() { *f } else { NO_FACET };
-            let map = FacetMap {
-                moved_from: planes.len() as u32,
-                facet_of: facets.iter().map(seen).collect(),
-                planes,
-                seers: Seers::default(),
-                size: [5, 4],
+            // Some tiles see one, others several.
+            let facet = |i: u32| facets[(i % width / 5 + i / width / 7 * 3) as usize % facets.len()];
+            let facet_of: Vec<u32> = (0..width * height).map(|i| seen(&facet(i))).collect();
+            let desired = View {
+                lens: Lens::pinhole(DVec2::ONE, DVec2::ONE),
+                width,
+                height,
+                camera_from_world: Rigid3::IDENTITY,
             };
-            let (few, facet_of) = map.few_planes();
-            let of = |facet: &u32| few.get(*facet as usize).copied();
-            prop_assert!(facet_of.iter().map(of).eq(map.facet_of.iter().map(|f| map.plane_of(*f))));
-            prop_assert!(few.len() <= 4096);
+            let map = FacetMap::of_pixels(planes, facet_of, &desired);
+            let Packed { planes, numbers } = map.packed(true);
+            for (i, facet) in map.facet_of.iter().enumerate() {
+                let (x, y) = (i % width as usize, i / width as usize);
+                let of_tile = numbers[y / TILE * (width as usize).div_ceil(TILE) + x / TILE] as usize;
+                let number = match of_tile % 2 {
+                    0 => of_tile / 2,
+                    _ => numbers[of_tile / 2 + y % TILE * TILE + x % TILE] as usize,
+                };
+                let plane = number.checked_sub(1).map(|at| planes[at]);
+                prop_assert_eq!(plane, map.plane_of(*facet));
+            }
+            prop_assert!(planes.len() <= 4096);
+            let one_by_one = map.packed(false);
+            for (number, facet) in one_by_one.numbers.iter().zip(map.facet_of.iter()) {
+                let plane = number.checked_sub(1).map(|at| one_by_one.planes[at as usize]);
+                prop_assert_eq!(plane, map.plane_of(*facet));
+            }
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::{Facets, Solid};
 use calibrate::{Lens, View};
 use glam::{DMat3, DVec3};
 pub use kept::Kept;
+use pulp::Arch;
 use rayon::prelude::*;
 pub use rays::Rays;
 use rays::{BLOCK, Bent};
@@ -75,15 +76,18 @@ impl Solid {
         scan
     }
 
-    /// The triangles of [`Self::scan_along`] alone.
-    pub fn triangles_along(&self, view: &View, rays: &Rays) -> Vec<u32> {
-        if self.within().is_some() {
-            return self.scan_along(view, rays).triangle_of;
-        }
+    /// The triangles of [`Self::scan_along`] alone, in place of whatever numbers there are for the pixels.
+    ///
+    /// # Panics
+    /// There are not as many as pixels.
+    pub fn triangles_along(&self, view: &View, rays: &Rays, triangle_of: &mut [u32]) {
         let [width, height] = rays.size;
-        let mut triangle_of = vec![0; width * height];
-        draw_all(&self.prepared(view, rays), rays, &mut triangle_of, None);
-        triangle_of
+        assert_eq!(triangle_of.len(), width * height, "a number for each pixel");
+        if self.within().is_some() {
+            triangle_of.copy_from_slice(&self.scan_along(view, rays).triangle_of);
+        } else {
+            draw_all(&self.prepared(view, rays), rays, triangle_of, None);
+        }
     }
 
     /// The triangles that rays may meet.
@@ -214,13 +218,21 @@ fn draw_all(triangles: &[Prepared], rays: &Rays, ids: &mut [u32], depths: Option
                     own.as_mut_slice()
                 }
             };
-            for (start, end, i) in spans {
-                let triangle = &triangles[*i as usize];
-                match &rays.bent {
-                    None => triangle.draw(row, *start as usize..*end as usize, ids, depths),
-                    Some(bent) => triangle.draw_bent(row, bent, ids, depths),
+            if let Some(bent) = &rays.bent {
+                for (_, _, i) in spans {
+                    triangles[*i as usize].draw_bent(row, bent, ids, depths);
                 }
+                continue;
             }
+            Arch::new().dispatch(
+                #[inline(always)]
+                move || {
+                    for (start, end, i) in spans {
+                        let columns = *start as usize..*end as usize;
+                        triangles[*i as usize].draw(row, columns, ids, depths);
+                    }
+                },
+            );
         }
     };
     let ids = ids.par_chunks_mut(pixels).enumerate();
@@ -413,6 +425,7 @@ impl Prepared {
     }
 
     /// Draws columns of a pinhole's row over what is farther.
+    #[inline(always)]
     fn draw(&self, row: usize, columns: Range<usize>, ids: &mut [u32], depths: &mut [f64]) {
         let rest = self.inverse_depth.y * (row as f64 + 0.5) + self.inverse_depth.z;
         let slope = self.inverse_depth.x;
@@ -457,7 +470,9 @@ mod tests {
         };
         // Without depths, which need not be compared everywhere, it is the same.
         let rays = Rays::reduced(view, reduction).unwrap();
-        assert_eq!(solid.triangles_along(view, &rays), scan.triangle_of);
+        let mut alone = vec![7; scan.triangle_of.len()];
+        solid.triangles_along(view, &rays, &mut alone);
+        assert_eq!(alone, scan.triangle_of);
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let mut seen = 0;
         for (i, (&id, &s)) in scan.triangle_of.iter().zip(&scan.inverse_depth).enumerate() {

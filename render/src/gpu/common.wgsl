@@ -21,7 +21,8 @@ struct Params {
     finest: f32,
     // 1 where all pixels see one plane, 0 where none sees anything.
     plane_seen: f32,
-    plane_row_bits: u32,
+    table_row_bits: u32,
+    tiles_across: u32,
 }
 
 // MAX_CONTRIBUTORS and SAME_RAY of the Rust side.
@@ -82,6 +83,8 @@ override MASKED: bool = false;
 override OCCLUDED: bool = false;
 // Whether each pixel sees a plane of its own.
 override FACETS: bool = false;
+// Whether these are looked up by tiles.
+override BY_TILES: bool = false;
 // Whether the rays come from the table: the desired lens is not a pinhole.
 override RAYS_IN_TABLE: bool = false;
 // Whether levels of detail go by the distance from the desired camera, for a wide lens.
@@ -126,7 +129,7 @@ const LENS_SKEWED_FISHEYE: f32 = 12.0;
 @group(0) @binding(5) var mask_sampler: sampler;
 // Half as large as the photos' array; a single texel where nothing can be hidden.
 @group(0) @binding(6) var distances: texture_2d_array<f32>;
-// Which of the planes each pixel sees, counted from the second.
+// Which of the planes each pixel sees (`Packed` of surface.rs); by tiles in rows of the same power of two.
 @group(0) @binding(7) var facets: texture_2d<u32>;
 
 fn source_data(source_idx: u32, texel: u32) -> vec4f {
@@ -182,12 +185,33 @@ fn rational(source_idx: u32, n: vec2f, r2: f32, full: bool) -> vec2f {
     return n * radial + 2.0 * k.zw * n.x * n.y + k.wz * (r2 + 2.0 * n * n);
 }
 
+// Pixels of a tile's side: TILE of tiles.rs.
+const TILE = 8u;
+
+fn facet_number(at: u32) -> u32 {
+    let bits = params.table_row_bits;
+    return textureLoad(facets, vec2u(at & ((1u << bits) - 1u), at >> bits), 0).x;
+}
+
+// The place of the plane that a pixel sees.
+fn facet_at(pixel: vec2u) -> u32 {
+    if !BY_TILES {
+        return textureLoad(facets, pixel, 0).x;
+    }
+    let tile = pixel / TILE;
+    let of_tile = facet_number(tile.y * params.tiles_across + tile.x);
+    if (of_tile & 1u) == 0u {
+        return of_tile >> 1u;
+    }
+    let within = pixel % TILE;
+    return facet_number((of_tile >> 1u) + within.y * TILE + within.x);
+}
+
 // The plane of the proxy seen at a pixel; w is 0 where there is none.
 fn plane_at(pixel: vec2u) -> vec4f {
     if FACETS {
-        // One more than the largest number is zero.
-        let facet = textureLoad(facets, pixel, 0).x + 1u;
-        let bits = params.plane_row_bits;
+        let facet = facet_at(pixel);
+        let bits = params.table_row_bits;
         return textureLoad(planes, vec2u(facet & ((1u << bits) - 1u), facet >> bits), 0);
     }
     return vec4f(params.plane, params.plane_seen);

@@ -6,6 +6,7 @@ use crate::frame::{Frame, FrameSource};
 use crate::options::{Blend, Resolution};
 use crate::sensor::focal_and_sensor;
 use crate::surface::Surface;
+use crate::tiles::TILE;
 use bytemuck::{Pod, Zeroable};
 use calibrate::Distortion;
 use glam::DVec3;
@@ -27,10 +28,10 @@ pub(crate) struct Params {
     pub k: u32,
     pub finest: f32,
     pub plane_seen: f32,
-    /// Bits of a plane's number within a row of their table.
-    pub plane_row_bits: u32,
-    /// A struct's size is a multiple of its alignment.
-    pub rest: u32,
+    /// Bits of a place within a row of the planes' table, and of the facets'.
+    pub table_row_bits: u32,
+    /// Of the facets' table.
+    pub tiles_across: u32,
 }
 
 /// A source view: the texels that common.wgsl names, in order.
@@ -113,7 +114,7 @@ impl Params {
         array_size: [u32; 2],
         finest: usize,
         part: Rect,
-        plane_row_bits: u32,
+        table_row_bits: u32,
     ) -> Self {
         let lens = frame.desired.lens;
         Self {
@@ -129,8 +130,8 @@ impl Params {
             k: frame.options.k as u32,
             finest: finest as f32,
             plane_seen: f32::from(u8::from(frame.surface != Surface::Nothing)),
-            plane_row_bits,
-            rest: 0,
+            table_row_bits,
+            tiles_across: frame.desired.width.div_ceil(TILE as u32),
         }
     }
 }

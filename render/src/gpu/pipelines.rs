@@ -36,6 +36,20 @@ pub enum ShadeBy {
     Workgroups,
 }
 
+impl ShadeBy {
+    /// Whether what a pixel sees is looked up by tiles: there is less to bring, and one more fetch a pixel, which costs
+    /// drivers that imitate a graphics processor more.
+    pub(crate) fn looks_up_tiles(self) -> bool {
+        self == Self::Workgroups
+    }
+
+    /// Whether a pixel keeps where it samples each photo that may count, rather than to find it again for the few
+    /// that do: graphics processors have memory of their own for little, which imitations need not have.
+    fn keeps_texels(self) -> bool {
+        self == Self::Fragments
+    }
+}
+
 /// What a pipeline computes at each pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Pass {
@@ -169,7 +183,13 @@ impl Pipelines {
                 immediate_size: 0,
             })
         };
-        let (shared, constants) = (&self.shared_layout, special.constants());
+        let shared = &self.shared_layout;
+        let mut constants = special.constants().to_vec();
+        let flag = |set: bool| f64::from(u8::from(set));
+        constants.push(("BY_TILES", flag(self.shade_by.looks_up_tiles())));
+        if matches!(pass, Pass::Triangles | Pass::BorderedTriangles) {
+            constants.push(("KEEPS_TEXELS", flag(self.shade_by.keeps_texels())));
+        }
         match (self.shade_by, pass) {
             (ShadeBy::Fragments, Pass::Triangles | Pass::BorderedTriangles | Pass::Exact) => {
                 let (corners, name) = match pass {

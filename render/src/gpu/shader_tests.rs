@@ -107,7 +107,7 @@ fn params_lie_where_the_shaders_read_them() {
     let expected = offsets!(
         plane beta ray_scale ray_offset image array_size part_origin part_size full_weight k finest
         plane_seen
-        plane_row_bits
+        table_row_bits tiles_across
     );
     for shader in SHADERS.into_iter().filter(has_common) {
         let (found, size) = members(&parse(shader), "Params");
@@ -165,6 +165,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
 fn corners_and_entries_are_what_the_shaders_take() {
     let module = shader("triangulated");
     assert_eq!(constants(&module)["ENTRIES_PER_ROW"] as u32, ENTRY_ROW);
+    assert_eq!(constants(&module)["TILE"] as usize, crate::tiles::TILE);
     // An entry is one texel: the source view in x, the corners' values in y, z and w.
     assert_eq!(size_of::<Entry>(), size_of::<[f32; 4]>());
     assert_eq!(offset_of!(Entry, source_idx), 0);

@@ -9,7 +9,7 @@ use super::target::flat;
 use crate::RenderError;
 use crate::frame::Frame;
 use crate::rays::RayMap;
-use crate::surface::Surface;
+use crate::surface::{Packed, Surface};
 use wgpu::util::DeviceExt;
 
 /// Four numbers a texel.
@@ -20,7 +20,7 @@ pub(super) struct Tables {
     pub rays: wgpu::TextureView,
     pub planes: wgpu::TextureView,
     pub facets: wgpu::TextureView,
-    plane_row_bits: u32,
+    table_row_bits: u32,
 }
 
 impl Gpu {
@@ -44,13 +44,13 @@ impl Gpu {
                 frame.sources.len()
             )));
         }
-        let plane_row_bits = side.ilog2();
-        let [planes, facets] = self.planes(frame, plane_row_bits)?;
+        let table_row_bits = side.ilog2();
+        let [planes, facets] = self.planes(frame, table_row_bits)?;
         Ok(Tables {
             rays: self.rays(frame),
             planes,
             facets,
-            plane_row_bits,
+            table_row_bits,
         })
     }
 
@@ -71,7 +71,7 @@ impl Gpu {
             photos.size,
             photos.finest,
             rect,
-            tables.plane_row_bits,
+            tables.table_row_bits,
         );
         let source = |i| {
             let layer_of = |layers: Option<&Layers>| layers.and_then(|layers| layers.layer(i));
@@ -127,20 +127,24 @@ impl Gpu {
         view
     }
 
-    /// The planes that pixels see, after that of none, and which of them each pixel sees; a single texel
-    /// each where all see the same.
+    /// The planes that pixels see, after that of none, and which of them each pixel sees, as [`Packed`] says it; a single texel each where all see the same.
     fn planes(
         &self,
         frame: &Frame<'_>,
         row_bits: u32,
     ) -> Result<[wgpu::TextureView; 2], RenderError> {
+        let format = wgpu::TextureFormat::R32Uint;
         let Surface::Facets(map) = &frame.surface else {
             let planes = self.texels("planes", 1, 1, &[[0.0; 4]]);
-            return Ok([planes, self.numbers("facets", 1, 1, &[0])]);
+            return Ok([planes, self.texture("facets", [1, 1], format, &[0; 4])]);
         };
-        let (planes, facet_of) = map.few_planes();
+        let Packed {
+            planes,
+            mut numbers,
+        } = map.packed(self.pipelines.shade_by.looks_up_tiles());
         let (row, side) = (1 << row_bits, self.limits.max_texture_dimension_2d);
-        if planes.len() >= row as usize * side as usize {
+        let most = row as usize * side as usize;
+        if planes.len() >= most || numbers.len() > most {
             return Err(RenderError::Gpu(format!(
                 "a picture of {} facets is more than this device draws; use --device cpu or a smaller --size",
                 planes.len()
@@ -148,10 +152,14 @@ impl Gpu {
         }
         let seen = planes.iter().map(|q| q.as_vec3().extend(1.0).to_array());
         let texels: Vec<[f32; 4]> = std::iter::once([0.0; 4]).chain(seen).collect();
-        let (width, height) = (frame.desired.width, frame.desired.height);
-        let facets = self.numbers("facets", width, height, &facet_of);
-        let texels = bytemuck::cast_slice(&texels);
-        Ok([self.table("planes", FLOATS, texels, row), facets])
+        let planes = self.table("planes", FLOATS, bytemuck::cast_slice(&texels), row);
+        let size = match self.pipelines.shade_by.looks_up_tiles() {
+            true => [row, (numbers.len() as u32).div_ceil(row)],
+            false => [frame.desired.width, frame.desired.height],
+        };
+        numbers.resize(size[0] as usize * size[1] as usize, 0);
+        let numbers = bytemuck::cast_slice(&numbers);
+        Ok([planes, self.texture("facets", size, format, numbers)])
     }
 
     /// A list of texels as a texture of rows of `row` texels; never empty.
@@ -176,16 +184,6 @@ impl Gpu {
         texels: &[[f32; 4]],
     ) -> wgpu::TextureView {
         self.texture(label, [width, height], FLOATS, bytemuck::cast_slice(texels))
-    }
-
-    fn numbers(&self, label: &str, width: u32, height: u32, numbers: &[u32]) -> wgpu::TextureView {
-        let format = wgpu::TextureFormat::R32Uint;
-        self.texture(
-            label,
-            [width, height],
-            format,
-            bytemuck::cast_slice(numbers),
-        )
     }
 
     fn texture(

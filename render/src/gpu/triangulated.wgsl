@@ -61,6 +61,11 @@ fn add_photo(mix: ptr<function, Mix>, weight: f32, source_idx: u32, texel: vec3f
     add(mix, weight, color, source_idx);
 }
 
+// Where a photo is sampled, and at which mip level.
+fn texel_of(source_idx: u32, sight: Sight, ray: vec3f, plane: vec3f) -> vec3f {
+    return vec3f(sight.pixel, level_of_detail(source_idx, sight, ray, plane));
+}
+
 fn entry(entry_idx: u32) -> vec4f {
     return textureLoad(entries, vec2u(entry_idx % ENTRIES_PER_ROW, entry_idx / ENTRIES_PER_ROW), 0);
 }
@@ -101,8 +106,7 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
         // Every listed view sees all of the triangle: fovBlend and mask are one.
         let sight = see(source_idx, ray, s);
         if sight.depth > 0.0 {
-            let level = level_of_detail(source_idx, sight, ray, plane.xyz);
-            add_photo(&mix, weight, source_idx, vec3f(sight.pixel, level));
+            add_photo(&mix, weight, source_idx, texel_of(source_idx, sight, ray, plane.xyz));
         }
     }
     return resolve(mix);
@@ -112,10 +116,13 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
 struct Terms {
     diff: array<f32, LISTED>,
     a: array<f32, LISTED>,
-    // Where to sample, and the mip level.
-    texel: array<vec3f, LISTED>,
     source_idx: array<u32, LISTED>,
+    // Where to sample, and the mip level, where they are kept.
+    texel: array<vec3f, LISTED>,
 }
+
+// Whether they are, rather than found again for the few that have weight (`ShadeBy` of pipelines.rs).
+override KEEPS_TEXELS: bool = false;
 
 // Where the border of a photo or a mask crosses the triangle: interpolated differences, the
 // pixel's own fovBlend and mask, and the blend of the exact field. A pipeline of its own, because software
@@ -161,8 +168,10 @@ fn bordered_color(pixel: vec2u, it: Listed) -> vec4f {
             sums += a * vec2f(1.0, diff);
             terms.diff[count] = diff;
             terms.a[count] = a;
-            terms.texel[count] = vec3f(sight.pixel, level_of_detail(source_idx, sight, ray, plane.xyz));
             terms.source_idx[count] = source_idx;
+            if KEEPS_TEXELS {
+                terms.texel[count] = texel_of(source_idx, sight, ray, plane.xyz);
+            }
             count++;
         }
     }
@@ -183,7 +192,14 @@ fn bordered_color(pixel: vec2u, it: Listed) -> vec4f {
             weight = terms.a[n];
         }
         if weight > 0.0 {
-            add_photo(&mix, weight, terms.source_idx[n], terms.texel[n]);
+            let source_idx = terms.source_idx[n];
+            var texel: vec3f;
+            if KEEPS_TEXELS {
+                texel = terms.texel[n];
+            } else {
+                texel = texel_of(source_idx, see(source_idx, ray, s), ray, plane.xyz);
+            }
+            add_photo(&mix, weight, source_idx, texel);
         }
     }
     return resolve(mix);
