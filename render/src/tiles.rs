@@ -48,7 +48,7 @@ impl FacetTiles {
     #[inline]
     pub(crate) fn at(&self, column: usize, row: usize) -> Option<u32> {
         let facet = self.facet_of[row / TILE * self.across + column / TILE];
-        (facet != MIXED).then_some(facet)
+        of_whole(facet)
     }
 
     /// Takes note that a pixel sees another facet.
@@ -83,7 +83,7 @@ impl FacetTiles {
     pub(crate) fn iter(&self) -> impl Iterator<Item = ([usize; 2], Option<u32>)> {
         let place = |i: usize| [i % self.across * TILE, i / self.across * TILE];
         let facets = self.facet_of.iter().enumerate();
-        facets.map(move |(i, &facet)| (place(i), (facet != MIXED).then_some(facet)))
+        facets.map(move |(i, &facet)| (place(i), of_whole(facet)))
     }
 
     /// How many rows of tiles there are.
@@ -99,12 +99,9 @@ impl FacetTiles {
     ) -> impl Iterator<Item = (Range<usize>, Option<u32>)> {
         let tiles = &self.facet_of[row * self.across..][..self.across];
         let starts = (0..width).step_by(TILE);
-        starts.zip(tiles).map(move |(start, &facet)| {
-            (
-                start..(start + TILE).min(width),
-                (facet != MIXED).then_some(facet),
-            )
-        })
+        starts
+            .zip(tiles)
+            .map(move |(start, &facet)| (start..(start + TILE).min(width), of_whole(facet)))
     }
 
     /// Whether any pixel of a rectangle, of the picture `facet_of`, sees a facet.
@@ -137,6 +134,12 @@ impl FacetTiles {
                 .any(|column| sees([column, row]))
         })
     }
+}
+
+/// What all of a tile's pixels see.
+#[inline]
+fn of_whole(facet: u32) -> Option<u32> {
+    (facet != MIXED).then_some(facet)
 }
 
 /// Notes what a row of tiles sees, given its rows of pixels; row by row, as memory has them.

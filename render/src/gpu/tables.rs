@@ -127,7 +127,8 @@ impl Gpu {
         view
     }
 
-    /// The planes that pixels see, after that of none, and which of them each pixel sees, as [`Packed`] says it; a single texel each where all see the same.
+    /// The planes that pixels see, after that of none, and which of them each pixel sees, as [`Packed`]
+    /// says it; a single texel each where all see the same.
     fn planes(
         &self,
         frame: &Frame<'_>,
