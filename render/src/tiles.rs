@@ -123,7 +123,8 @@ impl FacetTiles {
                 pixels.iter().any(|&facet| facet != NO_FACET)
             }),
         };
-        if x0 >= x1 {
+        // Also where the rectangle lies in a tile that reaches beyond the picture.
+        if x0 >= x1 || y0 >= y1 {
             return false;
         }
         let first = |at: usize| at / TILE * TILE;
