@@ -135,7 +135,9 @@ impl Solid {
         let point_inverse = if along > 0.0 { along.recip() } else { 0.0 };
         let mut around = Around::default();
         let mut passed = 0.0;
-        while let Some(hit) = self.first_hit(from_in_world + direction * passed, direction) {
+        // Sides where the ray leaves count, too.
+        let next = |from: DVec3| self.first_own_hit(from, direction, false);
+        while let Some(hit) = next(from_in_world + direction * passed) {
             // A little on, so that it is not met again.
             passed = (passed + hit.along) * (1.0 + ON);
             let [a, b, c] = self.corners(hit.triangle_idx as usize);

@@ -571,6 +571,54 @@ mod tests {
         assert_eq!(compare(&solid, &view, 1), 96 * 96);
     }
 
+    /// Two boxes, one before the other: as a hull, whose back sides do not count, and as any mesh.
+    #[test]
+    fn from_outside_a_closed_surface_back_sides_change_nothing() {
+        let boxes = [[2.0, 3.0], [5.0, 6.0]].map(|z| {
+            let pick = |i: u32, bit: u32| (i >> bit & 1) as usize;
+            let corner = |i| {
+                DVec3::new(
+                    [-1.0, 1.0][pick(i, 0)],
+                    [-0.7, 1.1][pick(i, 1)],
+                    z[pick(i, 2)],
+                )
+            };
+            let faces = [
+                [0, 2, 3, 1],
+                [4, 5, 7, 6],
+                [0, 1, 5, 4],
+                [2, 6, 7, 3],
+                [0, 4, 6, 2],
+                [1, 3, 7, 5],
+            ];
+            Mesh {
+                positions: (0..8).map(corner).collect(),
+                triangles: faces
+                    .iter()
+                    .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                    .collect(),
+            }
+        });
+        let mut mesh = boxes[0].clone();
+        mesh.append(&boxes[1]);
+        let [hull, any] =
+            [MeshKind::Hull, MeshKind::Mesh].map(|kind| Solid::new(kind, mesh.clone()));
+        for (center, turn) in [
+            (DVec3::ZERO, 0.0),
+            (DVec3::new(4.0, 0.4, 2.5), 1.4),
+            (DVec3::new(-0.3, 0.2, 4.0), 0.1),
+        ] {
+            let view = view(center, DQuat::from_rotation_y(turn), (96, 64), 40.0);
+            let scan = hull.scan(&view, 1).unwrap();
+            assert_eq!(scan, any.scan(&view, 1).unwrap());
+            let seen = compare(&hull, &view, 1);
+            assert!(seen > 500, "{seen}");
+        }
+        let within = view(DVec3::new(0.1, 0.2, 2.4), DQuat::IDENTITY, (8, 6), 40.0);
+        let first = hull.scan(&within, 1).unwrap().triangle_of[0];
+        assert!(first >= 12 && first != Scan::NOTHING, "{first}");
+    }
+
     #[test]
     fn nothing_is_seen_of_nothing() {
         let empty = Solid::new(MeshKind::Mesh, Mesh::default());

@@ -59,9 +59,10 @@ impl MeshKind {
 
     /// Whether only the sides of triangles that are counter-clockwise count. Between free space and
     /// solid nothing else can be seen from free space; and a desired view that strays into
-    /// what no line of sight carved looks out of it instead of at its near wall.
+    /// what no line of sight carved looks out of it instead of at its near wall. From within a hull
+    /// nothing is seen.
     pub fn has_front_sides_only(self) -> bool {
-        matches!(self, Self::Carved | Self::CarvedDense)
+        matches!(self, Self::Hull | Self::Carved | Self::CarvedDense)
     }
 }
 
@@ -186,7 +187,8 @@ impl Solid {
     /// The first triangle that a ray from a point meets, from either side but for kinds that
     /// [have front sides only](MeshKind::has_front_sides_only); kept within what bounds it.
     pub fn first_hit(&self, from_in_world: DVec3, direction: DVec3) -> Option<Hit> {
-        let own = self.first_own_hit(from_in_world, direction);
+        let front_only = self.kind.has_front_sides_only();
+        let own = self.first_own_hit(from_in_world, direction, front_only);
         let Some(hull) = &self.within else {
             return own;
         };
@@ -204,7 +206,13 @@ impl Solid {
         }
     }
 
-    fn first_own_hit(&self, from_in_world: DVec3, direction: DVec3) -> Option<Hit> {
+    /// Of its own triangles alone, if asked to of those whose corners the ray sees counter-clockwise.
+    pub(crate) fn first_own_hit(
+        &self,
+        from_in_world: DVec3,
+        direction: DVec3,
+        front_only: bool,
+    ) -> Option<Hit> {
         let from = from_in_world - self.origin;
         if self.mesh.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
             return None;
@@ -215,7 +223,6 @@ impl Solid {
         if !unit.is_finite() {
             return None;
         }
-        let front_only = self.kind.has_front_sides_only();
         let ray = Ray::new_inf(from.as_vec3().into(), unit.as_vec3().into());
         let mut nearest: Option<Hit> = None;
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
