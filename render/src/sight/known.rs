@@ -168,40 +168,49 @@ pub(super) fn facets_seen_whole(
             pixels.filter_map(at).fold(NO_BOX, grown)
         }
     };
-    let of_tiles = |tile_row: usize| {
+    let of_tiles = |mut boxes: Vec<Rectangle>, tile_row: usize| {
         let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
-        let mut boxes = Vec::new();
-        let (mixed, whole): (Vec<_>, Vec<_>) = known
-            .open_tiles(map, tile_row)
-            .into_iter()
-            .partition(|(_, facet)| facet.is_none());
-        for (columns, facet) in whole {
-            // Of straight rays the first and the last row are as far as any.
-            let step = if rays.are_straight() {
-                (rows.len() - 1).max(1)
-            } else {
-                1
-            };
-            let of_rows = rows
-                .clone()
-                .step_by(step)
-                .map(|y| of_run(columns.clone(), y));
-            boxes.extend(facet.map(|facet| (facet, of_rows.fold(NO_BOX, both))));
-        }
-        for y in rows {
-            let row = &map.facet_of[y * width..(y + 1) * width];
-            let runs = known.open_runs(row, &mixed).into_iter();
-            boxes.extend(runs.map(|run| (row[run.start], of_run(run, y))));
+        // Of straight rays the first and the last row are as far as any.
+        let step = if rays.are_straight() {
+            (rows.len() - 1).max(1)
+        } else {
+            1
+        };
+        let mut grow = |facet: u32, of_run: Rectangle| {
+            let all = &mut boxes[facet as usize];
+            *all = both(*all, of_run);
+        };
+        for (columns, facet) in known.open_tiles(map, tile_row) {
+            if let Some(facet) = facet {
+                let ends = rows.clone().step_by(step);
+                ends.for_each(|y| grow(facet, of_run(columns.clone(), y)));
+                continue;
+            }
+            for y in rows.clone() {
+                let row = &map.facet_of[y * width..][..columns.end];
+                let mut start = columns.start;
+                while start < columns.end {
+                    let facet = row[start];
+                    let others = row[start..].iter().position(|other| *other != facet);
+                    let end = others.map_or(columns.end, |run| start + run);
+                    if known.is_open(facet) {
+                        grow(facet, of_run(start..end, y));
+                    }
+                    start = end;
+                }
+            }
         }
         boxes
     };
+    let none = || vec![NO_BOX; map.planes.len()];
     let tile_rows = (0..map.tiles.down()).into_par_iter();
-    let of_parts: Vec<(u32, Rectangle)> = tile_rows.flat_map_iter(of_tiles).collect();
-    let mut boxes = vec![NO_BOX; map.planes.len()];
-    for (facet, of_part) in of_parts {
-        let all = &mut boxes[facet as usize];
-        *all = both(*all, of_part);
-    }
+    let boxes = tile_rows.with_min_len(TILE_ROWS).fold(none, of_tiles);
+    let of_both = |mut boxes: Vec<Rectangle>, others: Vec<Rectangle>| {
+        let pairs = boxes.iter_mut().zip(others);
+        pairs.for_each(|(own, other)| *own = both(*own, other));
+        boxes
+    };
+    let boxes = boxes.reduce(none, of_both);
 
     // 2. Whether they are seen.
     let mut whole = vec![false; boxes.len()];
@@ -245,5 +254,7 @@ fn grown((least, most): Rectangle, p: DVec2) -> Rectangle {
     (least.min(p), most.max(p))
 }
 
+/// Rows of tiles that are looked at one after the other, at the least.
+const TILE_ROWS: usize = 16;
 /// Facets that are asked one after the other.
 const FACETS: usize = 256;
