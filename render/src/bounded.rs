@@ -173,6 +173,7 @@ impl<'a> Samples<'a> {
     /// A photo or mask that is sampled cannot be decoded.
     pub fn new(frame: &'a Frame<'a>) -> Result<Self, PhotoError> {
         // 1. Who paints them.
+        frame.view_tree();
         let at = positions(frame.desired.width, frame.desired.height);
         let of_row = |(y, columns): &(u32, Vec<u32>)| {
             let painted = |&x: &u32| {

@@ -175,6 +175,33 @@ fn places(sources: &[SourceView], viewer: DVec3) -> Vec<DVec3> {
     places
 }
 
+/// Which source views take part in a frame, where it is not all of them alike.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Part {
+    /// One that does not.
+    pub without: Option<usize>,
+    /// Of a scene that moves: photos count by their times, too (see [`Moment::penalties`]), and those
+    /// outside the window not at all.
+    pub moment: Option<Moment>,
+}
+
+/// What each source view's time adds to its difference; infinite where it takes no part.
+fn penalties(lumigraph: &Lumigraph, moment: Option<&Moment>, k: usize, gone: &[usize]) -> Vec<f64> {
+    let sources = &lumigraph.sources;
+    let mut penalties = match moment {
+        None => vec![0.0; sources.len()],
+        Some(moment) => {
+            assert_eq!(moment.check(), Ok(()));
+            let times_s: Vec<Option<f64>> = sources.iter().map(|s| s.time_s).collect();
+            moment.penalties(&times_s, k)
+        }
+    };
+    for gone in gone {
+        penalties[*gone] = f64::INFINITY;
+    }
+    penalties
+}
+
 /// One desired view of a lumigraph, with all that does not depend on the pixel.
 #[derive(Debug)]
 pub struct Frame<'a> {
@@ -188,8 +215,6 @@ pub struct Frame<'a> {
     pub sources: Vec<FrameSource>,
     /// The proxy from there.
     pub surface: Surface,
-    /// Source views that take no part.
-    gone: Vec<usize>,
     /// What is left out.
     pub(crate) skips: Skips,
     /// Made when first asked for.
@@ -204,27 +229,22 @@ impl<'a> Frame<'a> {
     /// # Panics
     /// If the options fail [`FieldOptions::check`]: check them where they come in.
     pub fn new(lumigraph: &'a Lumigraph, desired: View, options: FieldOptions) -> Self {
-        Self::of(lumigraph, desired, options, Vec::new(), None)
+        Self::with(lumigraph, desired, options, &Part::default())
     }
 
-    /// As [`Self::new`], with a source view of the given index that takes no part. (The
-    /// lumigraph's proxy and points are as they are, whoever they rest on.)
+    /// The same with some of the source views. (The lumigraph's proxy and points are as they are, whoever
+    /// they rest on.)
     ///
     /// # Panics
-    /// If the options fail [`FieldOptions::check`].
-    pub fn without(
+    /// If the options fail [`FieldOptions::check`], or the moment [`Moment::check`].
+    pub fn with(
         lumigraph: &'a Lumigraph,
         desired: View,
         options: FieldOptions,
-        gone: Option<usize>,
+        part: &Part,
     ) -> Self {
-        Self::of(
-            lumigraph,
-            desired,
-            options,
-            gone.into_iter().collect(),
-            None,
-        )
+        let gone: Vec<usize> = part.without.into_iter().collect();
+        Self::of(lumigraph, desired, options, &gone, part.moment, None)
     }
 
     /// A desired view of facets that were found for it, in place of what it sees of the
@@ -233,20 +253,22 @@ impl<'a> Frame<'a> {
         lumigraph: &'a Lumigraph,
         desired: View,
         options: FieldOptions,
-        gone: Vec<usize>,
+        gone: &[usize],
         facets: FacetMap,
     ) -> Self {
-        Self::of(lumigraph, desired, options, gone, Some(facets))
+        Self::of(lumigraph, desired, options, gone, None, Some(facets))
     }
 
     fn of(
         lumigraph: &'a Lumigraph,
         desired: View,
         options: FieldOptions,
-        gone: Vec<usize>,
+        gone: &[usize],
+        moment: Option<Moment>,
         facets: Option<FacetMap>,
     ) -> Self {
         assert_eq!(options.check(), Ok(()));
+        let penalties = penalties(lumigraph, moment.as_ref(), options.k, gone);
         // A desired view finer than every photo undersamples all of them alike; that is no
         // reason to prefer any. So its focal length counts only up to the longest there is.
         let longest = lumigraph
@@ -260,14 +282,11 @@ impl<'a> Frame<'a> {
             .sources
             .iter()
             .zip(places(&lumigraph.sources, desired.center()))
-            .enumerate()
-            .map(|(i, (source, center))| {
+            .zip(penalties)
+            .map(|((source, center), time_penalty)| {
                 let View { width, height, .. } = source.view;
                 FrameSource {
-                    time_penalty: match gone.contains(&i) {
-                        true => f64::INFINITY,
-                        false => 0.0,
-                    },
+                    time_penalty,
                     footprint_ratio: match options.resolution {
                         Resolution::Footprint => desired_focal / source.view.lens.mean_focal(),
                         Resolution::Distance | Resolution::Length => 1.0,
@@ -290,7 +309,6 @@ impl<'a> Frame<'a> {
             options,
             sources,
             surface,
-            gone,
             skips: Skips::ALL,
             view_tree: OnceLock::new(),
             tally: Tally::new(lumigraph.sources.len()),
@@ -306,30 +324,6 @@ impl<'a> Frame<'a> {
         self.tally.scored()
     }
 
-    /// The same view at a moment of a scene that moves: photos count by their times, too
-    /// (see [`Moment::penalties`]), and those outside the window not at all.
-    ///
-    /// # Panics
-    /// If the moment fails [`Moment::check`].
-    #[must_use]
-    pub fn at(mut self, moment: &Moment) -> Self {
-        assert_eq!(moment.check(), Ok(()));
-        let sources = &self.lumigraph.sources;
-        let times_s: Vec<Option<f64>> = sources.iter().map(|s| s.time_s).collect();
-        let penalties = moment.penalties(&times_s, self.options.k);
-        for (source, penalty) in self.sources.iter_mut().zip(penalties) {
-            source.time_penalty = penalty;
-        }
-        for gone in &self.gone {
-            self.sources[*gone].time_penalty = f64::INFINITY;
-        }
-        // It has only those that take part.
-        self.view_tree = OnceLock::new();
-        self.tally = Tally::new(self.sources.len());
-        self.match_exposures();
-        self
-    }
-
     /// The same view, leaving out these things alone: the same pictures, sooner or later.
     #[must_use]
     pub fn skipping(mut self, skips: Skips) -> Self {
@@ -343,9 +337,15 @@ impl<'a> Frame<'a> {
         self.skips.views
     }
 
+    /// Loops on several threads are to ask for it before they begin: else each may make one.
     pub(crate) fn view_tree(&self) -> &ViewTree {
-        self.view_tree
-            .get_or_init(|| ViewTree::new(&self.sources, self.skips.views))
+        if let Some(tree) = self.view_tree.get() {
+            return tree;
+        }
+        // Not while others wait for it: a thread whose work others share takes up their work meanwhile, which may be
+        // to ask for the tree.
+        let tree = ViewTree::new(&self.sources, self.skips.views);
+        self.view_tree.get_or_init(|| tree)
     }
 
     /// The source views that take part: all but those outside the time window, in order.

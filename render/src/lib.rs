@@ -48,7 +48,7 @@ mod visibility;
 pub use bounded::{Bounded, ErrorEstimate, GRIDS, Samples, prepare_within};
 pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
-pub use frame::{Frame, FrameSource, LEVEL_BIAS, ProxyPoint};
+pub use frame::{Frame, FrameSource, LEVEL_BIAS, Part, ProxyPoint};
 pub use held::{Held, decode_ahead};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use mask::Mask;

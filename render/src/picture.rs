@@ -102,6 +102,7 @@ pub fn contributors_exact(frame: &Frame<'_>) -> Vec<Vec<Contributor>> {
             .proxy_point(center)
             .map_or_else(Vec::new, |point| frame.blend_at(&point))
     };
+    frame.view_tree();
     (0..width * height).into_par_iter().map(at_pixel).collect()
 }
 

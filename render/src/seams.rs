@@ -23,6 +23,7 @@ const COARSER: f64 = 3.0;
 /// A photo that is needed cannot be decoded.
 pub fn seams(frame: &Frame<'_>) -> Result<Option<f64>, PhotoError> {
     // 1. Who paints, so that memory is found for their photos and no others.
+    frame.view_tree();
     let rows: Vec<u32> = (STEP / 2..frame.desired.height)
         .step_by(STEP as usize)
         .collect();

@@ -4,7 +4,6 @@ use crate::lumigraph::SourceView;
 use calibrate::{Pixel, View};
 use half::f16;
 use proxy::{Proxy, Rays, Solid};
-use rayon::prelude::*;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -72,7 +71,7 @@ impl Visibility {
         }
     }
 
-    /// The map of a source view.
+    /// The map of a source view. It is made by the thread that first asks for it, alone, while others wait.
     pub fn map(&self, source_idx: usize) -> &DistanceMap {
         self.maps[source_idx].get_or_init(|| {
             let (view, first) = (&self.views[source_idx], &self.views[0]);
@@ -99,11 +98,11 @@ impl DistanceMap {
         Rays::reduced(view, REDUCTION)
     }
 
-    /// Finds what each texel sees: by scanning along the [`Self::rays`], else ray by ray.
+    /// Finds what each texel sees, on this thread alone: by scanning along the [`Self::rays`], else ray by ray.
     pub fn new(solid: &Solid, view: &View, rays: Option<&Rays>) -> Self {
         let size = [view.width, view.height].map(|side| side.div_ceil(REDUCTION));
         let [width, height] = size.map(|side| side as usize);
-        let scan = rays.map(|rays| (rays, solid.scan_along(view, rays)));
+        let scan = rays.map(|rays| (rays, solid.scan_alone(view, rays)));
         let center = view.center();
         let world_from_camera = view.camera_from_world.rotation.conjugate();
         let inverse_distance = |x: usize, y: usize| {
@@ -120,7 +119,7 @@ impl DistanceMap {
             let texel = |x| inverse_distance(x, y).unwrap_or(0.0);
             (0..width).map(texel).collect()
         };
-        let rows: Vec<Vec<f64>> = (0..height).into_par_iter().map(row).collect();
+        let rows: Vec<Vec<f64>> = (0..height).map(row).collect();
 
         // The unit keeps the values within what 16 bits hold.
         let nearest = rows.iter().flatten().copied().fold(0.0, f64::max);

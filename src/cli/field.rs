@@ -17,7 +17,7 @@ use render::field::FieldTriangle;
 use render::path::NerfstudioFrame;
 use render::picture::{contributors_exact, field_picture, palette};
 use render::triangulation::{Triangulation, to_svg};
-use render::{Frame, Method, TriangulatedField};
+use render::{Frame, Method, Part, TriangulatedField};
 use std::path::{Path, PathBuf};
 
 /// Picture the blending field: which photo paints which pixel
@@ -92,10 +92,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     let view = resized(view, args.size);
-    let mut frame = Frame::new(&lumigraph, view, args.field.options());
-    if let Some(clock) = Clock::of(&args.time, args.at.time, &lumigraph)? {
-        frame = frame.at(&clock.moment(&args.view, time_s)?);
-    }
+    let clock = Clock::of(&args.time, args.at.time, &lumigraph)?;
+    let moment = clock.map(|clock| clock.moment(&args.view, time_s));
+    let part = Part {
+        moment: moment.transpose()?,
+        ..Part::default()
+    };
+    let frame = Frame::with(&lumigraph, view, args.field.options(), &part);
 
     // 1. The field, as the renderer asked for has it.
     let triangulated = || TriangulatedField::new(&frame, args.field.grid);

@@ -15,8 +15,8 @@ use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
-    Bounded, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoError,
-    RenderError, Residency, Skips, decode_ahead, prepare_within,
+    Bounded, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part,
+    PhotoError, RenderError, Residency, Skips, decode_ahead, prepare_within,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -402,11 +402,11 @@ fn frame<'a>(
     moment: Option<&Moment>,
     skips: Skips,
 ) -> Frame<'a> {
-    let mut frame = Frame::new(lumigraph, desired.clone(), options);
-    if let Some(moment) = moment {
-        frame = frame.at(moment);
-    }
-    frame.skipping(skips)
+    let part = Part {
+        moment: moment.copied(),
+        ..Part::default()
+    };
+    Frame::with(lumigraph, desired.clone(), options, &part).skipping(skips)
 }
 
 /// A scene's sparse points that do not rest on the photos left out, in the world.

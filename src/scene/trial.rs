@@ -9,7 +9,7 @@ use image::RgbaImage;
 use proxy::dense::{DensePoints, Matching};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
-use render::{FieldOptions, Frame, Lumigraph, Method, Visibility, cpu, score};
+use render::{FieldOptions, Frame, Lumigraph, Method, Part, Visibility, cpu, score};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -312,12 +312,12 @@ impl<'a> Trials<'a> {
     /// PSNR of a judge's picture, in dB.
     fn score(&self, judge: usize) -> Result<f64, SceneError> {
         let judge = &self.judges[judge];
-        let frame = Frame::without(
-            &self.lumigraph,
-            judge.desired.clone(),
-            FieldOptions::default(),
-            Some(judge.source_idx),
-        );
+        let part = Part {
+            without: Some(judge.source_idx),
+            ..Part::default()
+        };
+        let (desired, options) = (judge.desired.clone(), FieldOptions::default());
+        let frame = Frame::with(&self.lumigraph, desired, options, &part);
         let picture = cpu::render(&frame, Method::Exact).map_err(unfit)?;
         Ok(score::score(&picture, &judge.truth).map_err(unfit)?.psnr)
     }

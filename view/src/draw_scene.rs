@@ -11,7 +11,7 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Prepared, RenderError, Skips,
+    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared, RenderError, Skips,
     TriangulatedField, picture,
 };
 use std::collections::BTreeSet;
@@ -148,11 +148,11 @@ impl<'a> SceneDrawer<'a> {
         if !self.ready.as_ref().is_some_and(is_same) {
             self.ready = None;
             let frame = timed(&mut stages, "surface", || {
-                let frame = Frame::without(self.lumigraph, view.clone(), look.options, self.gone);
-                let frame = match &look.moment {
-                    Some(moment) => frame.at(moment),
-                    None => frame,
+                let part = Part {
+                    without: self.gone,
+                    moment: look.moment,
                 };
+                let frame = Frame::with(self.lumigraph, view.clone(), look.options, &part);
                 frame.skipping(self.skips)
             });
             let prepared = timed(&mut stages, "field", || Prepared::new(&frame, look.method))?;

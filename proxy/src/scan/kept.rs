@@ -4,7 +4,7 @@
 //! where the ray enters. That holds on edges, too, where a ray meets both neighbours, which counting
 //! sides does not. A point outside goes to the nearest side; what sees no side sees nothing.
 
-use super::{BAND, Prepared, Sides, by_bands};
+use super::{BAND, Prepared, Sides, Threads, by_bands};
 use crate::{Rays, Solid};
 use calibrate::View;
 use glam::{DMat3, DVec3};
@@ -85,6 +85,16 @@ impl Solid {
     /// closed and counter-clockwise from outside: where each belongs, row by row. Points are given by
     /// 1/z in the camera's frame; one of zero or less is behind all there is.
     pub fn keep(&self, view: &View, rays: &Rays, inverse_depth: &[f64]) -> Vec<Kept> {
+        self.keep_by(Threads::All, view, rays, inverse_depth)
+    }
+
+    pub(super) fn keep_by(
+        &self,
+        threads: Threads,
+        view: &View,
+        rays: &Rays,
+        inverse_depth: &[f64],
+    ) -> Vec<Kept> {
         let plane_from_world =
             rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
@@ -96,8 +106,8 @@ impl Solid {
             Some((prepared, sides.volume < 0.0))
         };
         let triangles = (0..self.mesh().triangles.len()).into_par_iter();
-        let triangles: Vec<(Prepared, bool)> =
-            triangles.with_min_len(256).filter_map(prepare).collect();
+        let triangles = triangles.with_min_len(threads.at_least(256));
+        let triangles: Vec<(Prepared, bool)> = triangles.filter_map(prepare).collect();
         let [width, height] = rays.size;
         let bands = by_bands(triangles.iter().map(|(triangle, _)| &triangle.rows), height);
         let band = |(band_idx, (points, band)): (usize, (&[f64], &Vec<u32>))| {
@@ -125,7 +135,9 @@ impl Solid {
             kept.map(|(around, &point)| around.keep(point)).collect()
         };
         let points = inverse_depth.par_chunks((BAND * width).max(1));
-        let kept: Vec<Vec<Kept>> = points.zip(&bands).enumerate().map(band).collect();
+        let points = points.zip(&bands).enumerate();
+        let points = points.with_min_len(threads.at_least(1));
+        let kept: Vec<Vec<Kept>> = points.map(band).collect();
         kept.concat()
     }
 

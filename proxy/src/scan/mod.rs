@@ -68,9 +68,19 @@ impl Solid {
 
     /// [`Self::scan`] along rays of the view's camera.
     pub fn scan_along(&self, view: &View, rays: &Rays) -> Scan {
-        let mut scan = Scan::of(self.prepared(view, rays), rays);
+        self.scan_by(Threads::All, view, rays)
+    }
+
+    /// The same on this thread alone: for what others wait for. (A thread whose work others share takes up work of
+    /// theirs meanwhile, which may be to wait for it.)
+    pub fn scan_alone(&self, view: &View, rays: &Rays) -> Scan {
+        self.scan_by(Threads::This, view, rays)
+    }
+
+    fn scan_by(&self, threads: Threads, view: &View, rays: &Rays) -> Scan {
+        let mut scan = Scan::of(self.prepared(threads, view, rays), threads, rays);
         if let Some(hull) = self.within() {
-            let kept = hull.keep(view, rays, &scan.inverse_depth);
+            let kept = hull.keep_by(threads, view, rays, &scan.inverse_depth);
             scan.keep(&kept, self.mesh().triangles.len() as u32);
         }
         scan
@@ -86,12 +96,13 @@ impl Solid {
         if self.within().is_some() {
             triangle_of.copy_from_slice(&self.scan_along(view, rays).triangle_of);
         } else {
-            draw_all(&self.prepared(view, rays), rays, triangle_of, None);
+            let triangles = self.prepared(Threads::All, view, rays);
+            draw_all(&triangles, Threads::All, rays, triangle_of, None);
         }
     }
 
     /// The triangles that rays may meet.
-    fn prepared(&self, view: &View, rays: &Rays) -> Vec<Prepared> {
+    fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> Vec<Prepared> {
         let plane_from_world =
             rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
@@ -105,7 +116,26 @@ impl Solid {
             is_seen.then(|| Prepared::new(i as u32, &sides, inverse_depth, rays))?
         };
         let triangles = (0..self.mesh().triangles.len()).into_par_iter();
-        triangles.with_min_len(256).filter_map(prepare).collect()
+        let triangles = triangles.with_min_len(threads.at_least(256));
+        triangles.filter_map(prepare).collect()
+    }
+}
+
+/// Who works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Threads {
+    All,
+    /// Nothing is left for others to take up.
+    This,
+}
+
+impl Threads {
+    /// How much is done by one that could do with so much.
+    fn at_least(self, count: usize) -> usize {
+        match self {
+            Self::All => count,
+            Self::This => usize::MAX,
+        }
     }
 }
 
@@ -123,7 +153,7 @@ impl Facets {
         };
         let facets = (0..self.triangles.len()).into_par_iter();
         let facets = facets.with_min_len(256).filter_map(prepare).collect();
-        Scan::of(facets, rays)
+        Scan::of(facets, Threads::All, rays)
     }
 }
 
@@ -146,7 +176,7 @@ impl Rays {
 
 impl Scan {
     /// Of triangles in order.
-    fn of(triangles: Vec<Prepared>, rays: &Rays) -> Self {
+    fn of(triangles: Vec<Prepared>, threads: Threads, rays: &Rays) -> Self {
         let [width, height] = rays.size;
         let mut scan = Self {
             width,
@@ -154,7 +184,7 @@ impl Scan {
             inverse_depth: vec![0.0; width * height],
         };
         let depths = Some(scan.inverse_depth.as_mut_slice());
-        draw_all(&triangles, rays, &mut scan.triangle_of, depths);
+        draw_all(&triangles, threads, rays, &mut scan.triangle_of, depths);
         scan
     }
 
@@ -175,7 +205,13 @@ impl Scan {
 }
 
 /// Which triangle each pixel sees first, over whatever is there; and the inverse depths, over zeros.
-fn draw_all(triangles: &[Prepared], rays: &Rays, ids: &mut [u32], depths: Option<&mut [f64]>) {
+fn draw_all(
+    triangles: &[Prepared],
+    threads: Threads,
+    rays: &Rays,
+    ids: &mut [u32],
+    depths: Option<&mut [f64]>,
+) {
     let [width, height] = rays.size;
     let bands = by_bands(triangles.iter().map(|triangle| &triangle.rows), height);
     let pixels = (BAND * width).max(1);
@@ -236,6 +272,7 @@ fn draw_all(triangles: &[Prepared], rays: &Rays, ids: &mut [u32], depths: Option
         }
     };
     let ids = ids.par_chunks_mut(pixels).enumerate();
+    let ids = ids.with_min_len(threads.at_least(1));
     match depths {
         None => ids.for_each(|ids| draw(ids, None)),
         Some(depths) => {

@@ -15,6 +15,7 @@ const TILES_OF_BLOCK: usize = 4 * BAND / TILE[1];
 
 /// The exact field at every pixel; the fast twin of [`crate::reference::render_exact`].
 pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
+    frame.view_tree();
     let engine = Engine::new(frame, rays);
     let sources: Vec<usize> = frame.taking_part().collect();
     let photos = mark::hold(&engine, &sources);

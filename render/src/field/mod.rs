@@ -85,6 +85,7 @@ impl TriangulatedField {
         let grid = Grid::for_image(width, height, cells_across);
 
         // 1. What the triangulation must respect.
+        frame.view_tree();
         let epipoles = epipole_vertices(frame, grid);
         let points: Vec<DVec2> = epipoles.iter().map(|(_, at)| *at).collect();
         let edges = horizon(frame);

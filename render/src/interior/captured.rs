@@ -168,7 +168,7 @@ impl Captured {
                 &self.lumigraph,
                 view.clone(),
                 self.options,
-                self.gone.clone(),
+                &self.gone,
                 map.clone(),
             );
             match self.engine.render(&frame, self.method) {

@@ -7,11 +7,14 @@ use common::{METHODS, Shot, assert_close, by_all, pinhole, psnr, psnr_covered, u
 use glam::{DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::{Mesh, MeshKind, Proxy, Solid};
+use rayon::prelude::*;
 use render::gpu::{DeviceLimits, Gpu, ShadeBy};
 use render::{
-    FieldOptions, Frame, Lumigraph, Method, PhotoStore, SourceView, Visibility, cpu, reference,
+    FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoStore, SourceView, Surface,
+    Visibility, cpu, reference,
 };
 use std::sync::Arc;
+use std::time::Duration;
 
 fn quad(corners: [DVec3; 4]) -> Mesh {
     Mesh {
@@ -94,9 +97,13 @@ fn views() -> Vec<View> {
 }
 
 fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
-    let solid = Solid::new(kind, mesh);
+    let solid = Arc::new(Solid::new(kind, mesh));
+    lumigraph_of(&solid, |view| photo(&solid, view))
+}
+
+fn lumigraph_of(solid: &Arc<Solid>, photo: impl Fn(&View) -> RgbaImage) -> Lumigraph {
     let views = views();
-    let photos = views.iter().map(|view| photo(&solid, view)).collect();
+    let photos = views.iter().map(photo).collect();
     let source = |(i, view): (usize, View)| SourceView {
         name: format!("{i}.png"),
         view,
@@ -104,7 +111,7 @@ fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
         time_s: None,
     };
     let sources: Vec<SourceView> = views.into_iter().enumerate().map(source).collect();
-    let proxy = Proxy::Mesh(Arc::new(solid));
+    let proxy = Proxy::Mesh(Arc::clone(solid));
     Lumigraph {
         visibility: Visibility::of(&proxy, &sources),
         sources,
@@ -300,6 +307,78 @@ fn a_flat_mesh_is_a_plane() {
         let db = psnr_covered(&of(&flat, method), &of(&meshed, method));
         assert!(db >= 60.0, "{method:?}: {db} dB");
     }
+}
+
+/// Where the mesh is moved to what photos see, too: not to what only others would.
+#[test]
+fn photos_of_other_moments_might_as_well_not_be_there() {
+    let mut all = lumigraph(pillar(), MeshKind::Mesh);
+    let times = (0..7).map(f64::from);
+    let timed = all.sources.iter_mut().zip(times);
+    timed.for_each(|(source, time_s)| source.time_s = Some(time_s));
+    let photos = (0..3).map(|i| all.photos.get(i).unwrap().levels[0].clone());
+    let sources = all.sources[..3].to_vec();
+    let some = Lumigraph {
+        visibility: Visibility::of(&all.proxy, &sources),
+        photos: PhotoStore::from_images(photos.collect()),
+        proxy: all.proxy.clone(),
+        points: Vec::new(),
+        sources,
+    };
+    let options = FieldOptions {
+        k: 2,
+        ..FieldOptions::default()
+    };
+    let moment = Moment {
+        time_s: 1.0,
+        period_s: None,
+        window_s: Some(1.5),
+    };
+    let part = Part {
+        moment: Some(moment),
+        ..Part::default()
+    };
+    let mut moved = 0;
+    for (name, desired) in desired_views() {
+        let [of_all, of_some] =
+            [&all, &some].map(|of| Frame::with(of, desired.clone(), options, &part));
+        assert_eq!(of_all.taking_part().collect::<Vec<_>>(), [0, 1, 2]);
+        if let Surface::Facets(map) = &of_all.surface {
+            moved += map.planes.len() - solid_of(&all).triangle_count();
+        }
+        for method in METHODS {
+            let pictures = by_all(&of_all, method)
+                .into_iter()
+                .zip(by_all(&of_some, method));
+            for ((engine, a), (_, b)) in pictures {
+                assert!(a.unwrap() == b.unwrap(), "{name}, {engine}, {method:?}");
+            }
+        }
+    }
+    assert!(moved > 1000, "{moved}");
+}
+
+/// Threads whose work others share take up work of theirs meanwhile, which may be to wait for what they make.
+#[test]
+fn distances_asked_for_on_many_threads_are_not_waited_for_in_a_circle() {
+    let (done, is_done) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build();
+        let solid = Arc::new(Solid::new(MeshKind::Mesh, bent_wall(60)));
+        pool.unwrap().install(|| {
+            for _ in 0..50 {
+                let lumigraph = lumigraph_of(&solid, |_| RgbaImage::new(160, 120));
+                let visibility = lumigraph.visibility.as_ref().unwrap();
+                let asked = (0..700).into_par_iter().with_max_len(1);
+                asked.for_each(|i| {
+                    visibility.map(i % 7);
+                });
+            }
+        });
+        done.send(()).unwrap();
+    });
+    let waited = is_done.recv_timeout(Duration::from_secs(120));
+    assert!(waited.is_ok(), "threads wait for one another");
 }
 
 #[test]

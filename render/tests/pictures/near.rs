@@ -10,8 +10,8 @@ use proxy::{Mesh, MeshKind, Plane, Proxy, Solid};
 use render::field::TriangulatedField;
 use render::reference::blend_at;
 use render::{
-    Blend, FieldOptions, Frame, Lumigraph, Method, Moment, PhotoStore, ProxyPoint, Resolution,
-    Skips, SourceView, Visibility, cpu,
+    Blend, FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoStore, ProxyPoint,
+    Resolution, Skips, SourceView, Visibility, cpu,
 };
 use std::sync::Arc;
 
@@ -100,15 +100,15 @@ fn the_field_is_that_of_all_views() {
             ..FieldOptions::default()
         };
         let lumigraph = lumigraph(views, &mut random);
-        let mut frame = Frame::new(&lumigraph, desired, options);
+        let mut part = Part::default();
         if round % 5 == 4 {
-            let moment = Moment {
+            part.moment = Some(Moment {
                 time_s: random.within(0.0, 1.0),
                 period_s: None,
                 window_s: Some(0.2),
-            };
-            frame = frame.at(&moment);
+            });
         }
+        let frame = Frame::with(&lumigraph, desired, options, &part);
         for i in 0..40 {
             let ray = DVec3::Z + random.vector(1.0);
             let point = ProxyPoint {

@@ -6,8 +6,8 @@ use calibrate::{Pixel, View, find_period};
 use common::{Random, Shot, assert_close, gpu, psnr, psnr_covered};
 use image::RgbaImage;
 use render::{
-    FieldOptions, Frame, Lumigraph, Method, Moment, PhotoStore, TriangulatedField, cpu, field,
-    reference, snapshots,
+    FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoStore, TriangulatedField, cpu,
+    field, reference, snapshots,
 };
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -40,7 +40,11 @@ fn moment(time_s: f64) -> Moment {
 }
 
 fn frame<'a>(lumigraph: &'a Lumigraph, desired: &View, moment: &Moment) -> Frame<'a> {
-    Frame::new(lumigraph, desired.clone(), FieldOptions::default()).at(moment)
+    let part = Part {
+        moment: Some(*moment),
+        ..Part::default()
+    };
+    Frame::with(lumigraph, desired.clone(), FieldOptions::default(), &part)
 }
 
 /// By every fast engine there is.
@@ -259,12 +263,13 @@ fn a_source_view_that_takes_no_part_might_as_well_not_be_there() {
     let (with, without) = (lumigraph_of(shot, &all), lumigraph_of(shot, &rest));
     let desired = &shot.views[gone];
     let options = FieldOptions::default();
-    let frames = || {
-        let with = Frame::without(&with, desired.clone(), options, Some(gone));
-        (with, Frame::new(&without, desired.clone(), options))
+    let frames = |moment: Option<Moment>| {
+        let part = |without| Part { without, moment };
+        let frame = |of, without| Frame::with(of, desired.clone(), options, &part(without));
+        (frame(&with, Some(gone)), frame(&without, None))
     };
     for method in METHODS {
-        let (with, without) = frames();
+        let (with, without) = frames(None);
         assert_eq!(
             with.taking_part().count(),
             without.taking_part().count(),
@@ -275,8 +280,7 @@ fn a_source_view_that_takes_no_part_might_as_well_not_be_there() {
             "{method:?}"
         );
         // Whatever the time.
-        let (with, without) = frames();
-        let (with, without) = (with.at(&moment(0.3)), without.at(&moment(0.3)));
+        let (with, without) = frames(Some(moment(0.3)));
         assert!(
             by_engines(&with, method) == by_engines(&without, method),
             "{method:?}"
@@ -355,10 +359,11 @@ fn held_out_db(shot: &Shot, moment: impl Fn(f64) -> Option<Moment>) -> f64 {
     let lumigraph = lumigraph_of(shot, &rest);
     let scores = (0..count).step_by(8).map(|i| {
         let desired = shot.views[i].clone();
-        let mut frame = Frame::new(&lumigraph, desired, FieldOptions::default());
-        if let Some(moment) = moment(shot.dataset.photos[i].time_s.unwrap()) {
-            frame = frame.at(&moment);
-        }
+        let part = Part {
+            moment: moment(shot.dataset.photos[i].time_s.unwrap()),
+            ..Part::default()
+        };
+        let frame = Frame::with(&lumigraph, desired, FieldOptions::default(), &part);
         psnr(
             &cpu::render(&frame, Method::TRIANGULATED).unwrap(),
             &shot.photos[i],
