@@ -363,15 +363,15 @@ fn photos_of_other_moments_might_as_well_not_be_there() {
 fn distances_asked_for_on_many_threads_are_not_waited_for_in_a_circle() {
     let (done, is_done) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build();
-        let solid = Arc::new(Solid::new(MeshKind::Mesh, bent_wall(60)));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build();
+        let solid = Arc::new(Solid::new(MeshKind::Mesh, bent_wall(100)));
         pool.unwrap().install(|| {
-            for _ in 0..50 {
+            for _ in 0..200 {
                 let lumigraph = lumigraph_of(&solid, |_| RgbaImage::new(160, 120));
                 let visibility = lumigraph.visibility.as_ref().unwrap();
                 let asked = (0..700).into_par_iter().with_max_len(1);
                 asked.for_each(|i| {
-                    visibility.map(i % 7);
+                    visibility.map(i * 3 % 7);
                 });
             }
         });
