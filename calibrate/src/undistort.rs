@@ -162,7 +162,7 @@ impl Undistortion {
     fn reach(&self) -> f64 {
         let limit = self.lens.limit();
         let limit = match self.lens.distortion() {
-            Distortion::None | Distortion::Rational { .. } => limit,
+            Distortion::None | Distortion::Rational { .. } | Distortion::Tilted { .. } => limit,
             _ if limit < std::f64::consts::FRAC_PI_2 => limit.tan(),
             _ => f64::INFINITY,
         };

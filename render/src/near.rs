@@ -131,7 +131,8 @@ impl Frame<'_> {
                 near.candidates.extend(seen);
             }
             let reach = self.options.reach(&near.candidates);
-            if reach <= near.within {
+            // Nor can more be found where it is no number.
+            if !(reach > near.within) {
                 if ball.is_some() && reach < f64::INFINITY {
                     near.reach = reach;
                 }

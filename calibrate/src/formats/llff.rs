@@ -44,10 +44,11 @@ pub fn parse_llff(
     size_of: SizeOf<'_>,
 ) -> Result<Reconstruction, FormatError> {
     let rows = rows(bytes).map_err(|problem| problem.at(path, "header"))?;
-    let mut names = match names {
-        [] => (0..rows.len()).map(|row| format!("{row:04}")).collect(),
-        names => names.to_vec(),
-    };
+    let mut names = names.to_vec();
+    names.sort();
+    if names.is_empty() {
+        names.extend((0..rows.len()).map(|row| format!("{row:04}")));
+    }
     if rows.len() != names.len() {
         return Err(Problem::new(
             format!("found {} poses for {} photos", rows.len(), names.len()),
@@ -55,7 +56,6 @@ pub fn parse_llff(
         )
         .at(path, "header"));
     }
-    names.sort();
 
     let mut builder = Builder::new(path);
     for (index, (row, name)) in rows.iter().zip(&names).enumerate() {

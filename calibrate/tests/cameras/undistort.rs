@@ -58,6 +58,18 @@ fn wide() -> Vec<Camera> {
 }
 
 #[test]
+fn a_sensor_that_is_hardly_tilted_reaches_as_far_as_one_that_is_not() {
+    // It folds over within the photo.
+    let own = [400.0, 400.0, 320.0, 240.0, -0.6, 0.0, 0.0, 0.0];
+    let straight = of(&camera(ModelKind::OpenCv, &own)).camera();
+    let rest = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-12, 0.0];
+    let params = [&own[..], &rest[..]].concat();
+    let tilted = of(&camera(ModelKind::OpenCvTilted, &params)).camera();
+    let size = |camera: &Camera| (camera.width, camera.height);
+    assert_eq!(size(&tilted), size(&straight));
+}
+
+#[test]
 fn there_and_back_is_the_same_pixel() {
     for camera in [moderate(), wide()].concat() {
         let undistortion = of(&camera);
