@@ -65,6 +65,7 @@ arguments() {
 TIMEFORMAT='%U %S'
 seconds() {
     local spent
+    rm -rf "$work/out"
     # The words are options; folders have no spaces that we made.
     # shellcheck disable=SC2086
     spent=$({ time "$1" $2 >/dev/null 2>"$work/log"; } 2>&1) || {
@@ -102,6 +103,7 @@ done
 if command -v valgrind >/dev/null; then
     echo "== instructions, one thread"
     count() {
+        rm -rf "$work/out"
         # shellcheck disable=SC2086
         valgrind --tool=callgrind --callgrind-out-file=/dev/null "$1" --threads 1 $2 2>&1 >/dev/null |
             awk '/Collected/ { print $NF }'

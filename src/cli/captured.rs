@@ -117,6 +117,20 @@ impl Write for Fnv {
     }
 }
 
+impl Fnv {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+/// A number that another text would most likely not have.
+pub(super) fn hash_of(text: &str) -> String {
+    let mut hash = Fnv::new();
+    // Writing to it fails never.
+    let _ = hash.write_str(text);
+    format!("{:016x}", hash.0)
+}
+
 /// Cells across the image's longer side of the blending field's grid.
 const GRID: u32 = 32;
 
@@ -168,7 +182,7 @@ impl Photos {
     /// A number that other cameras, sparse points, gains or scales of depth would most likely not have:
     /// calibrations come in files of many kinds.
     pub(super) fn fingerprint(&self) -> String {
-        let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+        let mut hash = Fnv::new();
         let known = &self.scene.reconstruction;
         let images = known.images.values();
         let images = images.map(|i| (&i.name, i.camera_id, i.camera_from_world));

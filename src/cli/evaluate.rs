@@ -1,12 +1,14 @@
 //! `lumigraph evaluate`
 
 use super::exposure::ExposureArgs;
+use super::film::files_of;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::{Report, Start};
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
+use super::targets::{check_folder, check_inputs};
 use super::time::TimeArgs;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
@@ -74,6 +76,8 @@ struct Line {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
+    let output = args.output.as_deref();
+    output.map_or(Ok(()), check_folder)?;
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
     let mut session = Session::new(
@@ -87,7 +91,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.time,
         None,
     )?;
-    let output = args.output.as_deref();
     let size = args.draw.size;
     let lines = score_photos(&mut session, &held_out, size, output)?;
     let result = json(&session, &lines);
@@ -101,11 +104,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
-    Ok(match (args.every, &args.hold_out) {
-        (Some(every), _) => scene.every(every),
-        (None, Some(split)) => scene.held_out_some(split)?,
-        (None, None) => scene.held_out_by_default()?,
-    })
+    if let Some(every) = args.every {
+        return Ok(scene.every(every));
+    }
+    let Some(split) = args.hold_out.clone().or_else(|| scene.own_split()) else {
+        return Ok(scene.held_out_by_default()?);
+    };
+    let names = scene.held_out_some(&split)?;
+    let left_out = scene.left_out_of(&split)?;
+    if !left_out.is_empty() {
+        say!(
+            "note: {}: left out of the scene, and not scored: {}",
+            split.display(),
+            left_out.join(", ")
+        );
+    }
+    Ok(names)
 }
 
 /// Renders and scores each of the given photos; where one turns out corrupt it is left out,
@@ -118,6 +132,10 @@ fn score_photos(
 ) -> anyhow::Result<Vec<Line>> {
     let folder = output.unwrap_or(std::path::Path::new(""));
     let files = picture_files("view", names.iter().map(|n| (n.as_str(), true)), folder)?;
+    if output.is_some() {
+        let files = files.iter().map(PathBuf::as_path);
+        check_inputs(files, &files_of(&session.scene))?;
+    }
     session.prepare()?;
     let bar = progress(names.len(), "evaluating");
     let mut lines = Vec::new();

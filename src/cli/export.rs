@@ -3,7 +3,7 @@
 use super::Usage;
 use super::options::SceneArgs;
 use super::output::{print, write_file};
-use calibrate::export::{FrameFiles, check_colmap, opencv_yaml, transforms_json};
+use calibrate::export::{FrameFiles, check_colmap, has_board, opencv_yaml, transforms_json};
 use calibrate::{Image, colmap};
 use clap::ValueEnum;
 use lumigraph::scene::{Photo, Scene, relative};
@@ -77,6 +77,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         whole.images.len(),
         match args.format {
             Format::Transforms => "no points: the format has none".to_owned(),
+            Format::OpenCv if !has_board(whole) => {
+                "no points: the format has those of a calibration board alone".to_owned()
+            }
             _ => format!("{} points", whole.points.len()),
         }
     ))

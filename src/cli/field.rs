@@ -1,12 +1,15 @@
 //! `lumigraph field`
 
+use super::Usage;
 use super::exposure::ExposureArgs;
+use super::film::files_of;
 use super::frames::{NamedView, of_path};
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
+use super::targets::check_inputs;
 use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::anyhow;
 use calibrate::{Pixel, View};
@@ -75,7 +78,11 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    check_extensions(args)?;
     let scene = args.scene.open()?;
+    let others = [&args.weights, &args.triangulation].into_iter().flatten();
+    let files = others.chain([&args.output]).map(PathBuf::as_path);
+    check_inputs(files, &files_of(&scene))?;
     let mut without = args.hold_out.names(&scene)?;
     if args.without_view {
         without.insert(args.view.clone());
@@ -136,6 +143,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .map(|f| format!("{}\n", f.display()))
         .collect();
     print(&lines.concat())
+}
+
+/// Fails where a file's name is not that of what would be written to it.
+fn check_extensions(args: &Args) -> Result<(), Usage> {
+    let files = [
+        ("--output", "png", Some(&args.output)),
+        ("--weights", "npz", args.weights.as_ref()),
+        ("--triangulation", "svg", args.triangulation.as_ref()),
+    ];
+    for (option, expected, file) in files {
+        let Some(file) = file else { continue };
+        let found = file.extension();
+        if found.is_none_or(|found| !found.eq_ignore_ascii_case(expected)) {
+            let file = file.display();
+            let text = format!("{option} {file}: expected a file name that ends in .{expected}");
+            return Err(Usage(text));
+        }
+    }
+    Ok(())
 }
 
 /// The view of one frame of a path, and its time.

@@ -4,6 +4,7 @@ use super::Usage;
 use super::options::positive;
 use super::output::write_file;
 use super::stamp::{Stamp, changes, stamps};
+use super::targets::check_inputs;
 use anyhow::{Context, bail};
 use image::{Rgba, RgbaImage};
 use lumigraph::scene::{Photo, Scene};
@@ -13,7 +14,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Which frames: so many of a derived path, or a part of a path.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct FrameChoice {
     /// Of a derived path, where it is said.
     count: Option<u32>,
@@ -58,6 +59,22 @@ impl FrameChoice {
         self.count.unwrap_or(otherwise)
     }
 
+    /// Fails where so many frames are asked for of a path that has its own.
+    pub(super) fn check(&self, is_derived: bool) -> anyhow::Result<()> {
+        let text = match (self.count.filter(|_| !is_derived), &self.range) {
+            (None, _) => return Ok(()),
+            (Some(count), None) => format!(
+                "--frames {count}: the path has its own frames; for the first {count} of them it is \
+                 --frames 0..{count}"
+            ),
+            (Some(count), Some(Range { start, end })) => format!(
+                "--frames {start}..{end}/{count}: the path has its own frames; for some of them it is \
+                 --frames {start}..{end}"
+            ),
+        };
+        Err(Usage(text).into())
+    }
+
     /// Whether only a part of a path is drawn.
     pub(super) fn is_part(&self) -> bool {
         self.range.is_some()
@@ -70,8 +87,11 @@ impl FrameChoice {
         };
         let count = frames.len();
         if range.end > count {
+            let all = self
+                .count
+                .map_or(String::new(), |count| format!("/{count}"));
             let text = format!(
-                "--frames {}..{}: the path has {count} frames",
+                "--frames {}..{}{all}: the path has {count} frames",
                 range.start, range.end
             );
             return Err(Usage(text).into());
@@ -197,17 +217,30 @@ impl Plan {
 }
 
 impl FilmArgs {
-    /// Fails early where a film cannot be made, and says which frames are there already. `inputs` are
-    /// the files that frames are made of.
+    /// Fails early where a film cannot be made: by making a short one.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let Some(video) = &self.video else {
+            return Ok(());
+        };
+        capture::video::ffmpeg().text(&["-version"])?;
+        let folder = tempfile::tempdir()?;
+        let trial = folder.path().join(video.file_name().unwrap_or_default());
+        let (size, fps) = ((16, 16), self.fps.unwrap_or(30.0));
+        let frames = [Ok(vec![0; 3 * 16 * 16])].into_iter();
+        capture::video::encode(&trial, size, fps, frames)
+            .with_context(|| format!("--video {}", video.display()))
+    }
+
+    /// Which frames are there already. `inputs` are the files that frames are made of, over which none is
+    /// written.
     pub(super) fn begin(
         &self,
         folder: &Path,
         files: &[PathBuf],
         inputs: &[PathBuf],
     ) -> anyhow::Result<Vec<bool>> {
-        if self.video.is_some() {
-            capture::video::ffmpeg().text(&["-version"])?;
-        }
+        let video = self.video.iter();
+        check_inputs(files.iter().chain(video).map(PathBuf::as_path), inputs)?;
         if !self.resume {
             return Ok(vec![false; files.len()]);
         }
@@ -301,7 +334,12 @@ mod tests {
             "--frames 2..4: the path has 3 frames"
         );
         assert_eq!(part.count(30), 30);
-        assert_eq!(frame_choice("1..2/7").unwrap().count(30), 7);
+        let of_derived = frame_choice("1..2/7").unwrap();
+        assert_eq!(of_derived.count(30), 7);
+        assert!(part.check(false).is_ok() && FrameChoice::default().check(false).is_ok());
+        for count in [of_derived, all(60)] {
+            assert!(count.check(true).is_ok() && count.check(false).is_err());
+        }
         for bad in [
             "", "0", "4..4", "5..2", "-1..3", "1..", "100001", "1..2/0", "a..b",
         ] {

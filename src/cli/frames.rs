@@ -22,6 +22,30 @@ pub(super) struct ViewArgs {
     pub(super) path: Option<String>,
 }
 
+impl ViewArgs {
+    /// Whether the path is derived, or is asked for by no name that one has.
+    pub(super) fn is_derived(&self) -> bool {
+        let is_file = |path: &str| derived(path).is_none() && !is_misspelt(path);
+        self.views.is_none() && !self.path.as_deref().is_some_and(is_file)
+    }
+}
+
+/// The kind of derived path that has a name.
+fn derived(asked: &str) -> Option<Trajectory> {
+    match asked {
+        "orbit" => Some(Trajectory::Orbit),
+        "dolly" => Some(Trajectory::Dolly),
+        "sweep" => Some(Trajectory::Sweep),
+        _ => None,
+    }
+}
+
+/// Whether what is no kind of path cannot be meant as a file either.
+fn is_misspelt(asked: &str) -> bool {
+    let file = Path::new(asked);
+    file.extension().is_none() && !file.exists()
+}
+
 /// A view to render and what to call it.
 pub(super) struct NamedView {
     pub(super) name: String,
@@ -63,19 +87,12 @@ pub(super) fn of_path(
     points_in_world: impl FnOnce() -> Vec<DVec3>,
     frame: &NerfstudioFrame,
 ) -> anyhow::Result<(Vec<NamedView>, f64)> {
-    let kind = match asked {
-        "orbit" => Trajectory::Orbit,
-        "dolly" => Trajectory::Dolly,
-        "sweep" => Trajectory::Sweep,
-        _ => {
-            let file = Path::new(asked);
-            if file.extension().is_none() && !file.exists() {
-                let message =
-                    format!("--path {asked}: expected orbit, dolly, sweep or a path file");
-                return Err(Usage(message).into());
-            }
-            return of_file(file, frame);
+    let Some(kind) = derived(asked) else {
+        if is_misspelt(asked) {
+            let message = format!("--path {asked}: expected orbit, dolly, sweep or a path file");
+            return Err(Usage(message).into());
         }
+        return of_file(Path::new(asked), frame);
     };
     let points = points_in_world();
     let (sources, proxy) = (&lumigraph.sources, &lumigraph.proxy);

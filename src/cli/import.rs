@@ -2,17 +2,20 @@
 
 use super::Usage;
 use super::exposure::ExposureArgs;
+use super::interior::check_no_interior;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
 use super::session::{progress, spinner};
 use super::uncalibrated::UncalibratedArgs;
+use anyhow::bail;
+use capture::find_photos_folder;
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
     DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
 };
 use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Make a scene of photos and their calibration, or of photos alone
 ///
@@ -111,6 +114,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Scene::check_free(&args.output, args.force)?;
 
     // 1. The photos.
+    check_no_interior(&args.photos)?;
+    check_no_scene(&args.photos)?;
     let is_video = args.photos.is_file();
     if !is_video && args.uncalibrated.asks_for_frames() {
         let message = "--frames and --fps are for a video's file, and PHOTOS is none";
@@ -167,6 +172,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let (mut scene, warnings) = imported?;
     print_warnings(&warnings);
+    if args.strict {
+        check_photos(&scene)?;
+    }
     for photo in &mut scene.photos {
         if let Some(frame) = frames.iter().find(|frame| frame.name == photo.name) {
             photo.time_s = Some(frame.time_s);
@@ -193,6 +201,26 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         scene.reconstruction.points.len(),
         beside_text(&scene)
     ))
+}
+
+/// Fails of a scene whose photos lie elsewhere: there is nothing to import.
+fn check_no_scene(photos: &Path) -> anyhow::Result<()> {
+    if Scene::is_scene(photos) && find_photos_folder(photos).is_none() {
+        bail!(
+            "{}: a scene already (scene.json), which can be rendered as it is; to import its photos \
+             anew, give the folder that they lie in",
+            photos.display()
+        );
+    }
+    Ok(())
+}
+
+/// Fails of a photo that cannot be decoded.
+pub(super) fn check_photos(scene: &Scene) -> Result<(), SceneError> {
+    let bar = spinner("decoding every photo");
+    let checked = scene.check_photos();
+    bar.finish_and_clear();
+    checked
 }
 
 /// Makes the hull of its silhouettes a scene's own proxy.

@@ -1,6 +1,8 @@
 //! `lumigraph info`
 
+use super::import::check_photos;
 use super::info_of_file;
+use super::interior::check_no_interior;
 use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, tie_text};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
@@ -13,7 +15,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Photos, cameras, points, reprojection error per camera, proxy, memory
+/// Photos and their times, cameras, points, reprojection error per camera, proxy, memory
 ///
 /// Of a calibration alone, a file of any format or a COLMAP model: its cameras and poses.
 ///
@@ -37,6 +39,7 @@ const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
 const MASK_BYTES_PER_PIXEL: f64 = 4.0 / 3.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    check_no_interior(&args.scene.scene)?;
     if args.scene.scene.is_file() {
         return info_of_file::run(&args.scene.scene, &args.keys.keys(), args.json);
     }
@@ -44,6 +47,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return info_of_file::of_model(&model, args.json);
     }
     let scene = args.scene.open_whole()?;
+    if args.scene.strict {
+        check_photos(&scene)?;
+    }
     let info = gather(&scene)?;
     if args.json {
         return print_json(&info);
@@ -117,6 +123,10 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
         "object_mattes": object_mattes,
         "silhouettes": silhouettes,
         "depth_maps": depth_maps,
+        "times": times(scene).map(|(photos, first, last)| json!({
+            "photos": photos,
+            "range_s": [first, last],
+        })),
         "left_out": scene.left_out,
         "weakly_tied": reconstruction.weakly_tied(TRUSTED_TIE).iter().map(|group| json!({
             "photos": group.names,
@@ -129,6 +139,13 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
         "proxy": own,
         "memory_bytes": photo_bytes as u64,
     }))
+}
+
+/// How many photos have times, the earliest of them and the latest; `None` where none has.
+fn times(scene: &Scene) -> Option<(usize, f64, f64)> {
+    let mut times: Vec<f64> = scene.photos.iter().filter_map(|p| p.time_s).collect();
+    times.sort_by(f64::total_cmp);
+    Some((times.len(), *times.first()?, *times.last()?))
 }
 
 /// Mean, median and 95th percentile of the finite errors; how many there are, and how many points lie
@@ -176,6 +193,9 @@ fn text(scene: &Scene, info: &Value) -> String {
     }
     if let Some(beside) = beside_text(scene).strip_prefix(", ") {
         text += &format!("with     {beside}\n");
+    }
+    if let Some((photos, first, last)) = times(scene) {
+        text += &format!("times    of {photos} photos, {first:.3} to {last:.3} s\n");
     }
     text += &format!("points   {}", info["points"]);
     if let (Some(spacing), Some(isolated)) = (info["spacing"].as_f64(), info["isolated"].as_u64()) {

@@ -5,15 +5,16 @@ use super::made;
 use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
-use anyhow::Context;
+use anyhow::{Context, bail};
+use calibrate::colmap;
 use datasets::in_new_folder;
 use glam::DVec3;
 use image::ImageFormat;
 use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, Interior, InteriorError, InteriorWarning, compare, interior_from_nodes,
-    read_interior, read_rooms, write_interior,
+    Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
+    interior_from_nodes, read_interior, read_rooms, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::io::Cursor;
@@ -64,6 +65,9 @@ pub(super) struct Args {
     /// them, or another interior's folder; portals count within 0.3 m
     #[arg(long, value_name = "FILE|DIR", conflicts_with = "rooms")]
     compare: Option<PathBuf>,
+    /// Replace the interior that DIR holds, its layered depth images (`lumigraph ldis`) included
+    #[arg(long)]
+    force: bool,
     /// The interior's folder: interior.json, and the model beside it
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -87,10 +91,24 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         meter: args.meter,
         ..FindOptions::default()
     };
+    check_no_interior(&args.model)?;
+    // Before what may take long.
+    check_free(args)?;
     match args.model.is_dir() {
         true => run_scene(args, &options),
         false => run_model(args, &options),
     }
+}
+
+/// Fails where an interior would be replaced that was not asked to be: people correct them by hand.
+fn check_free(args: &Args) -> anyhow::Result<()> {
+    if args.output.join(INTERIOR).exists() && !args.force {
+        bail!(
+            "{}: holds an interior already; replace it with --force, or choose another folder",
+            args.output.display()
+        );
+    }
+    Ok(())
 }
 
 fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
@@ -145,10 +163,15 @@ fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !is_glb {
+        // Without an extension a folder was meant.
+        if args.model.extension().is_none() {
+            check_there(&args.model)?;
+        }
         let found = args.model.display();
         let text = format!("{found}: interiors are made of .glb models, or of folders of photos");
         return Err(Usage(text).into());
     }
+    check_there(&args.model)?;
     // The copy is of what was read.
     let unreadable = |e| MeshFileError::Io(args.model.clone(), e);
     let bytes = std::fs::read(&args.model).map_err(unreadable)?;
@@ -241,7 +264,7 @@ fn finish(
 }
 
 /// Fills a folder that takes its name only when it is complete. An interior that is there
-/// already is replaced, if it is nothing else.
+/// already, as with --force it may, is replaced, if it is nothing else.
 fn write(
     args: &Args,
     file: &str,
@@ -269,17 +292,60 @@ const PLAN_PNG: &str = "floor-plan.png";
 /// The interior's own file in its folder.
 pub(super) const INTERIOR: &str = "interior.json";
 
+/// How to come by an interior, for who gave something else.
+const REMEDY: &str = "`lumigraph interior CAPTURE_OR_GLB -o DIR` makes one";
+
 /// Opens an interior, its folder or its file, says what is odd, and where the file is.
 pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
+    check_there(given)?;
     let path = match given.is_dir() {
         true => given.join(INTERIOR),
         false => given.to_owned(),
     };
-    let (interior, warnings) = read_interior(&path)?;
+    if !path.exists() {
+        bail!(
+            "{}: no interior, as it holds no {INTERIOR}; {REMEDY}",
+            given.display()
+        );
+    }
+    // Of a file of that name it says where the slip is.
+    let is_named = path.file_name().is_some_and(|name| name == INTERIOR);
+    let (interior, warnings) = match read_interior(&path) {
+        Err(error @ InteriorFileError::Json(..)) if !is_named => bail!("{error}; {REMEDY}"),
+        read => read?,
+    };
     for warning in warnings {
         say!("warning: {warning}");
     }
     Ok((path, interior))
+}
+
+/// Fails where there is nothing at a path.
+fn check_there(given: &Path) -> anyhow::Result<()> {
+    if !given.exists() {
+        bail!(
+            "{}: there is no such file or folder; check the path",
+            given.display()
+        );
+    }
+    Ok(())
+}
+
+/// Fails where photos are expected, and an interior is given: its folder, unless that holds photos
+/// or a scene as well, or its file.
+pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
+    let is_file = given.is_file() && given.file_name().is_some_and(|name| name == INTERIOR);
+    let holds_photos = || {
+        let is_capture = given.join("images").is_dir() || colmap::find_model(given).is_ok();
+        is_capture || Scene::is_scene(given)
+    };
+    if is_file || (given.join(INTERIOR).is_file() && !holds_photos()) {
+        let given = given.display();
+        bail!(
+            "{given}: this is an interior, not photos; `lumigraph walk {given} -o FRAMES` is for it"
+        );
+    }
+    Ok(())
 }
 
 /// Whether a folder holds an interior, one model and perhaps a floor plan and LDIs, and nothing else.

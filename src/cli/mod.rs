@@ -31,6 +31,7 @@ mod report;
 mod session;
 mod stamp;
 mod surface;
+mod targets;
 mod time;
 mod uncalibrated;
 #[cfg(feature = "window")]

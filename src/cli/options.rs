@@ -1,5 +1,6 @@
 //! Options that several subcommands share.
 
+use super::interior::check_no_interior;
 use super::output::say;
 use calibrate::View;
 use calibrate::WeakGroup;
@@ -38,6 +39,7 @@ impl SceneArgs {
 
     /// As [`Self::open`], with photos whose places are unsure.
     pub(super) fn open_whole(&self) -> anyhow::Result<Scene> {
+        check_no_interior(&self.scene)?;
         let (scene, warnings) = Scene::open(&self.scene, self.strict)?;
         print_warnings(&warnings);
         Ok(scene)

@@ -10,6 +10,7 @@ use super::path::NerfstudioArgs;
 use super::report::{Report, Start};
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
+use super::targets::{check_folder, others};
 use super::time::{AtArgs, TimeArgs};
 use lumigraph::scene::picture_files;
 use serde_json::json;
@@ -27,10 +28,10 @@ pub(super) struct Args {
     scene: SceneArgs,
     #[command(flatten)]
     views: ViewArgs,
-    /// Frames of a derived path; or which of a path's are drawn, counted from 0, so that several
-    /// runs share a film: 120..240, or 120..240/300 of a derived path
-    #[arg(long, value_name = "N|A..B", default_value = "30", value_parser = frame_choice)]
-    frames: FrameChoice,
+    /// Frames of a derived path [default: 30]; or which of a path's are drawn, counted from 0, so
+    /// that several runs share a film: 120..240, or 120..240/300 of a derived path
+    #[arg(long, value_name = "N|A..B", value_parser = frame_choice)]
+    frames: Option<FrameChoice>,
     #[command(flatten)]
     nerfstudio: NerfstudioArgs,
     #[command(flatten)]
@@ -68,6 +69,10 @@ const FRAMES: u32 = 30;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
+    let chosen = args.frames.clone().unwrap_or_default();
+    chosen.check(args.views.is_derived())?;
+    check_folder(&args.output)?;
+    args.film.check()?;
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,
@@ -80,10 +85,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     session.max_error = args.max_error;
     let points = || session.points();
-    let count = args.frames.count(FRAMES);
+    let count = chosen.count(FRAMES);
     let world = args.nerfstudio.frame()?;
     let (frames, fps) = frames(&args.views, count, session.lumigraph(), points, &world)?;
-    let frames = args.frames.of(frames)?;
+    let frames = chosen.of(frames)?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
     let given = [
@@ -112,6 +117,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })?;
     bar.finish_and_clear();
     args.film.finish(&files, fps)?;
+    if let Some(note) = others(&args.output, &files)?.filter(|_| !chosen.is_part()) {
+        say!("note: {note}");
+    }
 
     let report = Report::new(&session, &start);
     if args.json {

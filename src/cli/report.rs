@@ -39,7 +39,11 @@ pub(super) struct Report {
     gpu_memory: Option<Memory>,
     /// What the graphics device did not do, and what became of it.
     notes: Vec<String>,
-    frames_by_cpu: u64,
+    /// As many as say so themselves, whatever device was asked for.
+    frames_by_cpu: usize,
+    /// Those that a graphics device was to draw.
+    #[serde(skip)]
+    frames_instead: u64,
     /// Where frames were drawn one after the other: what each stage has taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     stages: Option<Value>,
@@ -75,7 +79,8 @@ impl Report {
         let drawn = !costs.frames.is_empty();
         Self {
             notes: engine.map_or_else(Vec::new, |engine| engine.notes().to_vec()),
-            frames_by_cpu: engine.map_or(0, Engine::frames_by_cpu),
+            frames_by_cpu: costs.frames.iter().filter(|frame| frame.by_cpu).count(),
+            frames_instead: engine.map_or(0, Engine::frames_by_cpu),
             stages: drawn.then(|| stages.json()),
             stages_text: stages.text(),
             decode_seconds: photos.decode_time().as_secs_f64(),
@@ -129,8 +134,11 @@ impl Report {
             }
             text += &format!("\nskipped: {}", self.skipped.text());
         }
-        if self.frames_by_cpu > 0 {
-            text += &format!("\n{} frames were drawn by the CPU", self.frames_by_cpu);
+        if self.frames_instead > 0 {
+            text += &format!(
+                "\n{} frames were drawn by the CPU in place of the graphics device",
+                self.frames_instead
+            );
         }
         text
     }
@@ -201,7 +209,8 @@ impl Costs {
             } else {
                 (scored.questions * taking_part as u64).saturating_sub(scored.scorings)
             },
-            by_cpu,
+            // The reference is no engine that stands in, but runs there, too.
+            by_cpu: gpu.is_none(),
         });
     }
 

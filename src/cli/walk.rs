@@ -1,25 +1,25 @@
 //! `lumigraph walk`
 
 mod report;
+mod tour;
 
 use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::made::{self, Made};
 use super::options::{resized, size};
-use super::output::{make_parent, print, print_json, say, write_file};
+use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
 use super::plot::{Line, plot};
 use super::references::ReferenceArgs;
 use super::session::progress;
+use super::targets::check_folder;
 use anyhow::{Context, bail};
-use calibrate::{Camera, Lens, View};
+use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
-use glam::DVec2;
 use lumigraph::scene::{Truth, picture_files};
-use proxy::interior::{CellId, Interior};
-use render::interior::{Painter, PortalFill, Splat, Tour, Walk, WalkOptions};
+use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
 use render::path;
 use report::{Drawn, Scored, Walked, ms};
 use serde_json::{Value, json};
@@ -30,8 +30,9 @@ use std::path::{Path, PathBuf};
 /// The room one is in is drawn as geometry; what lies beyond its portals as geometry too, or out of
 /// images made before the portals: as textures, warped, or as layered depth images. Geometry has
 /// the model's colours, or those of the photos of a capture's rooms. Frames are PNGs; times.svg
-/// plots the time of each frame, path.json is the tour. --held-out draws the photos that were held out
-/// when the interior was made, and scores them as `evaluate` does.
+/// plots the time of each frame, path.json is the tour (no other path is written over). --held-out
+/// draws the photos that were held out when the interior was made, and scores them as `evaluate`
+/// does.
 ///
 ///     lumigraph walk house --portals all -o walk
 ///     lumigraph walk house --path film/path.json -o frames --video film.mp4
@@ -52,10 +53,10 @@ pub(super) struct Args {
     /// Draw and score the photos that were held out when the interior was made
     #[arg(long, conflicts_with_all = ["tour", "path", "frames", "video", "resume"])]
     held_out: bool,
-    /// Frames of a tour; or which of a path's are drawn, counted from 0, so that several runs share
-    /// a film: 120..240, or 120..240/300 of a tour
-    #[arg(long, value_name = "N|A..B", default_value = "520", value_parser = frame_choice)]
-    frames: FrameChoice,
+    /// Frames of a tour [default: 520]; or which of a path's are drawn, counted from 0, so that several
+    /// runs share a film: 120..240, or 120..240/300 of a tour
+    #[arg(long, value_name = "N|A..B", value_parser = frame_choice)]
+    frames: Option<FrameChoice>,
     /// What portals show: geometry, texture, warp1, warp2, ldi, several of them, or all; of several,
     /// each has a folder of its own. whole draws everything as if there were no cells
     #[arg(
@@ -98,6 +99,13 @@ pub(super) struct Args {
     output: PathBuf,
 }
 
+impl Args {
+    /// Which frames.
+    fn chosen(&self) -> FrameChoice {
+        self.frames.clone().unwrap_or_default()
+    }
+}
+
 /// What is not to be left out.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum NoSkip {
@@ -106,12 +114,8 @@ enum NoSkip {
     Columns,
 }
 
-/// The tour's own size, that of Rafferty et al. 1998.
-const SIZE: (u32, u32) = (640, 512);
+/// Frames a second of a tour.
 const FPS: f64 = 15.0;
-const FRAMES: u32 = 520;
-/// Of a tour's camera, over the picture's width.
-const FOCAL: f64 = 0.7;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // 1. What to do.
@@ -121,7 +125,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--near is {near}; expected 0 or more");
         return Err(Usage(text).into());
     }
-    if args.persist && args.frames.is_part() {
+    let chosen = args.chosen();
+    chosen.check(args.path.is_none())?;
+    if args.persist && chosen.is_part() {
         let text = "--persist: what a frame keeps is of the one before; draw all of the path";
         return Err(Usage(text.to_owned()).into());
     }
@@ -140,6 +146,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         persist: args.persist,
         ..defaults
     };
+    check_folder(&args.output)?;
+    args.film.check()?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");
     let references = &args.references;
@@ -293,7 +301,7 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
             (_, Some(fill)) => fills.push(fill),
             _ => {
                 let known = PortalFill::ALL.map(PortalFill::name).join(", ");
-                let text = format!("--portals: unknown {name:?}; expected {known}, or all");
+                let text = format!("--portals: unknown {name:?}; expected {known}, whole, or all");
                 return Err(Usage(text).into());
             }
         }
@@ -333,55 +341,17 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
 
 /// The frames to draw, and how many a second a film of them shows.
 fn frames(args: &Args, opened: &Opened) -> anyhow::Result<(Vec<Named>, f64)> {
-    let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     let path = match &args.path {
         Some(file) => path::read_in(file, &args.nerfstudio.frame()?)?,
-        None => {
-            let (width, height) = args.size.unwrap_or(SIZE);
-            let size = DVec2::new(f64::from(width), f64::from(height));
-            let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
-            let camera = Camera::of(&lens, width, height);
-            let count = args.frames.count(FRAMES) as usize;
-            let planned = Tour::new(interior, contents, model, &camera, count, FPS)
-                .with_context(|| args.interior.display().to_string())?;
-            for note in notes_of(&planned, interior) {
-                say!("note: {note}");
-            }
-            let file = args.output.join("path.json");
-            make_parent(&file)?;
-            path::write(&file, &planned.path)?;
-            planned.path
-        }
+        None => tour::plan(args, opened)?,
     };
     let named = |frame: path::PathFrame| Named {
         name: frame.name,
         view: resized(frame.view, args.size),
         truth: None,
     };
-    let frames = args.frames.of(path.frames)?;
+    let frames = args.chosen().of(path.frames)?;
     Ok((frames.into_iter().map(named).collect(), path.fps))
-}
-
-/// What is not as one would walk, a line each.
-fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
-    let cells =
-        |ids: &[CellId]| -> Vec<&str> { ids.iter().map(|id| &*interior.cell(*id).name).collect() };
-    let mut notes = Vec::new();
-    if !tour.left_out.is_empty() {
-        let names = cells(&tour.left_out).join(", ");
-        notes.push(format!(
-            "no opening leads to {names}; the tour leaves them out"
-        ));
-    }
-    let portals = tour.shut.iter().map(|id| &*interior.portal(*id).name);
-    let names: Vec<&str> = cells(&tour.blocked).into_iter().chain(portals).collect();
-    if !names.is_empty() {
-        let names = names.join(", ");
-        notes.push(format!(
-            "something at eye height is in the way in {names}; the tour goes straight through it"
-        ));
-    }
-    notes
 }
 
 fn draw(

@@ -189,7 +189,8 @@ pub enum SceneError {
     },
     /// Photos are to be held out that the scene does not have.
     #[error(
-        "{}: the scene has no {}; it has {}", path.display(), names.join(", "), examples(known)
+        "{}: the scene has no {}; it has {}; name those, or choose others with --hold-out FILE (or, \
+         to `evaluate`, --every N)", path.display(), names.join(", "), examples(known)
     )]
     UnknownHeldOut {
         /// The split file.
@@ -203,7 +204,10 @@ pub enum SceneError {
     #[error("{}: \"test\" names no photo; name some to hold out", .0.display())]
     EmptySplit(PathBuf),
     /// None of the photos that a split names can be used.
-    #[error("{}: all of its photos are missing or corrupt", .0.display())]
+    #[error(
+        "{}: all of its photos are missing or corrupt; choose others with --hold-out FILE or \
+         --every N", .0.display()
+    )]
     UnusableSplit(PathBuf),
     /// Every photo is held out or corrupt.
     #[error("no photo is left to render from: all {0} are held out or corrupt")]

@@ -27,6 +27,9 @@ pub struct SceneFile {
     pub version: u32,
     /// By name.
     pub photos: Vec<PhotoEntry>,
+    /// The photos that the import had to leave out, by what the capture calls them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     /// The folder of the COLMAP model.
     pub model: String,
     /// The scene's own proxy.

@@ -9,6 +9,7 @@ use calibrate::formats::Format;
 use calibrate::opencv::Keys;
 use calibrate::{Reconstruction, colmap};
 use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -199,6 +200,24 @@ impl Scene {
         self.leave_out(unusable, strict)
     }
 
+    /// Fails of the first photo that cannot be decoded, of which headers tell nothing.
+    ///
+    /// # Errors
+    /// As said; as where a missing photo is one.
+    pub fn check_photos(&self) -> Result<(), SceneError> {
+        let images = self.images_by_name();
+        let wrong = |photo: &Photo| {
+            let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
+            let error = photo.decode((camera.width, camera.height)).err()?;
+            Some(SceneError::Strict {
+                name: photo.name.clone(),
+                reason: error.to_string(),
+            })
+        };
+        let first = self.photos.par_iter().find_map_first(wrong);
+        first.map_or(Ok(()), Err)
+    }
+
     /// Leaves out photos for what is wrong with them, as long as enough others remain.
     pub(super) fn leave_out(
         &mut self,
@@ -221,9 +240,7 @@ impl Scene {
             });
         }
         let names: BTreeSet<String> = unusable.iter().map(|(name, _)| name.clone()).collect();
-        self.photos.retain(|photo| !names.contains(&photo.name));
-        self.reconstruction = self.reconstruction.without_images(&names);
-        self.left_out.extend(names);
+        self.take_out(&names);
         let warning = |(name, error): (String, CaptureError)| Warning::LeftOut {
             name,
             reason: error.to_string(),

@@ -69,7 +69,8 @@ pub struct Scene {
     pub capture: Option<PathBuf>,
     /// The calibration that was given beside it, if one was.
     pub calibration: Option<PathBuf>,
-    /// Photos that are calibrated but missing or corrupt, or dropped as weakly tied.
+    /// Photos that are calibrated but missing or corrupt, now or at the import, or dropped as weakly
+    /// tied; by what the capture calls them.
     pub left_out: Vec<String>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
@@ -125,9 +126,19 @@ impl Scene {
     pub fn drop_weak(&mut self) -> Vec<WeakGroup> {
         let weak = self.reconstruction.weakly_tied(TRUSTED_TIE);
         let names: BTreeSet<String> = weak.iter().flat_map(|g| g.names.iter().cloned()).collect();
-        self.photos.retain(|photo| !names.contains(&photo.name));
-        self.reconstruction = self.reconstruction.without_images(&names);
-        self.left_out.extend(names);
+        self.take_out(&names);
         weak
+    }
+
+    /// Takes photos out of the scene, and notes that they were left out.
+    fn take_out(&mut self, names: &BTreeSet<String>) {
+        let (gone, rest): (Vec<Photo>, Vec<Photo>) = std::mem::take(&mut self.photos)
+            .into_iter()
+            .partition(|photo| names.contains(&photo.name));
+        self.photos = rest;
+        self.reconstruction = self.reconstruction.without_images(names);
+        // Splits, which may name them, speak of the capture's photos.
+        let called = |photo: Photo| photo.original.unwrap_or(photo.name);
+        self.left_out.extend(gone.into_iter().map(called));
     }
 }

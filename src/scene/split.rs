@@ -33,6 +33,15 @@ impl SplitFile {
     }
 }
 
+fn read(split: &Path) -> Result<SplitFile, SceneError> {
+    let bytes = std::fs::read(split).map_err(|source| SceneError::Io {
+        path: split.to_owned(),
+        doing: "read the split",
+        source,
+    })?;
+    SplitFile::parse(split, &bytes)
+}
+
 impl Scene {
     /// The photos that a split file holds out. Those that this scene had to leave out
     /// anyway are passed over.
@@ -40,12 +49,7 @@ impl Scene {
     /// # Errors
     /// The file cannot be read, names no photo, or names one the scene does not have.
     pub fn held_out(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
-        let bytes = std::fs::read(split).map_err(|source| SceneError::Io {
-            path: split.to_owned(),
-            doing: "read the split",
-            source,
-        })?;
-        let read = SplitFile::parse(split, &bytes)?;
+        let read = read(split)?;
         // Splits speak of the photos as the capture calls them.
         let called = |photo: &Photo| photo.original.clone().map(|was| (was, photo.name.clone()));
         let renamed: BTreeMap<String, String> = self.photos.iter().filter_map(called).collect();
@@ -67,6 +71,16 @@ impl Scene {
             });
         }
         Ok(here)
+    }
+
+    /// Of the photos that a split file names, those that this scene had to leave out.
+    ///
+    /// # Errors
+    /// The file cannot be read, or names no photo.
+    pub fn left_out_of(&self, split: &Path) -> Result<Vec<String>, SceneError> {
+        let mut names = read(split)?.test;
+        names.retain(|name| self.left_out.contains(name));
+        Ok(names)
     }
 
     /// The split file that came with the photos: in the scene's own folder, else in the

@@ -146,7 +146,7 @@ impl Scene {
             calibration: at(&file.settings.calibration),
             settings: file.settings,
             folder: Some(folder.to_owned()),
-            left_out: Vec::new(),
+            left_out: file.left_out,
             other: file.other,
         })
     }
@@ -331,6 +331,7 @@ impl Scene {
         let file = SceneFile {
             version: 1,
             photos: self.photos.iter().map(entry).collect(),
+            left_out: self.left_out.clone(),
             model: MODEL_FOLDER.to_owned(),
             proxy: self.proxy.as_ref().map(proxy_entry),
             exposure: self.exposure.clone(),

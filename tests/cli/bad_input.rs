@@ -187,6 +187,43 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
 }
 
 #[test]
+fn strict_imports_decode_every_photo() {
+    let folder = with_wall();
+    let (here, wall) = (folder.path(), folder.path().join("wall"));
+    let jpeg = wall.join("images/0005.jpg");
+    let png = jpeg.with_extension("png");
+    let photo = image::open(&png).unwrap().into_rgb8();
+    photo.save(&jpeg).unwrap();
+    fs::remove_file(&png).unwrap();
+    let sparse = wall.join("sparse/0");
+    let mut model = calibrate::colmap::read_model(&sparse).unwrap();
+    for image in model.images.values_mut().filter(|i| i.name == "0005.png") {
+        image.name = "0005.jpg".to_owned();
+    }
+    calibrate::colmap::write_binary(&model, &sparse).unwrap();
+    lumigraph(here, "info wall --strict").ok();
+    lumigraph(here, "import wall --strict -o whole").ok();
+
+    // Its header says all that is asked of it otherwise.
+    let whole = fs::read(&jpeg).unwrap();
+    fs::write(&jpeg, &whole[..whole.len() / 2]).unwrap();
+    for line in [
+        "info wall --strict",
+        "info whole --strict",
+        "import wall --strict -o strict",
+        "import wall --strict --no-exposure -o strict",
+        "import wall --strict --undistort -o strict",
+    ] {
+        let error = lumigraph(here, line).error(1);
+        assert!(error.starts_with("photo 0005.jpg: "), "{error}");
+        assert!(error.contains("the JPEG data have no end"), "{error}");
+    }
+    assert!(!here.join("strict").exists());
+    lumigraph(here, "info wall").ok();
+    lumigraph(here, "import wall --no-exposure -o scene").ok();
+}
+
+#[test]
 fn a_corrupt_held_out_photo_cannot_be_scored() {
     let folder = with_wall();
     let path = folder.path().join("wall/images/0008.png");
@@ -217,7 +254,8 @@ fn splits_must_name_photos() {
     };
     assert_eq!(
         error(r#"{"test": ["0001.png", "0010.png", "x.jpg"]}"#),
-        "s.json: the scene has no 0010.png, x.jpg; it has 0000.png, 0001.png and 7 more"
+        "s.json: the scene has no 0010.png, x.jpg; it has 0000.png, 0001.png and 7 more; name those, \
+         or choose others with --hold-out FILE (or, to `evaluate`, --every N)"
     );
     assert_eq!(
         error(r#"{"test": []}"#),

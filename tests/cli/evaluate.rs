@@ -137,6 +137,36 @@ fn which_photos_are_held_out() {
 }
 
 #[test]
+fn what_the_import_left_out_of_a_split_is_noted_and_the_rest_scored() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::remove_file(here.join("wall/images/0008.png")).unwrap();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    for scene in ["wall", "scene", "flat"] {
+        let ran = lumigraph(here, &format!("evaluate {scene} --proxy plane --json")).ok();
+        let result = ran.json();
+        assert_eq!(names(&result), ["0000.png"], "{scene}");
+        let note = "wall/split.json: left out of the scene, and not scored: 0008.png";
+        assert!(ran.stderr.contains(note), "{scene}: {}", ran.stderr);
+    }
+    let info = lumigraph(here, "info scene --json").ok().json();
+    assert_eq!(info["left_out"][0], "0008.png");
+
+    // Of what nothing explains it is said how to go on.
+    let file = here.join("scene/scene.json");
+    let mut scene: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    scene.as_object_mut().unwrap().remove("left_out").unwrap();
+    fs::write(&file, scene.to_string()).unwrap();
+    let error = lumigraph(here, "evaluate scene --proxy plane").error(1);
+    assert!(error.contains("the scene has no 0008.png"), "{error}");
+    assert!(
+        error.contains("--hold-out FILE") && error.contains("--every N"),
+        "{error}"
+    );
+}
+
+#[test]
 fn held_out_photos_are_nowhere_used() {
     let folder = with_wall();
     let evaluate = |out: &str| {

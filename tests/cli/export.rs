@@ -176,7 +176,10 @@ fn an_undistorted_scene_holds_its_photos() {
 fn the_keys_that_were_chosen_are_recorded() {
     let folder = with_wall();
     let run = |line: &str| lumigraph(folder.path(), line).ok();
-    run("export wall --format opencv -o camera.yml");
+    let said = run("export wall --format opencv -o camera.yml").stdout;
+    let expected = "camera.yml: 9 photos, no points: the format has those of a calibration board";
+    assert!(said.starts_with(expected), "{said}");
+    assert_eq!(run("info camera.yml --json").json()["points"], 0);
     let file = folder.path().join("camera.yml");
     let text = fs::read_to_string(&file).unwrap();
     let text = text

@@ -232,3 +232,49 @@ fn a_command_that_is_stopped_leaves_whole_files_and_can_be_run_again() {
     }
     all_whole(folder.path());
 }
+
+/// By whatever command, and whatever the path to them.
+#[test]
+fn photos_are_not_written_over() {
+    let folder = with_wall();
+    let here = folder.path();
+    let before = files(here);
+    let size = "--proxy plane --size 48x36";
+    for line in [
+        format!("evaluate wall --every 3 {size} -o wall/images"),
+        format!("render wall --views wall {size} -o wall/../wall/images"),
+        format!("field wall --view 0000.png {size} -o wall/images/0000.png"),
+    ] {
+        let error = lumigraph(here, &line).error(1);
+        assert!(error.contains("000"), "{error}");
+        assert!(error.contains("pictures are made of this"), "{error}");
+        assert!(files(here) == before, "{line}");
+    }
+    // Beside them is room.
+    let line = format!("render wall --path sweep --frames 1 {size} -o wall/images");
+    lumigraph(here, &line).ok();
+}
+
+#[test]
+fn where_results_cannot_go_is_said_before_any_work() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::write(here.join("file"), "mine").unwrap();
+    for line in [
+        "render wall --path sweep --frames 1 -o file",
+        "render wall --path sweep --frames 1 -o file/frames",
+        "evaluate wall -o file",
+        "walk wall --frames 1 -o file",
+    ] {
+        let error = lumigraph(here, line).error(1);
+        assert!(
+            error.contains("file: a file is where the folder"),
+            "{error}"
+        );
+    }
+    let line = "render wall --path sweep --frames 1 -o out --video film.nothing";
+    let error = lumigraph(here, line).error(1);
+    assert!(error.contains("--video film.nothing"), "{error}");
+    assert!(!here.join("out").exists());
+    assert_eq!(fs::read(here.join("file")).unwrap(), b"mine");
+}

@@ -1,6 +1,6 @@
 //! Field pictures, weights and triangulations.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
@@ -114,6 +114,33 @@ fn a_photo_paints_its_own_view_alone() {
         assert_eq!(ids[at(x, y)], 4);
         assert_eq!(weights[at(x, y)], 1.0);
     }
+}
+
+#[test]
+fn files_are_called_what_they_are() {
+    let folder = with_wall();
+    for (options, said) in [
+        (
+            "-o f.jpg",
+            "--output f.jpg: expected a file name that ends in .png",
+        ),
+        ("-o f", "--output f: expected a file name that ends in .png"),
+        (
+            "-o f.png --weights w.txt",
+            "--weights w.txt: expected a file name that ends in .npz",
+        ),
+        (
+            "-o f.png --triangulation t.png",
+            "--triangulation t.png: expected a file name that ends in .svg",
+        ),
+    ] {
+        let line = format!("field wall --proxy plane --view 0004.png {options}");
+        assert_eq!(lumigraph(folder.path(), &line).error(2), said);
+    }
+    let names = files(folder.path());
+    assert!(names.keys().all(|name| name.starts_with("wall")));
+    let line = "field wall --proxy plane --view 0004.png --size 48x36 -o F.PNG";
+    lumigraph(folder.path(), line).ok();
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Interiors: a house is generated, made an interior of anew, and planned.
 
-use crate::run::lumigraph;
+use crate::run::{files, lumigraph};
 use glam::{DQuat, DVec3};
 use proxy::interior::read_interior;
 use serde_json::Value;
@@ -66,7 +66,7 @@ fn a_house_is_generated_and_planned() {
     assert!(ran.stdout.contains("-45.0°"), "{}", ran.stdout);
 }
 
-const ROOMS: &str = r#"{"version": 1,
+pub(crate) const ROOMS: &str = r#"{"version": 1,
     "rooms": [{"name": "all", "min": [-1, -1, -1], "max": [60, 5, 60]}]}"#;
 
 #[test]
@@ -75,9 +75,9 @@ fn an_interior_is_made_of_a_model() {
     let here = folder.path();
     std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
     let line = "interior house/house.glb --rooms rooms.json -o one";
-    // The second time it takes the first one's place.
-    for _ in 0..2 {
-        let ran = lumigraph(here, line).ok();
+    // The second time it takes the first one's place, where it is told to.
+    for more in ["", " --force"] {
+        let ran = lumigraph(here, &format!("{line}{more}")).ok();
         assert_eq!(ran.stderr, "");
         let said = "one: 1 cells, 0 portals, ";
         assert!(ran.stdout.contains(said), "{}", ran.stdout);
@@ -92,7 +92,9 @@ fn an_interior_is_made_of_a_model() {
         assert!(error.contains(said), "{error}");
     };
     let mine = "interior house/house.glb --rooms rooms.json -o mine";
-    failed(mine, "mine: the folder is not empty");
+    for more in ["", " --force"] {
+        failed(&format!("{mine}{more}"), "mine: the folder is not empty");
+    }
     // What is wrong is said, and nothing is left behind.
     for (rooms, said) in [
         ("{", "rooms.json: not a list of rooms"),
@@ -110,7 +112,9 @@ fn an_interior_is_made_of_a_model() {
     failed("interior empty.glb -o two", "empty.glb: not a glTF file");
     let left = ["empty.glb", "house", "mine", "one", "rooms.json"];
     assert_eq!(names(here), left);
-    failed("plan nowhere", "nowhere: ");
+    failed("plan nowhere", "nowhere: there is no such");
+    failed("interior nope.glb -o two", "nope.glb: there is no such");
+    failed("interior nope -o two", "nope: there is no such");
 }
 
 #[test]
@@ -118,7 +122,7 @@ fn rooms_that_nobody_names_are_found() {
     let folder = with_house();
     let here = folder.path();
     let line = "interior house/house.glb -o found";
-    // The second time it takes the first one's place, byte for byte.
+    // The second time it takes the first one's place, where it is told to, byte for byte.
     let ran = lumigraph(here, line).ok();
     let first = std::fs::read(here.join("found/interior.json")).unwrap();
     assert!(ran.stdout.contains("found: 2 cells, "), "{}", ran.stdout);
@@ -127,7 +131,7 @@ fn rooms_that_nobody_names_are_found() {
         "{}",
         ran.stderr
     );
-    lumigraph(here, &format!("--threads 1 {line}")).ok();
+    lumigraph(here, &format!("--threads 1 {line} --force")).ok();
     assert!(std::fs::read(here.join("found/interior.json")).unwrap() == first);
     let files = [
         "floor-plan.png",
@@ -139,6 +143,35 @@ fn rooms_that_nobody_names_are_found() {
     // It can be walked through at once.
     let walk = "walk found --tour --frames 2 --size 32x24 -o out";
     lumigraph(here, walk).ok();
+}
+
+#[test]
+fn an_interior_corrected_by_hand_is_replaced_by_force_alone() {
+    let folder = with_house();
+    let here = folder.path();
+    std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
+    let line = "interior house/house.glb --rooms rooms.json -o one";
+    let replace = || {
+        let error = lumigraph(here, line).error(1);
+        assert!(error.contains("one: holds an interior"), "{error}");
+        assert!(error.contains("--force"), "{error}");
+    };
+    lumigraph(here, line).ok();
+    let file = here.join("one/interior.json");
+    let mut text = std::fs::read_to_string(&file).unwrap();
+    text.push('\n');
+    std::fs::write(&file, &text).unwrap();
+    let before = files(&here.join("one"));
+    replace();
+    assert!(files(&here.join("one")) == before);
+    lumigraph(here, &format!("{line} --force")).ok();
+    assert!(files(&here.join("one")) != before);
+    // Whatever is in a file of that name.
+    std::fs::remove_dir_all(here.join("one")).unwrap();
+    std::fs::create_dir(here.join("one")).unwrap();
+    std::fs::write(&file, "{").unwrap();
+    replace();
+    assert_eq!(names(&here.join("one")), ["interior.json"]);
 }
 
 /// How far a box's or a polygon's sides are from another's, at most.
@@ -312,7 +345,7 @@ fn usage_errors_exit_with_2() {
         ("plan house --span 180", "less than 180"),
         (
             "walk house --portals none -o x",
-            "geometry, texture, warp1, warp2, ldi, or all",
+            "geometry, texture, warp1, warp2, ldi, whole, or all",
         ),
         ("walk house --reference-views 4 -o x", "an odd number"),
         ("walk house --near NaN -o x", "--near"),

@@ -71,7 +71,7 @@ fn walks_read_the_layered_images_that_were_made_for_them() {
         assert!(files(&here.join("house/ldi")) == before);
     }
     // An interior made anew takes them with it, but nothing else that lies there.
-    let again = "interior house/house.glb -o found";
+    let again = "interior house/house.glb -o found --force";
     lumigraph(here, again).ok();
     lumigraph(here, "ldis found --reference-size 24x24").ok();
     let mine = here.join("found/ldi/mine.txt");

@@ -14,6 +14,7 @@ mod gpu;
 mod help;
 mod hull;
 mod interior;
+mod kinds;
 mod ldis;
 mod masks;
 mod memory;

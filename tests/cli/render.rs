@@ -292,3 +292,33 @@ fn without_ffmpeg_a_film_fails_before_anything_is_drawn() {
     assert!(error.contains("apt-get install ffmpeg"), "{error}");
     assert!(!folder.path().join("frames").exists());
 }
+
+#[test]
+fn a_path_with_its_own_frames_is_not_asked_for_so_many() {
+    let folder = with_wall();
+    let line = |frames: &str, out: &str| {
+        format!("render wall --proxy plane --views wall --frames {frames} --size 48x36 -o {out}")
+    };
+    let error = lumigraph(folder.path(), &line("2", "all")).error(2);
+    assert!(error.contains("--frames 0..2"), "{error}");
+    lumigraph(folder.path(), &line("0..2", "two")).ok();
+    assert_eq!(files(&folder.path().join("two")).len(), 2);
+    // A kind that is misspelt is no file.
+    let misspelt = "render wall --proxy plane --path orbti --frames 2 -o out";
+    let error = lumigraph(folder.path(), misspelt).error(2);
+    assert!(error.contains("--path orbti: expected orbit"), "{error}");
+}
+
+#[test]
+fn frames_of_an_earlier_run_are_told_of() {
+    let folder = with_wall();
+    let run = |count: u32| {
+        let line =
+            format!("render wall --proxy plane --path sweep --frames {count} --size 48x36 -o out");
+        lumigraph(folder.path(), &line).ok().stderr
+    };
+    assert!(!run(3).contains("not of this run"));
+    let said = run(2);
+    let expected = "note: frame_0002.png in out is not of this run";
+    assert!(said.contains(expected), "{said}");
+}

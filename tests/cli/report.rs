@@ -32,6 +32,12 @@ fn a_frame_says_what_it_took_and_the_run_what_all_did() {
         };
         let ran = render("", renderer);
         let report = &ran["report"];
+        assert_eq!(report["frames_by_cpu"], 3);
+        let slow = render(" --device reference", &format!("{renderer}-slow"));
+        assert_eq!(slow["report"]["frames_by_cpu"], 3);
+        let frames = slow["frames"].as_array().unwrap().iter();
+        let by_cpu = frames.filter(|frame| frame["cost"]["drawn_by_cpu"] == true);
+        assert_eq!(by_cpu.count(), 3);
         let mut sums = [0.0; 6];
         for frame in ran["frames"].as_array().unwrap() {
             let cost = &frame["cost"];

@@ -103,6 +103,14 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
     fs::write(folder.path().join("two.csv"), "0001.png,7\n0002.png,9\n").unwrap();
     import(" --times two.csv", "list").ok();
     assert_eq!(times("list")[..4], [None, Some(7.0), Some(9.0), None]);
+    let info = lumigraph(folder.path(), "info list --json").ok().json();
+    assert_eq!(
+        info["times"],
+        serde_json::json!({"photos": 2, "range_s": [7.0, 9.0]})
+    );
+    let text = lumigraph(folder.path(), "info list").ok().stdout;
+    let line = "\ntimes    of 2 photos, 7.000 to 9.000 s\n";
+    assert!(text.contains(line), "{text}");
 
     fs::write(folder.path().join("bad.csv"), "0001.png,7\n0001.jpg,9\n").unwrap();
     let error = import(" --times bad.csv", "bad").error(1);
@@ -126,6 +134,8 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
 #[test]
 fn a_scene_without_times_or_period_says_so() {
     let folder = with_wall();
+    let info = lumigraph(folder.path(), "info wall --json").ok().json();
+    assert!(info["times"].is_null());
     for line in [
         "evaluate wall --proxy plane --period 2",
         "render wall --proxy plane --path orbit --time 1 -o out",

@@ -148,6 +148,65 @@ fn a_walk_becomes_a_film() {
 }
 
 #[test]
+fn a_tour_is_written_over_no_path_but_a_tour() {
+    let folder = with_house();
+    let here = folder.path();
+    let film = here.join("film/path.json");
+    let tour = |frames: u32| format!("walk house --frames {frames} --size 32x24 -o film");
+    // Another tour takes the place of one, of whatever length, size and house.
+    lumigraph(here, &tour(3)).ok();
+    let first = std::fs::read(&film).unwrap();
+    lumigraph(here, &tour(3)).ok();
+    assert!(std::fs::read(&film).unwrap() == first);
+    lumigraph(here, &tour(2)).ok();
+    assert!(std::fs::read(&film).unwrap() != first);
+    let other = "generate house --rooms 2 --triangles 1 --seed 2 -o house-2";
+    lumigraph(here, other).ok();
+    lumigraph(here, "walk house-2 --frames 2 --size 24x24 -o film").ok();
+    // So does it where an earlier version, which made no mark, wrote the very path.
+    lumigraph(here, &tour(3)).ok();
+    let mut path = render::path::read(&film).unwrap();
+    assert!(path.extra.remove("tour").is_some());
+    render::path::write(&film, &path).unwrap();
+    lumigraph(here, &tour(3)).ok();
+    assert!(std::fs::read(&film).unwrap() == first);
+    // What people made stays: keyframes, as `view` saves them, a path, a tour that was changed, and
+    // what is no path at all.
+    let keyframe = |t_s: f64, frame: &render::PathFrame| render::path::Keyframe {
+        t_s,
+        camera_from_world: frame.view.camera_from_world,
+        camera: frame.camera.clone(),
+        time_s: None,
+    };
+    let keyframes = render::path::KeyframeFile {
+        fps: 30.0,
+        keyframes: vec![
+            keyframe(0.0, &path.frames[0]),
+            keyframe(1.0, &path.frames[1]),
+        ],
+        interpolation: render::path::Interpolation::Linear,
+    };
+    let own = here.join("own.json");
+    render::path::write_keyframes(&own, &keyframes).unwrap();
+    let saved = std::fs::read(&own).unwrap();
+    path.frames.truncate(2);
+    render::path::write(&own, &path).unwrap();
+    let part = std::fs::read(&own).unwrap();
+    let changed = String::from_utf8(first).unwrap();
+    let changed = changed
+        .replacen("\"fps\": 15", "\"fps\": 16", 1)
+        .into_bytes();
+    for kept in [saved, part, changed, b"thesis".to_vec()] {
+        std::fs::write(&film, &kept).unwrap();
+        let _ = std::fs::remove_file(here.join("film/frame_0000.png"));
+        let error = lumigraph(here, &tour(3)).error(1);
+        assert!(error.contains("--path film/path.json, or"), "{error}");
+        assert!(std::fs::read(&film).unwrap() == kept);
+        assert!(!here.join("film/frame_0000.png").exists());
+    }
+}
+
+#[test]
 fn layered_images_of_the_nearest_views_are_the_same_in_parts() {
     let folder = with_house();
     let here = folder.path();

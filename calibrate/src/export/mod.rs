@@ -12,5 +12,5 @@ mod transforms;
 
 pub use error::ExportError;
 pub use lens::check_colmap;
-pub use opencv::opencv_yaml;
+pub use opencv::{has_board, opencv_yaml};
 pub use transforms::{FrameFiles, transforms_json};

@@ -69,6 +69,11 @@ pub fn opencv_yaml(
     Ok(yaml.0)
 }
 
+/// Whether [`opencv_yaml`] writes the sparse points: those of a calibration board.
+pub fn has_board(reconstruction: &Reconstruction) -> bool {
+    board(reconstruction).is_some()
+}
+
 /// OpenCV's six numbers of a pose: the rotation's axis times its angle, the translation.
 fn rotation_and_translation(camera_from_world: &Rigid3) -> [f64; 6] {
     let mut rotation = camera_from_world.rotation;

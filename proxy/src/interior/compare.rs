@@ -221,7 +221,9 @@ impl fmt::Display for Comparison {
             write!(f, "{}: {said}", portal.name)?;
             match &portal.nearest {
                 Some((name, apart, wider)) => {
-                    writeln!(f, "; {name} is {apart:.2} off and {wider:+.2} wide")?;
+                    let how = if *wider < 0.0 { "narrower" } else { "wider" };
+                    let by = wider.abs();
+                    writeln!(f, "; {name} is {apart:.2} off and {by:.2} {how}")?;
                 }
                 None => writeln!(f)?,
             }
@@ -236,5 +238,31 @@ impl fmt::Display for Comparison {
             f,
             "{found} of {cells} rooms, {seen} of {portals} portals found"
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_portal_is_wider_or_narrower() {
+        let said = |wider: f64| {
+            let portal = ComparedPortal {
+                name: "door".to_owned(),
+                nearest: Some(("doorway 2".to_owned(), 0.65, wider)),
+                is_found: false,
+            };
+            let comparison = Comparison {
+                cells: Vec::new(),
+                extra_cells: Vec::new(),
+                portals: vec![portal],
+                extra_portals: Vec::new(),
+            };
+            comparison.to_string()
+        };
+        let narrow = "door: not found; doorway 2 is 0.65 off and 3.20 narrower\n";
+        assert!(said(-3.2).starts_with(narrow), "{}", said(-3.2));
+        assert!(said(0.1).contains(" off and 0.10 wider\n"));
     }
 }

@@ -1,0 +1,95 @@
+//! What a command is about to write: not over what it reads, and only where it can.
+
+use anyhow::{Context, bail};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Fails where a folder cannot be made, as a file is in its place.
+pub(super) fn check_folder(folder: &Path) -> anyhow::Result<()> {
+    let in_the_way = folder.ancestors().find(|p| p.exists() && !p.is_dir());
+    if let Some(file) = in_the_way {
+        bail!(
+            "{}: a file is where the folder was to be; choose another -o",
+            file.display()
+        );
+    }
+    Ok(())
+}
+
+/// Fails where a file to be written is one of those that pictures are made of, by whatever path.
+pub(super) fn check_inputs<'a>(
+    files: impl IntoIterator<Item = &'a Path>,
+    inputs: &[PathBuf],
+) -> anyhow::Result<()> {
+    let there: Vec<&Path> = files.into_iter().filter(|file| file.exists()).collect();
+    if there.is_empty() {
+        return Ok(());
+    }
+    let whole = |path: &Path| std::fs::canonicalize(path).ok();
+    let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| whole(path)).collect();
+    let is_input = |file: &&&Path| whole(file).is_some_and(|file| inputs.contains(&file));
+    match there.iter().find(is_input) {
+        None => Ok(()),
+        Some(file) => bail!(
+            "{}: pictures are made of this very file; nothing was written: choose another -o",
+            file.display()
+        ),
+    }
+}
+
+/// What to say of pictures in a folder that are none of those just written, if there are any: films of
+/// all that lies there would show them, too.
+///
+/// # Errors
+/// The folder cannot be read.
+pub(super) fn others(folder: &Path, files: &[PathBuf]) -> anyhow::Result<Option<String>> {
+    let failed = || folder.display().to_string();
+    let own: BTreeSet<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let mut others = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(failed)? {
+        let path = entry.with_context(failed)?.path();
+        let is_picture = path.extension().is_some_and(|e| e == "png");
+        if is_picture && !own.contains(path.as_path()) {
+            others.extend(path.file_name().map(|name| name.display().to_string()));
+        }
+    }
+    others.sort();
+    let Some(first) = others.first() else {
+        return Ok(None);
+    };
+    let folder = folder.display();
+    Ok(Some(match others.len() {
+        1 => format!("{first} in {folder} is not of this run"),
+        count => format!("{count} pictures in {folder} are not of this run, as {first}"),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_read_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("images")).unwrap();
+        std::fs::write(at("images/a.png"), "a").unwrap();
+        let inputs = [at("images/a.png"), at("gone.png")];
+        let check = |file: PathBuf| check_inputs([file.as_path()], &inputs);
+        let error = check(at("images/../images/a.png")).unwrap_err().to_string();
+        assert!(
+            error.contains("a.png: pictures are made of this"),
+            "{error}"
+        );
+        assert!(check(at("images/b.png")).is_ok());
+        assert!(check(at("gone.png")).is_ok());
+
+        assert!(check_folder(&at("new/er")).is_ok());
+        assert!(check_folder(&at("images")).is_ok());
+        assert!(check_folder(&at("images/a.png/b")).is_err());
+
+        let others = |files: &[PathBuf]| others(&at("images"), files).unwrap();
+        assert_eq!(others(&[at("images/a.png")]), None);
+        assert!(others(&[]).unwrap().starts_with("a.png in "));
+    }
+}

@@ -1,0 +1,94 @@
+//! The tour of a walk that is given no path: planned, and kept as a path file.
+
+use super::super::captured::{Opened, hash_of};
+use super::super::output::{make_parent, say};
+use super::{Args, FPS};
+use anyhow::{Context, bail};
+use calibrate::{Camera, Lens};
+use glam::DVec2;
+use proxy::interior::{CellId, Interior};
+use render::CameraPath;
+use render::interior::Tour;
+use render::path::{self, PathFileError};
+use std::path::Path;
+
+/// The tour's own size, that of Rafferty et al. 1998.
+const SIZE: (u32, u32) = (640, 512);
+const FRAMES: u32 = 520;
+/// Of a tour's camera, over the picture's width.
+const FOCAL: f64 = 0.7;
+/// The file that keeps it, in the folder for the frames.
+const FILE: &str = "path.json";
+/// What that file says of itself: a hash of the rest, which a path that people made does not have.
+const KEY: &str = "tour";
+
+/// Plans a tour through an interior, says what is odd about it, and writes it beside the frames.
+pub(super) fn plan(args: &Args, opened: &Opened) -> anyhow::Result<CameraPath> {
+    let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
+    let (width, height) = args.size.unwrap_or(SIZE);
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    let lens = Lens::pinhole(DVec2::splat(FOCAL * size.x), 0.5 * size);
+    let camera = Camera::of(&lens, width, height);
+    let count = args.chosen().count(FRAMES) as usize;
+    let planned = Tour::new(interior, contents, model, &camera, count, FPS)
+        .with_context(|| args.interior.display().to_string())?;
+    for note in notes_of(&planned, interior) {
+        say!("note: {note}");
+    }
+    keep(&args.output.join(FILE), &planned.path)?;
+    Ok(planned.path)
+}
+
+/// Writes a tour, but over no path other than a tour: keyframes that `view` saved lie in such a file.
+fn keep(file: &Path, tour: &CameraPath) -> anyhow::Result<()> {
+    if file.exists() && !may_be_replaced(file, tour) {
+        let file = file.display();
+        bail!(
+            "{file}: this is no tour that a walk wrote, and the tour would take its place; walk \
+             it with --path {file}, or choose another -o"
+        );
+    }
+    make_parent(file)?;
+    let mut marked = tour.clone();
+    marked.extra.insert(KEY.to_owned(), mark(tour)?.into());
+    Ok(path::write(file, &marked)?)
+}
+
+/// Whether a file is a tour as a walk wrote it, or has the same path as a new one.
+fn may_be_replaced(file: &Path, tour: &CameraPath) -> bool {
+    let Ok(mut found) = path::read(file) else {
+        return false;
+    };
+    let said = found.extra.remove(KEY);
+    let Ok(own) = mark(&found) else {
+        return false;
+    };
+    said.is_some_and(|said| said == own) || mark(tour).is_ok_and(|new| new == own)
+}
+
+/// A hash of a path's file.
+fn mark(path: &CameraPath) -> Result<String, PathFileError> {
+    Ok(hash_of(&path::text(path)?))
+}
+
+/// What is not as one would walk, a line each.
+fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
+    let cells =
+        |ids: &[CellId]| -> Vec<&str> { ids.iter().map(|id| &*interior.cell(*id).name).collect() };
+    let mut notes = Vec::new();
+    if !tour.left_out.is_empty() {
+        let names = cells(&tour.left_out).join(", ");
+        notes.push(format!(
+            "no opening leads to {names}; the tour leaves them out"
+        ));
+    }
+    let portals = tour.shut.iter().map(|id| &*interior.portal(*id).name);
+    let names: Vec<&str> = cells(&tour.blocked).into_iter().chain(portals).collect();
+    if !names.is_empty() {
+        let names = names.join(", ");
+        notes.push(format!(
+            "something at eye height is in the way in {names}; the tour goes straight through it"
+        ));
+    }
+    notes
+}
