@@ -173,40 +173,14 @@ const ON: f64 = 1e-9;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Mesh, MeshKind, Scan};
+    use crate::{MeshKind, Scan};
     use calibrate::{Distortion, Lens, Pixel, Rigid3};
     use glam::{DQuat, DVec2};
     use proptest::prelude::*;
     use std::sync::Arc;
 
-    /// Boxes, each with its own corners.
     fn boxes(of: &[(DVec3, DVec3)]) -> Solid {
-        let mut mesh = Mesh::default();
-        for &(least, most) in of {
-            let first = mesh.positions.len() as u32;
-            mesh.positions.extend((0..8).map(|i: u32| {
-                let pick = |bit: u32, axis: usize| {
-                    if i >> bit & 1 == 1 {
-                        most[axis]
-                    } else {
-                        least[axis]
-                    }
-                };
-                DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
-            }));
-            let faces = [
-                [0, 2, 3, 1],
-                [4, 5, 7, 6],
-                [0, 1, 5, 4],
-                [2, 6, 7, 3],
-                [0, 4, 6, 2],
-                [1, 3, 7, 5],
-            ];
-            for [a, b, c, d] in faces.map(|face| face.map(|i: u32| first + i)) {
-                mesh.triangles.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        Solid::new(MeshKind::Hull, mesh)
+        Solid::new(MeshKind::Hull, crate::scan::tests::boxes(of))
     }
 
     fn view(center: DVec3, turn: DQuat, k1: f64) -> View {
