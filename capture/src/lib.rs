@@ -10,6 +10,7 @@ mod beside;
 mod decode;
 mod error;
 mod exif;
+pub mod folder;
 mod jpeg;
 mod photo_set;
 mod resize;
@@ -36,4 +37,4 @@ pub use times::{
 };
 pub use tool::{Tool, ToolError, fingerprint};
 pub use warp::{Footprint, Kernel, warp, warp_depth_steps};
-pub use write::{copy_photo, write_depth_steps, write_mask, write_png};
+pub use write::{copy_photo, write_depth_steps, write_mask, write_png, write_whole};

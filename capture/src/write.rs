@@ -44,32 +44,44 @@ pub fn copy_photo(from: &Path, to: &Path) -> Result<(), CaptureError> {
     write(to, |temporary| fs::copy(from, temporary).map(|_| ()))
 }
 
-/// Fills a file under a temporary name and renames it.
-fn write(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), CaptureError> {
-    let failed = |source| CaptureError::Write {
-        path: path.to_owned(),
-        source,
-    };
+/// Has a file filled under a temporary name beside its own, and renames it: it appears complete
+/// or not at all, and no other file is touched.
+///
+/// # Errors
+/// A path that does not end in a file's name; what `fill` fails with; a file that cannot be
+/// renamed.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().ok_or_else(|| {
-        failed(io::Error::new(
+        io::Error::new(
             io::ErrorKind::InvalidInput,
             "the path does not end in a file's name",
-        ))
+        )
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    if !folder.as_os_str().is_empty() {
-        fs::create_dir_all(folder).map_err(failed)?;
-    }
-    let temporary = folder.join(format!(
+    let temporary = path.with_file_name(format!(
         ".{}.{}.tmp",
         name.to_string_lossy(),
         std::process::id()
     ));
     let written = fill(&temporary).and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|source| {
+    if written.is_err() {
         // The error at hand is the one to report.
         let _ = fs::remove_file(&temporary);
-        failed(source)
+    }
+    written
+}
+
+/// [`write_whole`] in folders that are made where they are missing.
+fn write(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), CaptureError> {
+    let written = write_whole(path, |temporary| {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if !folder.as_os_str().is_empty() {
+            fs::create_dir_all(folder)?;
+        }
+        fill(temporary)
+    });
+    written.map_err(|source| CaptureError::Write {
+        path: path.to_owned(),
+        source,
     })
 }
 

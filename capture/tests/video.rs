@@ -144,6 +144,36 @@ fn a_variable_rate_keeps_its_times() {
     assert_eq!(scored[0].sharpness, sharpest);
 }
 
+#[cfg(unix)]
+#[test]
+fn hundreds_of_frames_are_taken_into_a_folder_of_any_name() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let video = here.path().join("a:b 50%.mp4");
+    let words = "-y -v error -f lavfi -i testsrc=size=64x48:rate=25 -frames:v 260";
+    let mut arguments: Vec<&str> = words.split(' ').collect();
+    arguments.push(video.to_str().unwrap());
+    ffmpeg
+        .run(&arguments, &here.path().join("log"), &mut |_| {})
+        .unwrap();
+    // Neither a number nor a protocol.
+    let photos = here.path().join("50%d: 7%").join("a:b%d");
+    let count = FrameCount::Frames(130);
+    let frames = video::extract(&ffmpeg, &video, count, &photos, &mut |_| {}).unwrap();
+    assert_eq!(frames.len(), 130);
+    for (i, frame) in (0..).zip(&frames) {
+        let stretch_s = 2.0 / 25.0;
+        let since_s = frame.time_s - f64::from(i) * stretch_s;
+        assert!((-1e-6..stretch_s).contains(&since_s), "{i}: {frame:?}");
+        assert!(photos.join(&frame.name).is_file(), "{frame:?}");
+    }
+    assert_eq!(
+        fs::read_dir(&photos).unwrap().count(),
+        131,
+        "and frames.txt"
+    );
+}
+
 #[test]
 fn what_is_no_video_is_refused() {
     let Some(ffmpeg) = ffmpeg() else { return };

@@ -3,6 +3,7 @@
 use crate::picture::{LensRays, depth_through, render_through};
 use crate::{Dataset, DatasetError, Photo};
 use calibrate::{Reconstruction, colmap};
+use capture::folder::{beside, place_of, take_place};
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::{Path, PathBuf};
 
@@ -38,29 +39,37 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
     Ok(capture_of(dataset).written(folder))
 }
 
-/// Fills a folder that takes its name only when it is complete.
+/// Fills a folder that takes its name only when it is complete. What was there goes only then.
 ///
 /// # Errors
-/// The folder is there and not empty, and `may_be_replaced` does not say that it may go;
-/// whatever `fill` fails with; the file system's. Then nothing stays behind.
+/// The folder is there and not empty, and `may_be_replaced` does not say that it may go; the path
+/// ends in no name, as `/` does; whatever `fill` fails with; the file system's. Then nothing stays
+/// behind.
 pub fn in_new_folder<E: From<DatasetError>>(
     folder: &Path,
-    may_be_replaced: impl FnOnce(&Path) -> bool,
+    may_be_replaced: impl Fn(&Path) -> bool,
     fill: impl FnOnce(&Path) -> Result<(), E>,
 ) -> Result<(), E> {
     // 1. A place to work, next to the destination: renaming must not cross disks.
-    if folder.exists() && !is_empty(folder)? && !may_be_replaced(folder) {
-        let folder = folder.to_owned();
-        return Err(DatasetError::NotEmpty { folder }.into());
-    }
-    let partial = partial_name(folder);
-    make_folder(&partial)?;
-    // 2. Fill it, and let it take the destination's place.
-    let done = fill(&partial).and_then(|()| {
-        if folder.exists() {
-            std::fs::remove_dir_all(folder).map_err(|source| io(folder, source))?;
+    let place = place_of(folder).map_err(|source| io(folder, source))?;
+    let check_free = || -> Result<(), DatasetError> {
+        if place.exists() && !is_empty(folder)? && !may_be_replaced(folder) {
+            let folder = folder.to_owned();
+            return Err(DatasetError::NotEmpty { folder });
         }
-        Ok(std::fs::rename(&partial, folder).map_err(|source| io(folder, source))?)
+        Ok(())
+    };
+    check_free()?;
+    let partial = beside(&place, &format!("partial-{}", std::process::id()));
+    if partial.exists() {
+        // In containers processes share their numbers: one that was killed had this one's.
+        std::fs::remove_dir_all(&partial).map_err(|source| io(&partial, source))?;
+    }
+    make_folder(&partial)?;
+    // 2. Fill it, and let it take the destination's place, unless others have filled that since.
+    let done = fill(&partial).and_then(|()| {
+        check_free()?;
+        Ok(take_place(&partial, &place).map_err(|source| io(folder, source))?)
     });
     if done.is_err() {
         // The first error is the one to tell.
@@ -227,12 +236,6 @@ fn readme(dataset: &Dataset) -> String {
 fn is_empty(folder: &Path) -> Result<bool, DatasetError> {
     let mut entries = std::fs::read_dir(folder).map_err(|source| io(folder, source))?;
     Ok(entries.next().is_none())
-}
-
-/// A hidden sibling named after this process.
-fn partial_name(folder: &Path) -> PathBuf {
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    folder.with_file_name(format!(".{name}.partial-{}", std::process::id()))
 }
 
 fn make_folder(folder: &Path) -> Result<(), DatasetError> {

@@ -401,13 +401,7 @@ pub fn write(
 
 /// Writes a file that appears complete or not at all.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let temporary = path.with_extension("tmp");
-    let written =
-        std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
+    capture::write_whole(path, |temporary| std::fs::write(temporary, bytes))
 }
 
 /// In lower case.
@@ -443,6 +437,25 @@ mod tests {
             2,
             "nothing left behind"
         );
+    }
+
+    #[test]
+    fn writing_touches_no_other_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let (others, own) = (
+            folder.path().join("room.tmp"),
+            folder.path().join("room.json"),
+        );
+        std::fs::write(&others, "mine").unwrap();
+        write(&own, &Proxy::ViewPlane, &[], &[]).unwrap();
+        // Where a folder has its name, a file cannot take its place.
+        let taken = folder.path().join("taken.json");
+        std::fs::create_dir(&taken).unwrap();
+        write(&taken, &Proxy::ViewPlane, &[], &[]).unwrap_err();
+        assert_eq!(std::fs::read_to_string(&others).unwrap(), "mine");
+        assert!(own.is_file());
+        let left = std::fs::read_dir(folder.path()).unwrap();
+        assert_eq!(left.count(), 3, "nothing left behind");
     }
 
     #[test]

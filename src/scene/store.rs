@@ -6,6 +6,7 @@ use super::relative::relative;
 use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
+use capture::folder::exchange;
 use proxy::Proxy;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -35,6 +36,8 @@ const COLMAP_FOLDER: &str = "colmap";
 const FRAMES_FOLDER: &str = "photos";
 /// What [`capture::video::extract`] leaves of the latter if it is killed.
 const PARTIAL_FRAMES: &str = ".photos.partial";
+/// What the name begins with of earlier frames, if it is killed while it replaces them.
+const REPLACED_FRAMES: &str = ".photos.replaced-";
 
 impl Scene {
     /// Opens a scene's folder, or imports a capture's in memory with the defaults.
@@ -195,7 +198,8 @@ impl Scene {
         for entry in entries {
             let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
             let name = entry.file_name().to_string_lossy().into_owned();
-            if !parts.contains(&name.as_str()) {
+            let is_left = name.starts_with(REPLACED_FRAMES);
+            if !is_left && !parts.contains(&name.as_str()) {
                 return Err(occupied(format!(
                     "holds {name}, which is no part of a scene; choose another folder"
                 )));
@@ -249,23 +253,16 @@ impl Scene {
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
-        // 2. They take their places.
+        // 2. They take their places, all or none.
         let old = made.path().join("old");
         std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
         std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
-        let rename = |part: &str, from: &Path, to: &Path| {
-            let (from, to) = (from.join(part), to.join(part));
-            if !from.exists() {
-                return Ok(());
-            }
-            std::fs::rename(from, to).map_err(|e| io(&folder.join(part), "replace", e))
-        };
-        for part in PARTS.iter().rev() {
-            rename(part, folder, &old)?;
+        let exchanged = exchange(&PARTS, &new, folder, &old);
+        if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
+            // It still holds what could not be put back.
+            let _ = made.keep();
         }
-        for part in PARTS {
-            rename(part, &new, folder)?;
-        }
+        exchanged.map_err(|e| io(folder, "replace the scene", e))?;
         self.folder = Some(folder.to_owned());
         Ok(())
     }

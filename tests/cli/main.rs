@@ -14,6 +14,7 @@ mod gpu;
 mod help;
 mod hull;
 mod interior;
+mod interior_folder;
 mod kinds;
 mod ldis;
 mod masks;

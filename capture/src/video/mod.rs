@@ -25,6 +25,7 @@ pub use error::VideoError;
 pub use list::VideoFrame;
 pub use scan::{scan, sharpness};
 
+use crate::folder::{beside, place_of, take_place};
 use crate::{Tool, ToolError};
 use std::ffi::OsString;
 use std::fs;
@@ -96,7 +97,7 @@ pub fn encode(
         "bt709",
     ];
     arguments.extend(marked.map(OsString::from));
-    arguments.push(temporary.clone().into());
+    arguments.push(scan::file(&temporary));
     let expected = 3 * width as usize * height as usize;
     let made = ffmpeg().feed(&arguments, move |mut stdin| {
         for frame in frames {
@@ -151,8 +152,8 @@ pub fn extract(
     }
 
     // 1. Which frames.
-    let passthrough = scan::passthrough(ffmpeg)?;
-    let scored = scan::scan_with(ffmpeg, passthrough, video, report)?;
+    let spelling = scan::spelling(ffmpeg)?;
+    let scored = scan::scan_with(ffmpeg, spelling, video, report)?;
     if scored.len() < 2 {
         return Err(VideoError::NoVideo {
             path: video.to_owned(),
@@ -166,13 +167,13 @@ pub fn extract(
 
     // 2. Their pixels, into a folder beside the final one.
     let failed = VideoError::write_at;
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    let partial = folder.with_file_name(format!(".{name}.partial"));
+    let place = place_of(folder).map_err(failed(folder))?;
+    let partial = beside(&place, "partial");
     if partial.exists() {
         fs::remove_dir_all(&partial).map_err(failed(&partial))?;
     }
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
-    write_frames(ffmpeg, passthrough, video, &chosen, &partial)?;
+    write_frames(ffmpeg, spelling, video, &chosen, &partial)?;
     let mut frames = Vec::new();
     for (i, &frame_idx) in chosen.iter().enumerate() {
         let time_s = scored[frame_idx].time_s;
@@ -190,33 +191,62 @@ pub fn extract(
     list::write(&partial, &source, &frames)?;
 
     // 3. It takes its place.
-    if folder.exists() {
-        fs::remove_dir_all(folder).map_err(failed(folder))?;
-    }
-    fs::rename(&partial, folder).map_err(failed(folder))?;
+    take_place(&partial, &place).map_err(failed(folder))?;
     Ok(frames)
 }
 
-/// Writes the frames of these indices as 1.jpg, 2.jpg, ….
+/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, ….
 fn write_frames(
     ffmpeg: &Tool,
-    passthrough: [&str; 2],
+    spelling: scan::Spelling,
     video: &Path,
     chosen: &[usize],
     folder: &Path,
 ) -> Result<(), VideoError> {
-    let any: Vec<String> = chosen.iter().map(|n| format!("eq(n,{n})")).collect();
+    // 1. The filter, in a file: an argument must not be as long as many frames make it.
     // JPEG's colours are BT.601 in full range whatever the video's are.
     let filter = format!(
         "select='{}',scale=out_color_matrix=bt601:out_range=full,format=yuvj420p",
-        any.join("+")
+        is_any_of(chosen)
     );
+    let filter_file = folder.join("filter.txt");
+    let failed = VideoError::write_at(&filter_file);
+    fs::write(&filter_file, filter).map_err(&failed)?;
+
+    // 2. The frames.
     let mut arguments = scan::input(video);
-    arguments.extend(["-vf", &filter].map(Into::into));
-    arguments.extend(passthrough.map(Into::into));
+    arguments.extend([spelling.filter_file.into(), scan::file(&filter_file)]);
+    arguments.extend(spelling.passthrough.map(Into::into));
     let quality = "-c:v mjpeg -q:v 1 -qmin 1 -bitexact -f image2";
     arguments.extend(quality.split(' ').map(Into::into));
-    arguments.push(folder.join("%d.jpg").into());
+    arguments.push(scan::file(&literal(folder).join("%d.jpg")));
     ffmpeg.stream(&arguments, &mut |_| {}, |_| Ok(()))?;
-    Ok(())
+    fs::remove_file(&filter_file).map_err(failed)
+}
+
+/// ffmpeg's expression that is not zero for the frames of these indices, which rise. It
+/// halves them again and again: ffmpeg refuses what is nested a hundred deep, as a plain sum is.
+fn is_any_of(frames: &[usize]) -> String {
+    match frames {
+        [] => "0".to_owned(),
+        [only] => format!("eq(n,{only})"),
+        _ => {
+            let (before, from) = frames.split_at(frames.len() / 2);
+            format!(
+                "if(lt(n,{}),{},{})",
+                from[0],
+                is_any_of(before),
+                is_any_of(from)
+            )
+        }
+    }
+}
+
+/// A folder as it must stand before a pattern for files' names, where `%` begins a number.
+fn literal(folder: &Path) -> PathBuf {
+    // What is no Unicode can only be handed on as it is.
+    folder.to_str().map_or_else(
+        || folder.to_owned(),
+        |name| PathBuf::from(name.replace('%', "%%")),
+    )
 }

@@ -17,12 +17,12 @@ pub fn scan(
     video: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Vec<ScoredFrame>, VideoError> {
-    scan_with(ffmpeg, passthrough(ffmpeg)?, video, report)
+    scan_with(ffmpeg, spelling(ffmpeg)?, video, report)
 }
 
 pub(super) fn scan_with(
     ffmpeg: &Tool,
-    passthrough: [&str; 2],
+    spelling: Spelling,
     video: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Vec<ScoredFrame>, VideoError> {
@@ -33,7 +33,7 @@ pub(super) fn scan_with(
     );
     let mut arguments = input(video);
     arguments.extend(["-vf", &filter].map(Into::into));
-    arguments.extend(passthrough.map(Into::into));
+    arguments.extend(spelling.passthrough.map(Into::into));
     arguments.extend("-c:v pgm -f image2pipe pipe:1".split(' ').map(Into::into));
     let mut times_s: Vec<f64> = Vec::new();
     let mut on_line = |line: &str| {
@@ -72,22 +72,40 @@ pub(super) fn input(video: &Path) -> Vec<OsString> {
         .split(' ')
         .map(Into::into)
         .collect();
-    // A name with a colon would be taken for a protocol's.
-    arguments.push("file:".into());
-    if let Some(name) = arguments.last_mut() {
-        name.push(video);
-    }
+    arguments.push(file(video));
     arguments.extend("-map 0:v:0 -an -sn -dn".split(' ').map(Into::into));
     arguments
 }
 
-/// The option that lets every frame through, once: its name changed in ffmpeg 5.1.
-pub(super) fn passthrough(ffmpeg: &Tool) -> Result<[&'static str; 2], ToolError> {
+/// A file's path as ffmpeg is to be told it: a name with a colon would be taken for a protocol's.
+pub(super) fn file(path: &Path) -> OsString {
+    let mut argument = OsString::from("file:");
+    argument.push(path);
+    argument
+}
+
+/// What this ffmpeg calls options whose names have changed.
+#[derive(Clone, Copy)]
+pub(super) struct Spelling {
+    /// Lets every frame through, once: changed in ffmpeg 5.1.
+    pub(super) passthrough: [&'static str; 2],
+    /// Takes a filter from a file: changed in ffmpeg 7.
+    pub(super) filter_file: &'static str,
+}
+
+pub(super) fn spelling(ffmpeg: &Tool) -> Result<Spelling, ToolError> {
     let help = ffmpeg.text(&["-hide_banner", "-h", "long"])?;
-    Ok(if help.contains("-fps_mode") {
-        ["-fps_mode", "passthrough"]
-    } else {
-        ["-vsync", "passthrough"]
+    Ok(Spelling {
+        passthrough: if help.contains("-fps_mode") {
+            ["-fps_mode", "passthrough"]
+        } else {
+            ["-vsync", "passthrough"]
+        },
+        filter_file: if help.contains("-filter_script") {
+            "-filter_script:v"
+        } else {
+            "-/filter:v"
+        },
     })
 }
 
