@@ -8,6 +8,7 @@
 //! minimisation, Stellingwerf 1978, with lags in the place of times).
 
 use glam::DVec3;
+use std::collections::BinaryHeap;
 
 /// What one photo shows of places common to all.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +69,11 @@ const BINS: usize = 8;
 const MIN_IN_BIN: usize = 4;
 /// Candidates for each step in which lags over the whole capture shift by a period.
 const OVERSAMPLING: f64 = 8.0;
+/// Candidates at most: as many as 5,000 photos at even steps have.
+const MAX_CANDIDATES: usize = 20_000;
+/// Times nearer than this part of the mean time from photo to photo are nearly the same: those of a rig's
+/// cameras, or of a burst.
+const NEARLY_AT_ONCE: f64 = 0.1;
 /// How often times are dealt at random: one chance in 20 of finding a period in nothing.
 const DEALS: u64 = 19;
 /// A period explains at least this much.
@@ -83,7 +89,10 @@ struct Pair {
 /// The period that best explains how the photos differ.
 ///
 /// It lies between twice the typical time from photo to photo and half the whole time; the
-/// order of the photos does not matter.
+/// order of the photos does not matter. Photos taken nearly at once count as one for what is
+/// typical. No more than 20,000 periods are tried, from the longest on at even steps of frequency:
+/// of photos that follow each other very much more quickly than the whole time is long, the
+/// shortest periods are left out.
 ///
 /// # Errors
 /// Too few photos; no period explains more than chance would.
@@ -95,26 +104,15 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
     let mut sorted: Vec<&Snapshot> = snapshots.iter().collect();
     sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let times_s: Vec<f64> = sorted.iter().map(|s| s.time_s).collect();
-    let mut steps: Vec<f64> = times_s.windows(2).map(|t| t[1] - t[0]).collect();
-    steps.retain(|step| *step > 0.0);
-    if steps.len() + 1 < MIN_PHOTOS {
-        let photos = steps.len() + usize::from(!times_s.is_empty());
-        return Err(PeriodError::TooFew { photos });
-    }
-    steps.sort_by(f64::total_cmp);
-    let span_s = times_s[times_s.len() - 1] - times_s[0];
-    let longest_s = 0.5 * span_s;
-    let shortest_s = (2.0 * steps[steps.len() / 2]).min(longest_s);
+    let Candidates {
+        frequencies_hz: candidates,
+        step_hz,
+    } = candidates(&times_s)?;
 
     // 2. How photos from nearby differ.
     let pairs = near_pairs(&sorted);
 
     // 3. The best of all candidates, and of as many for times that mean nothing.
-    let step_hz = 1.0 / (OVERSAMPLING * span_s);
-    let count = ((1.0 / shortest_s - 1.0 / longest_s) / step_hz) as usize + 1;
-    let candidates: Vec<f64> = (0..count)
-        .map(|i| 1.0 / longest_s + step_hz * i as f64)
-        .collect();
     let scores = |times_s: &[f64]| -> Vec<f64> {
         let lags = lags(&pairs, times_s);
         candidates.iter().map(|&hz| explained(&lags, hz)).collect()
@@ -160,27 +158,86 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
     })
 }
 
+/// One over the periods to try.
+struct Candidates {
+    /// From that of half the whole time on, rising.
+    frequencies_hz: Vec<f64>,
+    /// From one to the next.
+    step_hz: f64,
+}
+
+/// Those for photos of these times, which rise.
+fn candidates(times_s: &[f64]) -> Result<Candidates, PeriodError> {
+    // 1. How long the photos took.
+    let mut different_s = times_s.to_vec();
+    different_s.dedup();
+    let photos = different_s.len();
+    if photos < MIN_PHOTOS {
+        return Err(PeriodError::TooFew { photos });
+    }
+    let span_s = different_s[photos - 1] - different_s[0];
+    let longest_s = 0.5 * span_s;
+
+    // 2. From one to the next: the median says nothing where most come nearly at once with another.
+    let apart_s = NEARLY_AT_ONCE * span_s / (photos - 1) as f64;
+    different_s.dedup_by(|later, kept| *later - *kept < apart_s);
+    let mut steps: Vec<f64> = different_s.windows(2).map(|t| t[1] - t[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let shortest_s = (2.0 * steps[steps.len() / 2]).min(longest_s);
+
+    // 3. At even steps of frequency, the longest periods first.
+    let step_hz = 1.0 / (OVERSAMPLING * span_s);
+    let count = ((1.0 / shortest_s - 1.0 / longest_s) / step_hz) as usize + 1;
+    let frequency_hz = |i: usize| 1.0 / longest_s + step_hz * i as f64;
+    Ok(Candidates {
+        frequencies_hz: (0..count.min(MAX_CANDIDATES)).map(frequency_hz).collect(),
+        step_hz,
+    })
+}
+
 /// The pairs of photos taken from nearest each other, with how they differ.
 fn near_pairs(snapshots: &[&Snapshot]) -> Vec<Pair> {
-    let count = snapshots.len();
-    let all = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j]));
-    let mut near: Vec<(f64, u64, [usize; 2])> = all
-        .map(|[i, j]| {
-            let apart = snapshots[i].center.distance_squared(snapshots[j].center);
-            // A camera that stands still has ties: any of them, evenly.
-            (apart, scramble((i * count + j) as u64), [i, j])
-        })
-        .collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let kept = (NEAR_PART * near.len() as f64).ceil() as usize;
-    near.truncate(kept.min(MAX_PAIRS));
-    let pairs = near.into_iter().filter_map(|(_, _, [i, j])| {
+    let centers: Vec<DVec3> = snapshots.iter().map(|s| s.center).collect();
+    let pairs = nearest(&centers).into_iter().filter_map(|[i, j]| {
         Some(Pair {
             photos: [i, j],
             difference: difference(snapshots[i], snapshots[j])?,
         })
     });
     pairs.collect()
+}
+
+/// The pairs of places nearest each other, the nearest first. No more than these are held at once: of
+/// 10,000 photos all pairs would take gigabytes.
+fn nearest(centers: &[DVec3]) -> Vec<[usize; 2]> {
+    let count = centers.len();
+    let all = count * count.saturating_sub(1) / 2;
+    let kept = ((NEAR_PART * all as f64).ceil() as usize).min(MAX_PAIRS);
+    let mut nearest: BinaryHeap<(i64, u64, [usize; 2])> = BinaryHeap::with_capacity(kept);
+    for i in 0..count {
+        for j in i + 1..count {
+            let apart = centers[i].distance_squared(centers[j]);
+            // A camera that stands still has ties: any of them, evenly.
+            let tie = scramble((i * count + j) as u64);
+            let pair = (in_total_order(apart), tie, [i, j]);
+            if nearest.len() < kept {
+                nearest.push(pair);
+            } else if let Some(mut farthest) = nearest.peek_mut()
+                && pair < *farthest
+            {
+                *farthest = pair;
+            }
+        }
+    }
+    let sorted = nearest.into_sorted_vec();
+    sorted.into_iter().map(|(_, _, pair)| pair).collect()
+}
+
+/// Integers in the order of [`f64::total_cmp`].
+fn in_total_order(value: f64) -> i64 {
+    let bits = value.to_bits() as i64;
+    // Of negative numbers the greater have the lesser bits.
+    if bits < 0 { bits ^ i64::MAX } else { bits }
 }
 
 /// The logarithm of the mean squared difference over the places that both see, what all have
@@ -297,4 +354,97 @@ fn scramble(index: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whole numbers in a small range, so that some are the same.
+    fn some(seed: u64, range: u64) -> f64 {
+        (scramble(seed + 1) % range) as f64
+    }
+
+    #[test]
+    fn the_nearest_pairs_are_those_that_sorting_all_finds() {
+        for (count, range) in [
+            (0, 9),
+            (1, 9),
+            (2, 9),
+            (20, 3),
+            (20, 1000),
+            (300, 20),
+            (300, 1),
+        ] {
+            let center = |i: u64| DVec3::new(some(2 * i, range), some(2 * i + 1, range), 0.0);
+            let mut centers: Vec<DVec3> = (0..count).map(center).collect();
+            if count == 20 {
+                centers[3] = DVec3::NAN;
+                centers[7] = DVec3::INFINITY;
+            }
+            let count = centers.len();
+            let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j]));
+            let mut all: Vec<(f64, u64, [usize; 2])> = pairs
+                .map(|[i, j]| {
+                    let apart = centers[i].distance_squared(centers[j]);
+                    (apart, scramble((i * count + j) as u64), [i, j])
+                })
+                .collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let kept = (NEAR_PART * all.len() as f64).ceil() as usize;
+            all.truncate(kept.min(MAX_PAIRS));
+            let plain: Vec<[usize; 2]> = all.into_iter().map(|(_, _, pair)| pair).collect();
+            assert!(nearest(&centers) == plain, "{count} places, {range}");
+        }
+    }
+
+    #[test]
+    fn integers_stand_in_the_order_of_numbers() {
+        let numbers = [
+            f64::NAN,
+            -f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            0.0,
+            -0.0,
+            1e-310,
+            -1e-310,
+            2.5,
+            -2.5,
+        ];
+        for a in numbers {
+            for b in numbers {
+                let order = in_total_order(a).cmp(&in_total_order(b));
+                assert_eq!(order, a.total_cmp(&b), "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn photos_nearly_at_once_and_quick_ones_ask_for_no_more_periods_than_can_be_tried() {
+        let of = |times_s: &[f64]| candidates(times_s).unwrap();
+        // 1. At even steps: from half the whole time to twice a step.
+        let even: Vec<f64> = (0..600).map(|i| 0.1 * f64::from(i)).collect();
+        let found = of(&even);
+        let (first_hz, last_hz) = (
+            found.frequencies_hz[0],
+            *found.frequencies_hz.last().unwrap(),
+        );
+        assert!((1.0 / first_hz - 0.5 * 59.9).abs() < 1e-9);
+        assert!((last_hz - 1.0 / 0.2).abs() < 1.001 * found.step_hz);
+        // 2. A rig of two cameras, the second a little late, is no quicker than one.
+        let rig = even.iter().flat_map(|&time_s| [time_s, time_s + 1e-4]);
+        let of_rig = of(&rig.collect::<Vec<f64>>());
+        let off = of_rig
+            .frequencies_hz
+            .len()
+            .abs_diff(found.frequencies_hz.len());
+        assert!(off < 10, "{off}");
+        // 3. Ten thousand photos in a second, and one after a minute: these would ask for millions.
+        let mut burst: Vec<f64> = (0..10_000).map(|i| 1e-4 * f64::from(i)).collect();
+        burst.push(60.0);
+        let found = of(&burst);
+        assert_eq!(found.frequencies_hz.len(), MAX_CANDIDATES);
+        assert!((1.0 / found.frequencies_hz[0] - 30.0).abs() < 1e-9);
+    }
 }

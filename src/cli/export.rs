@@ -3,7 +3,9 @@
 use super::Usage;
 use super::options::SceneArgs;
 use super::output::{print, write_file};
-use calibrate::export::{FrameFiles, check_colmap, has_board, opencv_yaml, transforms_json};
+use calibrate::export::{
+    FrameFiles, check_colmap, check_colmap_text, has_board, opencv_yaml, transforms_json,
+};
 use calibrate::{Image, colmap};
 use clap::ValueEnum;
 use lumigraph::scene::{Photo, Scene, relative};
@@ -36,7 +38,7 @@ pub(super) struct Args {
 enum Format {
     /// COLMAP's binary model: everything
     Colmap,
-    /// COLMAP's text model: everything
+    /// COLMAP's text model: everything, of photos without white space in their names
     ColmapText,
     /// nerfstudio's transforms.json: cameras and poses
     Transforms,
@@ -54,12 +56,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let scene = args.scene.open_whole()?;
     let whole = &scene.reconstruction;
-    if !is_file {
-        check_colmap(whole)?;
-    }
     match args.format {
-        Format::Colmap => colmap::write_binary(whole, output)?,
-        Format::ColmapText => colmap::write_text(whole, output)?,
+        Format::Colmap => {
+            check_colmap(whole)?;
+            colmap::write_binary(whole, output)?;
+        }
+        Format::ColmapText => {
+            check_colmap_text(whole)?;
+            colmap::write_text(whole, output)?;
+        }
         Format::Transforms => {
             let files = Files::new(&scene, output);
             let text = transforms_json(whole, &|image| files.of(image))?;

@@ -108,6 +108,38 @@ fn what_a_format_lacks_is_said_and_undistorting_helps() {
 }
 
 #[test]
+fn names_that_colmap_would_read_in_part_go_out_in_binary_alone() {
+    let folder = with_wall();
+    let wall = folder.path().join("wall");
+    let sparse = wall.join("sparse/0");
+    let mut whole = colmap::read_model(&sparse).unwrap();
+    for image in whole.images.values_mut().filter(|i| i.name == "0003.png") {
+        image.name = "my left.png".to_owned();
+    }
+    colmap::write_binary(&whole, &sparse).unwrap();
+    let images = wall.join("images");
+    fs::rename(images.join("0003.png"), images.join("my left.png")).unwrap();
+    // Its name is the photo's, too.
+    fs::remove_dir_all(wall.join("depth")).unwrap();
+    let export = |format: &str| {
+        let line = format!("export wall --format {format} -o {format}");
+        lumigraph(folder.path(), &line)
+    };
+    assert_eq!(
+        export("colmap-text").error(1),
+        "photo \"my left.png\" has white space in its name, where COLMAP ends a name in its text \
+         format; export with --format colmap, or rename the photo and import again"
+    );
+    assert!(!folder.path().join("colmap-text").exists());
+    export("colmap").ok();
+    assert_same_cameras(&model(&folder, "colmap"), &whole);
+    // What a scene keeps for itself is text, and read by nobody else.
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let kept = model(&folder, "scene/model");
+    assert!(kept.images.values().any(|i| i.name == "my left.png"));
+}
+
+#[test]
 fn an_undistorted_scene_holds_its_photos() {
     let folder = with_wall();
     let sparse = folder.path().join("wall/sparse/0");

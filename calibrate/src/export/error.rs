@@ -48,6 +48,15 @@ pub enum ExportError {
         /// What is wrong with it.
         source: CameraError,
     },
+    /// A photo whose name COLMAP would read in part.
+    #[error(
+        "photo {name:?} has white space in its name, where COLMAP ends a name in its text format; \
+         export with --format colmap, or rename the photo and import again"
+    )]
+    WhiteSpace {
+        /// The photo's name.
+        name: String,
+    },
     /// There is nothing to export.
     #[error("the reconstruction has no images; there is nothing to export")]
     NoImages,

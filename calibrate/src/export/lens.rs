@@ -72,3 +72,17 @@ pub fn check_colmap(reconstruction: &Reconstruction) -> Result<(), ExportError> 
         None => Ok(()),
     }
 }
+
+/// Whether COLMAP reads all photos' names from its text format, too, as well as their cameras'
+/// models. Our own reading of that format takes names with blanks as they are.
+///
+/// # Errors
+/// As [`check_colmap`]; a photo with white space in its name.
+pub fn check_colmap_text(reconstruction: &Reconstruction) -> Result<(), ExportError> {
+    check_colmap(reconstruction)?;
+    let mut names = reconstruction.images.values().map(|image| &image.name);
+    match names.find(|name| name.contains(char::is_whitespace)) {
+        Some(name) => Err(ExportError::WhiteSpace { name: name.clone() }),
+        None => Ok(()),
+    }
+}

@@ -11,6 +11,6 @@ mod opencv;
 mod transforms;
 
 pub use error::ExportError;
-pub use lens::check_colmap;
+pub use lens::{check_colmap, check_colmap_text};
 pub use opencv::{has_board, opencv_yaml};
 pub use transforms::{FrameFiles, transforms_json};

@@ -36,7 +36,7 @@ pub(super) fn cameras(
     keys: &Keys,
     notes: &mut Vec<String>,
 ) -> Result<Vec<OpenCvCamera>, OpenCvError> {
-    refuse_other_models(values)?;
+    refuse_other_models(values, keys)?;
     let mut cameras = if let Some(key) = &keys.camera_matrix {
         vec![of_matrix(values, asked(values, key)?, keys, notes)?]
     } else {
@@ -54,8 +54,19 @@ pub(super) fn cameras(
     Ok(cameras)
 }
 
+/// What says which model the distortion is of.
+const DISTORTION_MODEL: [&str; 2] = ["distortionmodel", "distortiontype"];
+/// And which the camera is of: Kalibr writes `pinhole` for all of its distortions.
+const CAMERA_MODEL: [&str; 5] = [
+    "modeltype",
+    "cameratype",
+    "camera1type",
+    "cameramodel",
+    "calibrationmodel",
+];
+
 /// The models of other programs that keep their calibration in storage files.
-fn refuse_other_models(values: &Values<'_>) -> Result<(), OpenCvError> {
+fn refuse_other_models(values: &Values<'_>, keys: &Keys) -> Result<(), OpenCvError> {
     let refuse = |model: String| {
         Err(OpenCvError::Model {
             path: values.file.clone(),
@@ -66,7 +77,17 @@ fn refuse_other_models(values: &Values<'_>) -> Result<(), OpenCvError> {
         .find_within(&["xi"])
         .and_then(|v| v.node.matrix_or_number());
     let xi = xi.unwrap_or(0.0);
-    if let Some(model) = model_name(values) {
+    // Of all cameras, or of the one that is asked for.
+    let key = keys.camera_matrix.as_deref();
+    let prefix = key.map(|key| &key[..key.rfind('.').map_or(0, |at| at + 1)]);
+    let names = [&CAMERA_MODEL[..], &DISTORTION_MODEL].concat();
+    for named in values.called(&names) {
+        let Some(model) = named.node.text() else {
+            continue;
+        };
+        if prefix.is_some_and(|prefix| values.is_of_another(prefix, named)) {
+            continue;
+        }
         let plain = plain(model);
         if ["mei", "omni", "scaramuzza", "ocam", "eucm"]
             .iter()
@@ -81,18 +102,11 @@ fn refuse_other_models(values: &Values<'_>) -> Result<(), OpenCvError> {
     Ok(())
 }
 
-/// What the file calls its camera model, if it says.
-pub(super) fn model_name<'a>(values: &Values<'a>) -> Option<&'a str> {
-    let names = [
-        "modeltype",
-        "cameratype",
-        "camera1type",
-        "cameramodel",
-        "distortionmodel",
-        "distortiontype",
-        "calibrationmodel",
-    ];
-    values.find_within(&names)?.node.text()
+/// What the file calls the model of the distortion of a camera whose matrix has a prefix, if it says;
+/// else that of the camera.
+pub(super) fn model_name<'a>(values: &Values<'a>, prefix: &str) -> Option<&'a str> {
+    let text = |names: &[&str]| values.find_for(prefix, names)?.node.text();
+    text(&DISTORTION_MODEL).or_else(|| text(&CAMERA_MODEL))
 }
 
 pub(super) fn asked<'v, 'a>(

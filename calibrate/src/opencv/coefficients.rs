@@ -67,7 +67,7 @@ pub(super) fn coefficients_for<'a>(
 }
 
 /// Whether coefficients are those of `cv::fisheye`: as OpenCV's samples say it, then by
-/// the model's or the matrices' names, then by the file's.
+/// the model's or the matrices' names (the camera's first), then by the file's.
 pub(super) fn is_fisheye(
     values: &Values<'_>,
     keys: &Keys,
@@ -84,11 +84,12 @@ pub(super) fn is_fisheye(
     if keys.fisheye {
         return true;
     }
-    let flag = values.find_within(&["fisheyemodel", "usefisheye", "isfisheye"]);
+    let prefix = matrices[0].prefix();
+    let flag = values.find_for(prefix, &["fisheyemodel", "usefisheye", "isfisheye"]);
     if let Some(flag) = flag.and_then(|flag| flag.node.number()) {
         return flag != 0.0;
     }
-    if let Some(model) = model_name(values) {
+    if let Some(model) = model_name(values, prefix) {
         return says_so(model);
     }
     if matrices.iter().any(|named| says_so(&named.path)) {

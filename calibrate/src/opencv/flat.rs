@@ -42,7 +42,7 @@ pub(super) fn of_scalars(
             let term = |name: &&str| number(&of, &[*name]).unwrap_or(0.0);
             names.iter().map(term).collect()
         };
-        let says_fisheye = model_name(values).is_some_and(|model| {
+        let says_fisheye = model_name(values, prefix).is_some_and(|model| {
             let model = plain(model);
             model.contains("kannala") || model.contains("fisheye") || model.contains("equi")
         });
@@ -110,7 +110,7 @@ pub(super) fn size(values: &Values<'_>, prefix: &str) -> Result<Option<(u32, u32
         "resolution",
         "size",
     ];
-    let Some(named) = values.find_within(&names) else {
+    let Some(named) = values.find_for(prefix, &names) else {
         return Ok(None);
     };
     match named.node.matrix().map(|m| m.data).as_deref() {

@@ -40,6 +40,36 @@ impl<'a> Values<'a> {
         self.find(names).or_else(|| self.all.iter().find(wanted))
     }
 
+    /// The same for a camera whose matrix has a prefix: from its own map outwards, then in others, but not
+    /// in those of other cameras.
+    pub(super) fn find_for(&self, prefix: &str, names: &[&str]) -> Option<&Named<'a>> {
+        let mut around = std::iter::successors(Some(prefix), |&inner| {
+            let name = inner.strip_suffix('.')?;
+            Some(&inner[..name.rfind('.').map_or(0, |at| at + 1)])
+        });
+        let found = around.find_map(|map| self.called(names).find(|named| named.prefix() == map));
+        let elsewhere = || {
+            let mut called = self.called(names);
+            called.find(|named| !self.is_of_another(prefix, named))
+        };
+        found.or_else(|| self.find(names)).or_else(elsewhere)
+    }
+
+    /// All values with one of the names, with those of the maps around them or without.
+    pub(super) fn called(&self, names: &[&str]) -> impl Iterator<Item = &Named<'a>> {
+        self.all.iter().filter(move |named| {
+            let [path, last] = [named.path.as_str(), named.last()].map(plain);
+            names.contains(&path.as_str()) || names.contains(&last.as_str())
+        })
+    }
+
+    /// Whether a value lies in the map of another camera than that whose matrix has a prefix.
+    pub(super) fn is_of_another(&self, prefix: &str, named: &Named<'_>) -> bool {
+        let within = |prefix: &str| prefix.starts_with(named.prefix());
+        let mut all = self.all.iter();
+        !within(prefix) && all.any(|other| within(other.prefix()) && other.is_camera())
+    }
+
     /// A value by its exact path.
     pub(super) fn exactly(&self, path: &str) -> Option<&Named<'a>> {
         self.all.iter().find(|named| named.path == path)
@@ -74,6 +104,14 @@ impl Named<'_> {
     /// What stands before its own name: empty, or ends with a dot.
     pub(super) fn prefix(&self) -> &str {
         &self.path[..self.path.len() - self.last().len()]
+    }
+
+    /// A camera matrix, or the first number of a camera that is written as numbers.
+    fn is_camera(&self) -> bool {
+        if ["fx", "mu"].contains(&plain(self.last()).as_str()) {
+            return self.node.number().is_some();
+        }
+        matches!(role(self.last()), Some((Role::CameraMatrix, _))) && self.node.matrix().is_some()
     }
 }
 

@@ -1,6 +1,8 @@
 //! What is exported reads back the same.
 
-use calibrate::export::{ExportError, FrameFiles, check_colmap, opencv_yaml, transforms_json};
+use calibrate::export::{
+    ExportError, FrameFiles, check_colmap, check_colmap_text, opencv_yaml, transforms_json,
+};
 use calibrate::formats::read_transforms;
 use calibrate::opencv::{Keys, read_calibration};
 use calibrate::{
@@ -207,6 +209,28 @@ fn colmap_lacks_some_models() {
     assert_eq!(check(skewed), refused("OPENCV_SKEWED_FISHEYE", as_opencv));
     let inverse = camera(ModelKind::InverseRadial, &[-0.1]);
     assert_eq!(check(&inverse), refused("INVERSE_RADIAL", ""));
+}
+
+#[test]
+fn colmap_reads_names_with_blanks_from_its_binary_format_alone() {
+    let mut whole = reconstruction(&expressible(), &[Rigid3::IDENTITY; 2]);
+    assert_eq!(check_colmap(&whole), Ok(()));
+    for (image, name) in whole.images.values_mut().zip(["my_left.jpg", "right.jpg"]) {
+        image.name = name.to_owned();
+    }
+    assert_eq!(check_colmap_text(&whole), Ok(()));
+    for name in ["my right.jpg", "a\tb.jpg", "a\u{a0}b.jpg"] {
+        let renamed = whole.images.values_mut().next_back().unwrap();
+        renamed.name = name.to_owned();
+        let error = check_colmap_text(&whole).unwrap_err().to_string();
+        let said = "export with --format colmap, or rename the photo";
+        assert!(error.starts_with(&format!("photo {name:?} has")), "{error}");
+        assert!(error.contains(said), "{error}");
+        assert_eq!(check_colmap(&whole), Ok(()));
+    }
+    let inverse = camera(ModelKind::InverseRadial, &[-0.1]);
+    let lens = reconstruction(&[inverse], &[Rigid3::IDENTITY]);
+    assert_eq!(check_colmap_text(&lens), check_colmap(&lens));
 }
 
 #[test]

@@ -263,6 +263,61 @@ fn a_fisheye_is_known_by_what_the_file_says() {
 }
 
 #[test]
+fn every_camera_of_kalibrs_chain_has_its_own_model() {
+    let chain = |models: [&str; 2]| -> String {
+        let cameras = models.iter().enumerate().map(|(i, model)| {
+            format!(
+                "cam{i}:\n  cam_overlaps: [{}]\n  camera_model: pinhole\n  \
+                 distortion_coeffs: [0.1, 0.02, 0.003, 0.004]\n  distortion_model: {model}\n  \
+                 intrinsics: [500, 510, 319.5, 239.5]\n  resolution: [{}, 480]\n  \
+                 rostopic: /cam{i}/image_raw\n",
+                1 - i,
+                640 + i
+            )
+        });
+        cameras.collect()
+    };
+    let names = |text: &str, keys: &Keys| -> Vec<String> {
+        let found = read_with(text, keys).unwrap();
+        let name = |lens| Camera::of(lens, 1, 1).model.name().to_owned();
+        found.cameras.iter().map(|c| name(&c.lens)).collect()
+    };
+    let all = Keys::default();
+    for (models, expected) in [
+        (["radtan", "equidistant"], ["OPENCV", "OPENCV_FISHEYE"]),
+        (["equidistant", "radtan"], ["OPENCV_FISHEYE", "OPENCV"]),
+        (
+            ["equidistant", "equidistant"],
+            ["OPENCV_FISHEYE", "OPENCV_FISHEYE"],
+        ),
+    ] {
+        let text = chain(models);
+        assert_eq!(names(&text, &all), expected, "{models:?}");
+        let found = read(&text).unwrap();
+        assert_eq!(found.cameras[0].size, Some((640, 480)));
+        assert_eq!(found.cameras[1].size, Some((641, 480)));
+        assert_eq!(found.notes, Vec::<String>::new());
+        let second = Keys {
+            camera_matrix: Some("cam1.intrinsics".to_owned()),
+            ..Keys::default()
+        };
+        assert_eq!(names(&text, &second), expected[1..], "{models:?}");
+    }
+    // What the first says is not said of the second.
+    let text = chain(["equidistant", "radtan"]);
+    let silent = text.replace("  distortion_model: radtan\n", "");
+    assert_eq!(names(&silent, &all), ["OPENCV_FISHEYE", "OPENCV"]);
+    // Nor is one refused for what another is.
+    let omni = text + "cam2:\n  camera_model: omni\n  intrinsics: [1, 500, 510, 319.5, 239.5]\n";
+    assert!(error(&omni).contains("the camera model is omni"));
+    let first = Keys {
+        camera_matrix: Some("cam0.intrinsics".to_owned()),
+        ..Keys::default()
+    };
+    assert_eq!(names(&omni, &first), ["OPENCV_FISHEYE"]);
+}
+
+#[test]
 fn unknown_names_are_listed_and_can_be_chosen() {
     let text = matrix("Kamera", 3, 3, K)
         + "inner:\n"
