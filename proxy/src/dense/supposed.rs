@@ -9,9 +9,13 @@ use rayon::prelude::*;
 const ACROSS: usize = 6;
 const DOWN: usize = 4;
 const DEPTHS: usize = 6;
+/// Photos whose places are taken, at most: each place may be in the image of every other photo, and every
+/// two photos that have it are compared.
+const PHOTOS: usize = 60;
 
 /// Places spread over what photos may show between two inverse depths each, and the photos that have them in
-/// their images: as if nothing hid anything.
+/// their images: as if nothing hid anything. Of many photos the places of some are taken, at even steps in
+/// their order.
 pub(super) fn points(photos: &[Option<SmallPhoto>], ranges: &[[f64; 2]]) -> Vec<SparsePoint> {
     let of_photo = |i: usize| -> Vec<SparsePoint> {
         let Some(photo) = &photos[i] else {
@@ -44,8 +48,11 @@ pub(super) fn points(photos: &[Option<SmallPhoto>], ranges: &[[f64; 2]]) -> Vec<
             })
             .collect()
     };
-    (0..photos.len())
+    let usable: Vec<usize> = (0..photos.len()).filter(|&i| photos[i].is_some()).collect();
+    let taken = usable.len().min(PHOTOS);
+    (0..taken)
         .into_par_iter()
+        .map(|k| usable[k * usable.len() / taken])
         .flat_map_iter(of_photo)
         .collect()
 }

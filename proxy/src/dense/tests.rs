@@ -192,6 +192,44 @@ fn photos_tell_where_things_are_without_sparse_points() {
     assert!(points(1) == found);
 }
 
+/// A view of one of two places far apart, around which photos are taken in circles of 40.
+fn around_two_places(i: usize) -> View {
+    let place = DVec3::new(1e4 * (i / 40) as f64, 0.0, 5.0);
+    let (sin, cos) = (std::f64::consts::TAU * i as f64 / 40.0).sin_cos();
+    View {
+        camera_from_world: Rigid3::looking_at(
+            place + DVec3::new(2.0 * cos, 2.0 * sin, -5.0),
+            place,
+            DVec3::Y,
+        ),
+        ..view(i)
+    }
+}
+
+fn supposed_of(views: &[View]) -> Vec<SparsePoint> {
+    let blank = RgbaImage::from_pixel(192, 144, Rgba([90, 90, 90, 255]));
+    let photos: Vec<Option<SmallPhoto>> = views
+        .iter()
+        .map(|view| SmallPhoto::new(view, &blank, 16))
+        .collect();
+    supposed::points(&photos, &vec![[0.01, 0.6]; views.len()])
+}
+
+#[test]
+fn many_photos_suppose_no_more_places_than_some_that_lie_among_all() {
+    let places = 144;
+    let views: Vec<View> = (0..80).map(around_two_places).collect();
+    assert_eq!(supposed_of(&views[..60]).len(), 60 * places);
+    let points = supposed_of(&views);
+    assert_eq!(points.len(), 60 * places);
+    // Every photo goes together with others all the same.
+    let together = Affinity::new(&views, &points).neighbours(|_| true);
+    for (i, neighbours) in together.iter().enumerate() {
+        assert!(!neighbours.is_empty(), "{i}");
+        assert!(neighbours.iter().all(|j| j / 40 == i / 40), "{i}");
+    }
+}
+
 #[test]
 fn where_photos_show_nothing_in_common_there_are_no_points() {
     let (solid, views, _) = seen_by_nine();
