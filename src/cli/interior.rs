@@ -14,7 +14,7 @@ use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
     Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
-    interior_from_nodes, read_interior, read_rooms, write_interior,
+    interior_from_nodes, read_interior, read_rooms, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::io::Cursor;
@@ -193,8 +193,10 @@ fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
         Some((interior, warnings)) => (interior, warnings, Vec::new()),
         None => {
             let busy = spinner("finding rooms");
+            // Doors that the model marks are open.
+            let surface = surface_of(&model);
             let evidence = Evidence {
-                mesh: &model.mesh,
+                mesh: &surface,
                 cameras: &[],
                 sights: &[],
             };

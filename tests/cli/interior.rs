@@ -3,6 +3,7 @@
 use crate::run::{files, lumigraph};
 use glam::{DQuat, DVec3};
 use proxy::interior::read_interior;
+use proxy::mesh::{Mesh, model_to_glb, read_model};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -172,6 +173,45 @@ fn an_interior_corrected_by_hand_is_replaced_by_force_alone() {
     std::fs::write(&file, "{").unwrap();
     replace();
     assert_eq!(names(&here.join("one")), ["interior.json"]);
+}
+
+#[test]
+fn openings_that_nodes_name_are_no_walls() {
+    let folder = with_house();
+    let here = folder.path();
+    // 1. The house, with a mesh in every doorway and window.
+    let (interior, _) = read_interior(&here.join("house/interior.json")).unwrap();
+    let (mut model, _) = read_model(&here.join("house/house.glb")).unwrap();
+    for portal in &interior.portals {
+        let positions = portal.polygon.corners().to_vec();
+        let fan = 1..positions.len() as u32 - 1;
+        let opening = Mesh {
+            triangles: fan.map(|i| [0, i, i + 1]).collect(),
+            positions,
+        };
+        model.append(&opening, &format!("portal:{}", portal.name));
+    }
+    std::fs::write(here.join("named.glb"), model_to_glb(&model).unwrap()).unwrap();
+    // 2. Rooms and doors are found as without.
+    lumigraph(here, "interior house/house.glb --find -o plain").ok();
+    lumigraph(here, "interior named.glb --find -o named").ok();
+    let plain = corners(&here.join("plain"));
+    let named = corners(&here.join("named"));
+    assert!(!plain[1].is_empty());
+    for (plain, named) in plain.iter().zip(&named) {
+        assert_eq!(plain.len(), named.len());
+        for one in plain {
+            assert!(named.iter().any(|other| apart(one, other) < 0.1));
+        }
+    }
+    // 3. No cell shows them.
+    std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
+    let triangles = |model: &str| {
+        let line = format!("interior {model} --rooms rooms.json -o all --force");
+        let said = lumigraph(here, &line).ok().stdout;
+        said.lines().next().unwrap().to_owned()
+    };
+    assert_eq!(triangles("named.glb"), triangles("house/house.glb"));
 }
 
 /// How far a box's or a polygon's sides are from another's, at most.

@@ -4,10 +4,12 @@
 //! into line segments, and who walks is a disc that they keep out. A doorway is where there are
 //! none.
 
+mod squares;
+
 use glam::{DVec2, DVec3};
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
-use std::collections::BTreeMap;
+use squares::Squares;
 
 /// Heights at which things are cut, in eye heights over the floor. Tables and beds are lower:
 /// walking through them is better than being caught between them; hatches are not walked through.
@@ -23,7 +25,7 @@ pub struct Obstacles {
     axes: [DVec3; 2],
     eye_height: f64,
     radius: f64,
-    /// By floor, then by square of the map: ends of segments.
+    /// From the lowest.
     floors: Vec<Floor>,
     /// How high each cell's floor is, along `up`.
     floor_of_cell: Vec<Option<f64>>,
@@ -32,8 +34,8 @@ pub struct Obstacles {
 #[derive(Clone, Debug)]
 struct Floor {
     height: f64,
-    /// By square of side [`Obstacles::radius`] × 4.
-    squares: BTreeMap<(i32, i32), Vec<[DVec2; 2]>>,
+    /// What is in the way, seen from above.
+    squares: Squares,
 }
 
 impl Obstacles {
@@ -65,44 +67,21 @@ impl Obstacles {
     }
 
     fn cut(&self, height: f64, contents: &Contents, model: &Model) -> Floor {
-        let mut floor = Floor {
-            height,
-            squares: BTreeMap::new(),
-        };
+        let mut segments = Vec::new();
         let lists = contents.triangles.iter().chain([&contents.elsewhere]);
         for i in lists.flatten() {
             let corners = model.mesh.corners(*i as usize);
             let heights = corners.map(|p| p.dot(self.up) - height);
             for cut in CUTS {
                 if let Some(ends) = cut_triangle(corners, heights, cut * self.eye_height) {
-                    self.insert(&mut floor, ends.map(|p| self.seen_from_above(p)));
+                    segments.push(ends.map(|p| self.seen_from_above(p)));
                 }
             }
         }
-        // Triangles of two cells, and walls cut at several heights.
-        for list in floor.squares.values_mut() {
-            list.sort_by_key(|ends| ends.map(key));
-            list.dedup();
+        Floor {
+            height,
+            squares: Squares::new(segments, self.radius),
         }
-        floor
-    }
-
-    fn insert(&self, floor: &mut Floor, ends: [DVec2; 2]) {
-        let [a, b] = ends;
-        // What is within a radius of a square's points must be found from that square.
-        let low = self.square(a.min(b) - self.radius);
-        let high = self.square(a.max(b) + self.radius);
-        for x in low.0..=high.0 {
-            for y in low.1..=high.1 {
-                floor.squares.entry((x, y)).or_default().push(ends);
-            }
-        }
-    }
-
-    fn square(&self, point: DVec2) -> (i32, i32) {
-        let side = 4.0 * self.radius;
-        let index = |v: f64| (v / side).floor() as i32;
-        (index(point.x), index(point.y))
     }
 
     fn seen_from_above(&self, point: DVec3) -> DVec2 {
@@ -171,16 +150,13 @@ impl Obstacles {
 
     fn crosses(&self, floor: &Floor, [a, b]: [DVec2; 2]) -> bool {
         let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
-        let Some(list) = floor.squares.get(&self.square(a)) else {
-            return false;
-        };
-        list.iter().any(|&[c, d]| {
+        floor.squares.near(a).iter().any(|&[c, d]| {
             side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
         })
     }
 
     fn nearest(&self, floor: &Floor, point: DVec2) -> Option<(DVec2, f64)> {
-        let list = floor.squares.get(&self.square(point))?;
+        let list = floor.squares.near(point);
         let on = list.iter().map(|ends| nearest_on(*ends, point));
         let with_distance = on.map(|p| (p, p.distance(point)));
         with_distance.min_by(|a, b| a.1.total_cmp(&b.1))
@@ -233,17 +209,13 @@ fn nearest_on([a, b]: [DVec2; 2], point: DVec2) -> DVec2 {
     }
 }
 
-/// Something to sort by that is the same wherever bits are.
-fn key(point: DVec2) -> [u64; 2] {
-    [point.x.to_bits(), point.y.to_bits()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use datasets::house::{HouseOptions, house};
     use proptest::prelude::*;
-    use proxy::interior::Portal;
+    use proxy::interior::{Portal, RoomBox};
+    use proxy::mesh::Mesh;
     use std::sync::OnceLock;
 
     struct Place {
@@ -356,6 +328,50 @@ mod tests {
             let is_in = place.contents.locate(&place.interior, at).is_some();
             let left_by_door = place.interior.portals.iter().any(|p| p.cells.contains(&None));
             prop_assert!(is_in || left_by_door);
+        }
+    }
+
+    /// A wall through the origin, aslant to the map's axes, so far on both sides.
+    fn wall(reach: f64) -> Obstacles {
+        let mut interior = place().interior.clone();
+        interior.portals.clear();
+        interior.cells.truncate(1);
+        interior.cells[0].floor = None;
+        let up = interior.up;
+        let across = up.any_orthonormal_vector();
+        let along = reach * (across + up.cross(across));
+        let high = 3.0 * up;
+        let model = Model {
+            mesh: Mesh {
+                positions: vec![-along, along, along + high, high - along],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+            },
+            ..Model::default()
+        };
+        let room = RoomBox {
+            min: DVec3::new(-9.0, 0.0, -9.0),
+            max: DVec3::new(9.0, 3.0, 9.0),
+        };
+        let contents = Contents {
+            triangles: vec![vec![0, 1]],
+            bounds: vec![Some(room)],
+            elsewhere: Vec::new(),
+        };
+        Obstacles::new(&interior, &contents, &model)
+    }
+
+    #[test]
+    fn walls_of_any_length_stop_one() {
+        // Of a house, of one in millimetres, and farther than squares can be numbered.
+        for reach in [5.0, 5_000.0, 1e10] {
+            let obstacles = wall(reach);
+            let [x, y] = obstacles.axes;
+            let eye = 2.0 * x + 1.6 * obstacles.up;
+            let to = obstacles.walk(eye, -3.0 * x);
+            let height = (to.dot(x) - to.dot(y)) / f64::sqrt(2.0);
+            assert!(height > 0.9 * obstacles.radius, "{reach}: {height}");
+            // It slides.
+            assert!(to.distance(eye) > 1.0, "{reach}: {to}");
         }
     }
 

@@ -1,18 +1,21 @@
 //! What of the model each cell has.
 
 use super::{Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box};
-use crate::mesh::Model;
+use crate::mesh::{Mesh, Model};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// The triangles of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contents {
-    /// By [`CellId`](super::CellId), in order; a triangle may be in several cells.
+    /// By [`CellId`](super::CellId), in order; a triangle may be in several cells. One that stands
+    /// for an opening (`portal:A|B`) is in none.
     pub triangles: Vec<Vec<u32>>,
     /// By [`CellId`](super::CellId): the cell's box, or what its triangles span; none of a scene.
     pub bounds: Vec<Option<RoomBox>>,
-    /// Triangles of no cell, in order: they are drawn whatever is visible.
+    /// Triangles of no cell, in order: they are drawn whatever is visible. None stands for an
+    /// opening.
     pub elsewhere: Vec<u32>,
 }
 
@@ -28,15 +31,16 @@ impl Contents {
         interior: &Interior,
         model: &Model,
     ) -> Result<(Self, Vec<InteriorWarning>), InteriorError> {
-        // 1. Cells.
+        // 1. Cells, without what stands for openings: that is drawn nowhere.
+        let is_opening = openings(model);
         let mut contents = Self::default();
         for cell in &interior.cells {
-            let (triangles, bounds) = match &cell.content {
-                Content::Scene { room: None, .. } => (Vec::new(), None),
+            let mut triangles = match &cell.content {
+                Content::Scene { room: None, .. } => Vec::new(),
                 Content::Scene {
                     room: Some(room), ..
                 }
-                | Content::Box(room) => (touching(model, room), Some(*room)),
+                | Content::Box(room) => touching(model, room),
                 Content::Nodes(names) => {
                     let known = |name: &String| model.nodes.iter().any(|n| n.name == *name);
                     if let Some(node) = names.iter().find(|name| !known(name)) {
@@ -45,18 +49,20 @@ impl Contents {
                             node: node.clone(),
                         });
                     }
-                    let triangles = below(model, |name| names.iter().any(|n| n == name));
-                    let bounds = span(model, &triangles);
-                    (triangles, bounds)
+                    below(model, |name| names.iter().any(|n| n == name))
                 }
+            };
+            triangles.retain(|i| !is_opening[*i as usize]);
+            let bounds = match &cell.content {
+                Content::Nodes(_) => span(model, &triangles),
+                content => content.room(),
             };
             contents.triangles.push(triangles);
             contents.bounds.push(bounds);
         }
         // 2. The rest.
-        let mut is_taken = vec![false; model.mesh.triangles.len()];
-        let openings = below(model, |name| name.starts_with(PORTAL_NODE));
-        for i in contents.triangles.iter().flatten().chain(&openings) {
+        let mut is_taken = is_opening;
+        for i in contents.triangles.iter().flatten() {
             is_taken[*i as usize] = true;
         }
         let all = 0..model.mesh.triangles.len() as u32;
@@ -73,6 +79,31 @@ impl Contents {
         }
         Ok((contents, odd))
     }
+}
+
+/// The surface of a model, without what stands for openings: doors are looked for in it.
+pub fn surface_of(model: &Model) -> Cow<'_, Mesh> {
+    let is_opening = openings(model);
+    if !is_opening.contains(&true) {
+        return Cow::Borrowed(&model.mesh);
+    }
+    let triangles = model.mesh.triangles.iter().zip(&is_opening);
+    let walls = triangles.filter(|(_, is_opening)| !**is_opening);
+    let mut mesh = Mesh {
+        positions: model.mesh.positions.clone(),
+        triangles: walls.map(|(triangle, _)| *triangle).collect(),
+    };
+    mesh.drop_unused();
+    Cow::Owned(mesh)
+}
+
+/// By triangle: whether it stands for an opening.
+fn openings(model: &Model) -> Vec<bool> {
+    let mut is_opening = vec![false; model.mesh.triangles.len()];
+    for i in below(model, |name| name.starts_with(PORTAL_NODE)) {
+        is_opening[i as usize] = true;
+    }
+    is_opening
 }
 
 fn touching(model: &Model, room: &RoomBox) -> Vec<u32> {
@@ -101,4 +132,91 @@ fn span(model: &Model, triangles: &[u32]) -> Option<RoomBox> {
     let all = |(low, high): (DVec3, DVec3), p: DVec3| (low.min(p), high.max(p));
     let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), all);
     min.is_finite().then_some(RoomBox { min, max })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interior::{Cell, Extra};
+    use crate::mesh::{ModelNode, Part};
+
+    /// A cell's floor, and below its node an opening beside it, which reaches farther.
+    fn with_opening() -> Model {
+        let node = |name: &str, parent_idx| ModelNode {
+            name: name.to_owned(),
+            parent_idx,
+        };
+        let part = |i: u32| Part {
+            triangles: i..i + 1,
+            node_idx: i,
+            material_idx: 0,
+        };
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 2.0, 0.0],
+            [1.0, 2.0, 1.0],
+        ];
+        Model {
+            mesh: Mesh {
+                positions: corners.map(DVec3::from_array).to_vec(),
+                triangles: vec![[0, 1, 2], [3, 4, 5]],
+            },
+            parts: vec![part(0), part(1)],
+            nodes: vec![node("cell:a", None), node("portal:a|", Some(0))],
+            ..Model::default()
+        }
+    }
+
+    #[test]
+    fn what_stands_for_an_opening_is_in_no_cell() {
+        let model = with_opening();
+        let room = RoomBox {
+            min: DVec3::splat(-1.0),
+            max: DVec3::splat(3.0),
+        };
+        let seen = |triangles: &[u32]| span(&model, triangles).unwrap();
+        let scene = Content::Scene {
+            folder: "hall".to_owned(),
+            room: Some(room),
+        };
+        for (content, bounds) in [
+            (Content::Nodes(vec!["cell:a".to_owned()]), seen(&[0])),
+            (Content::Box(room), room),
+            (scene, room),
+        ] {
+            let interior = Interior {
+                model: None,
+                up: DVec3::Y,
+                eye_height: 1.6,
+                cells: vec![Cell {
+                    name: "a".to_owned(),
+                    content,
+                    floor: None,
+                    other: Extra::new(),
+                }],
+                portals: Vec::new(),
+                held_out: Vec::new(),
+                other: Extra::new(),
+            };
+            let (contents, odd) = Contents::new(&interior, &model).unwrap();
+            assert_eq!(contents.triangles, [[0]]);
+            assert_eq!(contents.bounds, [Some(bounds)]);
+            assert_eq!((contents.elsewhere.len(), odd.len()), (0, 0));
+        }
+    }
+
+    #[test]
+    fn a_surface_has_no_openings() {
+        let model = with_opening();
+        let surface = surface_of(&model);
+        assert_eq!(surface.triangles, [[0, 1, 2]]);
+        assert_eq!(surface.positions, model.mesh.positions[..3]);
+        // Without any it is the model's own.
+        let mut plain = with_opening();
+        plain.nodes[1].name = "door".to_owned();
+        assert!(matches!(surface_of(&plain), Cow::Borrowed(_)));
+    }
 }

@@ -16,28 +16,30 @@ pub(super) fn tolerance(portal: &Portal) -> f64 {
 
 impl Contents {
     /// The cell that a point is in, if any. Of several, it is the smallest. In a doorway as
-    /// deep as a wall, between two boxes, it is the one on the same side of the portal.
+    /// deep as a wall, between two boxes or in both, it is the one on the same side of the portal.
     pub fn locate(&self, interior: &Interior, point: DVec3) -> Option<CellId> {
         if !point.is_finite() {
             return None;
         }
         let ids = (0..interior.cells.len() as u32).map(CellId);
         let inside = ids.filter_map(|id| Some((self.room_around(interior, id, point)?, id)));
+        let inside: Vec<(f64, CellId)> = inside.collect();
         // The first of those that are alike.
-        if let Some((_, id)) = inside.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            return Some(id);
-        }
-        let doorways = interior.portals.iter().filter_map(|portal| {
-            let height = portal.polygon.height(point);
-            let cell = portal.cells[usize::from(height < 0.0)]?;
-            let bounds = self.bounds.get(cell.0 as usize).copied().flatten()?;
-            let foot = point - height * portal.polygon.normal();
-            let is_between = bounds.distance(point) <= bounds.distance(foot);
-            let is_in = is_between && portal.polygon.covers(point, tolerance(portal));
-            is_in.then_some((height.abs(), cell))
-        });
-        let nearest = doorways.min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.map(|(_, cell)| cell)
+        let smallest = inside.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, smallest)) = smallest else {
+            return nearest_side(interior, point, |portal, cell| {
+                let bounds = self.bounds.get(cell.0 as usize).copied().flatten();
+                let foot = point - portal.polygon.height(point) * portal.polygon.normal();
+                bounds.is_some_and(|room| room.distance(point) <= room.distance(foot))
+            });
+        };
+        let has = |cell: Option<CellId>| inside.iter().any(|(_, id)| Some(*id) == cell);
+        let is_in_both = |portal: &Portal, _| portal.cells.iter().all(|cell| has(*cell));
+        let side = match inside.len() {
+            1 => None,
+            _ => nearest_side(interior, point, is_in_both),
+        };
+        Some(side.unwrap_or(*smallest))
     }
 
     /// Something that grows with a cell's size, if the point is in it.
@@ -59,4 +61,21 @@ impl Contents {
         let is_over = height >= -ON_PLANE * floor.size() && floor.covers(over, 0.0);
         is_over.then(|| bounds.map_or(height.max(0.0), |room| room.volume()))
     }
+}
+
+/// Of those portals that a point is right before or behind, and their cell on its side, that are
+/// `wanted` the nearest's cell.
+fn nearest_side(
+    interior: &Interior,
+    point: DVec3,
+    wanted: impl Fn(&Portal, CellId) -> bool,
+) -> Option<CellId> {
+    let sides = interior.portals.iter().filter_map(|portal| {
+        let height = portal.polygon.height(point);
+        let cell = portal.cells[usize::from(height < 0.0)]?;
+        let is_in = wanted(portal, cell) && portal.polygon.covers(point, tolerance(portal));
+        is_in.then_some((height.abs(), cell))
+    });
+    let nearest = sides.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.map(|(_, cell)| cell)
 }

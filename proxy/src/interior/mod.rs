@@ -19,7 +19,7 @@ mod semicircle;
 mod visibility;
 
 pub use compare::{ComparedCell, ComparedPortal, Comparison, compare};
-pub use contents::Contents;
+pub use contents::{Contents, surface_of};
 pub use error::{InteriorError, InteriorFileError, InteriorWarning};
 pub use file::{parse_interior, read_interior, write_interior};
 pub use overlap::triangle_touches_box;

@@ -375,6 +375,15 @@ fn viewers_are_found() {
     assert_eq!(contents.locate(&thick, at(3.95, 1.0, 1.5)), west);
     assert_eq!(contents.locate(&thick, at(4.05, 1.0, 1.5)), east);
     assert_eq!(contents.locate(&thick, at(4.05, 1.0, 3.5)), None);
+    // Boxes that both have it: the same; beside the doorway, the smaller.
+    let both = TWO_ROOMS
+        .replace("\"max\": [4, 3, 4]", "\"max\": [4.1, 3, 4]")
+        .replace("\"min\": [4, 0, 0]", "\"min\": [3.8, 0, 0]");
+    let (both, _) = rooms(&both).unwrap();
+    let (contents, _) = Contents::new(&both, &Model::default()).unwrap();
+    assert_eq!(contents.locate(&both, at(3.95, 1.0, 1.5)), west);
+    assert_eq!(contents.locate(&both, at(4.05, 1.0, 1.5)), east);
+    assert_eq!(contents.locate(&both, at(4.05, 1.0, 3.5)), west);
 }
 
 #[test]

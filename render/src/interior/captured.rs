@@ -208,6 +208,11 @@ impl Captured {
         }
     }
 
+    /// Whether a photo was found to be of no use.
+    pub(super) fn is_left_out(&self, source_idx: usize) -> bool {
+        self.gone.contains(&source_idx)
+    }
+
     /// Goes on without a photo; with the last one it is an error.
     pub(super) fn leave_out(&mut self, error: PhotoError) -> Result<(), RenderError> {
         let sources = &self.lumigraph.sources;

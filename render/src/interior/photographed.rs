@@ -156,7 +156,7 @@ pub(super) fn photographed(
     };
     // 1. Who may see it.
     let mut ranked: Vec<(bool, f64, usize)> = (0..sources.len())
-        .filter(|i| maps.has(*i))
+        .filter(|i| maps.has(*i) && !captured.is_left_out(*i))
         .filter_map(|i| {
             let view = &sources[i].view;
             let is_beyond = before(portal, place, view.center()) < 0.0;

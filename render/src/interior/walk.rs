@@ -156,6 +156,8 @@ pub struct Walk<'a> {
     filled: Target,
     /// What is mixed into that.
     mixed_in: Target,
+    /// One portal's, where one is seen before another.
+    apart: Target,
     /// By pixel: one more than the place in the frame's list of fills; 0 for none.
     owners: Vec<u16>,
     picture: Target,
@@ -202,6 +204,7 @@ impl<'a> Walk<'a> {
             last_eye: None,
             filled: Target::default(),
             mixed_in: Target::default(),
+            apart: Target::default(),
             owners: Vec::new(),
             picture: Target::default(),
         }
@@ -258,10 +261,13 @@ impl<'a> Walk<'a> {
         };
         cost.cell = cell;
         cost.visible_cells = visibility.cells.len();
-        let own = visibility.passes.iter().filter(|pass| pass.depth == 0);
-        let open: Vec<(&Pass, CellId)> = own.filter_map(|p| Some((p, p.into?))).collect();
+        let own: Vec<&Pass> = visibility.passes.iter().filter(|p| p.depth == 0).collect();
+        let open: Vec<(&Pass, CellId)> = own.iter().filter_map(|p| Some((*p, p.into?))).collect();
         cost.portals = open.len();
-        let has_images = cell.is_some() && (fill.references() > 0 || fill == PortalFill::Ldi);
+        // Where there are too many portals to tell what one sees through them, all is geometry.
+        let is_known = !own.is_empty() || visibility.cells.len() <= 1;
+        let has_images = fill.references() > 0 || fill == PortalFill::Ldi;
+        let has_images = has_images && cell.is_some() && is_known;
         let fills = match has_images {
             true => self.fills(fill, cell, &open, &camera),
             false => Vec::new(),
@@ -276,7 +282,8 @@ impl<'a> Walk<'a> {
         }
         cost.references = start.elapsed();
         let start = Instant::now();
-        self.fill(fill, &fills, &images, &camera, &mut cost);
+        let apart = self.share_out(&fills, &own, &camera);
+        self.fill(fill, &fills, &images, &camera, apart, &mut cost);
         cost.fill = start.elapsed();
         // 3. Triangles.
         let start = Instant::now();

@@ -116,6 +116,16 @@ impl Taken {
         gain: impl Fn(usize) -> f64,
         map: impl Fn(usize, DepthMap) -> Result<DepthMap, String> + Send + Sync + 'static,
     ) -> Made {
+        self.of_those(|_| true, gain, map)
+    }
+
+    /// The same of those photos that can be decoded.
+    fn of_those(
+        &self,
+        is_whole: impl Fn(usize) -> bool + Send + Sync + 'static,
+        gain: impl Fn(usize) -> f64,
+        map: impl Fn(usize, DepthMap) -> Result<DepthMap, String> + Send + Sync + 'static,
+    ) -> Made {
         let photos = self.photos.iter().enumerate();
         let sources = photos.clone().map(|(i, (view, ..))| SourceView {
             name: format!("{i}.jpg"),
@@ -134,9 +144,13 @@ impl Taken {
         });
         let model = &self.house.model;
         let solid = Solid::new(MeshKind::Depth, model.mesh.clone());
+        let exposed: Vec<RgbaImage> = exposed.collect();
         let lumigraph = Lumigraph {
             visibility: None,
-            photos: PhotoStore::from_images(exposed.collect()),
+            photos: PhotoStore::new(exposed.len(), move |i| match is_whole(i) {
+                true => Ok(exposed[i].clone()),
+                false => Err(format!("{i}.jpg: not a picture")),
+            }),
             sources: sources.collect(),
             proxy: Proxy::Mesh(Arc::new(solid)),
             points: Vec::new(),
@@ -333,4 +347,22 @@ fn depth_maps_that_cannot_be_used_are_left_out() {
         none.notes
     );
     assert!(none.ldis.iter().all(|ldi| ldi.is_some()));
+}
+
+/// A photo that cannot be decoded is left out of all LDIs, not only of the first that asks for it.
+#[test]
+fn photos_that_cannot_be_decoded_are_left_out_of_all() {
+    let taken = taken(0.0, 0.0);
+    let mut times_said = 0;
+    for lost in 0..taken.photos.len() {
+        let some = taken.of_those(move |i| i != lost, |_| 1.0, |_, map| Ok(map));
+        let said = format!("photo {lost}.jpg is left out: ");
+        times_said += some.notes.matches(&said).count();
+        assert!(some.ldis.iter().all(|ldi| ldi.is_some()), "{}", some.notes);
+    }
+    // Some are seen by no portal's semicircle.
+    assert!(
+        (1..=taken.photos.len()).contains(&times_said),
+        "{times_said}"
+    );
 }

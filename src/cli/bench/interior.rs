@@ -210,7 +210,7 @@ pub(super) fn measure(
     for (measured, repeats) in measured.iter_mut().zip(&repeats) {
         measured.set_times(repeats);
     }
-    let walk = |options| Walk::with(Painter::default(), interior, contents, model, options);
+    let walk = |painter, options| Walk::with(painter, interior, contents, model, options);
     let skips = skips(&walk, base, &mut painter, first_view)?;
     let about = format!(
         "{} cells, {} portals, {} triangles; {} views through portals, up to 45° off their axis, \
@@ -256,9 +256,10 @@ fn draw_by(
     Ok(drawn?)
 }
 
-/// Each on its own, of the first view.
+/// Each on its own, of the first view. `walk` makes a walk by a painter, which says what the walk is
+/// of: a model, or photos. It is given `painter`, which draws all of them.
 fn skips<'a>(
-    walk: &dyn Fn(WalkOptions) -> Walk<'a>,
+    walk: &dyn Fn(Painter, WalkOptions) -> Walk<'a>,
     base: WalkOptions,
     painter: &mut Painter,
     view: &View,
@@ -276,7 +277,11 @@ fn skips<'a>(
         ("cells", PortalFill::Geometry, whole_cells),
         ("columns", PortalFill::Ldi, whole_ldis),
     ] {
-        let (mut with, mut without) = (walk(base), walk(changed));
+        let [mut with, mut without] = [base, changed].map(|options| {
+            let mut made = walk(std::mem::take(painter), options);
+            *painter = std::mem::take(made.painter_mut());
+            made
+        });
         let cost = draw_by(painter, &mut with, view, fill)?;
         let fired = match name {
             "cells" => (cost.triangles_in_cells - cost.triangles_tried, "triangles"),
@@ -291,4 +296,77 @@ fn skips<'a>(
         })?);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::captured::Opened;
+    use crate::cli::exposure::ExposureArgs;
+    use lumigraph::scene::Scene;
+    use proxy::interior::{parse_rooms, write_interior};
+    use proxy::mesh::model_to_glb;
+    use render::DeviceChoice;
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    /// The two halves of the hallway.
+    const HALVES: &str = r#"{"version": 1, "rooms": [
+        {"name": "front", "min": [-9, -0.1, -99], "max": [9, 9, -2]},
+        {"name": "back", "min": [-9, -0.1, -2], "max": [9, 9, 99]}],
+        "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,
+            "polygon": [[-1, 0, -2], [1, 0, -2], [1, 2.4, -2], [-1, 2.4, -2]]}]}"#;
+
+    #[test]
+    fn what_is_left_out_of_a_captured_interior_is_its_surface() {
+        // 1. An interior of photos.
+        let folder = tempfile::tempdir().unwrap();
+        let at = |path: &str| folder.path().join(path);
+        let options = datasets::Options {
+            size: Some((96, 72)),
+            ..datasets::Options::default()
+        };
+        let hallway = datasets::by_name("hallway", &options).unwrap();
+        datasets::write(&hallway, &at("hall")).unwrap();
+        let (scene, _) = Scene::open(&at("hall"), false).unwrap();
+        let surface = scene.surface(&BTreeSet::new()).unwrap();
+        let rooms = Path::new("rooms.json");
+        let rooms = parse_rooms(rooms, HALVES.as_bytes(), "model.glb");
+        let mut interior = rooms.unwrap().0;
+        interior.show_photos("../hall");
+        std::fs::create_dir(at("two")).unwrap();
+        let model = model_to_glb(&surface.model).unwrap();
+        std::fs::write(at("two/model.glb"), model).unwrap();
+        write_interior(&at("two/interior.json"), &interior).unwrap();
+        // 2. What draws it.
+        let exposure = ExposureArgs::default();
+        let mut opened = Opened::new(&at("two"), Some(&exposure), |_| {}).unwrap();
+        let mut painter = opened.painter(DeviceChoice::Cpu, None).unwrap();
+        let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
+        let walk = |painter, options| Walk::with(painter, interior, contents, model, options);
+        let mut base = WalkOptions::default();
+        base.library.size = [64, 64];
+        let places = SemicircleOptions {
+            views: 1,
+            span: 1.0,
+        };
+        let places = before_doorways(interior, contents, 1.25, &places);
+        let view = View {
+            lens: Lens::pinhole(DVec2::splat(45.0), DVec2::new(32.0, 24.0)),
+            width: 64,
+            height: 48,
+            camera_from_world: places[0].camera_from_world,
+        };
+        // 3. As a walk of it has it.
+        let mut whole = walk(std::mem::take(&mut painter), base);
+        let cost = whole.draw(&view, PortalFill::Geometry).unwrap();
+        painter = std::mem::take(whole.painter_mut());
+        assert_eq!(cost.triangles_in_cells, model.mesh.triangles.len());
+        let passed_over = cost.triangles_in_cells - cost.triangles_tried;
+        let skips = skips(&walk, base, &mut painter, &view).unwrap();
+        let fired = format!("{passed_over} triangles");
+        assert_eq!(skips[0].fired.as_deref(), Some(&fired[..]));
+        assert!(skips.iter().all(|skip| skip.same_bytes));
+        assert!(painter.captured().is_some());
+    }
 }

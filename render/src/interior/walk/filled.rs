@@ -1,13 +1,13 @@
 //! Portals filled with images.
 
 use super::compose::mixed;
-use super::{FrameCost, Walk, WalkError};
+use super::{FrameCost, Walk, WalkError, WalkOptions};
 use crate::interior::reference::plane_of;
 use crate::interior::{
     Beyond, Captured, LdiSource, Painter, Pinhole, PortalFill, PortalLdi, Reference, Shown, Target,
     Window, texture, warp,
 };
-use crate::ldi::{Clipped, FreeOptions};
+use crate::ldi::Clipped;
 use glam::DVec3;
 use proxy::interior::{CellId, Pass, Portal};
 use rayon::prelude::*;
@@ -178,57 +178,126 @@ impl Walk<'_> {
         ways.map(share).fold(1.0, f64::min)
     }
 
-    /// Draws images where one sees through portals.
+    /// Says which portal each pixel shows, if images fill it: of those that one sees through there, filled or
+    /// not, the nearest. (From one arm of a room with a corner one sees portals of the other arm behind
+    /// its own, and the walls between do not hide them.) Whether any is seen before another.
+    pub(super) fn share_out(
+        &mut self,
+        fills: &[Filled<'_>],
+        own: &[&Pass],
+        camera: &Pinhole,
+    ) -> bool {
+        let width = camera.width as usize;
+        self.owners.clear();
+        self.owners.resize(width * camera.height as usize, 0);
+        let mut are_apart = false;
+        let mut put = |window: &Window, plane: &Beyond, owner: u16| {
+            for y in 0..camera.height {
+                let open = window.row(y);
+                let row = &mut self.owners[y as usize * width..][..width];
+                let shown = &mut row[open.start as usize..open.end as usize];
+                if owner > 0 && shown.iter().all(|other| *other == 0) {
+                    shown.fill(owner);
+                    continue;
+                }
+                for (x, shown) in open.zip(shown) {
+                    let ray = camera.ray(x, y);
+                    let is_before = match fills.get(usize::from(*shown).wrapping_sub(1)) {
+                        None => owner > 0,
+                        Some(other) => {
+                            are_apart = true;
+                            plane.inverse_depth(ray) > other.plane.inverse_depth(ray)
+                        }
+                    };
+                    if is_before {
+                        *shown = owner;
+                    }
+                }
+            }
+        };
+        for (k, f) in fills.iter().enumerate() {
+            put(&f.window, &f.plane, k as u16 + 1);
+        }
+        let is_filled = |pass: &Pass| fills.iter().any(|f| std::ptr::eq(f.pass, pass));
+        for pass in own
+            .iter()
+            .filter(|pass| !fills.is_empty() && !is_filled(pass))
+        {
+            let plane = plane_of(camera, self.interior.portal(pass.portal), pass.into);
+            put(&Window::of(&pass.region, camera), &plane, 0);
+        }
+        are_apart
+    }
+
+    /// Draws images where one sees through portals, each in its own pixels: those of portals that are seen
+    /// one before the other are drawn `apart`.
     pub(super) fn fill(
         &mut self,
         fill: PortalFill,
         fills: &[Filled<'_>],
         images: &[Images],
         camera: &Pinhole,
+        apart: bool,
         cost: &mut FrameCost,
     ) {
         self.filled.clear(camera.width, camera.height);
-        self.owners.clear();
-        self.owners.resize(self.filled.color.len(), 0);
         for (k, (f, images)) in fills.iter().zip(images).enumerate() {
-            for y in 0..camera.height {
-                let open = f.window.row(y);
-                let first = y as usize * camera.width as usize;
-                let row = first + open.start as usize..first + open.end as usize;
-                self.owners[row].fill(k as u16 + 1);
+            if !apart {
+                let (painter, options) = (&mut self.painter, &self.options);
+                let into = [&mut self.filled, &mut self.mixed_in];
+                draw(fill, f, images, camera, painter, options, into, cost);
+                continue;
             }
-            let into = &mut self.filled;
-            match images {
-                Images::References(images) => {
-                    // The nearest last.
-                    for reference in images.iter().rev() {
-                        cost.samples += match fill {
-                            PortalFill::Texture => {
-                                texture(reference, &f.plane, camera, &f.window, into)
-                            }
-                            _ => warp(reference, camera, &f.window, self.options.splat, into),
-                        };
-                    }
+            self.apart.clear(camera.width, camera.height);
+            let (painter, options) = (&mut self.painter, &self.options);
+            let into = [&mut self.apart, &mut self.mixed_in];
+            draw(fill, f, images, camera, painter, options, into, cost);
+            for (pixel, owner) in self.owners.iter().enumerate() {
+                if usize::from(*owner) == k + 1 {
+                    self.filled.color[pixel] = self.apart.color[pixel];
+                    self.filled.inverse_depth[pixel] = self.apart.inverse_depth[pixel];
                 }
-                Images::Ldis(portals) => {
-                    let mut portals = portals.iter().filter_map(|portal| portal.as_ref().as_ref());
-                    let painter = &mut self.painter;
-                    let (options, is_whole) = (&self.options.ldi, self.options.whole_ldis);
-                    let mut draw = |portal, into: &mut Target| {
-                        draw_ldi(painter, portal, f, camera, options, is_whole, into, cost);
-                    };
-                    let Some(first) = portals.next() else {
-                        continue;
-                    };
-                    draw(first, into);
-                    if let (Some(other), Some((_, share))) =
-                        (portals.next(), f.shown.and_then(|shown| shown.other))
-                    {
-                        self.mixed_in.clear(camera.width, camera.height);
-                        draw(other, &mut self.mixed_in);
-                        mix(&f.window, into, &self.mixed_in, share);
-                    }
-                }
+            }
+        }
+    }
+}
+
+/// Draws a portal's images; the second target is for one that is mixed into another.
+fn draw(
+    fill: PortalFill,
+    f: &Filled<'_>,
+    images: &Images,
+    camera: &Pinhole,
+    painter: &mut Painter,
+    options: &WalkOptions,
+    [into, mixed_in]: [&mut Target; 2],
+    cost: &mut FrameCost,
+) {
+    match images {
+        Images::References(images) => {
+            // The nearest last.
+            for reference in images.iter().rev() {
+                cost.samples += match fill {
+                    PortalFill::Texture => texture(reference, &f.plane, camera, &f.window, into),
+                    _ => warp(reference, camera, &f.window, options.splat, into),
+                };
+            }
+        }
+        Images::Ldis(portals) => {
+            let mut portals = portals.iter().filter_map(|portal| portal.as_ref().as_ref());
+            let mut draw = |portal, into: &mut Target| {
+                draw_ldi(painter, portal, f, camera, options, into, cost);
+            };
+            let Some(first) = portals.next() else {
+                return;
+            };
+            draw(first, into);
+            if let (Some(other), Some((_, share))) =
+                (portals.next(), f.shown.and_then(|shown| shown.other))
+            {
+                mixed_in.clear(camera.width, camera.height);
+                draw(other, mixed_in);
+                mix(&f.window, into, mixed_in, share);
             }
         }
     }
@@ -240,18 +309,17 @@ fn draw_ldi(
     portal: &PortalLdi,
     f: &Filled<'_>,
     camera: &Pinhole,
-    options: &FreeOptions,
-    is_whole: bool,
+    options: &WalkOptions,
     into: &mut Target,
     cost: &mut FrameCost,
 ) {
     let ldi = &portal.ldi;
-    let reach = f64::from(options.reach());
-    let columns = match is_whole {
+    let reach = f64::from(options.ldi.reach());
+    let columns = match options.whole_ldis {
         true => Clipped::whole(ldi),
         false => portal.tree.columns(ldi, camera, &f.window, reach),
     };
-    let took = painter.free((ldi, &columns), camera, &f.window, options, into);
+    let took = painter.free((ldi, &columns), camera, &f.window, &options.ldi, into);
     cost.samples += took.drawn;
     if took.pixels > 0 {
         cost.samples_clipped += ldi.len() - took.samples;
