@@ -103,10 +103,12 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
             continue;
         }
         let source_idx = u32(listed.x);
-        // Every listed view sees all of the triangle: fovBlend and mask are one.
         let sight = see(source_idx, ray, s);
-        if sight.depth > 0.0 {
-            add_photo(&mix, weight, source_idx, texel_of(source_idx, sight, ray, plane.xyz));
+        // Every listed view sees all of the triangle: fovBlend and mask are one. But where the desired lens
+        // ends inside the triangle, nobody knows.
+        let fov = fov_blend(source_idx, sight);
+        if fov > 0.0 {
+            add_photo(&mix, fov * weight, source_idx, texel_of(source_idx, sight, ray, plane.xyz));
         }
     }
     return resolve(mix);
@@ -180,6 +182,10 @@ fn bordered_color(pixel: vec2u, it: Listed) -> vec4f {
     }
     // 2. Their weights and colours.
     let t = max(threshold(&terms, count, sums), SMALLEST_THRESHOLD);
+    // Where the nearest is as far as the threshold, or no view differs that counts, all are tied: those of
+    // lowest index share, as many as may contribute.
+    let are_tied = nearest >= t || t <= SMALLEST_THRESHOLD;
+    var tied = 0u;
     var mix = Mix(vec4f(0.0), 0.0);
     for (var n = 0u; n < count; n++) {
         let diff = terms.diff[n];
@@ -187,9 +193,9 @@ fn bordered_color(pixel: vec2u, it: Listed) -> vec4f {
         if !BLEND_OF_PAPER {
             weight /= max(diff, SAME_RAY);
         }
-        // Where the nearest is as far as the threshold, all are tied.
-        if nearest >= t && diff <= nearest {
+        if are_tied && diff <= nearest && tied < CONTRIBUTORS {
             weight = terms.a[n];
+            tied++;
         }
         if weight > 0.0 {
             let source_idx = terms.source_idx[n];

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use calibrate::{Distortion, Lens, Rigid3, View, colmap};
+use calibrate::{Distortion, Lens, Pixel, Rigid3, View, colmap};
 use common::{METHODS, Shot, assert_close, by_all, by_reference, gpu, pinhole, psnr, psnr_covered};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
@@ -89,6 +89,69 @@ fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
             }
         }
     }
+}
+
+/// Where as many photos look from one place as contribute, none is nearer than the others: all share.
+#[test]
+fn photos_of_one_place_share_in_every_engine() {
+    let shot = Shot::of("shelf", 9, None);
+    let mut lumigraph = shot.lumigraph();
+    let first = shot.views[4].clone();
+    for (i, (x, y)) in [(0.1, 0.3), (-0.2, 0.1), (0.05, -0.3)]
+        .into_iter()
+        .enumerate()
+    {
+        lumigraph.sources[i].view = turned(&first, x, y);
+    }
+    for (name, desired) in [
+        ("a photo's own", first.clone()),
+        ("turned", turned(&first, 0.02, 0.15)),
+    ] {
+        for k in [1, 2, 3, 5] {
+            for method in METHODS {
+                let options = FieldOptions {
+                    k,
+                    ..FieldOptions::default()
+                };
+                let frame = Frame::new(&lumigraph, desired.clone(), options);
+                let truth = by_reference(&frame, method).unwrap();
+                for (engine, picture) in by_all(&frame, method).split_off(1) {
+                    let what = format!("{name}, k = {k}, {engine}, {method:?}");
+                    assert_close(&picture.unwrap(), &truth, &what);
+                }
+            }
+        }
+    }
+}
+
+/// Where the desired lens ends within the picture, triangles that end with it reach beyond photos' borders.
+#[test]
+fn beyond_a_photos_border_it_shows_nothing_at_the_end_of_the_desired_lens() {
+    let shot = Shot::of("shelf", 9, None);
+    let lumigraph = shot.lumigraph();
+    let bent = Distortion::Rational {
+        k: [-0.6, 0.0, 0.0, 0.0, 0.0, 0.0],
+        p: [0.0; 2],
+    };
+    let lens = Lens::new(DVec2::splat(130.0), DVec2::new(80.0, 60.0), bent);
+    let mut without_ray = 0;
+    for (x, y) in [(0.0, 0.0), (0.3, 0.2), (-0.2, 0.5), (0.5, -0.3)] {
+        let desired = View {
+            lens,
+            ..turned(&shot.views[4], x, y)
+        };
+        let middle = (0..120).flat_map(|y| (0..160).map(move |x| Pixel::center_of(x, y)));
+        without_ray += middle.filter(|p| lens.unproject(*p).is_none()).count();
+        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        for method in METHODS {
+            let truth = by_reference(&frame, method).unwrap();
+            for (engine, picture) in by_all(&frame, method).split_off(1) {
+                let what = format!("turned by {x}, {y}, {engine}, {method:?}");
+                assert_close(&picture.unwrap(), &truth, &what);
+            }
+        }
+    }
+    assert!(without_ray > 1000, "{without_ray}");
 }
 
 // ---------------------------------------------------------------- Engine against engine
