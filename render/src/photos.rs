@@ -279,7 +279,8 @@ impl PhotoStore {
             let bytes = photo.bytes() as u64;
             if shelf.residency.allows(bytes) {
                 shelf.put(source_idx, None);
-                shelf.evict(bytes, |_| false);
+                // And for those that are being decoded ahead of need, for which there was room before.
+                shelf.evict(shelf.awaited + bytes, |_| false);
                 shelf.put(source_idx, Some(Arc::clone(photo)));
             }
         })

@@ -79,7 +79,8 @@ impl Visibility {
             if alike(view) == alike(first) {
                 DistanceMap::new(&self.solid, view, self.rays.as_ref())
             } else {
-                DistanceMap::new(&self.solid, view, DistanceMap::rays(view).as_ref())
+                let rays = Rays::reduced_alone(view, REDUCTION);
+                DistanceMap::new(&self.solid, view, rays.as_ref())
             }
         })
     }

@@ -1,5 +1,6 @@
 //! Where pixels' rays meet the plane before the camera.
 
+use super::Threads;
 use calibrate::{Distortion, Lens, Pixel, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -87,7 +88,11 @@ impl Bounds {
 
 impl Rays {
     /// `None` where some pixel looks aside or back.
-    pub fn of(lens: &Lens, (width, height): (u32, u32)) -> Option<Self> {
+    pub fn of(lens: &Lens, size: (u32, u32)) -> Option<Self> {
+        Self::by(Threads::All, lens, size)
+    }
+
+    fn by(threads: Threads, lens: &Lens, (width, height): (u32, u32)) -> Option<Self> {
         let size = [width as usize, height as usize];
         let mut rays = Self {
             lens: *lens,
@@ -95,7 +100,7 @@ impl Rays {
             bent: None,
         };
         if lens.distortion() != Distortion::None {
-            rays.bent = Some(Bent::of(lens, size)?);
+            rays.bent = Some(Bent::of(threads, lens, size)?);
         }
         Some(rays)
     }
@@ -103,9 +108,18 @@ impl Rays {
     /// Of a view's picture reduced so many times: the pixel in column i and row j looks along the ray
     /// of the view's pixel ((i + ½)·reduction, (j + ½)·reduction).
     pub fn reduced(view: &View, reduction: u32) -> Option<Self> {
+        Self::reduced_by(Threads::All, view, reduction)
+    }
+
+    /// [`Self::reduced`] on this thread alone: see [`Solid::scan_alone`](crate::Solid::scan_alone).
+    pub fn reduced_alone(view: &View, reduction: u32) -> Option<Self> {
+        Self::reduced_by(Threads::This, view, reduction)
+    }
+
+    fn reduced_by(threads: Threads, view: &View, reduction: u32) -> Option<Self> {
         let step = f64::from(reduction).recip();
         let size = [view.width, view.height].map(|side| side.div_ceil(reduction));
-        Self::of(&view.lens.scaled(step, step), size.into())
+        Self::by(threads, &view.lens.scaled(step, step), size.into())
     }
 
     /// Where the ray of a pixel's centre meets the plane z = 1; `None` where the lens has none.
@@ -126,7 +140,7 @@ impl Rays {
 }
 
 impl Bent {
-    fn of(lens: &Lens, [width, height]: [usize; 2]) -> Option<Self> {
+    fn of(threads: Threads, lens: &Lens, [width, height]: [usize; 2]) -> Option<Self> {
         let row = |y: usize| -> Option<Vec<DVec2>> {
             let of_column = |x: usize| {
                 let center = Pixel::center_of(x as u32, y as u32);
@@ -137,7 +151,10 @@ impl Bent {
             };
             (0..width).map(of_column).collect()
         };
-        let at: Option<Vec<Vec<DVec2>>> = (0..height).into_par_iter().map(row).collect();
+        let at: Option<Vec<Vec<DVec2>>> = match threads {
+            Threads::All => (0..height).into_par_iter().map(row).collect(),
+            Threads::This => (0..height).map(row).collect(),
+        };
         let at = at?.concat();
         let mut blocks = Vec::new();
         let mut rows = Vec::new();

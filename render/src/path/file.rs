@@ -270,8 +270,13 @@ pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> 
     let io = |e| PathFileError::Io(path.to_owned(), e);
     let mut temporary = path.as_os_str().to_owned();
     temporary.push(".tmp");
-    std::fs::write(&temporary, text).map_err(io)?;
-    std::fs::rename(&temporary, path).map_err(io)
+    let written = std::fs::write(&temporary, text);
+    let written = written.and_then(|()| std::fs::rename(&temporary, path));
+    if written.is_err() {
+        // There is nothing to do about it where this fails, too.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written.map_err(io)
 }
 
 fn interpolation_of(stored: Option<StoredInterpolation>) -> Interpolation {

@@ -31,6 +31,8 @@ pub(super) struct Capture {
     pub(super) nearest_scene: f64,
 }
 
+/// Cameras nearer to one another than this, in shares of how far the farthest is, are at one place.
+const SAME_PLACE: f64 = 1e-4;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
 
@@ -151,6 +153,8 @@ impl Capture {
         let third = 2.min(sorted.len() - 1);
         let third_nearest = *sorted.select_nth_unstable_by(third, f64::total_cmp).1;
         let width = third_nearest.max(self.spacing * self.spacing);
+        // At a place where all cameras are, each counts as much as any.
+        let width = width.max(f64::MIN_POSITIVE);
         squares.iter().map(|s| (-0.5 * s / width).exp()).collect()
     }
 
@@ -331,17 +335,18 @@ fn geometric_median(points: &[DVec3]) -> DVec3 {
     at
 }
 
-/// The distance to the third-nearest other point, in the median.
+/// The distance to the third-nearest point elsewhere, in the median: cameras of a rig, and photos of one
+/// place by several exposures, are at one place.
 fn spacing(points: &[DVec3]) -> f64 {
-    if points.len() < 2 {
-        return 0.0;
-    }
-    let third = 3.min(points.len() - 1);
-    let step = points.len().div_ceil(MANY);
+    let farthest = points.iter().map(|p| p.length()).fold(0.0, f64::max);
+    let same_place = SAME_PLACE * farthest;
+    let step = points.len().div_ceil(MANY).max(1);
     let distance = |at: &DVec3| {
-        let mut distances: Vec<f64> = points.iter().map(|p| p.distance(*at)).collect();
-        // The nearest of all is the point itself.
-        *distances.select_nth_unstable_by(third, f64::total_cmp).1
+        let distances = points.iter().map(|p| p.distance(*at));
+        let mut elsewhere: Vec<f64> = distances.filter(|d| *d > same_place).collect();
+        let third = 2.min(elsewhere.len().checked_sub(1)?);
+        Some(*elsewhere.select_nth_unstable_by(third, f64::total_cmp).1)
     };
-    median(points.iter().step_by(step).map(distance).collect()).unwrap_or(0.0)
+    let sampled = points.iter().step_by(step);
+    median(sampled.filter_map(distance).collect()).unwrap_or(0.0)
 }

@@ -251,6 +251,41 @@ fn moving_the_world_moves_the_path() {
     }
 }
 
+/// As cameras of a rig, and exposures of one motif.
+#[test]
+fn photos_of_one_place_count_as_one_place() {
+    let one = grid();
+    let rotation = |i: usize| DQuat::from_rotation_y(0.3 * (i % 4) as f64);
+    let many = (0..4 * one.sources.len()).map(|i| {
+        let pose = one.sources[i / 4].view.camera_from_world;
+        source(i, Rigid3::new(rotation(i), DVec3::ZERO) * pose)
+    });
+    let many = Scene {
+        sources: many.collect(),
+        ..grid()
+    };
+    let wide = |s: &Scene| {
+        let centers = centers(&path(Trajectory::Orbit, s));
+        let off = centers.iter().map(|c| c.distance(centers[0]));
+        off.fold(0.0, f64::max)
+    };
+    let (one, many) = (wide(&one), wide(&many));
+    assert!(one > 1.0 && many > 0.7 * one, "{one} {many}");
+    // All of them at one place, or at two.
+    for apart in [0.0, 1.0] {
+        let poses = (0..8).map(|i| {
+            let side = f64::from(i % 2) * 2.0 - 1.0;
+            let center = DVec3::X * apart * side;
+            Rigid3::looking_at(center, center + DVec3::Z, DVec3::NEG_Y)
+        });
+        let few = scene(poses.collect(), Vec::new(), DVec3::Z * 12.0);
+        for kind in ALL {
+            let path = derive(kind, &few.sources, &[], &few.proxy, 10, 30.0);
+            assert!(path.is_ok(), "{kind:?} {apart}: {path:?}");
+        }
+    }
+}
+
 #[test]
 fn the_camera_is_typical() {
     let mut s = grid();

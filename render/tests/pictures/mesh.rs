@@ -365,16 +365,34 @@ fn distances_asked_for_on_many_threads_are_not_waited_for_in_a_circle() {
     std::thread::spawn(move || {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build();
         let solid = Arc::new(Solid::new(MeshKind::Mesh, bent_wall(100)));
-        pool.unwrap().install(|| {
-            for _ in 0..200 {
-                let lumigraph = lumigraph_of(&solid, |_| RgbaImage::new(160, 120));
-                let visibility = lumigraph.visibility.as_ref().unwrap();
-                let asked = (0..700).into_par_iter().with_max_len(1);
-                asked.for_each(|i| {
-                    visibility.map(i * 3 % 7);
-                });
+        let ask = |lumigraph: &Lumigraph| {
+            let visibility = lumigraph.visibility.as_ref().unwrap();
+            let asked = (0..700).into_par_iter().with_max_len(1);
+            asked.for_each(|i| {
+                visibility.map(i * 3 % 7);
+            });
+        };
+        let pool = pool.unwrap();
+        for _ in 0..100 {
+            let lumigraph = lumigraph_of(&solid, |_| RgbaImage::new(160, 120));
+            pool.install(|| ask(&lumigraph));
+        }
+        // Lenses that bend, each in its own way: their rays have to be found, too.
+        for _ in 0..4 {
+            let mut lumigraph = lumigraph_of(&solid, |_| RgbaImage::new(160, 120));
+            for (i, source) in lumigraph.sources.iter_mut().enumerate() {
+                let k1 = 0.01 * i as f64 - 0.1;
+                let bent = Distortion::Rational {
+                    k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0],
+                    p: [0.0; 2],
+                };
+                let view = source.view.resized(800, 600);
+                let lens = Lens::new(view.lens.focal, view.lens.principal, bent);
+                source.view = View { lens, ..view };
             }
-        });
+            lumigraph.visibility = Visibility::of(&lumigraph.proxy, &lumigraph.sources);
+            pool.install(|| ask(&lumigraph));
+        }
         done.send(()).unwrap();
     });
     let waited = is_done.recv_timeout(Duration::from_secs(120));
