@@ -3,7 +3,7 @@
 use super::Usage;
 use super::exposure::ExposureArgs;
 use super::film::files_of;
-use super::frames::{NamedView, of_path};
+use super::frames::{Asked, NamedView};
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
@@ -87,14 +87,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.without_view {
         without.insert(args.view.clone());
     }
+    let path = args.path.as_deref();
+    let asked = path.map(|path| Asked::path(path, &NerfstudioFrame::default()));
+    // What need not be derived is found first: fitting a proxy may take long.
+    let known = match asked.transpose()? {
+        None => Ok((scene.view(&args.view)?, scene.time_s(&args.view))),
+        Some(Asked::Read(views, _)) => Ok(frame_of(views, &args.view)?),
+        Some(derived) => Err(derived),
+    };
     let proxy = args.proxy.choose(&scene, &without)?;
     let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
-    let (view, time_s) = match &args.path {
-        None => (scene.view(&args.view)?, scene.time_s(&args.view)),
-        Some(path) => {
+    let (view, time_s) = match known {
+        Ok(known) => known,
+        Err(derived) => {
             let points = || points(&scene, &without);
-            let frame = NerfstudioFrame::default();
-            let (views, _) = of_path(path, args.frames, &lumigraph, points, &frame)?;
+            let (views, _) = derived.frames(args.frames, &lumigraph, points)?;
             frame_of(views, &args.view)?
         }
     };

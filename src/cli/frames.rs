@@ -54,56 +54,72 @@ pub(super) struct NamedView {
     pub(super) time_s: Option<f64>,
 }
 
-/// The views asked for, and how many a second a film shows. `points_in_world` are the sparse points,
-/// for derived paths; `frame` is where nerfstudio's paths lie.
-///
-/// # Errors
-/// They cannot be read or derived.
-pub(super) fn frames(
-    args: &ViewArgs,
-    count: u32,
-    lumigraph: &Lumigraph,
-    points_in_world: impl FnOnce() -> Vec<DVec3>,
-    frame: &NerfstudioFrame,
-) -> anyhow::Result<(Vec<NamedView>, f64)> {
-    match (&args.views, &args.path) {
-        (Some(views), _) if views.is_dir() => Ok((of_model(views)?, FPS)),
-        (Some(views), _) => of_file(views, frame),
-        (None, path) => {
-            let asked = path.as_deref().unwrap_or_default();
-            of_path(asked, count, lumigraph, points_in_world, frame)
-        }
-    }
+/// The views asked for, read as far as they can be before anything is known of a scene.
+pub(super) enum Asked {
+    /// Those of a file or model, and how many a second a film shows.
+    Read(Vec<NamedView>, f64),
+    /// A path that the photos' places are needed for.
+    Derived(Trajectory),
 }
 
-/// The frames of a path, and how many of them a second: a kind of derived path, or a file.
-///
-/// # Errors
-/// It cannot be read or derived.
-pub(super) fn of_path(
-    asked: &str,
-    count: u32,
-    lumigraph: &Lumigraph,
-    points_in_world: impl FnOnce() -> Vec<DVec3>,
-    frame: &NerfstudioFrame,
-) -> anyhow::Result<(Vec<NamedView>, f64)> {
-    let Some(kind) = derived(asked) else {
+impl Asked {
+    /// Reads what is asked for; `frame` is where nerfstudio's paths lie.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(super) fn new(args: &ViewArgs, frame: &NerfstudioFrame) -> anyhow::Result<Self> {
+        let Some(views) = &args.views else {
+            return Self::path(args.path.as_deref().unwrap_or_default(), frame);
+        };
+        if !views.exists() {
+            let message = format!(
+                "--views {}: there is no such file; expected the folder of a COLMAP model, a path \
+                 file (.json), or a screenshot of `view` (.png)",
+                views.display()
+            );
+            return Err(Usage(message).into());
+        }
+        match views.is_dir() {
+            true => Ok(Self::Read(of_model(views)?, FPS)),
+            false => of_file(views, frame),
+        }
+    }
+
+    /// The same of a path: a kind of derived path, or a file.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn path(asked: &str, frame: &NerfstudioFrame) -> anyhow::Result<Self> {
+        if let Some(kind) = derived(asked) {
+            return Ok(Self::Derived(kind));
+        }
         if is_misspelt(asked) {
             let message = format!("--path {asked}: expected orbit, dolly, sweep or a path file");
             return Err(Usage(message).into());
         }
-        return of_file(Path::new(asked), frame);
-    };
-    let points = points_in_world();
-    let (sources, proxy) = (&lumigraph.sources, &lumigraph.proxy);
-    Ok(named(trajectory::derive(
-        kind,
-        sources,
-        &points,
-        proxy,
-        count as usize,
-        FPS,
-    )?))
+        of_file(Path::new(asked), frame)
+    }
+
+    /// The views, and how many a second a film shows: of a derived path so many, `points_in_world` are
+    /// the sparse points.
+    ///
+    /// # Errors
+    /// They cannot be derived.
+    pub(super) fn frames(
+        self,
+        count: u32,
+        lumigraph: &Lumigraph,
+        points_in_world: impl FnOnce() -> Vec<DVec3>,
+    ) -> anyhow::Result<(Vec<NamedView>, f64)> {
+        let kind = match self {
+            Self::Read(views, fps) => return Ok((views, fps)),
+            Self::Derived(kind) => kind,
+        };
+        let (sources, proxy) = (&lumigraph.sources, &lumigraph.proxy);
+        let (points, count) = (points_in_world(), count as usize);
+        let path = trajectory::derive(kind, sources, &points, proxy, count, FPS)?;
+        Ok(named(path))
+    }
 }
 
 /// Frames a second where no path says. Only a film made of the frames would show it.
@@ -135,14 +151,15 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
 }
 
 /// The frames of a path file, or the one that a screenshot was taken of.
-fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<(Vec<NamedView>, f64)> {
+fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
     let is_shot = file
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
-    Ok(named(match is_shot {
+    let (views, fps) = named(match is_shot {
         true => path::read_shot(file)?,
         false => path::read_in(file, frame)?,
-    }))
+    });
+    Ok(Asked::Read(views, fps))
 }
 
 fn named(path: CameraPath) -> (Vec<NamedView>, f64) {

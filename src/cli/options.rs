@@ -302,9 +302,20 @@ impl DrawArgs {
         self.device.choice()
     }
 
-    /// A view at the size asked for.
-    pub(super) fn resized(&self, view: View) -> View {
-        resized(view, self.size)
+    /// A frame's view at the size asked for.
+    ///
+    /// # Errors
+    /// It has more pixels on a side than are drawn.
+    pub(super) fn resized(&self, name: &str, view: View) -> anyhow::Result<View> {
+        let view = resized(view, self.size);
+        let (width, height) = (view.width, view.height);
+        if width.max(height) > MAX_SIDE {
+            anyhow::bail!(
+                "frame {name} has {width} x {height} pixels; at most {MAX_SIDE} are drawn each way: give \
+                 --size"
+            );
+        }
+        Ok(view)
     }
 }
 

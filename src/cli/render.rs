@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, files_of, frame_choice};
-use super::frames::{NamedView, ViewArgs, frames};
+use super::frames::{Asked, NamedView, ViewArgs};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
@@ -73,6 +73,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     chosen.check(args.views.is_derived())?;
     check_folder(&args.output)?;
     args.film.check()?;
+    let asked = Asked::new(&args.views, &args.nerfstudio.frame()?)?;
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,
@@ -86,9 +87,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     session.max_error = args.max_error;
     let points = || session.points();
     let count = chosen.count(FRAMES);
-    let world = args.nerfstudio.frame()?;
-    let (frames, fps) = frames(&args.views, count, session.lumigraph(), points, &world)?;
+    let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
     let frames = chosen.of(frames)?;
+    let resized = |frame: &NamedView| args.draw.resized(&frame.name, frame.view.clone());
+    let desired = frames
+        .iter()
+        .map(resized)
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
     let given = [
@@ -102,13 +107,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
     let missing: Vec<usize> = (0..files.len()).filter(|i| !is_there[*i]).collect();
     let bar = progress(missing.len(), "rendering");
-    let view = |frame: &NamedView| {
-        let moment = session.moment(&frame.name, frame.time_s)?;
-        Ok((args.draw.resized(frame.view.clone()), moment))
+    let view = |i: usize| {
+        let moment = session.moment(&frames[i].name, frames[i].time_s)?;
+        Ok((desired[i].clone(), moment))
     };
     let views = missing
         .iter()
-        .map(|&i| view(&frames[i]))
+        .map(|&i| view(i))
         .collect::<anyhow::Result<Vec<_>>>()?;
     session.draw_all(&views, |i, picture| {
         args.film.write(&files[missing[i]], picture)?;

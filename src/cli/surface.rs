@@ -82,6 +82,10 @@ impl ProxyArgs {
         match self.proxy.as_deref() {
             Some("auto") => fitted(None),
             Some(name) if let Some(kind) = Kind::from_name(name) => fitted(Some(kind)),
+            Some(file) if is_proxy_file(file) && !Path::new(file).exists() => Err(Usage(format!(
+                "--proxy {file}: there is no such file; `lumigraph proxy SCENE KIND -o {file}` makes one"
+            ))
+            .into()),
             Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
                 proxy: proxy::read(Path::new(file))?,
                 origin: file.to_owned(),
@@ -112,7 +116,13 @@ impl ProxyArgs {
                         trials: Vec::new(),
                     })
                 }
-                None => fitted(None),
+                None => {
+                    let chosen = fitted(None)?;
+                    if without.is_empty() && !chosen.trials.is_empty() {
+                        say!("note: `lumigraph proxy SCENE auto` keeps this proxy with the scene");
+                    }
+                    Ok(chosen)
+                }
             },
         }
     }

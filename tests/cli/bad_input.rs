@@ -308,3 +308,52 @@ fn a_scene_without_points_says_how_to_go_on() {
     lumigraph(folder.path(), by_hand).ok();
     lumigraph(folder.path(), "evaluate wall --proxy p.json").ok();
 }
+
+/// Choosing a proxy may take minutes: what cannot be drawn is said first.
+#[test]
+fn views_that_cannot_be_read_are_said_before_a_proxy_is_fitted() {
+    let folder = with_wall();
+    fs::write(folder.path().join("odd.json"), "{}").unwrap();
+    fs::write(
+        folder.path().join("huge.json"),
+        r#"{"version": 1, "fps": 30, "frames": [{"name": "far", "width": 1000000, "height": 1000000,
+            "model": "PINHOLE", "params": [9, 9, 5, 5],
+            "camera_from_world": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]}"#,
+    )
+    .unwrap();
+    for (line, code, said) in [
+        (
+            "render wall --views nope -o out",
+            2,
+            "--views nope: there is no such file",
+        ),
+        ("render wall --path nope.json -o out", 1, "nope.json"),
+        ("render wall --path odd.json -o out", 1, "odd.json"),
+        (
+            "render wall --path orbit --proxy nope.ply -o out",
+            2,
+            "nope.ply: there is no such file",
+        ),
+        (
+            "field wall --view 0001.png --path nope.json -o out.png",
+            1,
+            "nope.json",
+        ),
+        ("field wall --view nope.png -o out.png", 1, "nope.png"),
+    ] {
+        let ran = lumigraph(folder.path(), line);
+        let error = ran.error(code);
+        assert!(error.contains(said), "{line}: {error}");
+        assert!(!ran.stderr.contains("proxy: "), "{line}: {}", ran.stderr);
+    }
+    let ran = lumigraph(
+        folder.path(),
+        "render wall --proxy plane --path huge.json -o out",
+    );
+    let error = ran.error(1);
+    assert!(
+        error.contains("frame far has 1000000 x 1000000 pixels"),
+        "{error}"
+    );
+    assert!(!folder.path().join("out").exists());
+}
