@@ -205,7 +205,7 @@ impl<'a> Samples<'a> {
         };
         let rows: Vec<Result<Row, PhotoError>> = fields.into_par_iter().map(row).collect();
         let rows = rows.into_iter().collect::<Result<_, _>>()?;
-        frame.lumigraph.photos.check_masks()?;
+        frame.check_masks()?;
         Ok(Self {
             frame,
             photos,

@@ -171,7 +171,7 @@ impl Engine {
             return Ok(Ready(Ok(None)));
         };
         if prepared.field().is_some() {
-            frame.lumigraph.photos.check_masks()?;
+            frame.check_masks()?;
         }
         match gpu.load(frame, prepared.field()) {
             Err(error @ (RenderError::Photo(_) | RenderError::Triangulation(_))) => Err(error),

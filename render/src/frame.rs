@@ -5,6 +5,7 @@ pub(crate) mod every_lens;
 
 use crate::lumigraph::{Lumigraph, SourceView};
 use crate::options::{FieldOptions, Resolution, Skips};
+use crate::photos::PhotoError;
 use crate::planted::{Fault, is_planted};
 use crate::sight::within_sight;
 use crate::surface::{FacetMap, Surface};
@@ -177,9 +178,9 @@ fn places(sources: &[SourceView], viewer: DVec3) -> Vec<DVec3> {
 
 /// Which source views take part in a frame, where it is not all of them alike.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Part {
-    /// One that does not.
-    pub without: Option<usize>,
+pub struct Part<'p> {
+    /// Those that do not.
+    pub without: &'p [usize],
     /// Of a scene that moves: photos count by their times, too (see [`Moment::penalties`]), and those
     /// outside the window not at all.
     pub moment: Option<Moment>,
@@ -241,10 +242,9 @@ impl<'a> Frame<'a> {
         lumigraph: &'a Lumigraph,
         desired: View,
         options: FieldOptions,
-        part: &Part,
+        part: &Part<'_>,
     ) -> Self {
-        let gone: Vec<usize> = part.without.into_iter().collect();
-        Self::of(lumigraph, desired, options, &gone, part.moment, None)
+        Self::of(lumigraph, desired, options, part.without, part.moment, None)
     }
 
     /// A desired view of facets that were found for it, in place of what it sees of the
@@ -351,6 +351,14 @@ impl<'a> Frame<'a> {
     /// The source views that take part: all but those outside the time window, in order.
     pub fn taking_part(&self) -> impl Iterator<Item = usize> {
         (0..self.sources.len()).filter(|&i| self.takes_part(i))
+    }
+
+    /// Whether the ignore masks of those could be decoded, as far as they were asked for.
+    ///
+    /// # Errors
+    /// The first of those that could not.
+    pub fn check_masks(&self) -> Result<(), PhotoError> {
+        self.lumigraph.photos.check_masks(self.taking_part())
     }
 
     fn takes_part(&self, source_idx: usize) -> bool {

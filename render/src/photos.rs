@@ -257,12 +257,13 @@ impl PhotoStore {
             .map_err(Clone::clone)
     }
 
-    /// Whether every mask that was asked for could be decoded.
+    /// Whether every mask of these source views that was asked for could be decoded.
     ///
     /// # Errors
     /// The first of those that could not.
-    pub fn check_masks(&self) -> Result<(), PhotoError> {
-        let mut asked = self.masks.iter().flatten().filter_map(OnceLock::get);
+    pub fn check_masks(&self, of: impl IntoIterator<Item = usize>) -> Result<(), PhotoError> {
+        let masks = of.into_iter().filter_map(|i| self.masks.get(i)?.as_ref());
+        let mut asked = masks.filter_map(OnceLock::get);
         match asked.find_map(|mask| mask.as_ref().err()) {
             Some(error) => Err(error.clone()),
             None => Ok(()),
@@ -479,14 +480,16 @@ mod tests {
             (0..3).map(|i| store.is_masked(i)).collect::<Vec<_>>(),
             [true, false, true]
         );
-        assert_eq!(store.check_masks(), Ok(()));
+        assert_eq!(store.check_masks(0..3), Ok(()));
         assert!(store.mask(1).is_none() && store.get(1).is_ok());
         assert_eq!(store.mask(2), Some(&Mask::nothing()));
         let expected = PhotoError {
             source_idx: 2,
             message: "c.png: corrupt".to_owned(),
         };
-        assert_eq!(store.check_masks(), Err(expected.clone()));
+        assert_eq!(store.check_masks(0..3), Err(expected.clone()));
+        // It is no matter to those that do without.
+        assert_eq!(store.check_masks(0..2), Ok(()));
         assert_eq!(store.get(2), Err(expected));
         assert_eq!(
             store.get(0).unwrap_err().to_string(),

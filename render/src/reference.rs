@@ -137,7 +137,7 @@ pub(crate) fn render(
     let rows: Vec<Result<Vec<u8>, _>> = (0..height).into_par_iter().map(row).collect();
     // The first error from the top, whichever thread is the first to meet one.
     let rows: Vec<Vec<u8>> = rows.into_iter().collect::<Result<_, _>>()?;
-    frame.lumigraph.photos.check_masks()?;
+    frame.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, rows.concat()).expect("one row each"))
 }
 

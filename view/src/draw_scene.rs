@@ -33,7 +33,7 @@ pub(crate) struct SceneDrawer<'a> {
     ready: Option<Ready<'a>>,
     palette: Vec<[u8; 3]>,
     /// A photo that cannot be decoded.
-    gone: Option<usize>,
+    gone: Vec<usize>,
 }
 
 struct Ready<'a> {
@@ -57,13 +57,13 @@ impl<'a> SceneDrawer<'a> {
             skips,
             ready: None,
             palette: Vec::new(),
-            gone: None,
+            gone: Vec::new(),
         }
     }
 
-    /// The photo that is left out, if one was found that cannot be decoded.
-    pub(crate) fn gone(&self) -> Option<usize> {
-        self.gone
+    /// The photos that are left out, as they cannot be decoded.
+    pub(crate) fn gone(&self) -> &[usize] {
+        &self.gone
     }
 
     /// The photo itself, half as large, for a view from its own camera: there before anything else
@@ -105,21 +105,28 @@ impl<'a> SceneDrawer<'a> {
     /// out from then on.
     ///
     /// # Errors
-    /// A second such photo; a plane that cannot be triangulated.
+    /// No photo is left; a plane that cannot be triangulated.
     pub(crate) fn draw(
         &mut self,
         engine: &mut Engine,
         request: &Request,
         reduction: u32,
     ) -> Result<Drawn, RenderError> {
-        match self.try_draw(engine, request, reduction) {
-            Err(RenderError::Photo(error)) if self.gone.is_none() => {
-                self.gone = Some(error.source_idx);
-                self.ready = None;
-                self.try_draw(engine, request, reduction)
+        loop {
+            match self.try_draw(engine, request, reduction) {
+                Err(RenderError::Photo(error)) if self.may_leave_out(error.source_idx) => {
+                    self.gone.push(error.source_idx);
+                    self.ready = None;
+                }
+                drawn => return drawn,
             }
-            drawn => drawn,
         }
+    }
+
+    /// Whether that is news, and any photo is left.
+    fn may_leave_out(&self, source_idx: usize) -> bool {
+        let is_last = self.gone.len() + 1 >= self.lumigraph.sources.len();
+        !is_last && !self.gone.contains(&source_idx)
     }
 
     fn try_draw(
@@ -149,7 +156,7 @@ impl<'a> SceneDrawer<'a> {
             self.ready = None;
             let frame = timed(&mut stages, "surface", || {
                 let part = Part {
-                    without: self.gone,
+                    without: &self.gone,
                     moment: look.moment,
                 };
                 let frame = Frame::with(self.lumigraph, view.clone(), look.options, &part);

@@ -10,6 +10,8 @@ const APART_S: f64 = 2.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframes {
     poses: Vec<Rigid3>,
+    /// The scene's own time at each, where a file gave one.
+    times_s: Vec<Option<f64>>,
     /// Which one, while there are any.
     chosen: usize,
     /// Seconds from one to the next.
@@ -24,6 +26,7 @@ impl Default for Keyframes {
     fn default() -> Self {
         Self {
             poses: Vec::new(),
+            times_s: Vec::new(),
             chosen: 0,
             apart_s: APART_S,
             fps: 30.0,
@@ -53,10 +56,22 @@ impl Keyframes {
         &self.poses
     }
 
-    /// Adds one after the chosen one, and chooses it.
+    /// Whether it is the same path, whichever keyframe is chosen.
+    pub fn is_same_path(&self, other: &Self) -> bool {
+        let with_its_choice = Self {
+            chosen: other.chosen,
+            ..self.clone()
+        };
+        with_its_choice == *other
+    }
+
+    /// Adds one after the chosen one, and chooses it. The scene's time is that of the chosen one:
+    /// with one keyframe that has none, those of all others would not count.
     pub fn add(&mut self, pose: Rigid3) {
         let at = self.chosen().map_or(0, |i| i + 1);
+        let time_s = self.times_s.get(self.chosen).copied().flatten();
         self.poses.insert(at, pose);
+        self.times_s.insert(at, time_s);
         self.chosen = at;
     }
 
@@ -64,6 +79,7 @@ impl Keyframes {
     pub fn delete(&mut self) {
         if self.chosen < self.poses.len() {
             self.poses.remove(self.chosen);
+            self.times_s.remove(self.chosen);
         }
         self.chosen = self.chosen.saturating_sub(1);
     }
@@ -83,6 +99,7 @@ impl Keyframes {
         };
         if to < self.poses.len() {
             self.poses.swap(self.chosen, to);
+            self.times_s.swap(self.chosen, to);
             self.chosen = to;
         }
     }
@@ -110,13 +127,14 @@ impl Keyframes {
     /// As path files have them, for a camera with the lens and size of `view`.
     pub fn stored(&self, view: &View) -> Vec<Keyframe> {
         let camera = Camera::of(&view.lens, view.width, view.height);
-        let keyframe = |(i, pose): (usize, &Rigid3)| Keyframe {
+        let keyframe = |(i, (pose, time_s)): (usize, (&Rigid3, &Option<f64>))| Keyframe {
             t_s: i as f64 * self.apart_s,
             camera_from_world: *pose,
             camera: camera.clone(),
-            time_s: None,
+            time_s: *time_s,
         };
-        self.poses.iter().enumerate().map(keyframe).collect()
+        let keyframes = self.poses.iter().zip(&self.times_s);
+        keyframes.enumerate().map(keyframe).collect()
     }
 
     /// The frames of the film.
@@ -130,6 +148,7 @@ impl Keyframes {
     /// Takes over keyframes of a file, their times made even.
     pub fn load(&mut self, keyframes: &[Keyframe], interpolation: Interpolation, fps: f64) {
         self.poses = keyframes.iter().map(|k| k.camera_from_world).collect();
+        self.times_s = keyframes.iter().map(|k| k.time_s).collect();
         self.chosen = self.poses.len().saturating_sub(1);
         self.interpolation = interpolation;
         self.fps = fps;
@@ -214,5 +233,31 @@ mod tests {
         let mut again = Keyframes::default();
         again.load(&keyframes.stored(&view(0.0)), Interpolation::Spline, 30.0);
         assert_eq!(again, keyframes);
+        again.choose(0);
+        assert!(again.is_same_path(&keyframes) && again != keyframes);
+        again.shift(true);
+        assert!(!again.is_same_path(&keyframes));
+    }
+
+    #[test]
+    fn the_scenes_times_go_with_their_keyframes() {
+        let mut keyframes = Keyframes::default();
+        for x in [0.0, 1.0, 2.0] {
+            keyframes.add(view(x).camera_from_world);
+        }
+        let mut stored = keyframes.stored(&view(0.0));
+        for (i, keyframe) in stored.iter_mut().enumerate() {
+            keyframe.time_s = Some(10.0 * i as f64);
+        }
+        keyframes.load(&stored, Interpolation::Spline, 30.0);
+        assert_eq!(keyframes.stored(&view(0.0)), stored);
+        keyframes.choose(1);
+        keyframes.shift(false);
+        keyframes.add(view(5.0).camera_from_world);
+        keyframes.choose(3);
+        keyframes.delete();
+        assert_eq!(xs(&keyframes), [1, 5, 0]);
+        let times = keyframes.stored(&view(0.0)).into_iter().map(|k| k.time_s);
+        assert_eq!(times.collect::<Vec<_>>(), [10.0, 10.0, 0.0].map(Some));
     }
 }

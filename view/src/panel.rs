@@ -3,10 +3,13 @@
 use crate::compose::BEHIND;
 use crate::picture::{Layer, Shown};
 use crate::state::{Action, Mode, State};
-use egui::{Align2, Color32, ComboBox, Context, Frame, Id, RichText, Slider, Ui};
+use egui::{
+    Align2, Color32, ComboBox, Context, Frame, Id, RichText, Slider, SliderClamping, Ui, emath,
+};
 use render::Method;
 use render::interior::PortalFill;
 use render::path::Interpolation;
+use std::ops::RangeInclusive;
 
 /// What is drawn over the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,7 +159,7 @@ fn contents(
         ui.checkbox(&mut has_wipe, "wipe to the nearest photo (O)");
         state.wipe = has_wipe.then(|| state.wipe.unwrap_or(0.5));
         if let Some(share) = &mut state.wipe {
-            ui.add(Slider::new(share, 0.0..=1.0).text("wipe").show_value(false));
+            ui.add(slider(share, 0.0..=1.0).text("wipe").show_value(false));
         }
         ui.separator();
         field_sliders(ui, state);
@@ -164,14 +167,10 @@ fn contents(
     let times = state.space().and_then(|space| space.times);
     if let (Some(times), Some(moment)) = (times, &mut state.look.moment) {
         let [first, last] = times.range_s;
-        ui.add(Slider::new(&mut moment.time_s, first..=last).text("time, s"));
+        ui.add(slider(&mut moment.time_s, first..=last).text("time, s"));
     }
     let exposure = &mut state.look.exposure_stops;
-    ui.add(
-        Slider::new(exposure, -3.0..=3.0)
-            .text("exposure")
-            .step_by(0.1),
-    );
+    ui.add(slider(exposure, -3.0..=3.0).text("exposure").step_by(0.1));
     ui.horizontal(|ui| {
         let background = &mut state.look.background;
         let mut is_clear = background.is_none();
@@ -197,34 +196,27 @@ fn contents(
     });
 }
 
+/// A slider. What the command line or a file gave stays as it is until it is moved, be it outside
+/// the range or between the steps.
+fn slider<Number: emath::Numeric>(value: &mut Number, range: RangeInclusive<Number>) -> Slider<'_> {
+    Slider::new(value, range).clamping(SliderClamping::Edits)
+}
+
 fn field_sliders(ui: &mut Ui, state: &mut State) {
     let mut is_exact = state.look.method == Method::Exact;
-    let mut grid = match state.look.method {
-        Method::Triangulated { cells_across } => cells_across,
-        Method::Exact => 32,
-    };
-    ui.add(Slider::new(&mut state.look.options.k, 1..=render::MAX_CONTRIBUTORS).text("k"));
-    ui.add(
-        Slider::new(&mut state.alpha, 0.1..=10.0)
-            .logarithmic(true)
-            .text("α"),
-    );
-    ui.add(Slider::new(&mut state.beta, 0.0..=2.0).text("β"));
+    ui.add(slider(&mut state.look.options.k, 1..=render::MAX_CONTRIBUTORS).text("k"));
+    let alpha = slider(&mut state.alpha, 0.1..=10.0);
+    ui.add(alpha.logarithmic(true).text("α"));
+    ui.add(slider(&mut state.beta, 0.0..=2.0).text("β"));
     ui.horizontal(|ui| {
         ui.selectable_value(&mut is_exact, false, "triangulated");
         ui.selectable_value(&mut is_exact, true, "exact (X)");
     });
-    if !is_exact {
-        ui.add(
-            Slider::new(&mut grid, 4..=128)
-                .logarithmic(true)
-                .text("grid"),
-        );
+    state.set_exact(is_exact);
+    if let Method::Triangulated { cells_across } = &mut state.look.method {
+        let grid = slider(cells_across, 4..=128);
+        ui.add(grid.logarithmic(true).text("grid"));
     }
-    state.look.method = match is_exact {
-        true => Method::Exact,
-        false => Method::Triangulated { cells_across: grid },
-    };
 }
 
 fn path(ui: &mut Ui, state: &mut State, commands: &mut Vec<Command>) {
@@ -292,7 +284,7 @@ fn path(ui: &mut Ui, state: &mut State, commands: &mut Vec<Command>) {
         }
     });
     let apart = &mut state.keyframes.apart_s;
-    ui.add(Slider::new(apart, 0.2..=10.0).text("s apart").step_by(0.1));
+    ui.add(slider(apart, 0.2..=10.0).text("s apart").step_by(0.1));
     ui.horizontal(|ui| {
         let interpolation = &mut state.keyframes.interpolation;
         ui.selectable_value(interpolation, Interpolation::Spline, "smooth");

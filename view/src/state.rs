@@ -11,7 +11,7 @@ use calibrate::{Lens, Pixel, Rigid3, View};
 use glam::{DVec2, DVec3};
 use hands::Drag;
 use proxy::interior::CellId;
-use render::PathFrame;
+use render::{Method, PathFrame};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -124,6 +124,8 @@ pub struct State {
     pub mode: Mode,
     /// How it is drawn.
     pub look: Look,
+    /// Of the triangulated field, while the exact one is shown.
+    cells_across: Option<u32>,
     /// α of the field: only β/α counts.
     pub alpha: f64,
     /// β of the field.
@@ -165,6 +167,7 @@ impl State {
             alpha: 1.0,
             beta: look.options.beta,
             look,
+            cells_across: None,
             wipe: None,
             tells_weights: false,
             keyframes: Keyframes::default(),
@@ -329,6 +332,21 @@ impl State {
         }
     }
 
+    /// Shows the exact field, or the triangulated one, at the grid that it had before.
+    pub fn set_exact(&mut self, is_exact: bool) {
+        self.look.method = match (self.look.method, is_exact) {
+            (Method::Triangulated { cells_across }, true) => {
+                self.cells_across = Some(cells_across);
+                Method::Exact
+            }
+            (Method::Exact, false) => match self.cells_across {
+                Some(cells_across) => Method::Triangulated { cells_across },
+                None => Method::TRIANGULATED,
+            },
+            (same, _) => same,
+        };
+    }
+
     /// The stop that is nearest to where one is.
     pub fn nearest(&self) -> Option<usize> {
         let space = self.space.as_ref()?;
@@ -359,7 +377,9 @@ impl State {
         let Some(Content::Interior(house)) = &self.content else {
             return self.pose;
         };
-        let at = house.obstacles.walk(self.pose.center(), motion_in_world);
+        let eye = self.pose.center();
+        let cell = house.contents.locate(&house.interior, eye);
+        let at = house.obstacles.walk(cell, eye, motion_in_world);
         let cell = house.contents.locate(&house.interior, at);
         pose_of(self.pose.rotation, house.obstacles.at_eye_height(cell, at))
     }

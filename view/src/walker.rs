@@ -95,23 +95,22 @@ impl Obstacles {
 
     /// Where the eyes are over the floor of a cell.
     pub fn at_eye_height(&self, cell: Option<CellId>, eye: DVec3) -> DVec3 {
-        let floor = cell.and_then(|id| self.floor_of_cell.get(id.0 as usize).copied().flatten());
-        match floor {
+        match self.height_of(cell) {
             Some(floor) => eye + self.up * (floor + self.eye_height - eye.dot(self.up)),
             None => eye,
         }
     }
 
-    /// Where one arrives who stands at `eye` and goes by `motion`, of which only what is level
-    /// counts: along walls, where they are in the way. In short steps, so that no wall is
-    /// jumped.
-    pub fn walk(&self, eye: DVec3, motion: DVec3) -> DVec3 {
+    /// Where one arrives who stands at `eye` in a cell and goes by `motion`, of which only what
+    /// is level counts: along walls, where they are in the way. In short steps, so that no wall
+    /// is jumped.
+    pub fn walk(&self, cell: Option<CellId>, eye: DVec3, motion: DVec3) -> DVec3 {
         let level = self.seen_from_above(motion);
         let length = level.length();
         if !(length > 0.0) || !length.is_finite() {
             return eye;
         }
-        let Some(floor) = self.floor_below(eye) else {
+        let Some(floor) = self.floor_of(cell).or_else(|| self.floor_below(eye)) else {
             return eye + motion - self.up * motion.dot(self.up);
         };
         let steps = (length / (0.4 * self.radius)).ceil().clamp(1.0, 10_000.0);
@@ -160,6 +159,19 @@ impl Obstacles {
         let on = list.iter().map(|ends| nearest_on(*ends, point));
         let with_distance = on.map(|p| (p, p.distance(point)));
         with_distance.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// How high a cell's floor is, along `up`.
+    fn height_of(&self, cell: Option<CellId>) -> Option<f64> {
+        self.floor_of_cell.get(cell?.0 as usize).copied().flatten()
+    }
+
+    /// A cell's floor, whatever other floors are under the eyes: one of another room may be only a
+    /// few steps higher.
+    fn floor_of(&self, cell: Option<CellId>) -> Option<&Floor> {
+        let height = self.height_of(cell)?;
+        let off = |f: &Floor| (f.height - height).abs();
+        self.floors.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     /// The highest floor under the eyes.
@@ -273,8 +285,8 @@ mod tests {
             .at_eye_height(portal.cells[0], portal.polygon.center());
         let normal = portal.polygon.normal();
         let from = center + 0.4 * normal;
-        let to = place.obstacles.walk(from, -0.8 * normal);
         let cell = |p| place.contents.locate(&place.interior, p);
+        let to = place.obstacles.walk(cell(from), from, -0.8 * normal);
         assert_eq!((cell(from), cell(to)), (portal.cells[0], portal.cells[1]));
         assert!(to.distance(center - 0.4 * normal) < 1e-9);
     }
@@ -290,14 +302,13 @@ mod tests {
             .at_eye_height(portal.cells[0], portal.polygon.center());
         // Against the wall beside the door, at a slant.
         let from = center + 0.6 * normal + along * (0.5 * portal.width(up) + 0.5);
-        let straight = place.obstacles.walk(from, -5.0 * normal);
-        assert_eq!(
-            place.contents.locate(&place.interior, straight),
-            portal.cells[0]
-        );
+        let cell = |p| place.contents.locate(&place.interior, p);
+        let straight = place.obstacles.walk(cell(from), from, -5.0 * normal);
+        assert_eq!(cell(straight), portal.cells[0]);
         let height = portal.polygon.height(straight);
         assert!(height > place.obstacles.radius * 0.9, "{height}");
-        let aslant = place.obstacles.walk(straight, -along * 0.2 - normal);
+        let aslant = -along * 0.2 - normal;
+        let aslant = place.obstacles.walk(cell(straight), straight, aslant);
         assert!((aslant - straight).dot(-along) > 0.15);
     }
 
@@ -316,7 +327,8 @@ mod tests {
                     + obstacles.axes[1] * f64::sin(angle)) * length;
                 let before = obstacles.seen_from_above(at);
                 let room = obstacles.nearest(&obstacles.floors[0], before);
-                let next = obstacles.walk(at, motion);
+                let cell = place.contents.locate(&place.interior, at);
+                let next = obstacles.walk(cell, at, motion);
                 prop_assert!(next.is_finite() && (next.dot(obstacles.up) - height).abs() < 1e-9);
                 prop_assert!(next.distance(at) <= length * 1.5 + obstacles.radius);
                 let after = obstacles.nearest(&obstacles.floors[0], obstacles.seen_from_above(next));
@@ -333,31 +345,54 @@ mod tests {
 
     /// A wall through the origin, aslant to the map's axes, so far on both sides.
     fn wall(reach: f64) -> Obstacles {
+        wall_between(reach, [0.0, 3.0], &[0.0])
+    }
+
+    /// One between two heights, with cells whose floors are so high.
+    fn wall_between(reach: f64, [low, high]: [f64; 2], floors: &[f64]) -> Obstacles {
         let mut interior = place().interior.clone();
         interior.portals.clear();
-        interior.cells.truncate(1);
-        interior.cells[0].floor = None;
+        interior.cells.truncate(floors.len());
+        for cell in &mut interior.cells {
+            cell.floor = None;
+        }
         let up = interior.up;
         let across = up.any_orthonormal_vector();
         let along = reach * (across + up.cross(across));
-        let high = 3.0 * up;
+        let (low, high) = (low * up, high * up);
         let model = Model {
             mesh: Mesh {
-                positions: vec![-along, along, along + high, high - along],
+                positions: vec![low - along, low + along, high + along, high - along],
                 triangles: vec![[0, 1, 2], [0, 2, 3]],
             },
             ..Model::default()
         };
-        let room = RoomBox {
-            min: DVec3::new(-9.0, 0.0, -9.0),
-            max: DVec3::new(9.0, 3.0, 9.0),
+        let room = |floor: &f64| {
+            Some(RoomBox {
+                min: DVec3::new(-9.0, *floor, -9.0),
+                max: DVec3::new(9.0, 3.0, 9.0),
+            })
         };
         let contents = Contents {
-            triangles: vec![vec![0, 1]],
-            bounds: vec![Some(room)],
+            triangles: floors.iter().map(|_| vec![0, 1]).collect(),
+            bounds: floors.iter().map(room).collect(),
             elsewhere: Vec::new(),
         };
         Obstacles::new(&interior, &contents, &model)
+    }
+
+    #[test]
+    fn a_room_that_lies_a_few_steps_higher_closes_no_doorway() {
+        // The top of a doorway, which would be in the way from the higher floor only.
+        let obstacles = wall_between(5.0, [2.0, 3.0], &[0.0, 0.8]);
+        let [x, y] = obstacles.axes;
+        let eye = 2.0 * x + 1.6 * obstacles.up;
+        let way = 2.0 * (y - x);
+        let walk = |cell| obstacles.walk(cell, eye, way);
+        assert!(walk(Some(CellId(0))).distance(eye + way) < 1e-9);
+        for elsewhere in [Some(CellId(1)), None, Some(CellId(9))] {
+            assert!(walk(elsewhere).distance(eye + way) > 0.5);
+        }
     }
 
     #[test]
@@ -367,7 +402,7 @@ mod tests {
             let obstacles = wall(reach);
             let [x, y] = obstacles.axes;
             let eye = 2.0 * x + 1.6 * obstacles.up;
-            let to = obstacles.walk(eye, -3.0 * x);
+            let to = obstacles.walk(Some(CellId(0)), eye, -3.0 * x);
             let height = (to.dot(x) - to.dot(y)) / f64::sqrt(2.0);
             assert!(height > 0.9 * obstacles.radius, "{reach}: {height}");
             // It slides.
@@ -380,11 +415,11 @@ mod tests {
         let place = place();
         let eye = middle(place, CellId(0));
         for motion in [DVec3::ZERO, DVec3::NAN, place.interior.up] {
-            assert_eq!(place.obstacles.walk(eye, motion), eye);
+            assert_eq!(place.obstacles.walk(Some(CellId(0)), eye, motion), eye);
         }
         // Nothing to stand on: nothing in the way.
         let below = eye - 100.0 * place.interior.up;
         let motion = place.obstacles.axes[0];
-        assert_eq!(place.obstacles.walk(below, motion), below + motion);
+        assert_eq!(place.obstacles.walk(None, below, motion), below + motion);
     }
 }

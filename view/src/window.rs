@@ -16,6 +16,7 @@ use crate::state::State;
 use crate::trace::{Took, Trace, Watch};
 use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
+use hands::Saves;
 use pane::{Opened, Pane};
 use panels::Panels;
 use render::path::{KeyframeFile, NerfstudioFrame};
@@ -86,8 +87,10 @@ type Tell = Arc<dyn Fn(Event) + Send + Sync>;
 const FRAME: Duration = Duration::from_millis(8);
 /// How long closing waits for the picture that is just being drawn.
 const PATIENCE: Duration = Duration::from_millis(150);
-/// A device that is lost more often is not opened again.
+/// A device that is lost more often one time after the other is not opened again.
 const MOST_LOSSES: u32 = 5;
+/// A device that still shows frames after so long works.
+const STEADY: Duration = Duration::from_secs(10);
 
 /// Opens a window and shows in it what `load`, on a thread of its own, has to show. Returns when
 /// the window is closed; threads may still be at work then.
@@ -162,6 +165,12 @@ struct App {
     events: Took,
     frames: u64,
     losses: u32,
+    /// Those since a device worked.
+    losses_in_a_row: u32,
+    /// When the last device was opened.
+    opened: Instant,
+    /// What of the path is in files.
+    saves: Saves,
     /// When the panels want another frame.
     wake: Option<Instant>,
     error: Option<ViewError>,
@@ -175,6 +184,7 @@ impl App {
                 .keyframes
                 .load(&file.keyframes, file.interpolation, file.fps);
         }
+        let saves = Saves::opened(state.keyframes.clone());
         let of_worker = Arc::clone(&tell);
         let tell_news = move |news| of_worker(Event::News(news));
         let worker = Worker::start(options.worker.clone(), tell_news);
@@ -203,6 +213,9 @@ impl App {
             events: Took::default(),
             frames: 0,
             losses: 0,
+            losses_in_a_row: 0,
+            opened: Instant::now(),
+            saves,
             wake: None,
             error: None,
         }
@@ -239,6 +252,7 @@ impl App {
         let points = width as f32 / pane.panels.scale();
         self.shows.get_or_insert_with(|| Shows::fitting(points));
         self.pane = Some(pane);
+        self.opened = Instant::now();
         if self.losses > 0 {
             self.status.said = Some("the graphics device was lost and opened anew".to_owned());
         }
@@ -251,8 +265,9 @@ impl App {
     /// Opens another device in place of one that was lost.
     fn reopen(&mut self, event_loop: &ActiveEventLoop) {
         self.losses += 1;
+        self.losses_in_a_row += 1;
         self.pane = None;
-        match self.losses {
+        match self.losses_in_a_row {
             0..=MOST_LOSSES => self.open(event_loop),
             _ => {
                 let text = "it was lost again and again".to_owned();
@@ -261,7 +276,19 @@ impl App {
         }
     }
 
-    fn fail(&mut self, event_loop: &ActiveEventLoop, error: ViewError) {
+    /// Takes note of a frame that reached the screen.
+    fn presented(&mut self, now: Instant) {
+        if now.saturating_duration_since(self.opened) >= STEADY {
+            self.losses_in_a_row = 0;
+        }
+    }
+
+    fn fail(&mut self, event_loop: &ActiveEventLoop, mut error: ViewError) {
+        if let ViewError::NoDevice(text) = &mut error
+            && let Some(said) = self.rescue_path()
+        {
+            *text = format!("{text}; {said}");
+        }
         self.error = Some(error);
         self.close(event_loop);
     }
@@ -356,6 +383,7 @@ impl App {
         }
         self.trace = None;
         self.worker.end(PATIENCE);
+        self.saves.wait();
         event_loop.exit();
     }
 }
@@ -453,6 +481,13 @@ mod tests {
         app.progress(Progress::Failed("no such scene".to_owned()));
         assert_eq!(app.status.failed.as_deref(), Some("no such scene"));
         assert_eq!(*app.state.pose(), Rigid3::IDENTITY);
+        // Devices that worked for a while are not counted with those that are lost at once.
+        app.losses_in_a_row = MOST_LOSSES;
+        app.presented(app.opened);
+        assert_eq!(app.losses_in_a_row, MOST_LOSSES);
+        app.presented(app.opened + STEADY);
+        assert_eq!(app.losses_in_a_row, 0);
+        assert_eq!(app.rescue_path(), None, "there is none");
         app.worker.end(Duration::from_secs(10));
     }
 }

@@ -44,6 +44,8 @@ pub struct WorkerOptions {
 const SLOW_MS: f64 = 50.0;
 /// A finer one is tried again where a frame took less.
 const FAST_MS: f64 = 18.0;
+/// So long a screenshot that was asked for is waited for at the end.
+const SHOT_PATIENCE: Duration = Duration::from_secs(60);
 /// Times that a picture is drawn smaller at most, each way.
 const MOST_REDUCED: u32 = 4;
 
@@ -55,6 +57,8 @@ struct Inbox {
     content: Option<Given>,
     request: Option<Request>,
     shots: usize,
+    /// Whether one of the screenshots that were asked for is being made.
+    is_shooting: bool,
     is_over: bool,
 }
 
@@ -111,13 +115,21 @@ impl Worker {
     }
 
     /// Asks the thread to end, and waits for it, but not for long: one frame may take seconds.
+    /// Screenshots that were asked for are waited for longer.
     pub fn end(&mut self, patience: Duration) {
         self.tell(|inbox| inbox.is_over = true);
         let Some(thread) = self.thread.take() else {
             return;
         };
         let start = Instant::now();
-        while !thread.is_finished() && start.elapsed() < patience {
+        let patience = || {
+            let inbox = self.shared.inbox();
+            match inbox.shots > 0 || inbox.is_shooting {
+                true => patience.max(SHOT_PATIENCE),
+                false => patience,
+            }
+        };
+        while !thread.is_finished() && start.elapsed() < patience() {
             std::thread::sleep(Duration::from_millis(2));
         }
         if thread.is_finished() {
@@ -137,8 +149,10 @@ enum Job {
 
 fn next_job(shared: &Shared) -> Job {
     let mut inbox = shared.inbox();
+    inbox.is_shooting = false;
     loop {
-        if inbox.is_over {
+        // What was asked for before the end is still made, and what it takes.
+        if inbox.is_over && inbox.shots == 0 {
             return Job::End;
         }
         if let Some(given) = inbox.content.take() {
@@ -149,6 +163,7 @@ fn next_job(shared: &Shared) -> Job {
         }
         if inbox.shots > 0 {
             inbox.shots -= 1;
+            inbox.is_shooting = true;
             return Job::Shoot;
         }
         inbox = shared
@@ -238,7 +253,7 @@ impl<'s> Desk<'s> {
     ) -> Option<Given> {
         let mut drawer = SceneDrawer::new(lumigraph, space, self.options.skips);
         let mut notes = engine.notes().len();
-        let mut gone = None;
+        let mut gone = 0;
         // Of what comes later there is a picture on the screen already.
         let mut is_first = self.revision <= 1;
         self.serve(|tell, request, reduction| {
@@ -251,14 +266,13 @@ impl<'s> Desk<'s> {
                 tell(News::Trouble((*note).to_owned()));
             }
             notes = engine.notes().len();
-            if gone != drawer.gone() {
-                gone = drawer.gone();
-                let name = gone.map(|i| lumigraph.sources[i].name.as_str());
-                let name = name.unwrap_or_default();
+            for idx in &drawer.gone()[gone..] {
+                let name = &lumigraph.sources[*idx].name;
                 tell(News::Trouble(format!(
                     "{name} cannot be decoded and is left out"
                 )));
             }
+            gone = drawer.gone().len();
             drawn.map_err(|error| error.to_string())
         })
     }
@@ -487,6 +501,34 @@ mod tests {
         let expected = engine.render(&frame, render::Method::TRIANGULATED).unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), expected);
         worker.end(Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_shot_that_was_asked_for_is_made_before_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WorkerOptions {
+            device: DeviceChoice::Cpu,
+            gpu_memory: None,
+            skips: render::Skips::ALL,
+            walk: WalkOptions::default(),
+            output: folder.path().join("shots"),
+        };
+        let mut worker = Worker::start(options.clone(), |_| {});
+        show(&worker, 0, 1);
+        worker.ask(request(1, 0.25));
+        worker.shoot();
+        worker.shoot();
+        worker.end(Duration::ZERO);
+        for name in ["shot_0001.png", "shot_0002.png"] {
+            let file = options.output.join(name);
+            assert!(render::path::read_shot(&file).is_ok(), "{name}");
+        }
+        // With nothing to show there is nothing to wait for.
+        let mut worker = Worker::start(options, |_| {});
+        worker.shoot();
+        let start = Instant::now();
+        worker.end(Duration::ZERO);
+        assert!(start.elapsed() < SHOT_PATIENCE / 2);
     }
 
     #[test]

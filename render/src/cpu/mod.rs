@@ -324,6 +324,6 @@ fn draw<S: Default + Send>(
         // The first error from the top, whichever thread is the first to meet one.
         .find_map_first(Result::err)
         .map_or(Ok(()), Err)?;
-    frame.lumigraph.photos.check_masks()?;
+    frame.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
 }

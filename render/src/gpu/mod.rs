@@ -233,7 +233,7 @@ impl Gpu {
             }
             Method::Triangulated { cells_across } => {
                 let field = TriangulatedField::new(frame, cells_across)?;
-                frame.lumigraph.photos.check_masks()?;
+                frame.check_masks()?;
                 self.render_field(frame, &field)
             }
         }

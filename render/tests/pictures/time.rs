@@ -266,7 +266,7 @@ fn a_source_view_that_takes_no_part_might_as_well_not_be_there() {
     let frames = |moment: Option<Moment>| {
         let part = |without| Part { without, moment };
         let frame = |of, without| Frame::with(of, desired.clone(), options, &part(without));
-        (frame(&with, Some(gone)), frame(&without, None))
+        (frame(&with, &[gone][..]), frame(&without, &[]))
     };
     for method in METHODS {
         let (with, without) = frames(None);

@@ -240,6 +240,27 @@ fn weights_and_sliders_reach_the_request() {
 }
 
 #[test]
+fn the_grid_comes_back_with_the_triangulated_field() {
+    let fine = Method::Triangulated { cells_across: 256 };
+    let mut state = State::new(Look {
+        method: fine,
+        ..Look::default()
+    });
+    for is_exact in [true, true, false, false] {
+        state.set_exact(is_exact);
+        assert_eq!(state.look.method == Method::Exact, is_exact);
+    }
+    assert_eq!(state.look.method, fine);
+    // It was exact from the beginning.
+    let mut state = State::new(Look {
+        method: Method::Exact,
+        ..Look::default()
+    });
+    state.set_exact(false);
+    assert_eq!(state.look.method, Method::TRIANGULATED);
+}
+
+#[test]
 fn one_walks_in_a_house_at_eye_height() {
     let options = HouseOptions {
         rooms: 2,

@@ -69,6 +69,7 @@ impl App {
         self.status.draw_ms = upload.ms + draw.ms;
         if presented == Presented::Yes {
             self.trace_frame(&steps, [upload, draw]);
+            self.presented(now);
         }
         let watch = Watch::start();
         for command in std::mem::take(&mut painted.commands) {

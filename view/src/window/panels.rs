@@ -228,8 +228,10 @@ fn draw_letters(context: &Context) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::content::{Content, Space, Times};
     use crate::state::Action;
     use egui::TextureId;
+    use proxy::Proxy;
 
     /// There is no device to bring anything to.
     fn discard(mut painted: Painted) {
@@ -292,6 +294,62 @@ mod tests {
                 discard(next);
             }
         }
+    }
+
+    #[test]
+    fn sliders_leave_alone_what_nobody_moves() {
+        let size = (1280, 1600);
+        let lumigraph = render::Lumigraph {
+            points: Vec::new(),
+            sources: Vec::new(),
+            photos: render::PhotoStore::from_images(Vec::new()),
+            proxy: proxy::Plane::new(glam::DVec3::Z, glam::DVec3::Z)
+                .map(Proxy::Plane)
+                .unwrap(),
+            visibility: None,
+        };
+        let mut space = Space::of_scene(&lumigraph);
+        let moment = render::Moment {
+            time_s: 7.0,
+            period_s: Some(2.0),
+            window_s: None,
+        };
+        space.times = Some(Times {
+            moment,
+            range_s: [0.0, 2.0],
+        });
+        let method = render::Method::Triangulated { cells_across: 256 };
+        let mut state = State::new(Look {
+            method,
+            exposure_stops: 0.05,
+            ..Look::default()
+        });
+        state.resize(size.0, size.1);
+        let _ = state.show(Content::Scene(Arc::new(lumigraph)), Arc::new(space));
+        (state.alpha, state.beta) = (20.0, 5.0);
+        state.keyframes.add(calibrate::Rigid3::IDENTITY);
+        state.keyframes.apart_s = 15.03;
+        let mut panels = Panels::warm(1.0, size, TEXTURE_SIDE);
+        for _ in 0..3 {
+            let mut input = RawInput {
+                max_texture_side: Some(TEXTURE_SIDE),
+                ..RawInput::default()
+            };
+            panels.fit(&mut input, size);
+            let sight = Sight {
+                state: &mut state,
+                shows: &mut all_shown(),
+                status: &Status::default(),
+                shown: None,
+                plan: None,
+            };
+            discard(panels.run(input, sight));
+        }
+        assert_eq!((state.alpha, state.beta), (20.0, 5.0));
+        assert_eq!(state.keyframes.apart_s, 15.03);
+        let look = &state.look;
+        assert_eq!((look.method, look.moment), (method, Some(moment)));
+        assert_eq!(look.exposure_stops, 0.05);
     }
 
     #[test]
