@@ -112,6 +112,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Before what may take hours.
     Scene::check_free(&args.output, args.force)?;
+    let given = [&args.calibration, &args.masks, &args.mattes, &args.depth];
+    let inputs = given.into_iter().flatten().chain([&args.photos]).cloned();
+    Scene::check_apart(&args.output, inputs.chain(find_photos_folder(&args.photos)))?;
 
     // 1. The photos.
     check_no_interior(&args.photos)?;

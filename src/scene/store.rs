@@ -38,6 +38,9 @@ const FRAMES_FOLDER: &str = "photos";
 const PARTIAL_FRAMES: &str = ".photos.partial";
 /// What the name begins with of earlier frames, if it is killed while it replaces them.
 const REPLACED_FRAMES: &str = ".photos.replaced-";
+/// What the name begins with of the folder that a scene is made in, within its own: only that
+/// is surely on the same disk.
+const WORK_PREFIX: &str = ".lumigraph-";
 
 impl Scene {
     /// Opens a scene's folder, or imports a capture's in memory with the defaults.
@@ -179,17 +182,14 @@ impl Scene {
         };
         let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
         let is_scene = Self::is_scene(folder);
-        let mut parts = vec![
-            SCENE_FILE,
-            MODEL_FOLDER,
-            PROXY_FILE,
-            PROXY_MESH,
-            COLMAP_FOLDER,
-            FRAMES_FOLDER,
-            PARTIAL_FRAMES,
-        ];
+        let mut parts = vec![COLMAP_FOLDER, FRAMES_FOLDER, PARTIAL_FRAMES];
+        // Without its file, only what is left of an import that was killed as its parts took
+        // their places: all else is somebody's own.
+        if is_scene || is_own_model(&folder.join(MODEL_FOLDER)) {
+            parts.extend([MODEL_FOLDER, PROXY_FILE, PROXY_MESH]);
+        }
         if is_scene {
-            parts.push(SILHOUETTES_FOLDER);
+            parts.extend([SCENE_FILE, SILHOUETTES_FOLDER]);
         }
         // Other photos are part of a scene only where it says that they are its own.
         if is_scene && holds_photos(folder) {
@@ -198,7 +198,9 @@ impl Scene {
         for entry in entries {
             let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
             let name = entry.file_name().to_string_lossy().into_owned();
-            let is_left = name.starts_with(REPLACED_FRAMES);
+            let is_left = [REPLACED_FRAMES, WORK_PREFIX]
+                .iter()
+                .any(|prefix| name.starts_with(prefix));
             if !is_left && !parts.contains(&name.as_str()) {
                 return Err(occupied(format!(
                     "holds {name}, which is no part of a scene; choose another folder"
@@ -218,7 +220,7 @@ impl Scene {
     /// video, which may be in the folder already, stay.
     ///
     /// # Errors
-    /// As [`Scene::check_free`]; files that cannot be written.
+    /// As [`Scene::check_free`] and [`Scene::check_apart`]; files that cannot be written.
     pub fn save(&mut self, folder: &Path, replace: bool) -> Result<(), SceneError> {
         self.write_folder(folder, replace, |_, _| Ok(()))
     }
@@ -232,17 +234,79 @@ impl Scene {
         fill: impl FnOnce(&mut Self, &Path) -> Result<(), SceneError>,
     ) -> Result<(), SceneError> {
         Self::check_free(folder, replace)?;
-        let parent = match folder.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        std::fs::create_dir_all(parent).map_err(|e| io(parent, "make the folder", e))?;
+        Self::check_apart(folder, self.inputs())?;
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+        let missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
+        let written = self.write_parts(folder, fill);
+        if written.is_err() {
+            for path in missing {
+                // One that is not empty stays.
+                let _ = std::fs::remove_dir(path);
+            }
+        }
+        written
+    }
 
-        // 1. Everything into a folder beside it, which goes away on errors.
+    /// Whether no file or folder that a scene is made of goes as it is written to a folder:
+    /// those within a part of an earlier scene there would.
+    ///
+    /// # Errors
+    /// One would go.
+    pub fn check_apart(
+        folder: &Path,
+        inputs: impl IntoIterator<Item = PathBuf>,
+    ) -> Result<(), SceneError> {
+        let Ok(real) = folder.canonicalize() else {
+            return Ok(());
+        };
+        let is_replaced = |input: &PathBuf| {
+            let input = input.canonicalize();
+            input.is_ok_and(|input| PARTS.iter().any(|part| input.starts_with(real.join(part))))
+        };
+        match inputs.into_iter().find(is_replaced) {
+            None => Ok(()),
+            Some(input) => Err(SceneError::Occupied {
+                path: folder.to_owned(),
+                problem: format!(
+                    "the new scene is made of {}, which would be replaced; choose another folder",
+                    input.display()
+                ),
+            }),
+        }
+    }
+
+    /// The files and folders that the scene refers to or was calibrated by.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let given = self.calibration.as_ref().or(self.capture.as_ref());
+        let model = given.and_then(|folder| colmap::find_model(folder).ok());
+        let mut inputs: Vec<PathBuf> = model.into_iter().collect();
+        inputs.extend(self.calibration.clone());
+        for photo in &self.photos {
+            inputs.push(photo.path.clone());
+            let beside = [
+                &photo.ignore_mask,
+                &photo.object_matte,
+                &photo.silhouette,
+                &photo.depth_map,
+            ];
+            inputs.extend(beside.into_iter().flatten().cloned());
+        }
+        inputs.extend(self.capture.clone());
+        inputs
+    }
+
+    /// Writes all parts and has them take their places, all or none.
+    fn write_parts(
+        &mut self,
+        folder: &Path,
+        fill: impl FnOnce(&mut Self, &Path) -> Result<(), SceneError>,
+    ) -> Result<(), SceneError> {
+        // 1. Everything into a folder within it, which goes away on errors.
+        std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
         let made = tempfile::Builder::new()
-            .prefix(".lumigraph-")
-            .tempdir_in(parent)
-            .map_err(|e| io(parent, "make a folder within", e))?;
+            .prefix(WORK_PREFIX)
+            .tempdir_in(folder)
+            .map_err(|e| io(folder, "make a folder within", e))?;
         let new = made.path().join("scene");
         std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
         fill(self, &new)?;
@@ -253,10 +317,9 @@ impl Scene {
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
-        // 2. They take their places, all or none.
+        // 2. They take their places.
         let old = made.path().join("old");
         std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
-        std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
         let exchanged = exchange(&PARTS, &new, folder, &old);
         if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
             // It still holds what could not be put back.
@@ -366,6 +429,14 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneErr
     let temporary = path.with_extension("json.tmp");
     std::fs::write(&temporary, text + "\n").map_err(|e| io(&temporary, "write", e))?;
     std::fs::rename(&temporary, path).map_err(|e| io(path, "write", e))
+}
+
+/// Whether a folder holds a model as scenes have it, and nothing else.
+fn is_own_model(folder: &Path) -> bool {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
+    names.sort();
+    names == ["cameras.txt", "images.txt", "points3D.txt"]
 }
 
 /// Whether the scene in a folder was undistorted into it.

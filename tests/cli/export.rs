@@ -1,6 +1,6 @@
 //! Out to other programs' formats and back in.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use calibrate::{ModelKind, Reconstruction, colmap};
 use serde_json::json;
 use std::fs;
@@ -105,6 +105,32 @@ fn what_a_format_lacks_is_said_and_undistorting_helps() {
     lumigraph(folder.path(), "export flat --format transforms -o t.json").ok();
     let usage = lumigraph(folder.path(), "export flat --format opencv -o flat");
     assert_eq!(usage.code, 2);
+}
+
+#[test]
+fn the_calibration_is_not_written_over() {
+    let folder = with_wall();
+    let wall = folder.path().join("wall");
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let to_file = "export wall --format transforms -o wall/transforms.json";
+    // It is not what the photos are read with, as long as there is a model.
+    lumigraph(folder.path(), to_file).ok();
+    lumigraph(folder.path(), to_file).ok();
+    // The pose of a photo that is away for now would be lost.
+    fs::rename(wall.join("images/0003.png"), folder.path().join("away.png")).unwrap();
+    let refused = |line: &str| {
+        let before = files(folder.path());
+        let error = lumigraph(folder.path(), line).error(1);
+        assert!(error.contains("calibration is this very file"), "{error}");
+        assert!(files(folder.path()) == before, "{line}");
+    };
+    refused("export wall --format colmap -o wall/sparse/0");
+    refused("export wall --format colmap-text -o wall/images/../sparse/0");
+    refused("export scene --format colmap -o scene/model");
+    refused("export scene --format colmap -o wall/sparse/0");
+    fs::remove_dir_all(wall.join("sparse")).unwrap();
+    refused(to_file);
+    lumigraph(folder.path(), "export wall --format transforms -o t.json").ok();
 }
 
 #[test]

@@ -255,6 +255,61 @@ fn photos_are_not_written_over() {
     lumigraph(here, &line).ok();
 }
 
+/// As with photos that are links into the scene's folder.
+#[test]
+fn photos_are_not_replaced_by_their_scene() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    let photo = here.join("wall/images/0003.png");
+    fs::remove_file(&photo).unwrap();
+    std::os::unix::fs::symlink("../../flat/images/0003.png", photo).unwrap();
+    let before = files(here);
+    let error = lumigraph(here, "import wall -o flat --force").error(1);
+    assert!(
+        error.contains("0003.png, which would be replaced"),
+        "{error}"
+    );
+    assert!(files(here) == before);
+}
+
+/// The names of all that is in a folder, hidden or not.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().display().to_string());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_scene_may_lie_on_another_disk_and_nothing_is_left_beside_it() {
+    let folder = with_wall();
+    let here = folder.path();
+    let memory = Path::new("/dev/shm");
+    let other = if memory.is_dir() {
+        tempfile::tempdir_in(memory).unwrap()
+    } else {
+        eprintln!("SKIPPED: {} is absent", memory.display());
+        tempfile::tempdir().unwrap()
+    };
+    std::os::unix::fs::symlink(other.path(), here.join("scene")).unwrap();
+    for line in ["import wall -o scene", "import wall -o scene --force"] {
+        lumigraph(here, line).ok();
+        assert_eq!(names_in(other.path()), ["model", "scene.json"]);
+    }
+    assert_eq!(names_in(here), ["scene", "wall"]);
+    // An import that fails takes along what it made, and nothing else.
+    on_a_full_disk(here, "import wall -o deep/er/scene").error(1);
+    on_a_full_disk(here, "import wall -o scene --force").error(1);
+    assert_eq!(names_in(here), ["scene", "wall"]);
+    assert_eq!(names_in(other.path()), ["model", "scene.json"]);
+    lumigraph(here, "info scene").ok();
+    // What a killed one leaves is in nobody's way.
+    fs::create_dir_all(here.join("new/.lumigraph-abc/scene")).unwrap();
+    lumigraph(here, "import wall -o new").ok();
+}
+
 #[test]
 fn where_results_cannot_go_is_said_before_any_work() {
     let folder = with_wall();
@@ -277,4 +332,24 @@ fn where_results_cannot_go_is_said_before_any_work() {
     assert!(error.contains("--video film.nothing"), "{error}");
     assert!(!here.join("out").exists());
     assert_eq!(fs::read(here.join("file")).unwrap(), b"mine");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn frames_of_an_interrupted_run_are_kept_whatever_their_folder_is_called() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = with_wall();
+    // No Unicode.
+    let [wall, out] = [&b"wall\xff"[..], b"out\xff"].map(std::ffi::OsStr::from_bytes);
+    fs::rename(folder.path().join("wall"), folder.path().join(wall)).unwrap();
+    let line = "--proxy plane --path sweep --frames 2 --size 48x36 --device cpu --resume -o";
+    for kept in [false, true] {
+        let mut command = Command::new(PROGRAM);
+        command.current_dir(folder.path()).arg("render").arg(wall);
+        let output = command.args(line.split(' ')).arg(out).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(said.contains("2 of them from before"), kept, "{said}");
+    }
 }

@@ -1,6 +1,7 @@
 //! The scene's folder.
 
 use crate::run::{files, lumigraph, with_wall};
+use calibrate::colmap;
 use serde_json::{Value, json};
 use std::fs;
 
@@ -87,6 +88,62 @@ fn an_earlier_scene_is_replaced_only_by_force_and_other_folders_never() {
     let error = lumigraph(folder.path(), "import wall -o wall --force").error(1);
     assert!(error.contains("no part of a scene"), "{error}");
     assert!(files(folder.path()) == before);
+}
+
+#[test]
+fn a_scene_is_not_made_of_what_it_replaces() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall --undistort -o flat").ok();
+    let before = files(folder.path());
+    for inputs in [
+        "flat",
+        "flat --undistort",
+        "flat/images --calibration flat/model",
+        "wall/images --calibration flat",
+        "wall --depth flat/depth",
+    ] {
+        let line = format!("import {inputs} -o flat --force");
+        let error = lumigraph(folder.path(), &line).error(1);
+        let is_told = error.starts_with("flat: ") && error.contains("would be replaced");
+        assert!(is_told, "{line}: {error}");
+        assert!(files(folder.path()) == before, "{line}");
+    }
+    lumigraph(folder.path(), "import flat -o thin").ok();
+    lumigraph(folder.path(), "import flat -o thin --force").ok();
+    lumigraph(folder.path(), "import wall -o flat --force").ok();
+}
+
+#[test]
+fn a_model_or_a_proxy_of_somebodys_own_stays() {
+    let folder = with_wall();
+    let at = |path: &str| folder.path().join(path);
+    let whole = colmap::read_model(&at("wall/sparse/0")).unwrap();
+    fs::create_dir(at("ws")).unwrap();
+    fs::rename(at("wall/images"), at("ws/photos")).unwrap();
+    let refused = |line: &str, said: &str| {
+        let before = files(folder.path());
+        let error = lumigraph(folder.path(), line).error(1);
+        assert!(error.contains(said), "{line}: {error}");
+        assert!(files(folder.path()) == before, "{line}");
+    };
+    let line = "import ws/photos --calibration ws -o ws";
+    colmap::write_binary(&whole, &at("ws/model")).unwrap();
+    refused(line, "ws: holds model, which is no part of a scene");
+    fs::remove_dir_all(at("ws/model")).unwrap();
+    colmap::write_text(&whole, &at("ws/model")).unwrap();
+    refused(line, "ws/model, which would be replaced");
+
+    let line = "import ws/photos --calibration ws -o scene";
+    fs::create_dir(at("scene")).unwrap();
+    fs::write(at("scene/proxy.json"), "mine").unwrap();
+    refused(line, "scene: holds proxy.json, which is no part of a scene");
+    fs::remove_file(at("scene/proxy.json")).unwrap();
+    // What an import that was killed has left is in nobody's way.
+    lumigraph(folder.path(), line).ok();
+    lumigraph(folder.path(), "proxy scene plane").ok();
+    fs::remove_file(at("scene/scene.json")).unwrap();
+    lumigraph(folder.path(), line).ok();
+    assert!(!at("scene/proxy.json").exists());
 }
 
 #[test]
