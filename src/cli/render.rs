@@ -1,7 +1,7 @@
 //! `lumigraph render`
 
 use super::exposure::ExposureArgs;
-use super::film::{FilmArgs, FrameChoice, files_of, frame_choice};
+use super::film::{FilmArgs, FrameChoice, files_behind, files_of, frame_choice};
 use super::frames::{Asked, NamedView, ViewArgs};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
@@ -96,12 +96,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
-    let given = [
-        &args.views.path.as_ref().map(PathBuf::from),
-        &args.views.views,
-    ];
-    let inputs = given.into_iter().flatten().cloned();
-    let inputs: Vec<PathBuf> = inputs.chain(files_of(&session.scene)).collect();
+    let kind_or_file = [&args.views.path, &args.proxy.proxy].into_iter().flatten();
+    let named = [&args.views.views, &args.hold_out.hold_out].into_iter();
+    let named = named.flatten().cloned();
+    let named = named.chain(kind_or_file.map(PathBuf::from));
+    let mut inputs = files_behind(named, std::slice::from_ref(&args.scene.scene));
+    inputs.extend(files_of(&session.scene));
     let is_there = args.film.begin(&args.output, &files, &inputs)?;
     session.prepare()?;
 

@@ -35,6 +35,11 @@ pub(super) fn stamps(files: &[PathBuf], name: impl Fn(&Path) -> PathBuf) -> Vec<
     stamps
 }
 
+/// A file's path as it can be written as JSON: what is no Unicode is replaced.
+pub(super) fn in_unicode(file: &Path) -> PathBuf {
+    PathBuf::from(file.to_string_lossy().into_owned())
+}
+
 /// More files than these are not named.
 const NAMED: usize = 3;
 

@@ -103,6 +103,47 @@ fn a_scene_is_measured_once_and_the_report_is_whole() {
 }
 
 #[test]
+fn a_scene_that_changed_is_measured_anew_with_the_gains_it_has() {
+    let folder = with_wall();
+    let here = folder.path();
+    // Photos of two exposures, which the scene is to leave as they are.
+    for i in [1, 3, 5, 7] {
+        let path = here.join(format!("wall/images/{i:04}.png"));
+        let mut photo = image::open(&path).unwrap().into_rgb8();
+        photo.iter_mut().for_each(|value| *value /= 2);
+        photo.save(&path).unwrap();
+    }
+    lumigraph(here, "import wall --no-exposure -o scene").ok();
+    let line = LINE.replace("wall", "scene");
+    let result = lumigraph(here, &line).ok().json();
+    let settings = result["subjects"][0]["settings"].as_array().unwrap();
+    let psnr = |name: &str| settings.iter().find(|s| s["name"] == name).unwrap()["psnr"].as_f64();
+    assert_eq!(psnr("default"), psnr("exposure off"));
+
+    let split = here.join("wall/split.json");
+    let written = fs::read(&split).unwrap();
+    let one = r#"{"test": ["0004.png"]}"#;
+    fs::write(&split, one).unwrap();
+    let other = lumigraph(here, &line).ok();
+    let (said, result) = (&other.stderr, other.json());
+    assert!(!said.contains("measured before"), "{said}");
+    assert!(said.contains("wall/split.json has"), "{said}");
+    assert_eq!(result["subjects"][0]["views"][0], "0004.png");
+    let again = lumigraph(here, &line).ok().stderr;
+    assert!(again.contains("scene: measured before"), "{again}");
+
+    // A surface of its own, and the calibration.
+    fs::write(&split, written).unwrap();
+    lumigraph(here, "proxy scene plane").ok();
+    let images = here.join("scene/model/images.txt");
+    fs::write(&images, fs::read(&images).unwrap()).unwrap();
+    let said = lumigraph(here, &line).ok().stderr;
+    for file in ["scene/proxy.json is new", "images.txt was written since"] {
+        assert!(said.contains(file), "{file}: {said}");
+    }
+}
+
+#[test]
 fn an_interior_is_measured_by_what_portals_show() {
     let folder = tempfile::tempdir().unwrap();
     let line = "generate house --rooms 2 --triangles 2000 -o house";

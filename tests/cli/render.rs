@@ -284,6 +284,50 @@ fn a_film_is_shared_resumed_and_made() {
 }
 
 #[test]
+fn frames_made_of_other_files_are_not_mixed_in() {
+    let folder = with_wall();
+    let here = folder.path();
+    let write = |file: &str, text: &str| std::fs::write(here.join(file), text).unwrap();
+    write("split.json", r#"{"test": ["0004.png"]}"#);
+    let frame = r#"{"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 1}"#;
+    write("frame.json", frame);
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "proxy wall plane -o plane.json").ok();
+    let lines = [
+        "scene --proxy plane.json --hold-out split.json --views wall --frames 0..2",
+        "wall --proxy=plane.json --path sweep --frames 2 --dataparser-transforms=frame.json",
+    ];
+    let times: String = (0..9).map(|i| format!("{i:04}.png,{i}\n")).collect();
+    let cases = [
+        (0, "plane.json"),
+        (0, "split.json"),
+        (0, "wall/sparse/0/images.bin"),
+        (0, "scene/model/images.txt"),
+        (1, "plane.json"),
+        (1, "frame.json"),
+        (1, "wall/sparse/0/points3D.bin"),
+        (1, "wall/times.csv"),
+    ];
+    for (i, (line, file)) in cases.into_iter().enumerate() {
+        let line = format!("render {} --size 48x36 -o out{i} --resume", lines[line]);
+        lumigraph(here, &line).ok();
+        // With all as it was, frames stay.
+        let again = lumigraph(here, &line).ok().stdout;
+        assert!(again.contains("2 frames, 2 of them from before"), "{again}");
+        let path = here.join(file);
+        let bytes = std::fs::read(&path).unwrap_or_else(|_| times.clone().into_bytes());
+        let how = match path.exists() {
+            true => "was written since",
+            false => "is new",
+        };
+        std::fs::write(&path, bytes).unwrap();
+        let error = lumigraph(here, &line).error(1);
+        let expected = format!("made of other files: {file} {how};");
+        assert!(error.contains(&expected), "{file}: {error}");
+    }
+}
+
+#[test]
 fn without_ffmpeg_a_film_fails_before_anything_is_drawn() {
     let folder = with_wall();
     let line = "render wall --proxy plane --path sweep -o frames --video film.mp4";

@@ -1,6 +1,6 @@
 //! Walks through a house, frame by frame and as films.
 
-use crate::interior::{names, with_house};
+use crate::interior::{HALVES, names, with_house};
 use crate::run::lumigraph;
 use serde_json::Value;
 use std::path::Path;
@@ -144,6 +144,34 @@ fn a_walk_becomes_a_film() {
             "{more}: {}",
             ran.stderr
         );
+    }
+}
+
+#[test]
+fn frames_of_a_capture_calibrated_anew_are_not_mixed_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    lumigraph(here, "interior hall --rooms halves.json -o house").ok();
+    let frame = r#"{"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 1}"#;
+    std::fs::write(here.join("frame.json"), frame).unwrap();
+    lumigraph(here, "walk house --frames 2 --size 32x24 -o tour").ok();
+    let named = "--path tour/path.json --dataparser-transforms frame.json";
+    let cases = [
+        ("--frames 2", "house/../hall/sparse/0/images.bin"),
+        (named, "frame.json"),
+    ];
+    for (i, (more, file)) in cases.into_iter().enumerate() {
+        let line = format!("walk house {more} --size 32x24 -o out{i} --resume");
+        lumigraph(here, &line).ok();
+        let again = lumigraph(here, &line).ok().stdout;
+        assert!(again.contains("2 frames, 2 of them from before"), "{again}");
+        let path = here.join(file);
+        std::fs::write(&path, std::fs::read(&path).unwrap()).unwrap();
+        let error = lumigraph(here, &line).error(1);
+        let expected = format!("made of other files: {file} was written since;");
+        assert!(error.contains(&expected), "{error}");
     }
 }
 

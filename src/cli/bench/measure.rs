@@ -33,8 +33,12 @@ pub(super) fn measure(
         unmatched.forget_exposure();
         unmatched
     };
+    // As `render` has it: a scene's own gains are kept, and that it has none.
+    let own_gains = scene.folder.is_some() && scene.exposure_is_without(&without);
     let ((), exposure) = timed(|| {
-        scene.match_exposure(&without);
+        if !own_gains {
+            scene.match_exposure(&without);
+        }
     });
     bar.set_message(format!("{name}: fitting"));
     let (default, fit) = timed(|| default_proxy(&scene, &without, effort.thorough));

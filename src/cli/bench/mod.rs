@@ -16,9 +16,11 @@ mod variants;
 use super::Usage;
 use super::captured::Opened;
 use super::exposure::ExposureArgs;
+use super::film::{calibration_of, files_of, scenes_of};
 use super::options::DeviceName;
 use super::output::{print, print_json, say, write_file};
 use super::session::progress;
+use super::stamp::{Stamp, changes, in_unicode, stamps};
 use anyhow::Context;
 use datasets::house::{HouseOptions, house};
 use indicatif::ProgressBar;
@@ -42,7 +44,8 @@ use std::time::Instant;
 /// against held-out photos and against the exact picture; of interiors what portals show, against
 /// the model drawn whole. Writes report.html (plots, the settings that nothing beats, pictures and
 /// their differences), results.json and results.csv. What a folder holds already is not measured
-/// again. Without scenes: three synthetic ones and a house.
+/// again while the files it was measured of stay as they were. Without scenes: three synthetic
+/// ones and a house.
 ///
 ///     lumigraph bench my-capture house -o measured
 #[derive(clap::Args)]
@@ -98,6 +101,8 @@ struct Plan {
     effort: Effort,
     device: String,
     threads: usize,
+    /// What it was measured of; none of what is synthetic.
+    inputs: Vec<Stamp>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
@@ -129,14 +134,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             effort,
             device: args.device.name().to_owned(),
             threads: rayon::current_num_threads(),
+            inputs: inputs(&given).with_context(|| name.clone())?,
         };
         let file = args.output.join("measured").join(format!("{name}.json"));
         let kept = std::fs::read(&file).ok();
         let kept: Option<Kept> = kept.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        if let Some(kept) = kept.filter(|kept| kept.plan == plan) {
-            say!("{name}: measured before; {} holds it", file.display());
-            subjects.push((kept.subject, kept.thumbnails));
-            continue;
+        if let Some(kept) = kept {
+            if kept.plan == plan {
+                say!("{name}: measured before; {} holds it", file.display());
+                subjects.push((kept.subject, kept.thumbnails));
+                continue;
+            }
+            let changes = changes(&kept.plan.inputs, &plan.inputs);
+            if !changes.is_empty() {
+                say!("{name}: measured anew, as before it was of other files: {changes}");
+            }
         }
         let bar = progress(1, name.clone());
         let measured = measure_one(&given, &name, args, effort, &bar);
@@ -218,6 +230,31 @@ fn given(scenes: &[PathBuf]) -> anyhow::Result<Vec<(Given, String)>> {
         all.push((Given::Folder(full), name));
     }
     Ok(all)
+}
+
+/// The files that decide what is measured, as they are now: a scene's, or an interior's and its scenes'.
+fn inputs(given: &Given) -> anyhow::Result<Vec<Stamp>> {
+    let Given::Folder(folder) = given else {
+        return Ok(Vec::new());
+    };
+    let mut files = Vec::new();
+    let mut scenes = vec![folder.clone()];
+    if folder.join(super::interior::INTERIOR).is_file() {
+        let (file, interior) = super::interior::open(folder)?;
+        files.extend(interior.model.iter().map(|name| folder.join(name)));
+        scenes = scenes_of(&file, &interior);
+        files.push(file);
+    }
+    for folder in &scenes {
+        // It is opened once more where it is measured, and its warnings are told then.
+        let (scene, _) = Scene::open(folder, false)?;
+        files.extend(files_of(&scene));
+        files.extend(scene.own_split());
+        files.extend(calibration_of(folder));
+    }
+    let mut stamps = stamps(&files, in_unicode);
+    stamps.dedup();
+    Ok(stamps)
 }
 
 fn measure_one(

@@ -23,7 +23,7 @@ pub(super) struct Setting {
     pub(super) kind: Option<Kind>,
     /// Photos are reduced so many times, by area.
     pub(super) reduced: u32,
-    /// Whether exposures are matched.
+    /// Whether photos have gains: the scene's own, else those that are matched.
     pub(super) exposure: bool,
 }
 
