@@ -3,9 +3,10 @@
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::film::files_of;
 use super::interior::open;
-use super::options::print_warnings;
+use super::options::{drop_weak_of_interior, print_warnings};
 use super::output::say;
 use anyhow::{Context, bail};
+use calibrate::View;
 use lumigraph::scene::{Scene, Truth};
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::{Model, read_model};
@@ -156,6 +157,7 @@ impl Photos {
         let named = || format!("{}: the scene of its cells", file.display());
         let (mut scene, warnings) = Scene::open(&folder, false).with_context(named)?;
         print_warnings(&warnings);
+        drop_weak_of_interior(&mut scene);
         let known: BTreeSet<String> = scene.names().into_iter().collect();
         let held_out = interior
             .held_out
@@ -228,14 +230,20 @@ impl Photos {
         Ok(Painter::of_photos(captured.with_depth_maps(depth_maps?)))
     }
 
-    /// The photos that were held out, to compare pictures with. Those that are corrupt are left
-    /// out, with a warning.
-    pub(super) fn held_out(&self) -> anyhow::Result<Vec<(String, calibrate::View, Truth)>> {
+    /// The photos that were held out, to compare pictures with, as large as those are: all of them are
+    /// kept. Those that are corrupt are left out, with a warning.
+    pub(super) fn held_out(
+        &self,
+        resized: impl Fn(View) -> View,
+    ) -> anyhow::Result<Vec<(String, View, Truth)>> {
         let mut found = Vec::new();
         for name in &self.without {
-            let view = self.scene.view(name)?;
+            let view = resized(self.scene.view(name)?);
             match self.scene.truth(name, &self.without)? {
-                Ok(truth) => found.push((name.clone(), view, truth)),
+                Ok(truth) => {
+                    let truth = truth.resized(view.width, view.height);
+                    found.push((name.clone(), view, truth));
+                }
                 Err(error) => say!("warning: photo {name} is left out: {error}"),
             }
         }

@@ -32,6 +32,14 @@ enum How {
 }
 
 impl ExposureArgs {
+    /// Forgets the scene's own gains if none are to be used.
+    #[cfg(feature = "window")]
+    pub(super) fn forget(&self, scene: &mut Scene) {
+        if self.no_exposure {
+            scene.forget_exposure();
+        }
+    }
+
     /// Gives the scene's photos the gains to draw with: its own if it has been written
     /// with some that rest on none of the photos in `without`, else new ones.
     pub(super) fn choose(&self, scene: &mut Scene, without: &BTreeSet<String>) -> ExposureUsed {

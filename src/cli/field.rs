@@ -54,9 +54,9 @@ pub(super) struct Args {
     hold_out: HoldOutArgs,
     #[command(flatten)]
     proxy: ProxyArgs,
-    // Taken as by the commands that draw; weights do not depend on it.
+    // As by the commands that draw; weights do not depend on it, but what `auto` chooses.
     #[command(flatten)]
-    _exposure: ExposureArgs,
+    exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
     #[command(flatten)]
@@ -79,7 +79,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_extensions(args)?;
-    let scene = args.scene.open()?;
+    let mut scene = args.scene.open()?;
     let others = [&args.weights, &args.triangulation].into_iter().flatten();
     let files = others.chain([&args.output]).map(PathBuf::as_path);
     check_inputs(files, &files_of(&scene))?;
@@ -95,6 +95,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Some(Asked::Read(views, _)) => Ok(frame_of(views, &args.view)?),
         Some(derived) => Err(derived),
     };
+    if args.proxy.is_searched(&scene) {
+        // Kinds are compared by what is drawn, which is exposed alike.
+        args.exposure.choose(&mut scene, &without);
+    }
     let proxy = args.proxy.choose(&scene, &without)?;
     let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
     let (view, time_s) = match known {
@@ -124,7 +128,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             (field.contributors(&frame), Some(field))
         }
     };
-    lumigraph.photos.check_masks()?;
+    frame.check_masks()?;
     bar.finish_and_clear();
 
     // 2. Its pictures.

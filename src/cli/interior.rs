@@ -113,8 +113,9 @@ fn check_free(args: &Args) -> anyhow::Result<()> {
 
 fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     let named = || args.model.display().to_string();
-    let (scene, warnings) = Scene::open(&args.model, false)?;
+    let (mut scene, warnings) = Scene::open(&args.model, false)?;
     super::options::print_warnings(&warnings);
+    super::options::drop_weak_of_interior(&mut scene);
     let without = args.hold_out.names(&scene)?;
     // 1. The surface.
     let start = Instant::now();

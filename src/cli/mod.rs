@@ -40,7 +40,7 @@ mod walk;
 
 use anyhow::Context as _;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches as _, Parser, Subcommand};
 use output::say;
 use std::fmt::Write as _;
 use std::num::NonZero;
@@ -86,15 +86,22 @@ struct Usage(String);
 /// Parses the command line, runs the command, and says what went wrong: exit code 2 for
 /// usage, 1 for bad data.
 pub(super) fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = start_threads(cli.threads).and_then(|()| run(cli));
     let Err(error) = done else {
         return ExitCode::SUCCESS;
     };
     if let Some(Usage(message)) = error.downcast_ref() {
-        let _ = Cli::command()
-            .error(ErrorKind::ValueValidation, message)
-            .print();
+        // With the usage of the command that was given.
+        let mut all = Cli::command();
+        all.build();
+        let name = matches.subcommand_name().unwrap_or_default();
+        let command = match all.find_subcommand_mut(name) {
+            Some(command) => command,
+            None => &mut all,
+        };
+        let _ = command.error(ErrorKind::ValueValidation, message).print();
         return ExitCode::from(2);
     }
     if output::is_closed_pipe(&error) {

@@ -63,11 +63,21 @@ pub(super) fn beside_text(scene: &Scene) -> String {
     counts.map(|(what, n)| format!(", {n} {what}")).collect()
 }
 
-/// Leaves out photos whose places are unsure, and says which.
+/// Leaves out photos whose places are unsure, and says which, and what uses them.
 pub(super) fn drop_weak(scene: &mut Scene) {
+    drop_weak_saying(scene, "; --keep-weak uses them");
+}
+
+/// The same for interiors, whatever anyone asks for: one of their photos that is misplaced has walls where
+/// none are.
+pub(super) fn drop_weak_of_interior(scene: &mut Scene) {
+    drop_weak_saying(scene, "");
+}
+
+fn drop_weak_saying(scene: &mut Scene, remedy: &str) {
     for group in scene.drop_weak() {
         let tie = tie_text(&group);
-        say!("note: left out, as they may be misplaced: {tie}; --keep-weak uses them");
+        say!("note: left out, as they may be misplaced: {tie}{remedy}");
     }
 }
 

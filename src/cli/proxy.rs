@@ -1,6 +1,7 @@
 //! `lumigraph proxy`
 
 use super::Usage;
+use super::exposure::ExposureArgs;
 use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
@@ -141,6 +142,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 Kind::Fitted(kind) => Some(kind),
                 Kind::Auto | Kind::Mesh => None,
             };
+            if kind.is_none() {
+                // Kinds are compared by what is drawn, which is exposed alike.
+                ExposureArgs::default().choose(&mut scene, &without);
+            }
             let fitted = fit(&scene, kind, &without)?;
             (fitted.proxy, fitted.how, Some(&without))
         }

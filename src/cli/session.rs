@@ -79,8 +79,9 @@ impl Session {
         if scene.photos.iter().all(|p| without.contains(&p.name)) {
             return Err(SceneError::NothingLeft(scene.photos.len()).into());
         }
-        let proxy = proxy.choose(&scene, &without)?;
+        // What is drawn to choose a proxy is exposed as all that is drawn later.
         let exposure = exposure.choose(&mut scene, &without);
+        let proxy = proxy.choose(&scene, &without)?;
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;

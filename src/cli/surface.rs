@@ -65,6 +65,14 @@ impl ProxyArgs {
         self.proxy.is_none()
     }
 
+    /// Whether kinds are to be compared.
+    pub(super) fn is_searched(&self, scene: &Scene) -> bool {
+        match self.proxy.as_deref() {
+            Some(asked) => asked == "auto",
+            None => scene.proxy.is_none(),
+        }
+    }
+
     /// The proxy asked for. A fitted one rests on none of the photos in `without`.
     pub(super) fn choose(
         &self,

@@ -60,7 +60,7 @@ pub(super) struct Args {
     #[command(flatten)]
     nerfstudio: NerfstudioArgs,
     /// The folder for screenshots (shot_0001.png, …) and the path (path.json; for nerfstudio
-    /// camera_path.json)
+    /// camera_path.json; path_2.json and so on beside those of an earlier session)
     #[arg(short, long, value_name = "DIR", default_value = "lumigraph-view")]
     output: PathBuf,
     /// Write a line of JSON for each frame on the screen: where one is, and what took how long
@@ -236,6 +236,7 @@ impl Load {
             Ok(())
         };
         // 1. At once.
+        exposure.forget(&mut scene);
         let is_ready = proxy.is_default() && scene.proxy.is_some() && without.is_empty();
         let quick = match &scene.proxy {
             Some(own) if is_ready => Some(own.proxy.clone()),

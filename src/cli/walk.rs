@@ -5,7 +5,7 @@ mod tour;
 
 use super::Usage;
 use super::captured::{Opened, Photos};
-use super::film::{FilmArgs, FrameChoice, frame_choice};
+use super::film::{FilmArgs, FrameChoice, files_behind, frame_choice, scenes_of};
 use super::made::{self, Made};
 use super::options::{resized, size};
 use super::output::{print, print_json, say, write_file};
@@ -164,7 +164,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         false => frames(args, &opened)?,
     };
     let mut inputs = opened.files();
-    inputs.extend(args.path.clone());
+    let scenes = match opened.photos {
+        Some(_) => scenes_of(&opened.file, &opened.interior),
+        None => Vec::new(),
+    };
+    inputs.extend(files_behind(args.path.clone(), &scenes));
     // 3. The walks: one walker, so that images are made once for all kinds.
     if references.no_photos {
         opened.photos = None;
@@ -324,11 +328,12 @@ struct Named {
 
 /// The photos that were held out.
 fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result<Vec<Named>> {
-    let held_out = photos.map(Photos::held_out).transpose()?;
-    let named = |(name, view, truth): (String, View, Truth)| {
-        let view = resized(view, size);
-        let truth = Some(truth.resized(view.width, view.height));
-        Named { name, view, truth }
+    let held_out = photos.map(|photos| photos.held_out(|view| resized(view, size)));
+    let held_out = held_out.transpose()?;
+    let named = |(name, view, truth): (String, View, Truth)| Named {
+        name,
+        view,
+        truth: Some(truth),
     };
     let named: Vec<Named> = held_out.into_iter().flatten().map(named).collect();
     if named.is_empty() {

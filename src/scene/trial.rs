@@ -313,7 +313,7 @@ impl<'a> Trials<'a> {
     fn score(&self, judge: usize) -> Result<f64, SceneError> {
         let judge = &self.judges[judge];
         let part = Part {
-            without: Some(judge.source_idx),
+            without: &[judge.source_idx],
             ..Part::default()
         };
         let (desired, options) = (judge.desired.clone(), FieldOptions::default());

@@ -50,6 +50,11 @@ fn usage_errors_exit_with_2() {
         assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
         assert!(ran.stderr.contains(said), "{line}: {}", ran.stderr);
         assert_eq!(ran.stdout, "", "{line}");
+        // If with a usage, with that command's own.
+        let command = line.split(' ').next().unwrap_or_default();
+        let own = ran.stderr.contains(&format!("Usage: lumigraph {command} "));
+        let has_usage = ran.stderr.contains("Usage: ") && command != "evalute";
+        assert!(own || !has_usage, "{line}: {}", ran.stderr);
     }
 }
 

@@ -60,12 +60,16 @@ fn a_turntable_needs_no_calibration() {
     println!("focal length {found:.2} of 480 px; {without:.2} dB, {with_truth:.2} with the truth");
     assert!(without > with_truth - 1.5, "{without} {with_truth}");
 
-    // An ordinary scene.
+    // An ordinary scene, whose proxy is chosen once.
+    lumigraph(folder, "proxy scene auto").ok();
     lumigraph(folder, "render scene --path orbit --frames 2 -o frames").ok();
     assert!(folder.join("frames/frame_0001.png").exists());
     lumigraph(folder, "export scene --format transforms -o t.json").ok();
-    lumigraph(folder, "evaluate scene --every 6 --size 80x60").ok();
-    lumigraph(folder, "proxy scene auto").ok();
+    lumigraph(
+        folder,
+        "evaluate scene --every 6 --size 80x60 --proxy plane",
+    )
+    .ok();
     assert_eq!(
         scene_json(folder, "scene")["settings"]["turntable_degrees"],
         15.0
