@@ -104,9 +104,12 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
         }
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
-        // Every listed view sees all of the triangle: fovBlend and mask are one. But where the desired lens
-        // ends inside the triangle, nobody knows.
-        let fov = fov_blend(source_idx, sight);
+        // Every listed view sees all of the triangle: fovBlend and mask are one. But where a desired lens that
+        // bends ends inside the triangle, nobody knows.
+        var fov = select(0.0, 1.0, sight.depth > 0.0);
+        if RAYS_IN_TABLE {
+            fov = fov_blend(source_idx, sight);
+        }
         if fov > 0.0 {
             add_photo(&mix, fov * weight, source_idx, texel_of(source_idx, sight, ray, plane.xyz));
         }
