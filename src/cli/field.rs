@@ -95,7 +95,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Some(Asked::Read(views, _)) => Ok(frame_of(views, &args.view)?),
         Some(derived) => Err(derived),
     };
-    if args.proxy.is_searched(&scene) {
+    if args.proxy.is_searched(&scene, &without) {
         // Kinds are compared by what is drawn, which is exposed alike.
         args.exposure.choose(&mut scene, &without);
     }

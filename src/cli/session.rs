@@ -79,9 +79,15 @@ impl Session {
         if scene.photos.iter().all(|p| without.contains(&p.name)) {
             return Err(SceneError::NothingLeft(scene.photos.len()).into());
         }
-        // What is drawn to choose a proxy is exposed as all that is drawn later.
-        let exposure = exposure.choose(&mut scene, &without);
-        let proxy = proxy.choose(&scene, &without)?;
+        let (exposure, proxy) = if proxy.is_searched(&scene, &without) {
+            // What is drawn to choose a proxy is exposed as all that is drawn later.
+            let exposure = exposure.choose(&mut scene, &without);
+            (exposure, proxy.choose(&scene, &without)?)
+        } else {
+            // What cannot be read is said at once.
+            let proxy = proxy.choose(&scene, &without)?;
+            (exposure.choose(&mut scene, &without), proxy)
+        };
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;

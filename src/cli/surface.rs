@@ -6,7 +6,7 @@ use super::session::spinner;
 use anyhow::Context;
 use clap::Args;
 use glam::DVec3;
-use lumigraph::scene::{Fitted, Kind, Scene, Trial, trials_text};
+use lumigraph::scene::{Fitted, Kind, Scene, SceneProxy, Trial, trials_text};
 use proxy::Proxy;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -66,10 +66,11 @@ impl ProxyArgs {
     }
 
     /// Whether kinds are to be compared.
-    pub(super) fn is_searched(&self, scene: &Scene) -> bool {
-        match self.proxy.as_deref() {
-            Some(asked) => asked == "auto",
-            None => scene.proxy.is_none(),
+    pub(super) fn is_searched(&self, scene: &Scene, without: &BTreeSet<String>) -> bool {
+        match (self.proxy.as_deref(), &scene.proxy) {
+            (Some(asked), _) => asked == "auto",
+            (None, Some(own)) => seen_by(own, without).is_some(),
+            (None, None) => true,
         }
     }
 
@@ -107,11 +108,7 @@ impl ProxyArgs {
             .into()),
             None => match &scene.proxy {
                 Some(own) => {
-                    let saw = own
-                        .fitted_without
-                        .as_ref()
-                        .and_then(|unseen| without.iter().find(|name| !unseen.contains(name)));
-                    if let Some(name) = saw {
+                    if let Some(name) = seen_by(own, without) {
                         say!(
                             "note: the scene's own proxy was fitted with held-out {name}; \
                              fitting another without"
@@ -126,7 +123,8 @@ impl ProxyArgs {
                 }
                 None => {
                     let chosen = fitted(None)?;
-                    if without.is_empty() && !chosen.trials.is_empty() {
+                    let is_kept = scene.folder.is_some() && without.is_empty();
+                    if is_kept && !chosen.trials.is_empty() {
                         say!("note: `lumigraph proxy SCENE auto` keeps this proxy with the scene");
                     }
                     Ok(chosen)
@@ -134,6 +132,12 @@ impl ProxyArgs {
             },
         }
     }
+}
+
+/// A photo among some that a scene's own proxy was fitted with, if there is one.
+fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n String> {
+    let unseen = own.fitted_without.as_ref()?;
+    names.iter().find(|name| !unseen.contains(name))
 }
 
 /// What proxies' files end in.

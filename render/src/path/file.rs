@@ -268,15 +268,7 @@ pub fn write_keyframes(path: &Path, file: &KeyframeFile) -> Result<(), PathFileE
 
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> {
     let io = |e| PathFileError::Io(path.to_owned(), e);
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".tmp");
-    let written = std::fs::write(&temporary, text);
-    let written = written.and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // There is nothing to do about it where this fails, too.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written.map_err(io)
+    capture::write_whole(path, |temporary| std::fs::write(temporary, text)).map_err(io)
 }
 
 fn interpolation_of(stored: Option<StoredInterpolation>) -> Interpolation {

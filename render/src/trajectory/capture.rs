@@ -31,7 +31,8 @@ pub(super) struct Capture {
     pub(super) nearest_scene: f64,
 }
 
-/// Cameras nearer to one another than this, in shares of how far the farthest is, are at one place.
+/// Cameras nearer to one another than this, in shares of their distance from the middle one, in the median, are
+/// at one place.
 const SAME_PLACE: f64 = 1e-4;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
@@ -338,8 +339,9 @@ fn geometric_median(points: &[DVec3]) -> DVec3 {
 /// The distance to the third-nearest point elsewhere, in the median: cameras of a rig, and photos of one
 /// place by several exposures, are at one place.
 fn spacing(points: &[DVec3]) -> f64 {
-    let farthest = points.iter().map(|p| p.length()).fold(0.0, f64::max);
-    let same_place = SAME_PLACE * farthest;
+    // A camera that is misplaced by far makes no others one.
+    let typical = median(points.iter().map(|p| p.length()).collect());
+    let same_place = SAME_PLACE * typical.unwrap_or(0.0);
     let step = points.len().div_ceil(MANY).max(1);
     let distance = |at: &DVec3| {
         let distances = points.iter().map(|p| p.distance(*at));

@@ -180,7 +180,7 @@ impl Walk<'_> {
 
     /// Says which portal each pixel shows, if images fill it: of those that one sees through there, filled or
     /// not, the nearest. (From one arm of a room with a corner one sees portals of the other arm behind
-    /// its own, and the walls between do not hide them.) Whether any is seen before another.
+    /// its own, and the walls between do not hide them.) Whether any that is filled is seen before another.
     pub(super) fn share_out(
         &mut self,
         fills: &[Filled<'_>],
@@ -196,7 +196,7 @@ impl Walk<'_> {
                 let open = window.row(y);
                 let row = &mut self.owners[y as usize * width..][..width];
                 let shown = &mut row[open.start as usize..open.end as usize];
-                if owner > 0 && shown.iter().all(|other| *other == 0) {
+                if shown.iter().all(|other| *other == 0) {
                     shown.fill(owner);
                     continue;
                 }
@@ -205,7 +205,8 @@ impl Walk<'_> {
                     let is_before = match fills.get(usize::from(*shown).wrapping_sub(1)) {
                         None => owner > 0,
                         Some(other) => {
-                            are_apart = true;
+                            // What is not filled is drawn nowhere.
+                            are_apart |= owner > 0;
                             plane.inverse_depth(ray) > other.plane.inverse_depth(ray)
                         }
                     };
@@ -252,10 +253,13 @@ impl Walk<'_> {
             let (painter, options) = (&mut self.painter, &self.options);
             let into = [&mut self.apart, &mut self.mixed_in];
             draw(fill, f, images, camera, painter, options, into, cost);
-            for (pixel, owner) in self.owners.iter().enumerate() {
-                if usize::from(*owner) == k + 1 {
-                    self.filled.color[pixel] = self.apart.color[pixel];
-                    self.filled.inverse_depth[pixel] = self.apart.inverse_depth[pixel];
+            for y in 0..camera.height {
+                let first = y as usize * camera.width as usize;
+                for pixel in f.window.row(y).map(|x| first + x as usize) {
+                    if usize::from(self.owners[pixel]) == k + 1 {
+                        self.filled.color[pixel] = self.apart.color[pixel];
+                        self.filled.inverse_depth[pixel] = self.apart.inverse_depth[pixel];
+                    }
                 }
             }
         }
