@@ -1,7 +1,7 @@
 //! An interior opened, with the photos that show its cells.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
-use super::film::files_of;
+use super::inputs::files_of;
 use super::interior::open;
 use super::options::{drop_weak_of_interior, print_warnings};
 use super::output::say;

@@ -1,7 +1,7 @@
 //! `lumigraph evaluate`
 
 use super::exposure::ExposureArgs;
-use super::film::files_of;
+use super::inputs::files_of;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};

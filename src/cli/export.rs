@@ -1,15 +1,15 @@
 //! `lumigraph export`
 
 use super::Usage;
+use super::inputs::{calibration_in, calibration_of, model_files, parts_of};
 use super::options::SceneArgs;
 use super::output::{print, write_file};
 use anyhow::bail;
 use calibrate::export::{
     FrameFiles, check_colmap, check_colmap_text, has_board, opencv_yaml, transforms_json,
 };
-use calibrate::{Image, colmap, formats, opencv};
+use calibrate::{Image, colmap};
 use clap::ValueEnum;
-use lumigraph::scene::file::SceneFile;
 use lumigraph::scene::{Photo, Scene, relative};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -93,16 +93,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     ))
 }
 
-/// The files of a COLMAP model, of either format: a binary model hides a text model beside it.
-const MODEL_FILES: [&str; 6] = [
-    "cameras.bin",
-    "images.bin",
-    "points3D.bin",
-    "cameras.txt",
-    "images.txt",
-    "points3D.txt",
-];
-
 /// Fails where the output would take the place of the scene's calibration: what is written
 /// lacks the photos that were left out, whose poses are nowhere else.
 fn check_calibration(
@@ -111,21 +101,17 @@ fn check_calibration(
     output: &Path,
     is_file: bool,
 ) -> anyhow::Result<()> {
-    let model_files = |folder: &Path| MODEL_FILES.map(|name| folder.join(name)).to_vec();
     let written = match is_file {
         true => vec![output.to_owned()],
         false => model_files(output),
     };
     let origin = scene.calibration.as_deref().or(scene.capture.as_deref());
-    let read = [own_calibration(given), origin.and_then(calibration_in)];
+    let read = [calibration_of(given), origin.and_then(calibration_in)];
     let real = |path: PathBuf| path.canonicalize().ok();
     let kept: Vec<PathBuf> = read
         .into_iter()
         .flatten()
-        .flat_map(|path| match path.is_dir() {
-            true => model_files(&path),
-            false => vec![path],
-        })
+        .flat_map(|path| parts_of(&path))
         .filter_map(real)
         .collect();
     let is_kept = |path: &PathBuf| real(path.clone()).is_some_and(|path| kept.contains(&path));
@@ -136,37 +122,6 @@ fn check_calibration(
         );
     }
     Ok(())
-}
-
-/// The model of a scene's folder, or the calibration of a capture.
-fn own_calibration(given: &Path) -> Option<PathBuf> {
-    if !Scene::is_scene(given) {
-        return calibration_in(given);
-    }
-    let path = given.join("scene.json");
-    let bytes = std::fs::read(&path).ok()?;
-    let file = SceneFile::parse(&path, &bytes).ok()?;
-    Some(given.join(file.model))
-}
-
-/// The calibration that `import` reads of a folder, or is told by a file: a model's folder or a
-/// file.
-fn calibration_in(path: &Path) -> Option<PathBuf> {
-    if path.is_file() {
-        let name = path.file_name().unwrap_or_default();
-        let is_model = MODEL_FILES.iter().any(|file| name == *file);
-        let folder = path.parent().filter(|_| is_model);
-        return Some(folder.unwrap_or(path).to_owned());
-    }
-    if let Ok(model) = colmap::find_model(path) {
-        return Some(model);
-    }
-    let of_opencv = opencv::find_calibrations(path).into_iter().next();
-    of_opencv.or_else(|| {
-        let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
-        let files = entries.map(|entry| entry.path()).filter(|p| p.is_file());
-        files.filter(|file| formats::detect(file).is_some()).min()
-    })
 }
 
 /// Where a scene's photos and masks lie, as seen from a file's folder.

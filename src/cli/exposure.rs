@@ -47,7 +47,7 @@ impl ExposureArgs {
         let how = if self.no_exposure {
             scene.forget_exposure();
             How::Off
-        } else if scene.folder.is_some() && scene.exposure_is_without(without) {
+        } else if keeps_own(scene, without) {
             How::Stored
         } else {
             let bar = spinner("matching exposures");
@@ -69,6 +69,12 @@ impl ExposureArgs {
             seconds: start.elapsed().as_secs_f64(),
         }
     }
+}
+
+/// Whether a scene's own gains are drawn with, or that it has none: it was written with what rests on
+/// none of the photos in `without`.
+pub(super) fn keeps_own(scene: &Scene, without: &BTreeSet<String>) -> bool {
+    scene.folder.is_some() && scene.exposure_is_without(without)
 }
 
 impl ExposureUsed {

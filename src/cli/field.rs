@@ -2,8 +2,8 @@
 
 use super::Usage;
 use super::exposure::ExposureArgs;
-use super::film::files_of;
 use super::frames::{Asked, NamedView};
+use super::inputs::files_of;
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};

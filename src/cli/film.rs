@@ -6,14 +6,9 @@ use super::output::write_file;
 use super::stamp::{Stamp, changes, in_unicode, stamps};
 use super::targets::check_inputs;
 use anyhow::{Context, bail};
-use calibrate::{colmap, formats, opencv};
 use image::{Rgba, RgbaImage};
-use lumigraph::scene::file::SceneFile;
-use lumigraph::scene::{Photo, Scene};
-use proxy::interior::Interior;
 use render::score::on_black;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -166,99 +161,6 @@ struct Plan {
     /// None of earlier versions.
     #[serde(default)]
     inputs: Vec<Stamp>,
-}
-
-/// The files of a scene that decide what its pictures are.
-pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
-    let of_photo = |p: &Photo| {
-        let beside = [&p.ignore_mask, &p.object_matte, &p.silhouette, &p.depth_map];
-        let beside = beside.into_iter().flatten().cloned();
-        std::iter::once(p.path.clone())
-            .chain(beside)
-            .collect::<Vec<_>>()
-    };
-    let own = scene.folder.iter().flat_map(|folder| {
-        let proxy = scene.proxy.iter().map(|p| folder.join(&p.file));
-        proxy.chain([folder.join("scene.json")])
-    });
-    own.chain(scene.photos.iter().flat_map(of_photo)).collect()
-}
-
-/// The files that frames are made of, besides photos and what lies beside these: those that options name (of a
-/// folder, the COLMAP model in it), and the calibrations of scenes and captures.
-pub(super) fn files_behind(
-    named: impl IntoIterator<Item = PathBuf>,
-    scenes: &[PathBuf],
-) -> Vec<PathBuf> {
-    let mut all = Vec::new();
-    for path in named.into_iter().chain(dataparser_transforms()) {
-        match colmap::find_model(&path) {
-            Ok(model) => all.extend(model_files(&model)),
-            Err(_) => all.push(path),
-        }
-    }
-    all.extend(scenes.iter().flat_map(|folder| calibration_of(folder)));
-    all
-}
-
-/// The file that says where nerfstudio's paths lie.
-fn dataparser_transforms() -> Option<PathBuf> {
-    const NAME: &str = "--dataparser-transforms";
-    let mut given = std::env::args_os().skip(1);
-    while let Some(argument) = given.next() {
-        if argument == NAME {
-            return given.next().map(PathBuf::from);
-        }
-        let text = argument.to_string_lossy();
-        if let Some(file) = text.strip_prefix(NAME).and_then(|t| t.strip_prefix('=')) {
-            return Some(PathBuf::from(file));
-        }
-    }
-    None
-}
-
-/// The folders of the scenes that show an interior's cells; `file` is the interior's.
-pub(super) fn scenes_of(file: &Path, interior: &Interior) -> Vec<PathBuf> {
-    let beside = file.parent().unwrap_or(Path::new(""));
-    let folders = interior.cells.iter().filter_map(|c| c.content.scene());
-    let folders: BTreeSet<&str> = folders.collect();
-    folders.into_iter().map(|f| beside.join(f)).collect()
-}
-
-/// The files that say where the photos of a scene or a capture were taken, and of a capture, when. Some
-/// may not be there.
-pub(super) fn calibration_of(folder: &Path) -> Vec<PathBuf> {
-    let file = folder.join("scene.json");
-    let scene = std::fs::read(&file).ok();
-    if let Some(scene) = scene.and_then(|bytes| SceneFile::parse(&file, &bytes).ok()) {
-        return model_files(&folder.join(scene.model));
-    }
-    let mut files = vec![folder.join("times.csv")];
-    // In the order in which captures are searched.
-    if let Ok(model) = colmap::find_model(folder) {
-        files.extend(model_files(&model));
-        return files;
-    }
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut there: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
-    there.sort();
-    let by_opencv = opencv::find_calibrations(folder).into_iter().next();
-    let by_others = || there.iter().find(|file| formats::detect(file).is_some());
-    files.extend(by_opencv.or_else(|| by_others().cloned()));
-    // Some calibrations leave it to a list which photos they are of.
-    let is_list = |file: &&PathBuf| {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        name.to_ascii_lowercase().contains("list")
-    };
-    files.extend(there.iter().filter(is_list).cloned());
-    files
-}
-
-/// The files of a COLMAP model, whichever way it is written.
-fn model_files(folder: &Path) -> Vec<PathBuf> {
-    let parts = ["cameras", "images", "points3D"].into_iter();
-    let files = parts.flat_map(|part| ["bin", "txt"].map(|end| format!("{part}.{end}")));
-    files.map(|name| folder.join(name)).collect()
 }
 
 /// Where a run with `--resume` says what it makes.

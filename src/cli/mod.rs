@@ -14,6 +14,7 @@ mod generate;
 mod import;
 mod info;
 mod info_of_file;
+mod inputs;
 mod interior;
 mod ldis;
 mod ledger;

@@ -36,17 +36,8 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
 /// Writes a file, complete or not at all; makes its folder where it is missing.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     make_parent(path)?;
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    let failed = || format!("{}: cannot write", path.display());
-    let written = std::fs::write(&temporary, bytes);
-    let written = written.and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // There is nothing to do about it where this fails, too.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written.with_context(failed)
+    let written = capture::write_whole(path, |temporary| std::fs::write(temporary, bytes));
+    written.with_context(|| format!("{}: cannot write", path.display()))
 }
 
 /// Makes the folder that a file is to lie in.

@@ -46,6 +46,11 @@ pub(super) struct NerfstudioArgs {
 }
 
 impl NerfstudioArgs {
+    /// The file, if there is one.
+    pub(super) fn file(&self) -> Option<&PathBuf> {
+        self.dataparser_transforms.as_ref()
+    }
+
     /// What the file says.
     pub(super) fn frame(&self) -> anyhow::Result<NerfstudioFrame> {
         let file = self.dataparser_transforms.as_deref();

@@ -1,8 +1,9 @@
 //! `lumigraph render`
 
 use super::exposure::ExposureArgs;
-use super::film::{FilmArgs, FrameChoice, files_behind, files_of, frame_choice};
+use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{Asked, NamedView, ViewArgs};
+use super::inputs::{files_behind, files_of};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
@@ -98,7 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let files = picture_files("view", names, &args.output)?;
     let kind_or_file = [&args.views.path, &args.proxy.proxy].into_iter().flatten();
     let named = [&args.views.views, &args.hold_out.hold_out].into_iter();
-    let named = named.flatten().cloned();
+    let named = named.flatten().chain(args.nerfstudio.file()).cloned();
     let named = named.chain(kind_or_file.map(PathBuf::from));
     let mut inputs = files_behind(named, std::slice::from_ref(&args.scene.scene));
     inputs.extend(files_of(&session.scene));

@@ -5,7 +5,8 @@ mod tour;
 
 use super::Usage;
 use super::captured::{Opened, Photos};
-use super::film::{FilmArgs, FrameChoice, files_behind, frame_choice, scenes_of};
+use super::film::{FilmArgs, FrameChoice, frame_choice};
+use super::inputs::{files_behind, scenes_of};
 use super::made::{self, Made};
 use super::options::{resized, size};
 use super::output::{print, print_json, say, write_file};
@@ -168,7 +169,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Some(_) => scenes_of(&opened.file, &opened.interior),
         None => Vec::new(),
     };
-    inputs.extend(files_behind(args.path.clone(), &scenes));
+    let named = args.path.iter().chain(args.nerfstudio.file()).cloned();
+    inputs.extend(files_behind(named, &scenes));
     // 3. The walks: one walker, so that images are made once for all kinds.
     if references.no_photos {
         opened.photos = None;

@@ -5,6 +5,7 @@ use super::settings::{Renderer, Setting, settings};
 use super::skips::{skips, start_up};
 use super::times::{Times, in_turn, timed};
 use super::variants::{HeldOut, Variants, default_proxy, draw, held_out, tried};
+use crate::cli::exposure::keeps_own;
 use anyhow::Context;
 use calibrate::View;
 use indicatif::ProgressBar;
@@ -33,10 +34,9 @@ pub(super) fn measure(
         unmatched.forget_exposure();
         unmatched
     };
-    // As `render` has it: a scene's own gains are kept, and that it has none.
-    let own_gains = scene.folder.is_some() && scene.exposure_is_without(&without);
+    // As `render` has it.
     let ((), exposure) = timed(|| {
-        if !own_gains {
+        if !keeps_own(&scene, &without) {
             scene.match_exposure(&without);
         }
     });

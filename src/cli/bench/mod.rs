@@ -16,7 +16,7 @@ mod variants;
 use super::Usage;
 use super::captured::Opened;
 use super::exposure::ExposureArgs;
-use super::film::{calibration_of, files_of, scenes_of};
+use super::inputs::{files_of, files_of_places, scenes_of};
 use super::options::DeviceName;
 use super::output::{print, print_json, say, write_file};
 use super::session::progress;
@@ -250,7 +250,7 @@ fn inputs(given: &Given) -> anyhow::Result<Vec<Stamp>> {
         let (scene, _) = Scene::open(folder, false)?;
         files.extend(files_of(&scene));
         files.extend(scene.own_split());
-        files.extend(calibration_of(folder));
+        files.extend(files_of_places(folder));
     }
     let mut stamps = stamps(&files, in_unicode);
     stamps.dedup();

@@ -1,0 +1,121 @@
+//! The files that pictures and calibrations follow from.
+
+use calibrate::{colmap, formats, opencv};
+use lumigraph::scene::file::SceneFile;
+use lumigraph::scene::{Photo, Scene};
+use proxy::interior::Interior;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The files of a scene that decide what its pictures are.
+pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
+    let of_photo = |p: &Photo| {
+        let beside = [&p.ignore_mask, &p.object_matte, &p.silhouette, &p.depth_map];
+        let beside = beside.into_iter().flatten().cloned();
+        std::iter::once(p.path.clone())
+            .chain(beside)
+            .collect::<Vec<_>>()
+    };
+    let own = scene.folder.iter().flat_map(|folder| {
+        let proxy = scene.proxy.iter().map(|p| folder.join(&p.file));
+        proxy.chain([folder.join("scene.json")])
+    });
+    own.chain(scene.photos.iter().flat_map(of_photo)).collect()
+}
+
+/// The files that frames are made of, besides photos and what lies beside these: those that options name (of a
+/// folder, the COLMAP model in it), and the calibrations of scenes and captures.
+pub(super) fn files_behind(
+    named: impl IntoIterator<Item = PathBuf>,
+    scenes: &[PathBuf],
+) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    for path in named {
+        match colmap::find_model(&path) {
+            Ok(model) => all.extend(model_files(&model)),
+            Err(_) => all.push(path),
+        }
+    }
+    all.extend(scenes.iter().flat_map(|folder| files_of_places(folder)));
+    all
+}
+
+/// The folders of the scenes that show an interior's cells; `file` is the interior's.
+pub(super) fn scenes_of(file: &Path, interior: &Interior) -> Vec<PathBuf> {
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let folders = interior.cells.iter().filter_map(|c| c.content.scene());
+    let folders: BTreeSet<&str> = folders.collect();
+    folders.into_iter().map(|f| beside.join(f)).collect()
+}
+
+/// The files that say where the photos of a scene or a capture were taken, and of a capture, when. Some
+/// may not be there.
+pub(super) fn files_of_places(folder: &Path) -> Vec<PathBuf> {
+    let calibration = calibration_of(folder);
+    let of_calibration = calibration.iter().flat_map(|path| parts_of(path));
+    if Scene::is_scene(folder) {
+        return of_calibration.collect();
+    }
+    let mut files = vec![folder.join("times.csv")];
+    files.extend(of_calibration);
+    // Some calibrations leave it to a list which photos they are of; a model does not.
+    if !calibration.is_some_and(|path| path.is_dir()) {
+        let is_list = |file: &PathBuf| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            name.to_ascii_lowercase().contains("list")
+        };
+        files.extend(files_in(folder).into_iter().filter(is_list));
+    }
+    files
+}
+
+/// The model of a scene's folder, or the calibration of a capture.
+pub(super) fn calibration_of(folder: &Path) -> Option<PathBuf> {
+    let file = folder.join("scene.json");
+    let scene = std::fs::read(&file).ok();
+    match scene.and_then(|bytes| SceneFile::parse(&file, &bytes).ok()) {
+        Some(scene) => Some(folder.join(scene.model)),
+        None => calibration_in(folder),
+    }
+}
+
+/// The calibration that `import` reads of a capture's folder, or is told by a file: a COLMAP model's folder or a
+/// file.
+pub(super) fn calibration_in(path: &Path) -> Option<PathBuf> {
+    if path.is_file() {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let is_model = model_files(folder).iter().any(|file| file == path);
+        return Some(if is_model { folder } else { path }.to_owned());
+    }
+    if let Ok(model) = colmap::find_model(path) {
+        return Some(model);
+    }
+    let of_opencv = opencv::find_calibrations(path).into_iter().next();
+    of_opencv.or_else(|| {
+        let mut files = files_in(path).into_iter();
+        files.find(|file| formats::detect(file).is_some())
+    })
+}
+
+/// The files of a calibration: its own, or those of a COLMAP model in a folder.
+pub(super) fn parts_of(calibration: &Path) -> Vec<PathBuf> {
+    match calibration.is_dir() {
+        true => model_files(calibration),
+        false => vec![calibration.to_owned()],
+    }
+}
+
+/// The files of a COLMAP model, of either format: a binary model hides a text model beside it.
+pub(super) fn model_files(folder: &Path) -> Vec<PathBuf> {
+    let parts = ["cameras", "images", "points3D"].into_iter();
+    let files = parts.flat_map(|part| ["bin", "txt"].map(|end| format!("{part}.{end}")));
+    files.map(|name| folder.join(name)).collect()
+}
+
+/// A folder's files, by name.
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
+    files.sort();
+    files
+}
