@@ -48,6 +48,10 @@ const MIN_SIGNIFICANCE: f64 = 4.0;
 /// Points near to each other err alike. On real captures the gains of half the points
 /// differ from those of the other half as if this many points counted for one.
 const CLUSTER: f64 = 10.0;
+/// Half of the points may link a photo by a few false matches alone, which robust weights cut
+/// off, or nearly: then its log gain could be anything. The prior that log gains are within
+/// about one of zero holds it, and is nothing beside a single match.
+const HALF_PRECISION: f64 = 1.0;
 
 /// Estimates each photo's gains from what it and others show of the same points, whose
 /// places in the world are `points_in_world`.
@@ -55,7 +59,9 @@ const CLUSTER: f64 = 10.0;
 /// Whether they mean anything is asked of the points in two halves that lie in different
 /// places (`halves`). Each is fitted by itself. What the two agree on, Σ a·b / n over n
 /// photos, is the variance of the true gains; what they don't, Σ (a − b)² / 2n, that of
-/// either's errors, whatever those are due to: noise, highlights, false matches.
+/// either's errors, whatever those are due to: noise, highlights, false matches. Photos with
+/// few points in a half count for less in both (`shares`): one alone may be off by more than
+/// all gains differ.
 ///
 /// The fit to all points has the first as the prior variance of log gains around zero, so
 /// that a photo with few points keeps a gain near one.
@@ -89,7 +95,10 @@ pub fn estimate(
     let variance = evidence.spread * evidence.spread;
     let log_gains: Vec<Vec<f64>> = (0..3)
         .into_par_iter()
-        .map(|c| Channel::new(photo_count, &by_point, c, |_| true).fit(CLUSTER / variance))
+        .map(|c| {
+            let channel = Channel::new(photo_count, &by_point, c, |_| true);
+            channel.fit(CLUSTER / variance, &vec![1.0; photo_count])
+        })
         .collect();
     let gains = |i: usize| std::array::from_fn(|c| log_gains[c][i].exp());
     Exposure {
@@ -100,6 +109,7 @@ pub fn estimate(
 
 /// Two halves' gains of one channel, compared over the photos that both have.
 struct Agreement {
+    /// How many photos that count in full are worth as much.
     photos: f64,
     /// Σ a·b / n.
     covariance: f64,
@@ -111,23 +121,34 @@ impl Agreement {
     fn new(photo_count: usize, by_point: &[&Observation], c: usize, half: &[bool]) -> Option<Self> {
         let channel = |side: bool| Channel::new(photo_count, by_point, c, |p| half[p] == side);
         let (first, second) = (channel(false), channel(true));
-        let (a, b) = (first.fit(0.0), second.fit(0.0));
-        let (in_first, in_second) = (first.linked(), second.linked());
-        let in_both: Vec<usize> = (0..photo_count)
-            .filter(|&i| in_first[i] && in_second[i])
-            .collect();
-        if in_both.len() < 2 {
+        let shares = shares(&first.counts(), &second.counts());
+        if shares.iter().filter(|share| **share > 0.0).count() < 2 {
             return None;
         }
-        let photos = in_both.len() as f64;
-        let mean =
-            |value: &dyn Fn(usize) -> f64| in_both.iter().map(|&i| value(i)).sum::<f64>() / photos;
+        let fit = |half: &Channel| half.fit(HALF_PRECISION, &shares);
+        let (a, b) = (fit(&first), fit(&second));
+        let total: f64 = shares.iter().sum();
+        let mean = |value: &dyn Fn(usize) -> f64| {
+            (0..photo_count).map(|i| shares[i] * value(i)).sum::<f64>() / total
+        };
         Some(Self {
-            photos,
+            photos: total / mean(&|i| shares[i]),
             covariance: mean(&|i| a[i] * b[i]),
             error_variance: mean(&|i| 0.5 * (a[i] - b[i]).powi(2)),
         })
+        .filter(|found| found.covariance.is_finite() && found.error_variance.is_finite())
     }
+}
+
+/// What each photo counts for where the halves' gains are compared, by how many observations
+/// it has in each. Below [`CLUSTER`] it has not even one independent one: the fewer, n, the
+/// further it errs, a·b with a variance of 1/n², and it counts for the inverse. All others
+/// count alike, as their gains differ by more than they err.
+fn shares(in_first: &[usize], in_second: &[usize]) -> Vec<f64> {
+    let fewer = in_first.iter().zip(in_second).map(|(a, b)| *a.min(b));
+    fewer
+        .map(|n| (n as f64 / CLUSTER).min(1.0).powi(2))
+        .collect()
 }
 
 /// The channels together. Were all gains one, a·b would have the mean 0 and the variance

@@ -22,6 +22,8 @@ const TUKEY: f64 = 4.685;
 const HUBER: f64 = 1.345;
 const HUBER_STEPS: usize = 5;
 const TUKEY_STEPS: usize = 10;
+/// How much of equal values their differences may keep by rounding.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// No noise is assumed smaller than half a step of the stored values at white.
 const MIN_NOISE: f64 = 0.5 / 255.0;
 
@@ -62,11 +64,11 @@ impl Channel {
         channel
     }
 
-    /// Which photos have an observation here.
-    pub(super) fn linked(&self) -> Vec<bool> {
-        let mut linked = vec![false; self.photo_count];
-        self.photo.iter().for_each(|&photo| linked[photo] = true);
-        linked
+    /// How many observations each photo has here.
+    pub(super) fn counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.photo_count];
+        self.photo.iter().for_each(|&photo| counts[photo] += 1);
+        counts
     }
 
     /// For each photo the lowest photo that shared points link it to; itself if none.
@@ -93,18 +95,18 @@ impl Channel {
 
     /// Robust least squares over log gainᵢ and log albedoₚ: iteratively reweighted, by
     /// Huber's function and then by Tukey's. Returns log gains by photo, which have the
-    /// mean zero over each linked group.
+    /// mean zero over each linked group, where each photo counts for its share.
     ///
     /// Beside the observations, whose noise is estimated, stands the prior that a log gain
     /// has the mean zero and the variance 1 / `precision`.
-    pub(super) fn fit(&self, precision: f64) -> Vec<f64> {
+    pub(super) fn fit(&self, precision: f64, shares: &[f64]) -> Vec<f64> {
         let groups = self.groups();
         let mut log_gains = vec![0.0; self.photo_count];
         let mut weights = self.evidence.clone();
         let mut prior = 0.0;
         for step in 0..HUBER_STEPS + TUKEY_STEPS {
             self.solve(&weights, prior, &mut log_gains);
-            center(&groups, &mut log_gains);
+            center(&groups, shares, &mut log_gains);
             let residuals = self.residuals(&weights, &log_gains);
             let noise = self.noise(&residuals);
             prior = precision * noise * noise;
@@ -204,7 +206,10 @@ impl Channel {
         let mut z = precondition(&r);
         let mut p = z.clone();
         let mut rz = dot(&r, &z);
-        let enough = 1e-24 * dot(&b, &precondition(&b)).max(f64::MIN_POSITIVE);
+        // Where all values are alike b is nothing but their rounding.
+        let squares = self.log.iter().zip(weights).map(|(log, w)| w * log * log);
+        let rounding = ROUNDING * ROUNDING * squares.sum::<f64>();
+        let enough = (1e-24 * dot(&b, &precondition(&b))).max(rounding);
         for _ in 0..20 * count.max(10) {
             if !(rz > enough) {
                 break;
@@ -213,7 +218,15 @@ impl Channel {
             for i in 0..count {
                 product[i] += prior * p[i];
             }
-            let step = rz / dot(&p, &product);
+            // Along gains that nothing ties down, a whole group's or those beyond a link
+            // without weight, the sum of squares is flat: what curvature is left is rounding,
+            // and a step by it goes anywhere.
+            let curvature = dot(&p, &product);
+            let untied: f64 = diagonal.iter().zip(&p).map(|(d, p)| d * p * p).sum();
+            if !(curvature > ROUNDING * untied) {
+                break;
+            }
+            let step = rz / curvature;
             for i in 0..count {
                 x[i] += step * p[i];
                 r[i] -= step * product[i];
@@ -228,14 +241,18 @@ impl Channel {
     }
 }
 
-/// Only ratios of gains are seen: the geometric mean of each linked group is one.
-fn center(groups: &[usize], log_gains: &mut [f64]) {
+/// Only ratios of gains are seen: the geometric mean of each linked group is one, where
+/// each photo counts for its share. A group without shares stays as it is.
+fn center(groups: &[usize], shares: &[f64], log_gains: &mut [f64]) {
     let mut sums = vec![(0.0, 0.0); log_gains.len()];
-    for (value, &group) in log_gains.iter().zip(groups) {
-        sums[group].0 += value;
-        sums[group].1 += 1.0;
+    for ((value, share), &group) in log_gains.iter().zip(shares).zip(groups) {
+        sums[group].0 += share * value;
+        sums[group].1 += share;
     }
     for (value, &group) in log_gains.iter_mut().zip(groups) {
-        *value -= sums[group].0 / sums[group].1;
+        let (sum, total) = sums[group];
+        if total > 0.0 {
+            *value -= sum / total;
+        }
     }
 }

@@ -155,6 +155,107 @@ fn a_photo_without_points_keeps_gain_one() {
     assert!(gain.iter().all(|g| (g - 1.0).abs() < 0.35), "{gain:?}");
 }
 
+/// A set whose last photo sees only so many of the points, half of them as something else.
+fn with_a_weak_photo(points: usize, seed: u64) -> Set {
+    let mut set = set(20, 600, 0.17, 0.04);
+    let mut random = Random(seed);
+    set.observations.retain(|o| o.photo_idx < 19);
+    let mut unseen: Vec<usize> = (0..set.points.len()).collect();
+    for _ in 0..points {
+        let point_idx = unseen.swap_remove((random.next() * unseen.len() as f64) as usize);
+        let of_point = |o: &&Observation| o.point_idx == point_idx;
+        let other = set.observations.iter().find(of_point);
+        let gain_of = |o: &Observation, c: usize| set.gains[19][c] / set.gains[o.photo_idx][c];
+        let is_false = random.next() < 0.5;
+        let rgb = std::array::from_fn(|c| {
+            let seen = other.and_then(|o| Some(o.rgb[c]? * gain_of(o, c)));
+            let value = if is_false {
+                Some(20.0 + 200.0 * random.next())
+            } else {
+                seen
+            };
+            value.filter(|v| (12.0..=245.0).contains(v))
+        });
+        set.observations.push(Observation {
+            photo_idx: 19,
+            point_idx,
+            rgb,
+        });
+    }
+    set
+}
+
+#[test]
+fn a_photo_with_few_points_does_not_keep_the_others_from_being_matched() {
+    for (points, seed) in [2, 3, 4, 6, 10]
+        .into_iter()
+        .flat_map(|n| (0..8).map(move |s| (n, s)))
+    {
+        let set = with_a_weak_photo(points, seed);
+        let found = set.estimate();
+        let what = format!("{points} points, seed {seed}: {:?}", found.verdict);
+        assert!(matches!(found.verdict, Verdict::Matched(_)), "{what}");
+        for c in 0..3 {
+            let error = |i: usize| (found.gains[i][c] / set.gains[i][c]).ln();
+            let mean = (0..19).map(error).sum::<f64>() / 19.0;
+            let worst = (0..19).map(|i| (error(i) - mean).abs()).fold(0.0, f64::max);
+            assert!(worst < 0.01, "{what}, off by {worst}");
+        }
+    }
+}
+
+/// Points that each photo shows in one colour.
+fn flat(colors: &[[f64; 3]]) -> Set {
+    let mut random = Random(7);
+    let points: Vec<DVec3> = (0..60)
+        .map(|_| DVec3::new(random.next(), random.next(), random.next()))
+        .collect();
+    let observation = |photo_idx: usize, point_idx: usize| Observation {
+        photo_idx,
+        point_idx,
+        rgb: colors[photo_idx].map(Some),
+    };
+    let observations = (0..points.len())
+        .flat_map(|p| (0..colors.len()).map(move |i| observation(i, p)))
+        .collect();
+    Set {
+        gains: vec![[1.0; 3]; colors.len()],
+        points,
+        observations,
+    }
+}
+
+#[test]
+fn photos_all_of_one_colour_have_no_gains_to_measure() {
+    for value in 12..=245 {
+        for photos in 2..5 {
+            let set = flat(&vec![[f64::from(value); 3]; photos]);
+            let Verdict::NotMeasurable(evidence) = set.estimate().verdict else {
+                panic!("{photos} photos of {value} do not differ");
+            };
+            let sizes = [evidence.spread, evidence.error, evidence.significance];
+            assert!(
+                sizes.iter().all(|size| (0.0..1e-9).contains(size)),
+                "{photos} photos of {value}: {evidence:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_channel_alike_in_all_photos_does_not_hide_what_the_others_show() {
+    for blue in 12..=245 {
+        let blue = f64::from(blue);
+        let found = flat(&[[100.0, 100.0, blue], [143.0, 143.0, blue]]).estimate();
+        let what = format!("blue {blue}: {found:?}");
+        assert!(matches!(found.verdict, Verdict::Matched(_)), "{what}");
+        let [a, b] = [0, 1].map(|i| found.gains[i]);
+        for (c, ratio) in [1.43, 1.43, 1.0].into_iter().enumerate() {
+            assert!((b[c] / a[c] - ratio).abs() < 0.01, "{what}");
+        }
+    }
+}
+
 #[test]
 fn groups_that_share_no_point_are_matched_each_by_itself() {
     let mut set = set(12, 3000, 0.3, 0.0);

@@ -24,7 +24,7 @@ pub(super) fn places(
     let free = free_places(interior, contents, solid);
     let mut distances = vec![f64::INFINITY; free.len()];
     let mut chosen = Vec::new();
-    let mut choose = |i: usize, distances: &mut Vec<f64>| {
+    let choose = |i: usize, chosen: &mut Vec<DVec3>, distances: &mut Vec<f64>| {
         chosen.push(free[i].1);
         for (distance, (_, place)) in distances.iter_mut().zip(&free) {
             *distance = distance.min(place.distance(free[i].1));
@@ -37,15 +37,16 @@ pub(super) fn places(
         let off = |i: &usize| free[*i].1.distance(middle);
         let inside = (0..free.len()).filter(|i| free[*i].0.0 as usize == cell);
         if let Some(i) = inside.min_by(|a, b| off(a).total_cmp(&off(b))) {
-            choose(i, &mut distances);
+            choose(i, &mut chosen, &mut distances);
         }
     }
-    // 2. Wherever one is farthest from them all.
-    for _ in contents.bounds.len()..count.max(contents.bounds.len()) {
+    // 2. Wherever one is farthest from them all, as long as that is elsewhere.
+    while chosen.len() < count {
         let farthest = (0..free.len()).max_by(|a, b| distances[*a].total_cmp(&distances[*b]));
-        if let Some(i) = farthest.filter(|i| distances[*i] > 0.0) {
-            choose(i, &mut distances);
-        }
+        let Some(i) = farthest.filter(|i| distances[*i] > 0.0) else {
+            break;
+        };
+        choose(i, &mut chosen, &mut distances);
     }
     chosen.truncate(count);
     if chosen.is_empty() {
