@@ -16,6 +16,11 @@ use std::collections::BTreeMap;
 /// 60°, where a pinhole picture is stretched fourfold outwards.
 pub const MAX_SLOPE: f64 = 1.732_050_807_568_877_2;
 
+/// A picture's sides are at most so many times the photo's: where a calibration asks for more, it is wrong.
+const MOST_TIMES: f64 = 8.0;
+/// And at most so many pixels, as a JPEG's.
+const LONGEST_SIDE: f64 = 65_535.0;
+
 /// Places on each side of the photo that stand for its border.
 const BORDER_SAMPLES: u32 = 256;
 
@@ -42,6 +47,28 @@ pub enum UndistortError {
          its distortion"
     )]
     Nothing(u32),
+    /// The picture would be larger than memory or files hold.
+    #[error(
+        "camera {camera_id} is {} with the parameters {}: without this distortion its photos of {} × {} \
+         pixels would become {width} × {height}, expected at most 8 times the sides and 65,535 pixels; \
+         check its focal length and its distortion, or calibrate again with fewer coefficients",
+        camera.model.name(), list(&camera.params), camera.width, camera.height
+    )]
+    TooLarge {
+        /// The camera's id.
+        camera_id: u32,
+        /// The camera.
+        camera: Camera,
+        /// What the picture's width would be, in pixels.
+        width: f64,
+        /// And its height.
+        height: f64,
+    },
+}
+
+fn list(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    numbers.join(", ")
 }
 
 /// How the photos of one camera become a pinhole's.
@@ -66,7 +93,8 @@ impl Undistortion {
     /// The pinhole camera for a lens.
     ///
     /// # Errors
-    /// A camera without a lens; one that looks all round; one that sees nothing.
+    /// A camera without a lens; one that looks all round; one that sees nothing; one whose
+    /// distortion makes more pixels of a photo than can be meant.
     pub fn new(id: CameraId, camera: &Camera) -> Result<Self, UndistortError> {
         let lens = camera.lens().map_err(|source| UndistortError::Camera {
             camera_id: id.0,
@@ -99,8 +127,17 @@ impl Undistortion {
         let extent = (high - low) * focal;
         // A rounding error below a whole number is no reason to lose a row.
         let size = (extent + 1e-6).floor();
-        if !(size.min_element() >= 1.0 && size.max_element() <= f64::from(u32::MAX)) {
+        if !size.cmpge(DVec2::ONE).all() {
             return Err(UndistortError::Nothing(id.0));
+        }
+        let most = (MOST_TIMES * photo_size).min(DVec2::splat(LONGEST_SIDE));
+        if !size.cmple(most).all() {
+            return Err(UndistortError::TooLarge {
+                camera_id: id.0,
+                camera: camera.clone(),
+                width: size.x,
+                height: size.y,
+            });
         }
         let principal = -low * focal - 0.5 * (extent - size);
         whole.pinhole = Lens::pinhole(focal, principal);

@@ -277,7 +277,15 @@ mod scripts {
         };
         let error = extract();
         assert!(error.contains("something other than"), "{error}");
-        fs::write(photos.join("frames.txt"), "# of another video\n").unwrap();
+        // Nor is a list that somebody else made, or one beside other files, a licence.
+        let first = "# Frames(2) of \"b.mp4\", 5 bytes of 6 ns\n";
+        for list in ["# of another video\n0 earlier.jpg\n", first] {
+            fs::write(photos.join("frames.txt"), list).unwrap();
+            let error = extract();
+            assert!(error.contains("something other than"), "{error}");
+            assert!(photos.join("earlier.jpg").is_file());
+        }
+        fs::write(photos.join("frames.txt"), format!("{first}0 earlier.jpg\n")).unwrap();
         let error = extract();
         assert!(error.contains("disk full"), "{error}");
         assert!(photos.join("earlier.jpg").is_file());

@@ -1,5 +1,5 @@
-//! Any model with any parameters: a camera is refused, or what its lens says is finite,
-//! and pixels that it takes for a ray are where that ray falls.
+//! Any model with any parameters: a camera is refused, or the pixels and rays that its lens
+//! gives are finite, and no ray is without a direction.
 #![no_main]
 use calibrate::{Camera, ModelKind, Pixel};
 use glam::DVec3;

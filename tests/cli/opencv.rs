@@ -383,8 +383,8 @@ fn what_cannot_be_imported_is_said() {
     let tilted = format!("{tilted}{poses}images: [ 0001.png, 0002.png ]\n");
     assert_eq!(
         error(&tilted),
-        "camera of c.yml, camera 1: parameter tauX of OPENCV_TILTED is 2; it must be an angle in \
-         radians between −π/2 and π/2"
+        "c.yml, line 10: Poly: parameter tauX of OPENCV_TILTED is 2; it must be an angle in \
+         radians between −π/2 and π/2; calibrate again"
     );
     let other_size = format!("{CAMERA}{poses}images: [ 0001.png, 0002.png ]\n");
     assert!(

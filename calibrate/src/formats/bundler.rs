@@ -11,7 +11,7 @@
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
-use super::words::Words;
+use super::words::{WORD, Words, excerpt};
 use crate::{Camera, ImageId, ModelKind, Pixel, Point3DId, Reconstruction};
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ pub fn parse_bundler(
     let mut words = Words::new(path, build::text(path, bytes)?);
     let header = words.line().unwrap_or_default();
     if !header.starts_with(HEADER) {
-        let problem = format!("found {header:.40?}, expected \"{HEADER}3\"");
+        let problem = format!("found {}, expected \"{HEADER}3\"", excerpt(header, WORD));
         return Err(words.error("header", Problem::broken(problem)));
     }
     let camera_count: usize = words.parse("header", "the number of cameras")?;
@@ -72,7 +72,8 @@ pub fn parse_bundler(
         read_point(&mut words, &mut builder, id, camera_count)?;
     }
     if let Some(word) = words.next() {
-        let problem = format!("found {word:?}, expected the end after {point_count} points");
+        let found = excerpt(word, WORD);
+        let problem = format!("found {found}, expected the end after {point_count} points");
         return Err(words.error("end", Problem::broken(problem)));
     }
     builder.finish("cameras")

@@ -14,7 +14,7 @@
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
-use super::words::Words;
+use super::words::{LINE, WORD, Words, excerpt};
 use crate::{Camera, Distortion, ImageId, Lens, Pixel, Point3DId, Reconstruction};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::path::Path;
@@ -64,7 +64,7 @@ fn fixed_calibration(header: &str) -> Result<Option<(DVec2, DVec2)>, Problem> {
     let mut words = header.split_whitespace();
     if words.next() != Some("NVM_V3") {
         return Err(Problem::new(
-            format!("found {header:.40?}, expected \"NVM_V3\""),
+            format!("found {}, expected \"NVM_V3\"", excerpt(header, WORD)),
             "save the model again with a VisualSFM of 2011 or later",
         ));
     }
@@ -79,7 +79,8 @@ fn fixed_calibration(header: &str) -> Result<Option<(DVec2, DVec2)>, Problem> {
     match numbers[..] {
         [fx, cx, fy, cy] if rest.len() == 5 => Ok(Some((DVec2::new(fx, fy), DVec2::new(cx, cy)))),
         _ => Err(Problem::broken(format!(
-            "found {header:?}, expected \"NVM_V3 FixedK fx cx fy cy\""
+            "found {}, expected \"NVM_V3 FixedK fx cx fy cy\"",
+            excerpt(header, LINE)
         ))),
     }
 }
@@ -141,7 +142,8 @@ fn split(line: &str) -> Result<(String, [f64; 9]), Problem> {
     }
     if words.len() != 11 {
         return Err(Problem::broken(format!(
-            "found {line:.80?}, expected a name and ten numbers"
+            "found {}, expected a name and ten numbers",
+            excerpt(line, LINE)
         )));
     }
     let name = build::name(&words[10].replace('"', " "))?;
@@ -151,7 +153,10 @@ fn split(line: &str) -> Result<(String, [f64; 9]), Problem> {
             .parse()
             .ok()
             .filter(|n: &f64| n.is_finite())
-            .ok_or_else(|| Problem::broken(format!("found {word:?}, expected a finite number")))?;
+            .ok_or_else(|| {
+                let found = excerpt(word, WORD);
+                Problem::broken(format!("found {found}, expected a finite number"))
+            })?;
     }
     Ok((name, numbers))
 }

@@ -4,6 +4,20 @@ use super::error::{FormatError, Problem};
 use std::path::Path;
 use std::str::FromStr;
 
+/// How many characters of a word messages show: what is no number may be a whole file.
+pub(super) const WORD: usize = 40;
+/// And of a line.
+pub(super) const LINE: usize = 80;
+
+/// The beginning of a text in quotation marks, for a message.
+pub(super) fn excerpt(text: &str, most: usize) -> String {
+    let mut shown: String = text.chars().take(most).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    format!("{shown:?}")
+}
+
 /// The words that have not been read yet.
 pub(super) struct Words<'a> {
     path: &'a Path,
@@ -22,7 +36,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The rest of the line begun, or else the next line; `None` after the last.
+    /// The next line, whatever is left of the one begun; `None` after the last.
     pub(super) fn line(&mut self) -> Option<&'a str> {
         let (line_idx, line) = self.lines.next()?;
         self.line_idx = line_idx;
@@ -30,7 +44,7 @@ impl<'a> Words<'a> {
         Some(line)
     }
 
-    /// The next word of the file.
+    /// The next word of the file, on whichever line.
     pub(super) fn next(&mut self) -> Option<&'a str> {
         loop {
             if let Some(word) = self.words.next() {
@@ -62,7 +76,7 @@ impl<'a> Words<'a> {
         word.parse().map_err(|_| {
             self.error(
                 of,
-                Problem::broken(format!("found {word:?}, expected {what}")),
+                Problem::broken(format!("found {}, expected {what}", excerpt(word, WORD))),
             )
         })
     }

@@ -92,17 +92,28 @@ fn rational_radius(r: f64, k: &[f64; 6]) -> (f64, f64) {
     (point.x, jacobian.x_axis.x)
 }
 
-/// The radius up to which [`rational_prism`] is one to one.
+/// The radius up to which [`rational_prism`] is one to one; infinite where it is so throughout.
 ///
 /// The radial terms' Jacobian is symmetric, with the eigenvalues f/r and f'; the others are
 /// bounded by [`sideways_bound`]. Where the sum is positive definite on a disc, which is
 /// convex, the mapping is one to one there.
 pub(super) fn limit(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> f64 {
-    // Radius 50 is 88.9° off the axis.
-    scan(50.0, 20_000, f64::INFINITY, |r| {
+    let grows = |r: f64| {
         let (value, slope) = rational_radius(r, k);
         slope.min(value / r) > sideways_bound(r, p, s) * r
-    })
+    };
+    // 1. To 88.9° off the axis, in small steps.
+    const NEAR: f64 = 50.0;
+    let near = scan(NEAR, 20_000, f64::INFINITY, grows);
+    if near.is_finite() {
+        return near;
+    }
+    // 2. To within a millionth of a degree of 90°, in steps of 1 %: small coefficients fold the image
+    // there, and what is beyond would come back into its middle.
+    let radius = |steps: f64| NEAR * (0.01 * steps).exp();
+    let far = scan(1450.0, 1450, f64::INFINITY, |steps| grows(radius(steps)));
+    // Infinity stays what it is.
+    radius(far)
 }
 
 /// The point that [`rational_prism`] maps to a distorted one.

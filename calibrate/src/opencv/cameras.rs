@@ -4,9 +4,10 @@ use super::OpenCvError;
 use super::coefficients::{coefficients_for, is_fisheye};
 use super::flat::{of_scalars, size};
 use super::storage::{Matrix, Value};
-use super::values::{Named, Role, Values, plain, role};
-use crate::{Distortion, Lens};
+use super::values::{Named, Role, Values, plain};
+use crate::{Camera, CameraError, Distortion, Lens};
 use glam::DVec2;
+use std::collections::HashMap;
 
 /// Which of a file's matrices to use, where its names leave that open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -130,21 +131,25 @@ fn of_known_names(
     notes: &mut Vec<String>,
 ) -> Result<Vec<OpenCvCamera>, OpenCvError> {
     let mut found: Vec<(String, &Named<'_>, Matrix)> = Vec::new();
+    let mut by_group: HashMap<String, usize> = HashMap::new();
     for named in &values.all {
-        let Some((Role::CameraMatrix, side)) = role(named.last()) else {
+        let Some((Role::CameraMatrix, side)) = &named.role else {
             continue;
         };
         let Some(matrix) = named.node.matrix() else {
             continue;
         };
         // Short names are often something else; a long one is meant.
-        let certain = plain(named.last()).len() > 4;
+        let certain = named.plain().len() > 4;
         if !certain && (matrix.rows, matrix.cols) != (3, 3) {
             continue;
         }
         let group = format!("{}{side}", plain(named.prefix()));
-        match found.iter().find(|(other, ..)| *other == group) {
-            None => found.push((group, named, matrix)),
+        match by_group.get(&group).map(|&i| &found[i]) {
+            None => {
+                by_group.insert(group.clone(), found.len());
+                found.push((group, named, matrix));
+            }
             Some((_, _, same)) if same.data == matrix.data => {}
             Some((_, earlier, _)) => {
                 let problem = format!(
@@ -204,9 +209,18 @@ fn of_matrix(
         );
         return Err(values.refuse(named, problem));
     }
+    let lens = Lens::new(k.focal, k.principal + 0.5, distortion);
+    // What a model cannot have, such as a sensor tilted by a right angle. The size is not known yet.
+    if let Err(error) = Camera::of(&lens, 1, 1).lens() {
+        let wrong = match (&error, &coefficients) {
+            (CameraError::Range { .. }, Some((of, _))) => of,
+            _ => named,
+        };
+        return Err(values.refuse(wrong, format!("{error}; calibrate again")));
+    }
     Ok(OpenCvCamera {
         name: named.path.clone(),
-        lens: Lens::new(k.focal, k.principal + 0.5, distortion),
+        lens,
         size: size(values, named.prefix())?,
     })
 }

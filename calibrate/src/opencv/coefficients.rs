@@ -2,7 +2,7 @@
 
 use super::OpenCvError;
 use super::cameras::{Keys, asked, model_name};
-use super::values::{Named, Role, Values, plain, role};
+use super::values::{Named, Values, plain};
 
 /// The distortion coefficients that belong to a camera matrix.
 pub(super) fn coefficients_for<'a>(
@@ -16,12 +16,8 @@ pub(super) fn coefficients_for<'a>(
         Some("none") => return Ok(None),
         Some(key) => Some(asked(values, key)?),
         None => {
-            let side = role(camera.last()).map_or(String::new(), |(_, side)| side);
-            values.all.iter().find(|named| {
-                named.prefix() == camera.prefix()
-                    && role(named.last()) == Some((Role::Distortion, side.clone()))
-                    && named.node.matrix().is_some()
-            })
+            let side = camera.role.as_ref().map_or("", |(_, side)| side);
+            values.distortion(camera.prefix(), side)
         }
     };
     if let Some(named) = named
@@ -41,17 +37,7 @@ pub(super) fn coefficients_for<'a>(
         return Ok(Some((named.clone(), matrix.data)));
     }
     // 2. There may be some under a name that nobody knows.
-    let maybe = |named: &&Named<'_>| {
-        let matrix = named.node.matrix();
-        role(named.last()).is_none()
-            && !plain(named.last()).contains("roi")
-            && matrix.is_some_and(|m| {
-                m.channels == 1
-                    && m.rows.min(m.cols) == 1
-                    && [4, 5, 8, 12, 14].contains(&m.data.len())
-            })
-    };
-    if let Some(named) = values.all.iter().find(maybe) {
+    if let Some(named) = values.unknown_coefficients() {
         let problem = format!(
             "these may be the distortion coefficients of {}, for which none have a name known \
              here; choose with --distortion KEY, or say --distortion none",

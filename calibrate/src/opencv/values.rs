@@ -2,12 +2,20 @@
 
 use super::OpenCvError;
 use super::storage::{Entries, FileStorage, Node, Value};
+use std::cell::OnceCell;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+
+/// Values whose paths are longer are left out: no calibration has any, and a long name around
+/// many values would fill memory.
+const LONGEST_PATH: usize = 200;
 
 /// Every named value of a file, those within maps too.
 pub(super) struct Values<'a> {
     pub(super) file: PathBuf,
     pub(super) all: Vec<Named<'a>>,
+    index: Index,
+    unknown_coefficients: OnceCell<Option<usize>>,
 }
 
 /// A value and what it is called.
@@ -16,6 +24,71 @@ pub(super) struct Named<'a> {
     /// The names of the maps around it and its own, dots between them.
     pub(super) path: String,
     pub(super) node: &'a Node,
+    /// What its own name says that it is for, and of which side: see [`role`].
+    pub(super) role: Option<(Role, String)>,
+    plain_path: String,
+    /// Where its own name begins in that.
+    plain_own: usize,
+}
+
+/// Where in [`Values::all`] the first value of each name is: files may hold thousands of cameras,
+/// and all values are not gone through for each.
+#[derive(Default)]
+struct Index {
+    by_path: HashMap<String, usize>,
+    by_plain_path: HashMap<String, usize>,
+    by_plain_name: HashMap<String, usize>,
+    /// By prefix and plain name.
+    in_map: HashMap<String, usize>,
+    /// By plain path and by plain name: those that lie in no camera's map.
+    of_no_camera: HashMap<String, usize>,
+    /// Matrices, by prefix and side.
+    distortion: HashMap<String, usize>,
+    /// The prefixes of cameras and of the maps around them.
+    of_cameras: HashSet<String>,
+}
+
+impl Index {
+    fn of(all: &[Named<'_>]) -> Self {
+        let mut index = Self::default();
+        for named in all.iter().filter(|named| named.is_camera()) {
+            for map in around(named.prefix()) {
+                if !index.of_cameras.insert(map.to_owned()) {
+                    break;
+                }
+            }
+        }
+        for (i, named) in all.iter().enumerate() {
+            let (path, name, prefix) = (&named.plain_path, named.plain(), named.prefix());
+            let first = |map: &mut HashMap<String, usize>, key: &str| {
+                if !map.contains_key(key) {
+                    map.insert(key.to_owned(), i);
+                }
+            };
+            first(&mut index.by_path, &named.path);
+            first(&mut index.by_plain_path, path);
+            first(&mut index.by_plain_name, name);
+            first(&mut index.in_map, &format!("{prefix}{name}"));
+            if !index.of_cameras.contains(prefix) {
+                first(&mut index.of_no_camera, path);
+                first(&mut index.of_no_camera, name);
+            }
+            if let Some((Role::Distortion, side)) = &named.role
+                && named.node.matrix().is_some()
+            {
+                first(&mut index.distortion, &format!("{prefix}{side}"));
+            }
+        }
+        index
+    }
+}
+
+/// The prefix of a map and those of the maps around it, outwards.
+pub(super) fn around(prefix: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(prefix), |&inner| {
+        let name = inner.strip_suffix('.')?;
+        Some(&inner[..name.rfind('.').map_or(0, |at| at + 1)])
+    })
 }
 
 impl<'a> Values<'a> {
@@ -24,55 +97,87 @@ impl<'a> Values<'a> {
         collect("", &storage.entries, &mut all);
         Self {
             file: file.to_owned(),
+            index: Index::of(&all),
+            unknown_coefficients: OnceCell::new(),
             all,
         }
     }
 
     /// The first value with one of the names, written in whatever way.
     pub(super) fn find(&self, names: &[&str]) -> Option<&Named<'a>> {
-        let wanted = |named: &&Named<'a>| names.contains(&plain(&named.path).as_str());
-        self.all.iter().find(wanted)
+        self.first(&self.index.by_plain_path, names)
     }
 
     /// The same among the innermost names, whatever the maps around them are called.
     pub(super) fn find_within(&self, names: &[&str]) -> Option<&Named<'a>> {
-        let wanted = |named: &&Named<'a>| names.contains(&plain(named.last()).as_str());
-        self.find(names).or_else(|| self.all.iter().find(wanted))
+        let within = || self.first(&self.index.by_plain_name, names);
+        self.find(names).or_else(within)
     }
 
     /// The same for a camera whose matrix has a prefix: from its own map outwards, then in others, but not
     /// in those of other cameras.
     pub(super) fn find_for(&self, prefix: &str, names: &[&str]) -> Option<&Named<'a>> {
-        let mut around = std::iter::successors(Some(prefix), |&inner| {
-            let name = inner.strip_suffix('.')?;
-            Some(&inner[..name.rfind('.').map_or(0, |at| at + 1)])
-        });
-        let found = around.find_map(|map| self.called(names).find(|named| named.prefix() == map));
-        let elsewhere = || {
-            let mut called = self.called(names);
-            called.find(|named| !self.is_of_another(prefix, named))
-        };
+        let found = around(prefix).find_map(|map| self.find_in(map, names));
+        let elsewhere = || self.first(&self.index.of_no_camera, names);
         found.or_else(|| self.find(names)).or_else(elsewhere)
+    }
+
+    /// The first value in the map of a prefix, but not in those within it, that is called so with the
+    /// names of the maps around it or without.
+    pub(super) fn find_in(&self, prefix: &str, names: &[&str]) -> Option<&Named<'a>> {
+        let map = plain(prefix);
+        let own = names.iter().copied();
+        let own = own.chain(names.iter().filter_map(|name| name.strip_prefix(&*map)));
+        let keys: Vec<String> = own.map(|name| format!("{prefix}{name}")).collect();
+        let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+        self.first(&self.index.in_map, &keys)
+    }
+
+    fn first(&self, index: &HashMap<String, usize>, keys: &[&str]) -> Option<&Named<'a>> {
+        let first = keys.iter().filter_map(|&key| index.get(key)).min();
+        first.map(|&i| &self.all[i])
     }
 
     /// All values with one of the names, with those of the maps around them or without.
     pub(super) fn called(&self, names: &[&str]) -> impl Iterator<Item = &Named<'a>> {
         self.all.iter().filter(move |named| {
-            let [path, last] = [named.path.as_str(), named.last()].map(plain);
-            names.contains(&path.as_str()) || names.contains(&last.as_str())
+            names.contains(&named.plain_path.as_str()) || names.contains(&named.plain())
         })
     }
 
     /// Whether a value lies in the map of another camera than that whose matrix has a prefix.
     pub(super) fn is_of_another(&self, prefix: &str, named: &Named<'_>) -> bool {
-        let within = |prefix: &str| prefix.starts_with(named.prefix());
-        let mut all = self.all.iter();
-        !within(prefix) && all.any(|other| within(other.prefix()) && other.is_camera())
+        !prefix.starts_with(named.prefix()) && self.index.of_cameras.contains(named.prefix())
     }
 
     /// A value by its exact path.
     pub(super) fn exactly(&self, path: &str) -> Option<&Named<'a>> {
-        self.all.iter().find(|named| named.path == path)
+        self.first(&self.index.by_path, &[path])
+    }
+
+    /// The first matrix in the map of a prefix that is called distortion coefficients of a side.
+    pub(super) fn distortion(&self, prefix: &str, side: &str) -> Option<&Named<'a>> {
+        self.first(&self.index.distortion, &[&format!("{prefix}{side}")])
+    }
+
+    /// The first value that may be distortion coefficients by its shape, and by a name that says
+    /// nothing.
+    pub(super) fn unknown_coefficients(&self) -> Option<&Named<'a>> {
+        let maybe = |named: &Named<'_>| {
+            let matrix = || named.node.matrix();
+            named.role.is_none()
+                && !named.plain().contains("roi")
+                && matrix().is_some_and(|m| {
+                    m.channels == 1
+                        && m.rows.min(m.cols) == 1
+                        && [4, 5, 8, 12, 14].contains(&m.data.len())
+                })
+        };
+        let first = self.unknown_coefficients.get_or_init(|| {
+            let mut all = self.all.iter();
+            all.position(maybe)
+        });
+        first.map(|i| &self.all[i])
     }
 
     /// What the matrices are called and their shapes, for people.
@@ -95,7 +200,22 @@ impl<'a> Values<'a> {
     }
 }
 
-impl Named<'_> {
+impl<'a> Named<'a> {
+    fn new(prefix: &str, name: &str, node: &'a Node) -> Self {
+        let path = format!("{prefix}{name}");
+        let mut named = Self {
+            plain_path: plain(&path),
+            path,
+            node,
+            role: None,
+            plain_own: 0,
+        };
+        // A name may have dots of its own.
+        named.plain_own = plain(named.prefix()).len();
+        named.role = role(named.last());
+        named
+    }
+
     /// Its own name.
     pub(super) fn last(&self) -> &str {
         self.path.rsplit('.').next().unwrap_or_default()
@@ -106,12 +226,17 @@ impl Named<'_> {
         &self.path[..self.path.len() - self.last().len()]
     }
 
+    /// Its own name as [`plain`] has it.
+    pub(super) fn plain(&self) -> &str {
+        &self.plain_path[self.plain_own..]
+    }
+
     /// A camera matrix, or the first number of a camera that is written as numbers.
     fn is_camera(&self) -> bool {
-        if ["fx", "mu"].contains(&plain(self.last()).as_str()) {
+        if ["fx", "mu"].contains(&self.plain()) {
             return self.node.number().is_some();
         }
-        matches!(role(self.last()), Some((Role::CameraMatrix, _))) && self.node.matrix().is_some()
+        matches!(self.role, Some((Role::CameraMatrix, _))) && self.node.matrix().is_some()
     }
 }
 
@@ -123,11 +248,13 @@ pub(super) fn plain(name: &str) -> String {
 
 fn collect<'a>(prefix: &str, entries: &'a Entries, all: &mut Vec<Named<'a>>) {
     for (key, node) in entries {
-        let path = format!("{prefix}{key}");
-        if let Value::Map(inner) = &node.value {
-            collect(&format!("{path}."), inner, all);
+        if prefix.len() + key.len() > LONGEST_PATH {
+            continue;
         }
-        all.push(Named { path, node });
+        if let Value::Map(inner) = &node.value {
+            collect(&format!("{prefix}{key}."), inner, all);
+        }
+        all.push(Named::new(prefix, key, node));
     }
 }
 
@@ -183,7 +310,7 @@ const SIDES: [&str; 12] = [
 
 /// What a name stands for, and which camera it belongs to: `M1` is camera `1`'s matrix.
 /// The long names are certain; `K1` may be anything.
-pub(super) fn role(name: &str) -> Option<(Role, String)> {
+fn role(name: &str) -> Option<(Role, String)> {
     let name = plain(name);
     for (role, names) in [
         (Role::CameraMatrix, CAMERA_MATRIX),

@@ -428,6 +428,35 @@ fn nothing_is_seen_behind_or_beyond_the_fold() {
     }
 }
 
+/// Such a fold lies where next to nothing is seen, but what is beyond it would come back into the
+/// image's middle.
+#[test]
+fn nothing_is_seen_beyond_a_fold_close_to_90_degrees() {
+    let lens = |k1: f64, p1: f64| {
+        let distortion = Distortion::Rational {
+            k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0],
+            p: [p1, 0.0],
+        };
+        Lens::new(DVec2::splat(1000.0), DVec2::ZERO, distortion)
+    };
+    // r(1 − k·r²) turns back at r = 1/√(3k); at 1/√k it is back at 0.
+    for k in [1e-4_f64, 1e-6, 1e-12] {
+        let barrel = lens(-k, 0.0);
+        let fold = 1.0 / (3.0 * k).sqrt();
+        assert!((barrel.limit() / fold - 1.0).abs() < 1e-9, "{k}");
+        assert!(barrel.project(DVec3::new(0.99 * fold, 0.0, 1.0)).is_some());
+        assert_eq!(barrel.project(DVec3::new(1.01 * fold, 0.0, 1.0)), None);
+        let middle = DVec3::new(1.0 / k.sqrt(), 0.0, 1.0);
+        assert_eq!(barrel.project(middle), None, "{k}");
+    }
+    // 6·p·r = 1.
+    let tangential = lens(0.0, 1e-6).limit();
+    assert!((tangential * 6e-6 - 1.0).abs() < 1e-9, "{tangential}");
+    // Nothing folds where the radius grows throughout.
+    assert!(lens(1e-4, 0.0).limit().is_infinite());
+    assert!(lens(1e-4, 1e-6).limit().is_infinite());
+}
+
 /// Newton's method crept away from the pole that ends this lens' range in steps too small
 /// to notice, and its starting point was taken for the answer.
 #[test]

@@ -263,6 +263,17 @@ fn a_fisheye_is_known_by_what_the_file_says() {
 }
 
 #[test]
+fn a_fisheye_of_camodocals_has_its_terms_among_its_projection_parameters() {
+    let text = "model_type: KANNALA_BRANDT\nprojection_parameters:\n   k2: 0.1\n   k3: 0.02\n   \
+                k4: 0.003\n   k5: 0.0004\n   mu: 500\n   mv: 510\n   u0: 319.5\n   v0: 239.5\n";
+    let lens = read(text).unwrap().cameras[0].lens;
+    let k = [0.1, 0.02, 0.003, 0.0004];
+    assert_eq!(lens.distortion(), Distortion::Fisheye { k });
+    assert_eq!(lens.focal, DVec2::new(500.0, 510.0));
+    assert_eq!(lens.principal, DVec2::new(320.0, 240.0));
+}
+
+#[test]
 fn every_camera_of_kalibrs_chain_has_its_own_model() {
     let chain = |models: [&str; 2]| -> String {
         let cameras = models.iter().enumerate().map(|(i, model)| {
@@ -315,6 +326,67 @@ fn every_camera_of_kalibrs_chain_has_its_own_model() {
         ..Keys::default()
     };
     assert_eq!(names(&omni, &first), ["OPENCV_FISHEYE"]);
+}
+
+/// Names and what they mean are looked up, not searched for anew for each camera.
+#[test]
+fn thousands_of_cameras_take_time_by_their_number() {
+    let count = 10_000;
+    let size = "image_size: [640, 480]\n";
+    let in_maps = (0..count).map(|i| {
+        format!("c{i}:\n  camera_matrix: [[500, 0, 1], [0, 500, 1], [0, 0, 1]]\n  gain: 1\n")
+    });
+    let side_by_side =
+        (0..count).map(|i| format!("camera_matrix{i}: [[500, 0, 1], [0, 500, 1], [0, 0, 1]]\n"));
+    for text in [
+        in_maps.collect::<String>() + "last:\n  " + size,
+        side_by_side.collect::<String>() + size,
+    ] {
+        let started = cpu_time::ThreadTime::now();
+        let cameras = read(&text).unwrap().cameras;
+        let took = started.elapsed();
+        assert_eq!(cameras.len(), count);
+        assert!(cameras.iter().all(|c| c.size == Some((640, 480))));
+        assert!(took.as_secs_f64() < 10.0, "{took:?}");
+    }
+}
+
+/// Else one long name around many values, repeated in the path of each, would fill memory.
+#[test]
+fn values_of_endless_names_are_left_out() {
+    let matrix = "[[500, 0, 1], [0, 500, 1], [0, 0, 1]]";
+    let within = |name: &str| format!("{name}:\n  camera_matrix: {matrix}\n");
+    assert!(read(&within(&"a".repeat(100))).is_ok());
+    assert!(error(&within(&"a".repeat(1000))).contains("no camera matrix"));
+}
+
+#[test]
+fn the_size_of_something_else_is_not_the_images() {
+    let camera = matrix("K", 3, 3, K);
+    let size = |text: &str| read(text).unwrap().cameras[0].size;
+    for (beside, expected) in [
+        ("board: { size: [9, 6] }", None),
+        ("display: { resolution: [1920, 1080] }", None),
+        ("size: [640, 480]", Some((640, 480))),
+        ("size: [9, 6]\nimage_size: [640, 480]", Some((640, 480))),
+        (
+            "board: { size: [9, 6] }\nresolution: [640, 480]",
+            Some((640, 480)),
+        ),
+        // Those that say what they are of may be anywhere.
+        ("info: { image_size: [640, 480] }", Some((640, 480))),
+        ("image: { size: [640, 480] }", Some((640, 480))),
+    ] {
+        assert_eq!(size(&format!("{beside}\n{camera}")), expected, "{beside}");
+        assert_eq!(size(&format!("{camera}{beside}\n")), expected, "{beside}");
+    }
+    let k = "camera_matrix: [[500, 0, 1], [0, 500, 1], [0, 0, 1]]";
+    let rig = format!(
+        "size: [9, 6]\nrig:\n  resolution: [800, 600]\n  a:\n    size: [640, 480]\n    {k}\n  \
+         b:\n    {k}\n"
+    );
+    let sizes: Vec<_> = read(&rig).unwrap().cameras.iter().map(|c| c.size).collect();
+    assert_eq!(sizes, [Some((640, 480)), Some((800, 600))]);
 }
 
 #[test]
@@ -456,6 +528,33 @@ fn bad_values_are_named() {
         (
             matrix("K", 3, 3, K) + &matrix("D", 1, 4, "0, .Inf, 0, 0"),
             ", line 6: D: the distortion holds inf, expected finite numbers",
+        ),
+        (
+            matrix("K", 3, 3, K) + &matrix("D", 1, 14, "0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0"),
+            ", line 6: D: parameter tauX of OPENCV_TILTED is 2; it must be an angle in radians \
+             between −π/2 and π/2; calibrate again",
+        ),
+        (
+            "Camera.fx: 500\nCamera.fy: .Nan\nCamera.cx: 320\nCamera.cy: 240\n".to_owned(),
+            ", line 1: Camera.fx: the focal lengths are 500 and NaN, expected positive numbers; \
+             calibrate again",
+        ),
+        (
+            "Camera.fx: 500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: .Nan\n".to_owned(),
+            ", line 4: Camera.cy: the principal point is NaN, expected a finite number; calibrate \
+             again",
+        ),
+        (
+            "Camera.fx: 500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\nCamera.p2: -.Inf\n"
+                .to_owned(),
+            ", line 5: Camera.p2: the distortion is -inf, expected a finite number; calibrate again",
+        ),
+        (
+            "model_type: KANNALA_BRANDT\nprojection_parameters:\n   k2: 0.1\n   k3: .Inf\n   \
+             mu: 500\n   mv: 500\n   u0: 320\n   v0: 240\n"
+                .to_owned(),
+            ", line 4: projection_parameters.k3: the distortion is inf, expected a finite number; \
+             calibrate again",
         ),
         (
             good.clone() + &matrix("extrinsic_parameters", 6, 2, "1,2,3,4,5,6,7,8,9,10,11,12"),

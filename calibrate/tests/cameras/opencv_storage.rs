@@ -282,3 +282,45 @@ fn hostile_files_are_refused() {
     let error = parse_bytes(&packed).unwrap_err().to_string();
     assert!(error.contains("unpacks to more than 100 times"), "{error}");
 }
+
+/// Each name looks only as far as it goes, not to the end of its line.
+#[test]
+fn a_map_on_one_long_line_takes_time_by_its_length() {
+    let entries: String = (0..300_000).map(|i| format!("a{i}: 1, ")).collect();
+    let started = cpu_time::ThreadTime::now();
+    let storage = parse(&format!("%YAML:1.0\n---\nmap: {{ {entries}b: 2 }}\n"));
+    let took = started.elapsed();
+    let Value::Map(map) = &storage.get("map").unwrap().value else {
+        panic!("no map");
+    };
+    assert_eq!(map.len(), 300_001);
+    assert_eq!(map[299_999].0, "a299999");
+    assert!(took.as_secs_f64() < 10.0, "{took:?}");
+}
+
+#[test]
+fn names_within_braces_end_where_they_should() {
+    let map = |text: &str| {
+        let storage = parse(&format!("%YAML:1.0\n---\nmap: {text}\nlast: 1\n"));
+        assert_eq!(storage.get("last").unwrap().number(), Some(1.0));
+        let Value::Map(map) = &storage.get("map").unwrap().value else {
+            panic!("no map: {text}");
+        };
+        let entry = |(key, node): &(String, Node)| (key.clone(), node.number().unwrap());
+        map.iter().map(entry).collect::<Vec<_>>()
+    };
+    let expected = [("a b".to_owned(), 1.0), ("c".to_owned(), 2.0)];
+    for text in [
+        "{a b: 1, c: 2}",
+        "{ a b : 1 , c : 2 }",
+        "{a b: 1, # the first: one\n  c: 2}",
+        "{\r\n  \"a b\": 1,\r\n  c: 2\r\n  }",
+    ] {
+        assert_eq!(map(text), expected, "{text}");
+    }
+    let said = error("%YAML:1.0\n---\nmap: {a # b: 1\n}\n");
+    assert!(
+        said.contains("line 3: found \"# b: 1\", expected a colon after the name \"a\""),
+        "{said}"
+    );
+}

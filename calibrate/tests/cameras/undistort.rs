@@ -189,6 +189,37 @@ fn what_has_no_undistorted_picture_is_refused() {
     );
 }
 
+/// A distortion that no lens has would fill terabytes.
+#[test]
+fn a_picture_many_times_as_large_as_its_photo_is_refused() {
+    let absurd = camera(
+        ModelKind::InverseRadial,
+        &[1e6, 1e6, 320.0, 240.0, 100_000_000_000.0],
+    );
+    assert_eq!(
+        Undistortion::new(CameraId(7), &absurd)
+            .unwrap_err()
+            .to_string(),
+        "camera 7 is INVERSE_RADIAL with the parameters 1000000, 1000000, 320, 240, 100000000000: \
+         without this distortion its photos of 640 × 480 pixels would become 3464101 × 3464101, \
+         expected at most 8 times the sides and 65,535 pixels; check its focal length and its \
+         distortion, or calibrate again with fewer coefficients"
+    );
+    // The side alone of a photo that is large itself.
+    let large = Camera {
+        width: 40_000,
+        ..camera(
+            ModelKind::InverseRadial,
+            &[1e5, 1e5, 20_000.0, 240.0, 100.0],
+        )
+    };
+    let error = Undistortion::new(CameraId(7), &large).unwrap_err();
+    assert!(
+        matches!(error, UndistortError::TooLarge { width, .. } if width > 65_535.0),
+        "{error}"
+    );
+}
+
 /// Two fisheye images of points before and beside them.
 fn two_images() -> Reconstruction {
     let mut whole = Reconstruction::default();

@@ -305,6 +305,37 @@ fn other_photos_or_options_start_over() {
 }
 
 #[test]
+fn a_folder_that_holds_anything_of_others_is_not_emptied() {
+    // A record of somebody else's.
+    for record in ["", "{}", "{\"inputs\": 3, \"finished\": []}"] {
+        let mut bench = Bench::new();
+        fs::create_dir(bench.at("work")).unwrap();
+        bench.write("work/run.json", record);
+        let error = bench.run().unwrap_err().to_string();
+        assert!(error.contains("something other than"), "{error}");
+        let left = fs::read_to_string(bench.at("work/run.json")).unwrap();
+        assert_eq!(left, record);
+    }
+
+    // Something beside an earlier run's work.
+    let mut bench = Bench::new();
+    bench.run().unwrap();
+    bench.write("work/precious.png", "a picture");
+    bench.write("photos/g.jpg", "one more");
+    let error = bench.run().unwrap_err().to_string();
+    assert!(error.contains("something other than"), "{error}");
+    assert!(bench.at("work/precious.png").is_file() && bench.at("work/sparse/1").is_dir());
+    // All that runs leave, interrupted ones too, goes.
+    fs::remove_file(bench.at("work/precious.png")).unwrap();
+    bench.write("work/database.db-wal", "more");
+    bench.write("work/run.tmp", "half");
+    fs::create_dir(bench.at("work/sparse.partial")).unwrap();
+    bench.run().unwrap();
+    assert_eq!(bench.events[0], Event::StartingOver);
+    assert!(!bench.at("work/run.tmp").exists());
+}
+
+#[test]
 fn photos_that_lie_close_are_placed_at_the_second_try() {
     let none = "  => No good initial image pair found.\n".to_owned();
     // Where it began with a pair that led nowhere, too.

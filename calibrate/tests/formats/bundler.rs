@@ -53,6 +53,23 @@ fn platypus_reprojects_as_its_readme_states() {
     assert!((error_px - 0.083).abs() < 0.001, "{error_px}");
 }
 
+/// A file without line breaks is no reason to print all of it.
+#[test]
+fn errors_quote_only_the_beginning_of_long_lines() {
+    let long = "é".repeat(100_000);
+    let list = "a.jpg\nb.jpg\n";
+    let shown = format!("found \"{}…\", expected", "é".repeat(40));
+    for bundle in [
+        long.clone(),
+        BUNDLE.replacen("100 -0.1", &long, 1),
+        BUNDLE.to_owned() + &long,
+    ] {
+        let error = error(&bundle, list);
+        assert!(error.contains(&shown), "{error:.300}");
+        assert!(error.len() < 500, "{} bytes", error.len());
+    }
+}
+
 #[test]
 fn axes_and_pixels_are_bundler_s() {
     let whole = parse(BUNDLE, "a b.jpg 0 700.5\n./d\\c 1.jpg\n").unwrap();

@@ -161,6 +161,25 @@ fn errors_name_the_line_and_a_remedy() {
     );
 }
 
+/// A file without line breaks is no reason to print all of it.
+#[test]
+fn errors_quote_only_the_beginning_of_long_lines() {
+    let long = "é".repeat(100_000);
+    let shown = |most: usize| format!("found \"{}…\", expected", "é".repeat(most));
+    for (from, most) in [
+        ("NVM_V3", 40),
+        (".\\d\\c 1.jpg 100 0.7071067811865476", 80),
+        ("0.7071067811865476", 40),
+        ("1 0 5 9.5", 40),
+    ] {
+        let error = error(from, &long);
+        assert!(error.contains(&shown(most)), "{from}: {error:.300}");
+        assert!(error.len() < 1000, "{from}: {} bytes", error.len());
+    }
+    let fixed = error("NVM_V3", &format!("NVM_V3 FixedK {long}"));
+    assert!(fixed.contains("\"NVM_V3 FixedK é") && fixed.len() < 500);
+}
+
 #[test]
 fn damaged_files_are_refused() {
     let needed = MODEL.find("19\n0").unwrap() + 1;

@@ -3,7 +3,10 @@
 
 use super::{FrameCount, VideoError};
 use crate::fingerprint;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
+use std::io;
 use std::path::Path;
 
 /// Beside the frames.
@@ -28,10 +31,65 @@ pub(super) fn source(video: &Path, count: FrameCount) -> Result<String, VideoErr
     Ok(format!("# {count:?} of {name:?}, {now}"))
 }
 
-/// Whether a folder is not there, is empty, or holds the frames of an earlier run.
+/// Whether a line is one that [`source`] makes, of any video.
+fn is_source(line: &str) -> bool {
+    let is_count = |count: &str| {
+        let number = |kind: &str| {
+            let inner = count.strip_prefix(kind)?.strip_prefix('(')?;
+            inner.strip_suffix(')')
+        };
+        count == "Auto"
+            || number("Frames").is_some_and(|n| n.parse::<usize>().is_ok())
+            || number("PerSecond").is_some_and(|n| n.parse::<f64>().is_ok())
+    };
+    let is_fingerprint = |text: &str| {
+        let numbers = text
+            .split_once(" bytes of ")
+            .and_then(|(bytes, time)| Some([bytes, time.strip_suffix(" ns")?]));
+        numbers.is_some_and(|numbers| numbers.iter().all(|n| n.parse::<u128>().is_ok()))
+    };
+    // A video's name may hold anything; it ends with the last quotation mark.
+    let parts = line.strip_prefix("# ").and_then(|line| {
+        let (count, named) = line.split_once(" of \"")?;
+        let (_, fingerprint) = named.rsplit_once("\", ")?;
+        Some((count, fingerprint))
+    });
+    parts.is_some_and(|(count, fingerprint)| is_count(count) && is_fingerprint(fingerprint))
+}
+
+/// Whether a folder is not there, is empty, or holds the frames of an earlier run and nothing
+/// else: what is in it will be removed.
 pub(super) fn may_replace(folder: &Path) -> bool {
-    let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-    !folder.exists() || folder.join(FILE).is_file() || is_empty()
+    if !folder.exists() {
+        return true;
+    }
+    let entries = fs::read_dir(folder);
+    let names: io::Result<Vec<OsString>> =
+        entries.and_then(|all| all.map(|entry| Ok(entry?.file_name())).collect());
+    let Ok(names) = names else { return false };
+    let listed = listed(folder);
+    let is_listed = |name: &OsString| {
+        let name = name.to_str();
+        name.is_some_and(|name| name == FILE || listed.iter().any(|all| all.contains(name)))
+    };
+    names.is_empty() || listed.is_some() && names.iter().all(is_listed)
+}
+
+/// What an earlier run listed, of whatever video.
+fn listed(folder: &Path) -> Option<BTreeSet<String>> {
+    let text = fs::read_to_string(folder.join(FILE)).ok()?;
+    let mut lines = text.lines();
+    lines.next().filter(|line| is_source(line))?;
+    lines.map(|line| Some(frame(line)?.name)).collect()
+}
+
+/// A frame from its line.
+fn frame(line: &str) -> Option<VideoFrame> {
+    let (time_s, name) = line.split_once(' ')?;
+    Some(VideoFrame {
+        name: name.to_owned(),
+        time_s: time_s.parse().ok()?,
+    })
 }
 
 /// The frames that an earlier run took from the same source, if all are still there.
@@ -41,15 +99,8 @@ pub(super) fn read(folder: &Path, source: &str) -> Option<Vec<VideoFrame>> {
     if lines.next() != Some(source) {
         return None;
     }
-    let frame = |line: &str| {
-        let (time_s, name) = line.split_once(' ')?;
-        folder.join(name).is_file().then_some(())?;
-        Some(VideoFrame {
-            name: name.to_owned(),
-            time_s: time_s.parse().ok()?,
-        })
-    };
-    lines.map(frame).collect()
+    let there = |line: &str| frame(line).filter(|frame| folder.join(&frame.name).is_file());
+    lines.map(there).collect()
 }
 
 pub(super) fn write(folder: &Path, source: &str, frames: &[VideoFrame]) -> Result<(), VideoError> {
@@ -57,4 +108,64 @@ pub(super) fn write(folder: &Path, source: &str, frames: &[VideoFrame]) -> Resul
     let lines: String = frames.iter().map(line).collect();
     let path = folder.join(FILE);
     fs::write(&path, format!("{source}\n{lines}")).map_err(VideoError::write_at(&path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_known_by_its_first_line() {
+        let here = tempfile::tempdir().unwrap();
+        // A name that looks like the rest of the line.
+        let video = here.path().join("# Auto of b, 1 bytes of 2 ns.mp4");
+        fs::write(&video, "video").unwrap();
+        for count in [
+            FrameCount::Auto,
+            FrameCount::Frames(7),
+            FrameCount::PerSecond(0.5),
+        ] {
+            let line = source(&video, count).unwrap();
+            assert!(is_source(&line), "{line}");
+        }
+        for line in [
+            "",
+            "# frames of my film",
+            "# Auto of \"a.mp4\"",
+            "# Auto of \"a.mp4\", 5 bytes of long ago",
+            "# Frames(some) of \"a.mp4\", 5 bytes of 6 ns",
+            "Auto of \"a.mp4\", 5 bytes of 6 ns",
+        ] {
+            assert!(!is_source(line), "{line}");
+        }
+    }
+
+    #[test]
+    fn only_what_a_list_names_is_replaced() {
+        let here = tempfile::tempdir().unwrap();
+        let folder = here.path().join("photos");
+        assert!(may_replace(&folder));
+        fs::create_dir(&folder).unwrap();
+        assert!(may_replace(&folder));
+
+        let first = "# Auto of \"a.mp4\", 5 bytes of 6 ns";
+        let frames = ["000000.250s.jpg", "000001.500s.jpg"].map(|name| VideoFrame {
+            name: name.to_owned(),
+            time_s: 1.0,
+        });
+        write(&folder, first, &frames).unwrap();
+        fs::write(folder.join(&frames[0].name), "").unwrap();
+        assert!(may_replace(&folder), "though a frame is gone");
+        fs::write(folder.join("precious.png"), "").unwrap();
+        assert!(!may_replace(&folder));
+        fs::remove_file(folder.join("precious.png")).unwrap();
+        assert!(may_replace(&folder));
+
+        // A list of somebody's own.
+        for text in ["", "000000.250s.jpg\n", "# Auto\n1 000000.250s.jpg\n"] {
+            fs::write(folder.join(FILE), text).unwrap();
+            assert!(!may_replace(&folder), "{text}");
+        }
+        assert!(!may_replace(&folder.join(FILE)), "no folder");
+    }
 }

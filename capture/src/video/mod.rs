@@ -27,6 +27,7 @@ pub use scan::{scan, sharpness};
 
 use crate::folder::{beside, place_of, take_place};
 use crate::{Tool, ToolError};
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
@@ -123,13 +124,14 @@ pub fn encode(
 }
 
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
-/// named by their time in seconds, and a list of them. Where an earlier run did the same
+/// named by their time in seconds, and a list of them. A folder that holds anything else is
+/// left alone. Where an earlier run did the same
 /// with the same video, nothing is done; another video's frames are replaced. An
 /// interrupted run leaves no folder, or the earlier one.
 ///
 /// # Errors
-/// `ffmpeg` is missing or fails; a file that is no video or has but one frame; files that
-/// cannot be read or written.
+/// `ffmpeg` is missing or fails; a file that is no video or has but one frame; a folder that
+/// holds anything but an earlier run's frames; files that cannot be read or written.
 pub fn extract(
     ffmpeg: &Tool,
     video: &Path,
@@ -174,12 +176,12 @@ pub fn extract(
     }
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
     write_frames(ffmpeg, spelling, video, &chosen, &partial)?;
+    let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     let mut frames = Vec::new();
-    for (i, &frame_idx) in chosen.iter().enumerate() {
-        let time_s = scored[frame_idx].time_s;
-        let name = format!("{time_s:010.3}s.jpg");
+    for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
+        let time_s = times_s[i];
         let written = partial.join(format!("{}.jpg", i + 1));
-        if !written.is_file() || frames.iter().any(|f: &VideoFrame| f.name == name) {
+        if !written.is_file() {
             return Err(VideoError::Changed {
                 path: video.to_owned(),
                 frame: frame_idx,
@@ -224,6 +226,21 @@ fn write_frames(
     fs::remove_file(&filter_file).map_err(failed)
 }
 
+/// What frames' files are called: by their times in seconds, to the millisecond, or to as many
+/// digits as tell them all apart. Times differ, and names sort as they do.
+fn names(times_s: &[f64]) -> Vec<String> {
+    // ffmpeg prints no more.
+    const MOST_DIGITS: usize = 17;
+    let with = |digits: usize| -> Vec<String> {
+        let width = 7 + digits;
+        let name = |time_s: &f64| format!("{time_s:0width$.digits$}s.jpg");
+        times_s.iter().map(name).collect()
+    };
+    let differ = |names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+    let fewest = (3..MOST_DIGITS).map(with).find(differ);
+    fewest.unwrap_or_else(|| with(MOST_DIGITS))
+}
+
 /// ffmpeg's expression that is not zero for the frames of these indices, which rise. It
 /// halves them again and again: ffmpeg refuses what is nested a hundred deep, as a plain sum is.
 fn is_any_of(frames: &[usize]) -> String {
@@ -249,4 +266,24 @@ fn literal(folder: &Path) -> PathBuf {
         || folder.to_owned(),
         |name| PathBuf::from(name.replace('%', "%%")),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_a_fraction_of_a_millisecond_apart_have_names_of_their_own() {
+        assert_eq!(names(&[]), [""; 0]);
+        assert_eq!(
+            names(&[0.25, 12.0, 3600.062]),
+            ["000000.250s.jpg", "000012.000s.jpg", "003600.062s.jpg"]
+        );
+        // 2,400 frames a second.
+        let fast: Vec<f64> = (0..2400).map(|i| f64::from(i) / 2400.0).collect();
+        let named = names(&fast);
+        assert_eq!(named[..2], ["000000.0000s.jpg", "000000.0004s.jpg"]);
+        assert!(named.is_sorted());
+        assert_eq!(names(&[1.0, 1.0000001])[1], "000001.0000001s.jpg");
+    }
 }

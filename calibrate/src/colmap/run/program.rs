@@ -8,9 +8,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 pub(super) const LIST: &str = "photos.txt";
-const DATABASE: &str = "database.db";
+/// Beside it SQLite keeps its own, `database.db-wal` and others.
+pub(super) const DATABASE: &str = "database.db";
 /// Where models are once the mapper is through, a folder each.
 pub(super) const MODELS: &str = "sparse";
+/// And until then.
+pub(super) const PARTIAL_MODELS: &str = "sparse.partial";
 
 /// Photos that make a model: COLMAP would throw away further ones of less than ten, and
 /// nobody would learn why their photos are in none.
@@ -92,7 +95,7 @@ impl<'a> Program<'a> {
         let left: &[&str] = match step {
             Step::Features => &[DATABASE, "database.db-shm", "database.db-wal"],
             Step::Matching => return Ok(()),
-            Step::Mapping => &[MODELS, "sparse.partial"],
+            Step::Mapping => &[MODELS, PARTIAL_MODELS],
         };
         for name in left.iter().chain([&step.log()]) {
             let path = self.work.join(name);
@@ -116,7 +119,7 @@ impl<'a> Program<'a> {
         };
         let help = self.colmap.text(&[command, "-h"])?;
         let models = self.work.join(MODELS);
-        let partial = models.with_extension("partial");
+        let partial = self.work.join(PARTIAL_MODELS);
         self.remove_unfinished(step)?;
         if step == Step::Mapping {
             fs::create_dir(&partial).map_err(io_error(&partial, "make the folder"))?;

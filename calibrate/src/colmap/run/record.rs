@@ -1,14 +1,19 @@
 //! `run.json`: what a work folder is of, and how far it is.
 
 use super::error::io_error;
+use super::program::{DATABASE, LIST, MODELS, PARTIAL_MODELS};
 use super::{Event, Options, RunError, Step};
 use capture::{PhotoSet, fingerprint};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 const FILE: &str = "run.json";
+/// Until it is whole.
+const TEMPORARY: &str = "run.tmp";
 
 /// What the results depend on.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +47,25 @@ struct File {
     finished: Vec<Step>,
 }
 
+/// Whether all that a folder holds is called as what runs leave there.
+fn holds_only_a_runs(work: &Path) -> io::Result<bool> {
+    let logs = Step::ALL.map(Step::log);
+    let own = [FILE, TEMPORARY, LIST, MODELS, PARTIAL_MODELS];
+    let is_own = |name: &OsStr| {
+        let name = name.to_str().unwrap_or_default();
+        let of_database = name.strip_prefix(DATABASE);
+        own.contains(&name)
+            || logs.contains(&name)
+            || of_database.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+    };
+    for entry in fs::read_dir(work)? {
+        if !is_own(&entry?.file_name()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
 pub(super) struct Record {
     path: PathBuf,
     file: File,
@@ -49,7 +73,7 @@ pub(super) struct Record {
 
 impl Record {
     /// What an earlier run with the same inputs left in the folder; else a beginning, in
-    /// an empty folder.
+    /// an empty folder. It is emptied only of what runs leave.
     pub(super) fn open(
         work: &Path,
         inputs: Inputs,
@@ -58,12 +82,16 @@ impl Record {
         let path = work.join(FILE);
         let earlier = fs::read(&path).ok();
         let earlier: Option<File> = earlier.and_then(|b| serde_json::from_slice(&b).ok());
+        let is_record = earlier.is_some();
         if let Some(file) = earlier.filter(|file| file.inputs == inputs) {
             return Ok(Self { path, file });
         }
         let is_empty = |work: &Path| Ok(fs::read_dir(work)?.next().is_none());
         if work.exists() && !is_empty(work).map_err(io_error(work, "list the folder"))? {
-            if !path.is_file() {
+            // The record alone does not say whose the rest is.
+            let is_ours =
+                is_record && holds_only_a_runs(work).map_err(io_error(work, "list the folder"))?;
+            if !is_ours {
                 return Err(RunError::Occupied {
                     folder: work.to_owned(),
                 });
@@ -89,7 +117,7 @@ impl Record {
     }
 
     fn write(&self) -> Result<(), RunError> {
-        let temporary = self.path.with_extension("tmp");
+        let temporary = self.path.with_file_name(TEMPORARY);
         let bytes = serde_json::to_vec_pretty(&self.file).unwrap_or_default();
         fs::write(&temporary, bytes).map_err(io_error(&temporary, "write"))?;
         fs::rename(&temporary, &self.path).map_err(io_error(&self.path, "write"))

@@ -5,7 +5,7 @@ use super::super::matrix;
 use super::super::storage::{Entries, Node, Value};
 use super::cursor::Reader;
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
     /// `[ … ]`, `{ … }`, quoted text, or a word within the former.
     pub(super) fn flow(&mut self, marked: bool, depth: usize) -> Result<Node, Problem> {
         self.check_depth(depth)?;
@@ -32,10 +32,7 @@ impl Reader<'_> {
             Some('"') => Value::Text(self.double_quoted()?),
             Some('\'') => Value::Text(self.single_quoted()?),
             _ => {
-                // Not `rest_of_line`: a matrix may stand on one long line.
-                let word = self.rest();
-                let word = &word[..word.find([',', ']', '}', '\n']).unwrap_or(word.len())];
-                let word = word.split(" #").next().unwrap_or_default();
+                let word = self.plain_before([',', ']', '}', '\n']);
                 self.at += word.len();
                 match word.trim_end() {
                     "" => return Err(self.unexpected("a value")),
@@ -52,8 +49,7 @@ impl Reader<'_> {
             Some('"') => self.double_quoted()?,
             Some('\'') => self.single_quoted()?,
             _ => {
-                let line = self.rest_of_line();
-                let word = &line[..line.find([':', ',', ']', '}']).unwrap_or(line.len())];
+                let word = self.plain_before([':', ',', ']', '}', '\n']);
                 self.at += word.len();
                 word.trim_end().to_owned()
             }
@@ -64,6 +60,14 @@ impl Reader<'_> {
         }
         self.at += 1;
         Ok(key)
+    }
+
+    /// What stands before the first of some characters and a comment. Not `rest_of_line`: a matrix
+    /// or a map may stand on one long line.
+    fn plain_before<const N: usize>(&self, ends: [char; N]) -> &'a str {
+        let word = self.rest();
+        let word = &word[..word.find(ends).unwrap_or(word.len())];
+        word.split(" #").next().unwrap_or_default()
     }
 
     /// Steps over the bracket, items with commas between them, and the closing bracket.
