@@ -1,7 +1,6 @@
 //! What must hold of an interior, and what is odd about one.
 
-use super::{CellId, Content, Interior, InteriorError, InteriorWarning, Polygon, RoomBox};
-use glam::DVec3;
+use super::{CellId, Content, Interior, InteriorError, InteriorWarning, RoomBox};
 use std::collections::BTreeSet;
 
 /// What may be due to rounding, in shares of a box's or polygon's size.
@@ -108,31 +107,11 @@ impl Interior {
                     });
                 }
             }
-            if is_turned(&portal.polygon, portal.cells.map(|id| self.middle(id))) {
+            if self.is_turned(portal) {
                 found.push(InteriorWarning::Turned(portal.name.clone()));
             }
         }
         found
-    }
-
-    /// About where a cell is, by its own words.
-    pub(super) fn middle(&self, id: Option<CellId>) -> Option<DVec3> {
-        let cell = self.cells.get(id?.0 as usize)?;
-        match &cell.floor {
-            Some(floor) => Some(floor.center()),
-            None => cell.content.room().map(|room| room.min.midpoint(room.max)),
-        }
-    }
-}
-
-/// Whether the middles of the cells in front and behind say that an outline goes the other way
-/// round.
-pub(super) fn is_turned(polygon: &Polygon, middles: [Option<DVec3>; 2]) -> bool {
-    match middles.map(|m| m.map(|m| polygon.height(m))) {
-        [Some(front), Some(back)] => front < back,
-        [Some(front), None] => front < 0.0,
-        [None, Some(back)] => back > 0.0,
-        [None, None] => false,
     }
 }
 

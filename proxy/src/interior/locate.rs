@@ -1,6 +1,6 @@
 //! Which cell a viewer is in.
 
-use super::{CellId, Contents, Interior, Portal};
+use super::{CellId, Contents, Interior, Polygon, Portal};
 use glam::DVec3;
 
 /// How near to a portal's plane counts as on it, in shares of its size.
@@ -53,14 +53,20 @@ impl Contents {
             return Some(bounds?.volume());
         };
         // Of floors one over the other, the next below.
-        let along_up = interior.up * floor.normal().dot(interior.up).signum();
-        let steepness = floor.normal().dot(along_up);
-        let height = floor.height(point) / steepness.abs().max(1e-6);
-        let over = point - height * along_up;
-        let height = height * floor.normal().dot(interior.up).signum();
-        let is_over = height >= -ON_PLANE * floor.size() && floor.covers(over, 0.0);
-        is_over.then(|| bounds.map_or(height.max(0.0), |room| room.volume()))
+        let height = height_over(floor, interior.up, point)?;
+        Some(bounds.map_or(height, |room| room.volume()))
     }
+}
+
+/// How high over a floor a point is, if it is over it.
+pub(super) fn height_over(floor: &Polygon, up: DVec3, point: DVec3) -> Option<f64> {
+    let along_up = up * floor.normal().dot(up).signum();
+    let steepness = floor.normal().dot(along_up);
+    let height = floor.height(point) / steepness.abs().max(1e-6);
+    let over = point - height * along_up;
+    let height = height * floor.normal().dot(up).signum();
+    let is_over = height >= -ON_PLANE * floor.size() && floor.covers(over, 0.0);
+    is_over.then(|| height.max(0.0))
 }
 
 /// Of those portals that a point is right before or behind, and their cell on its side, that are

@@ -16,6 +16,7 @@ mod overlap;
 mod polygon;
 mod rooms;
 mod semicircle;
+mod turned;
 mod visibility;
 
 pub use compare::{ComparedCell, ComparedPortal, Comparison, compare};

@@ -18,16 +18,17 @@
 //! ```
 //!
 //! `up` is y and `eye_height` 1.6 where they are not given; `floor` and `radius` need not be. An
-//! outline may go either way round. Boxes should meet in the plane of the opening between
-//! them: triangles between boxes are in no cell, and drawn always.
+//! outline may go either way round; where boxes do not tell its sides (both are all around it), it
+//! is counter-clockwise as the first of its rooms sees it. Boxes should meet in the plane of the
+//! opening between them: triangles between boxes are in no cell, and drawn always.
 //!
 //! In a model, the node `cell:NAME` and all below it are a cell, and the node `portal:A|B`, a
 //! flat mesh, is the opening between two of them; `portal:A|` leads outside. What follows
 //! another `|` tells openings between the same cells apart.
 
-use super::check::is_turned;
 use super::contents::{PORTAL_NODE, below};
 use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
+use super::turned::Seen;
 use super::{
     Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
     InteriorWarning, Polygon, Portal,
@@ -137,7 +138,8 @@ impl Rooms {
     }
 }
 
-/// Turns the outlines round that go the other way, by where the cells are, and checks the whole.
+/// Turns the outlines round that go the other way, by which cell is before them and which behind,
+/// and checks the whole.
 ///
 /// # Errors
 /// As for [`Interior::check`].
@@ -145,17 +147,18 @@ pub fn interior_from_rooms(
     mut interior: Interior,
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
     interior.check()?;
-    for i in 0..interior.portals.len() {
-        let middles = interior.portals[i].cells.map(|id| interior.middle(id));
-        turn(&mut interior.portals[i], middles);
-    }
+    let portals = interior.portals.iter();
+    let turned: Vec<bool> = portals.map(|portal| interior.is_turned(portal)).collect();
+    turn(&mut interior.portals, &turned);
     let warnings = interior.check()?;
     Ok((interior, warnings))
 }
 
-fn turn(portal: &mut Portal, middles: [Option<DVec3>; 2]) {
-    if is_turned(&portal.polygon, middles) {
-        portal.polygon = portal.polygon.clone().reversed();
+fn turn(portals: &mut [Portal], turned: &[bool]) {
+    for (portal, is_turned) in portals.iter_mut().zip(turned) {
+        if *is_turned {
+            portal.polygon = portal.polygon.clone().reversed();
+        }
     }
 }
 
@@ -196,13 +199,7 @@ pub fn interior_from_nodes(
         other: Extra::new(),
     };
     interior.check()?;
-    // 2. Where they are, to tell their sides of a portal.
-    let (contents, _) = Contents::new(&interior, model)?;
-    let middle = |id: Option<CellId>| {
-        let bounds = contents.bounds[id?.0 as usize]?;
-        Some(bounds.min.midpoint(bounds.max))
-    };
-    // 3. Portals.
+    // 2. Portals.
     let ids = interior.cells.iter().map(|c| c.name.as_str());
     let ids: BTreeMap<&str, CellId> = ids.zip((0..).map(CellId)).collect();
     for name in names {
@@ -219,16 +216,22 @@ pub fn interior_from_nodes(
         let corners = outline(model, &below(model, |n| n == name)).map_err(failed)?;
         let polygon =
             Polygon::new(corners).map_err(|e| InteriorError::Portal(between.to_owned(), e))?;
-        let mut portal = Portal {
+        let portal = Portal {
             cells: sides(between, &between_cells, &ids)?,
             name: between.to_owned(),
             polygon,
             radius: None,
             other: Extra::new(),
         };
-        let middles = portal.cells.map(middle);
-        turn(&mut portal, middles);
         interior.portals.push(portal);
+    }
+    // 3. Their sides, by what of the model one sees through them.
+    if !interior.portals.is_empty() {
+        let (contents, _) = Contents::new(&interior, model)?;
+        let seen = Seen::new(&contents, model);
+        let portals = interior.portals.iter();
+        let turned: Vec<bool> = portals.map(|portal| seen.is_turned(portal)).collect();
+        turn(&mut interior.portals, &turned);
     }
     let warnings = interior.check()?;
     Ok((interior, warnings))

@@ -9,7 +9,8 @@ use proxy::Mesh;
 use proxy::interior::find::{
     Evidence, FindError, FindOptions, FoundInterior, find_interior, sights,
 };
-use proxy::interior::{Content, Interior, RoomBox, compare, parse_rooms};
+use proxy::interior::{Content, Contents, Interior, RoomBox, compare, parse_rooms};
+use proxy::mesh::Model;
 
 fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
     let evidence = Evidence {
@@ -381,6 +382,56 @@ fn corridors_as_wide_as_their_mouths_are_rooms() {
     let mouth = &found.interior.portals[0];
     assert!(mouth.polygon.center().distance(DVec3::new(3.7, 1.3, 5.0)) < 0.2);
     assert!((mouth.width(DVec3::Y) - 1.4).abs() < 0.2);
+}
+
+/// A room that goes around a smaller one in two arms, and a door between them.
+fn room_around_another() -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+        let [min, max] = [min, max].map(DVec3::from_array);
+        mesh.append(&open_box(min, max, faces));
+    };
+    // Floor and ceiling, and the ends and outer sides of both arms.
+    add([0.0, 0.0, 0.0], [12.0, 2.5, 12.0], &[0, 2, 3, 4]);
+    add([0.0, 0.0, 0.0], [3.0, 2.5, 12.0], &[5]);
+    add([0.0, 0.0, 0.0], [12.0, 2.5, 3.0], &[1]);
+    // Their inner sides, one of them with a door.
+    add([3.0, 0.0, 3.0], [3.1, 2.5, 3.8], &[0, 1, 4, 5]);
+    add([3.0, 0.0, 4.8], [3.1, 2.5, 12.0], &[0, 1, 4, 5]);
+    add([3.0, 2.0, 3.8], [3.1, 2.5, 4.8], &[0, 1, 2, 4, 5]);
+    add([3.1, 0.0, 3.0], [12.0, 2.5, 3.1], &[0, 1, 4, 5]);
+    // The smaller one's other walls.
+    add([5.5, 0.0, 3.1], [5.6, 2.5, 5.5], &[0, 1, 4, 5]);
+    add([3.1, 0.0, 5.5], [5.6, 2.5, 5.6], &[0, 1, 4, 5]);
+    mesh
+}
+
+#[test]
+fn a_door_has_its_sides_where_a_room_goes_around_the_next() {
+    let found = find(&room_around_another(), &FindOptions::default()).unwrap();
+    look_at(&found, "around");
+    assert_eq!(found.warnings, []);
+    assert_eq!(found.interior.cells.len(), 2);
+    assert_eq!(found.interior.portals.len(), 1);
+    let portal = &found.interior.portals[0];
+    let (contents, _) = Contents::new(&found.interior, &Model::default()).unwrap();
+    for (side, cell) in [1.0, -1.0].into_iter().zip(portal.cells) {
+        let beside = portal.polygon.center() + 0.4 * side * portal.polygon.normal();
+        assert_eq!(contents.locate(&found.interior, beside), cell);
+    }
+}
+
+#[test]
+fn a_house_in_millimetres_is_told_soon_or_found_if_that_is_said() {
+    let mut mesh = room_around_another();
+    mesh.transform(&DMat4::from_scale(DVec3::splat(1000.0)));
+    let error = find(&mesh, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+    let options = FindOptions {
+        meter: 1000.0,
+        ..FindOptions::default()
+    };
+    assert_eq!(find(&mesh, &options).unwrap().interior.cells.len(), 2);
 }
 
 #[test]

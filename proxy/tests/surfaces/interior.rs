@@ -355,6 +355,128 @@ fn nodes_name_cells_and_portals() {
     assert!(interior_from_nodes(&model, "m.glb").is_err());
 }
 
+/// An L-shaped corridor, a room in its crook, and what opens between them.
+fn room_in_the_crook(polygon: &str) -> String {
+    format!(
+        r#"{{"version": 1,
+            "rooms": [
+              {{"name": "corridor", "min": [0, 0, 0], "max": [6, 3, 6],
+               "floor": [[0, 0, 0], [6, 0, 0], [6, 0, 1.5], [1.5, 0, 1.5], [1.5, 0, 6], [0, 0, 6]]}},
+              {{"name": "room", "min": [1.6, 0, 1.6], "max": [3, 3, 3]}}
+            ],
+            "openings": [{{"name": "door", "between": ["corridor", "room"], "polygon": {polygon}}}]}}"#
+    )
+}
+
+#[test]
+fn a_door_has_its_sides_where_a_room_goes_around_the_next() {
+    // The corridor's middle lies beyond the room's, as seen from the door.
+    for polygon in [
+        "[[1.5, 0, 2], [1.5, 0, 2.8], [1.5, 2, 2.8], [1.5, 2, 2]]",
+        "[[1.5, 2, 2], [1.5, 2, 2.8], [1.5, 0, 2.8], [1.5, 0, 2]]",
+    ] {
+        let (mut interior, warnings) = rooms(&room_in_the_crook(polygon)).unwrap();
+        assert_eq!(warnings, []);
+        let door = &mut interior.portals[0].polygon;
+        assert!((door.normal() + DVec3::X).length() < 1e-12);
+        *door = door.clone().reversed();
+        let warnings = interior.check().unwrap();
+        assert_eq!(warnings, [InteriorWarning::Turned("door".to_owned())]);
+    }
+    // A window out of a U into its own yard.
+    let yard = r#"{"version": 1,
+        "rooms": [{"name": "u", "min": [0, 0, 0], "max": [6, 3, 6],
+          "floor": [[0, 0, 0], [6, 0, 0], [6, 0, 6], [4.5, 0, 6], [4.5, 0, 1.5], [1.5, 0, 1.5],
+                    [1.5, 0, 6], [0, 0, 6]]}],
+        "openings": [{"name": "window", "between": ["u", null],
+          "polygon": [[2.5, 1, 1.5], [3.5, 1, 1.5], [3.5, 2, 1.5], [2.5, 2, 1.5]]}]}"#;
+    let (interior, warnings) = rooms(yard).unwrap();
+    assert_eq!(warnings, []);
+    assert!((interior.portals[0].polygon.normal() + DVec3::Z).length() < 1e-12);
+}
+
+#[test]
+fn an_outline_is_believed_where_both_cells_are_on_both_sides() {
+    let both = TWO_ROOMS
+        .replace("\"max\": [4, 3, 4]", "\"max\": [8, 3, 4]")
+        .replace("\"min\": [4, 0, 0]", "\"min\": [0, 0, 0]")
+        .replace("\"max\": [8, 3, 4]", "\"max\": [9, 3, 4]");
+    let (mut interior, warnings) = rooms(&both).unwrap();
+    let is_turned = |warning: &InteriorWarning| matches!(warning, InteriorWarning::Turned(_));
+    assert!(!warnings.iter().any(is_turned), "{warnings:?}");
+    let door = &mut interior.portals[0].polygon;
+    assert!((door.normal() + DVec3::X).length() < 1e-12);
+    *door = door.clone().reversed();
+    assert!(!interior.check().unwrap().iter().any(is_turned));
+}
+
+/// Flat, four-sided pieces of named nodes.
+fn nodes_of_quads(quads: &[(&str, [[f64; 3]; 4])]) -> Model {
+    let triangles: Vec<[[f64; 3]; 3]> = quads
+        .iter()
+        .flat_map(|(_, [a, b, c, d])| [[*a, *b, *c], [*a, *c, *d]])
+        .collect();
+    let mut names: Vec<&str> = quads.iter().map(|(name, _)| *name).collect();
+    names.dedup();
+    let mut model = model(&triangles, &names);
+    for (i, part) in model.parts.iter_mut().enumerate() {
+        let name = quads[i / 2].0;
+        part.node_idx = names.iter().position(|n| *n == name).unwrap() as u32;
+    }
+    model
+}
+
+#[test]
+fn nodes_of_a_door_have_their_sides_where_a_room_goes_around_the_next() {
+    let level = |[x0, x1]: [f64; 2], [z0, z1]: [f64; 2], y: f64| {
+        [[x0, y, z0], [x1, y, z0], [x1, y, z1], [x0, y, z1]]
+    };
+    let wall = |[x0, z0]: [f64; 2], [x1, z1]: [f64; 2]| {
+        [[x0, 0.0, z0], [x1, 0.0, z1], [x1, 2.5, z1], [x0, 2.5, z0]]
+    };
+    let mut quads = Vec::new();
+    for y in [0.0, 2.5] {
+        quads.push(("cell:corridor", level([0.0, 6.0], [0.0, 1.5], y)));
+        quads.push(("cell:corridor", level([0.0, 1.5], [1.5, 6.0], y)));
+    }
+    for (from, to) in [
+        ([0.0, 0.0], [6.0, 0.0]),
+        ([0.0, 0.0], [0.0, 6.0]),
+        ([0.0, 6.0], [1.5, 6.0]),
+        ([6.0, 0.0], [6.0, 1.5]),
+        ([1.5, 1.5], [6.0, 1.5]),
+        ([1.5, 1.5], [1.5, 2.0]),
+        ([1.5, 3.0], [1.5, 6.0]),
+    ] {
+        quads.push(("cell:corridor", wall(from, to)));
+    }
+    for y in [0.0, 2.5] {
+        quads.push(("cell:room", level([1.5, 3.5], [1.5, 3.5], y)));
+    }
+    for (from, to) in [
+        ([1.5, 1.5], [3.5, 1.5]),
+        ([3.5, 1.5], [3.5, 3.5]),
+        ([1.5, 3.5], [3.5, 3.5]),
+    ] {
+        quads.push(("cell:room", wall(from, to)));
+    }
+    // Its outline may go either way round, and either side may be named first.
+    let door = wall([1.5, 2.0], [1.5, 3.0]);
+    let [a, b, c, d] = door;
+    for (name, outline, into_first) in [
+        ("portal:corridor|room", door, DVec3::NEG_X),
+        ("portal:corridor|room", [d, c, b, a], DVec3::NEG_X),
+        ("portal:room|corridor", door, DVec3::X),
+        ("portal:room|corridor", [d, c, b, a], DVec3::X),
+    ] {
+        let all = [quads.as_slice(), &[(name, outline)]].concat();
+        let (interior, warnings) = interior_from_nodes(&nodes_of_quads(&all), "m.glb").unwrap();
+        assert_eq!(warnings, []);
+        let normal = interior.portals[0].polygon.normal();
+        assert!((normal - into_first).length() < 1e-12, "{name}: {normal}");
+    }
+}
+
 #[test]
 fn viewers_are_found() {
     let interior = two_rooms();

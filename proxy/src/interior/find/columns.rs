@@ -107,6 +107,10 @@ impl Columns {
         }
         let vast = (extent.x * extent.y / MOST_COLUMNS).sqrt();
         let long = extent.max_element() / MOST_COLUMNS.sqrt() / 4.0;
+        if vast.max(long) > options.max_passage * options.meter {
+            // Kilometres: no square is as narrow as a passage between two rooms.
+            return Err(FindError::NoRooms(options.min_area, options.meter));
+        }
         let step = (options.cell_size * options.meter).max(vast).max(long);
         // Squares around it, for what grows out of rooms.
         const MARGIN: f64 = 12.0;
@@ -190,7 +194,16 @@ impl Columns {
         (is_in && x < self.size[0] && y < self.size[1]).then(|| (y * self.size[0] + x, bin as u32))
     }
 
-    /// Marks what a triangle touches, by samples that are half a square or bin apart.
+    /// How far apart samples are along the plan, in world units, and how lengths are stretched so
+    /// that samples of the same distance are near enough in height.
+    fn sampling(&self) -> (f64, DVec3) {
+        // Half of what is less, a square or a bin; where squares are coarse, a quarter of one.
+        let in_height = 0.5 * self.step.min(BIN * self.meter);
+        let in_plan = in_height.max(0.25 * self.step);
+        (in_plan, DVec3::new(1.0, 1.0, in_plan / in_height))
+    }
+
+    /// Marks what a triangle touches, by samples.
     fn add(&mut self, corners: [DVec3; 3]) {
         if !corners.iter().all(|p| p.is_finite()) {
             return;
@@ -201,20 +214,28 @@ impl Columns {
         if is_off {
             return;
         }
-        let apart = 0.5 * self.step.min(BIN * self.meter);
-        // Rows along the longest side.
-        let length = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
+        let (apart, stretch) = self.sampling();
+        // 1. Rows along the longest side.
+        let length = |i: usize| (stretch * (corners[(i + 1) % 3] - corners[i])).length();
         let longest = (1..3).fold(0, |b, i| if length(i) > length(b) { i } else { b });
         let [a, b, c] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
         let along = length(longest);
-        let across = (b - a).cross(c - a).length() / along.max(f64::MIN_POSITIVE);
+        let [ab, ac] = [b - a, c - a].map(|side| stretch * side);
+        let across = ab.cross(ac).length() / along.max(f64::MIN_POSITIVE);
         let steps = |x: f64| (x / apart).ceil().clamp(1.0, 1e5) as usize;
         let rows = steps(across);
+        // 2. Of each only what is between the lowest bin and the highest, and a bin more: there is
+        // little to mark of a tower.
+        let reach = [-BELOW - BIN, (BINS + 1) as f64 * BIN - BELOW].map(|h| h * self.meter);
         for row in 0..=rows {
             let t = row as f64 / rows as f64;
             let (from, to) = (a.lerp(c, t), b.lerp(c, t));
             let count = steps(along * (1.0 - t));
-            for k in 0..=count {
+            // Infinite where it is level.
+            let [low, high] = reach.map(|h| (h - from.z) / (to.z - from.z) * count as f64);
+            let first = low.min(high).max(0.0) as usize;
+            let last = low.max(high).min(count as f64) as usize;
+            for k in first..=last {
                 let point = from.lerp(to, k as f64 / count as f64);
                 if let Some((i, bin)) = self.bin_of(point) {
                     self.taken[i] |= 1 << bin;
@@ -225,7 +246,7 @@ impl Columns {
 
     /// What lines of sight pass, but for their last bit.
     fn sighted(&self, sights: &[[DVec3; 2]]) -> Vec<u128> {
-        let apart = 0.5 * self.step.min(BIN * self.meter);
+        let (apart, stretch) = self.sampling();
         let parts = sights.par_chunks(sights.len().div_ceil(8).max(1));
         let parts: Vec<Vec<u128>> = parts
             .map(|part| {
@@ -237,6 +258,7 @@ impl Columns {
                     if !(free > 0.0 && length.is_finite()) {
                         continue;
                     }
+                    let apart = apart * (length / (stretch * (to - from)).length());
                     let count = (free / apart).min(1e5) as usize;
                     for k in 0..=count {
                         let at = from.lerp(to, k as f64 * apart / length);

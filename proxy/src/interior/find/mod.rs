@@ -25,7 +25,7 @@ pub use sights::sights;
 
 use super::{
     Cell, CellId, Content, Extra, Interior, InteriorError, InteriorWarning, Polygon, Portal,
-    RoomBox, interior_from_rooms,
+    RoomBox,
 };
 use crate::mesh::Mesh;
 use columns::Columns;
@@ -190,7 +190,7 @@ pub fn find_interior(
     }
     // 4. Cells and portals.
     let interior = interior(evidence, &columns, &grown, openings, model, options)?;
-    let (interior, warnings) = interior_from_rooms(interior)?;
+    let warnings = interior.check()?;
     let place = |i: usize| match grown.labels[i] {
         _ if columns.is_wall(i) => Place::Wall,
         _ if columns.is_lintel(i) => Place::Lintel,
