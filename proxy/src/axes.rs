@@ -159,6 +159,18 @@ mod tests {
     }
 
     #[test]
+    fn a_ring_that_looks_down_has_the_plane_below_it() {
+        for above in [0.4, -0.4] {
+            let mut rays = ring(DVec3::ZERO, 4.0);
+            rays.iter_mut().for_each(|(center, _)| center.y = above);
+            // Above the plane that they look at, so that the normal points away from them.
+            let fit = plane_across_axes(&looking(&rays), &BTreeMap::new()).unwrap();
+            assert!(fit.plane.signed_distance(DVec3::ZERO).abs() < 1e-6);
+            assert!(fit.plane.normal().y * above.signum() < -0.999, "{fit:?}");
+        }
+    }
+
+    #[test]
     fn cameras_that_look_one_way_have_the_plane_across_it() {
         let target = DVec3::new(0.0, 0.0, 5.0);
         let rays: Vec<_> = [-1.0, -0.3, 0.4, 0.9]

@@ -94,7 +94,8 @@ const OUTLIER_SIGMAS: f64 = 3.0;
 /// Each observation of a point by an image counts once, so that what many photos see
 /// weighs more. Robust: isolated points go first, then inverse depths beyond three
 /// deviations of the median. Where the cameras look every way the orientation is that of
-/// least spread among the points.
+/// least spread among the points, and the plane lies on the side of the cameras on which most of
+/// what they observe does.
 ///
 /// # Errors
 /// No observation of a point in front of its camera.
@@ -112,7 +113,7 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
 
     // 2. Inverse depths along it, one an observation; and the observing cameras' mean.
     let mut observed: Vec<(f64, DVec3)> = Vec::new();
-    let mut total = 0;
+    let (mut total, mut ahead) = (0, 0.0);
     for (point, alone) in reconstruction.points.values().zip(&isolated) {
         for (image_id, _) in &point.track {
             let Some(image) = reconstruction.images.get(image_id) else {
@@ -121,15 +122,18 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
             total += 1;
             let in_front = (image.camera_from_world * point.position).z > 0.0;
             let center = image.camera_from_world.center();
-            let depth = normal.dot(point.position - center).abs();
-            if in_front && !alone && depth > 0.0 {
-                observed.push((1.0 / depth, center));
+            let depth = normal.dot(point.position - center);
+            if in_front && !alone && depth.abs() > 0.0 {
+                observed.push((1.0 / depth.abs(), center));
+                ahead += depth.signum();
             }
         }
     }
     if observed.is_empty() {
         return Err(FitError::NoPoints);
     }
+    // Of a direction of least spread the sign says nothing: the points say on which side they are.
+    let normal = if ahead < 0.0 { -normal } else { normal };
 
     // 3. Drop what is far from the middle, and average the rest.
     let middle = median(observed.iter().map(|o| o.0).collect());
@@ -153,23 +157,31 @@ pub fn fit_plane(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> 
 }
 
 /// A plane's normal and condition: where the cameras look on the whole, or else the direction in
-/// which something is thinnest.
+/// which something is thinnest, the way that they look along it rather than against it.
 pub(crate) fn forward_or(
     reconstruction: &Reconstruction,
     thinnest: impl FnOnce() -> Option<Thinnest>,
 ) -> (DVec3, f64) {
-    let forward = mean_forward(reconstruction).map(|mean| (mean.normalize(), 1.0 / mean.length()));
-    forward
-        .or_else(|| thinnest().map(|t| (t.direction, t.condition)))
-        .unwrap_or((DVec3::Z, f64::INFINITY))
+    let mean = mean_forward(reconstruction);
+    if mean.length() >= COMMON_DIRECTION {
+        return (mean.normalize(), 1.0 / mean.length());
+    }
+    let Some(Thinnest {
+        direction,
+        condition,
+    }) = thinnest()
+    else {
+        return (DVec3::Z, f64::INFINITY);
+    };
+    let is_against = direction.dot(mean) < 0.0;
+    (if is_against { -direction } else { direction }, condition)
 }
 
-/// The mean of the unit vectors that the cameras look along; `None` where they look every way.
-fn mean_forward(reconstruction: &Reconstruction) -> Option<DVec3> {
+/// The mean of the unit vectors that the cameras look along.
+fn mean_forward(reconstruction: &Reconstruction) -> DVec3 {
     let images = reconstruction.images.values();
     let forward = images.map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z);
-    let mean = forward.sum::<DVec3>() / reconstruction.images.len().max(1) as f64;
-    (mean.length() >= COMMON_DIRECTION).then_some(mean)
+    forward.sum::<DVec3>() / reconstruction.images.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -266,6 +278,49 @@ mod tests {
             (1.0 / fit.distance - (0.5 + 0.25) / 2.0).abs() < 1e-12,
             "{fit:?}"
         );
+    }
+
+    /// Eight cameras around a disc of points that look at its middle from above, or from below.
+    #[test]
+    fn cameras_that_look_every_way_have_the_plane_where_the_points_are() {
+        let far = Rigid3::new(DQuat::from_rotation_z(2.0), DVec3::new(4e5, 5e6, 120.0));
+        for (above, world_from_scene) in [(0.4, Rigid3::IDENTITY), (-0.4, Rigid3::IDENTITY)]
+            .into_iter()
+            .flat_map(|(above, same)| [(above, same), (above, far)])
+        {
+            let mut r = capture(5.0, world_from_scene);
+            r.points.clear();
+            let image = r.images[&ImageId(0)].clone();
+            let around = |i: u32, turn: f64, radius: f64, y: f64| {
+                let (sin, cos) = (f64::from(i) * turn).sin_cos();
+                DVec3::new(radius * cos, y, radius * sin)
+            };
+            let centers = (0..8).map(|i| around(i, std::f64::consts::FRAC_PI_4, 4.0, above));
+            let centers: Vec<DVec3> = centers.collect();
+            r.images = (0..)
+                .zip(&centers)
+                .map(|(i, center)| {
+                    let pose = Rigid3::looking_at(*center, DVec3::ZERO, DVec3::Y);
+                    let camera_from_world = pose * world_from_scene.inverse();
+                    let image = Image {
+                        camera_from_world,
+                        ..image.clone()
+                    };
+                    (ImageId(i), image)
+                })
+                .collect();
+            for i in 0..200 {
+                let scene = around(i, 2.4, 0.1 * f64::from(i).sqrt(), 1e-3 * f64::from(i % 3));
+                add_point(&mut r, i, world_from_scene * scene);
+            }
+            let plane = fit_plane(&r).unwrap().plane;
+            for at in [DVec3::ZERO, DVec3::X, DVec3::Z] {
+                let off = plane.signed_distance(world_from_scene * at);
+                assert!(off.abs() < 0.01, "{above}: {off}, {plane:?}");
+            }
+            let behind = |center: &DVec3| plane.signed_distance(world_from_scene * *center) < 0.0;
+            assert!(centers.iter().all(behind), "{above}: {plane:?}");
+        }
     }
 
     #[test]

@@ -57,12 +57,11 @@ impl Surface {
     /// The surface of a lumigraph's proxy from a desired view.
     pub(crate) fn of(lumigraph: &Lumigraph, desired: &View, sources: &[FrameSource]) -> Self {
         let views = || -> Vec<View> { lumigraph.sources.iter().map(|s| s.view.clone()).collect() };
-        let of_plane = |plane: Plane| {
+        let seen = |plane: Plane| {
             let q = plane.inverse_distance_from(desired.center());
-            q.map_or(Self::Nothing, |q| {
-                Self::Plane(desired.camera_from_world.rotation * q)
-            })
+            q.map(|q| desired.camera_from_world.rotation * q)
         };
+        let of_plane = |plane: Plane| seen(plane).map_or(Self::Nothing, Self::Plane);
         let rays = || Rays::of(&desired.lens, (desired.width, desired.height));
         match &lumigraph.proxy {
             Proxy::Plane(plane) => of_plane(*plane),
@@ -71,11 +70,20 @@ impl Surface {
                 plane.map_or(Self::Nothing, of_plane)
             }
             proxy @ (Proxy::Points { .. } | Proxy::Dense(_)) => {
-                let facets = points::facets(desired, &views(), &lumigraph.points);
-                facets.map_or(Self::Nothing, |facets| {
-                    let rays = rays();
-                    let map = FacetMap::of_facets(facets, desired, rays.as_ref(), proxy.within());
-                    Self::Facets(within_sight(map, desired, rays.as_ref(), sources))
+                let (views, rays) = (views(), rays());
+                let rays = rays.as_ref();
+                let map = match points::facets(desired, &views, &lumigraph.points) {
+                    Some(facets) => {
+                        let map = FacetMap::of_facets(facets, desired, rays, proxy.within());
+                        Some(map)
+                    }
+                    // Too few points are in sight, but photos may show all of it.
+                    None => points::plane_without_facets(desired, &views, &lumigraph.points)
+                        .and_then(seen)
+                        .map(|q| FacetMap::of_plane(q, desired, rays, proxy.within())),
+                };
+                map.map_or(Self::Nothing, |map| {
+                    Self::Facets(within_sight(map, desired, rays, sources))
                 })
             }
             Proxy::Mesh(solid) => {
@@ -297,22 +305,51 @@ impl FacetMap {
             facets.locate(&neighbours, ray, start)
         });
         let map = Self::of_pixels(facets.planes, facet_of, desired);
-        let Some(hull) = within else {
-            return map;
-        };
+        match within {
+            None => map,
+            Some(hull) => map.kept_along_rays(hull, desired),
+        }
+    }
+
+    /// One plane all over, or as far as its horizon; kept within a hull, all of which is before what lies
+    /// beyond that.
+    fn of_plane(q: DVec3, desired: &View, rays: Option<&Rays>, within: Option<&Solid>) -> Self {
+        let facet_of = Self::found(desired, |ray, _| {
+            let is_seen = within.is_some() || q.dot(ray) > 0.0;
+            if is_seen { 0 } else { NO_FACET }
+        });
+        let map = Self::of_pixels(vec![q], facet_of, desired);
+        match (within, rays) {
+            (None, _) => map,
+            (Some(hull), None) => map.kept_along_rays(hull, desired),
+            (Some(hull), Some(rays)) => {
+                let width = desired.width as usize;
+                let inverse_depth = (0..map.facet_of.len()).map(|i| {
+                    let at = rays.at(i % width, i / width);
+                    at.map_or(0.0, |at| q.dot(at.extend(1.0)))
+                });
+                let inverse_depth: Vec<f64> = inverse_depth.collect();
+                let kept = hull.keep(desired, rays, &inverse_depth);
+                map.kept(&kept, hull, desired)
+            }
+        }
+    }
+
+    /// What pixels see, kept within a hull, ray by ray.
+    fn kept_along_rays(self, hull: &Solid, desired: &View) -> Self {
         let world_from_camera = desired.camera_from_world.rotation.conjugate();
         let keep = |i: usize| {
             let (x, y) = (i as u32 % desired.width, i as u32 / desired.width);
             let ray = desired.lens.unproject(Pixel::center_of(x, y));
-            let seen = ray.zip(map.plane_of(map.facet_of[i]));
+            let seen = ray.zip(self.plane_of(self.facet_of[i]));
             seen.map_or(Kept::Nowhere, |(ray, plane)| {
                 let along = plane.dot(ray).recip();
                 hull.keep_on_ray(desired.center(), world_from_camera * ray, along)
             })
         };
-        let pixels = (0..map.facet_of.len()).into_par_iter();
+        let pixels = (0..self.facet_of.len()).into_par_iter();
         let kept: Vec<Kept> = pixels.map(keep).collect();
-        map.kept(&kept, hull, desired)
+        self.kept(&kept, hull, desired)
     }
 
     /// What pixels see, kept within a hull as was found.
@@ -404,9 +441,136 @@ impl FacetMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::{Lens, Rigid3};
+    use crate::{PhotoStore, SourceView};
+    use calibrate::{Distortion, Lens, Rigid3};
+    use image::RgbaImage;
     use proptest::collection::vec;
     use proptest::prelude::*;
+    use proxy::{Mesh, MeshKind, SparsePoint};
+    use std::sync::Arc;
+
+    /// Two photos ahead, and points seen by both, all far to the left of a view between them, at a depth
+    /// of 5.
+    fn lumigraph(within: Option<Arc<Solid>>) -> Lumigraph {
+        let source = |x: f64| SourceView {
+            name: format!("{x}"),
+            view: ahead(DVec3::X * x, Distortion::None),
+            gain: [1.0; 3],
+            time_s: None,
+        };
+        let point = |i: i32| SparsePoint {
+            position: DVec3::new(-30.0, 0.2 * f64::from(i), 5.0),
+            seen_by: vec![0, 1],
+        };
+        Lumigraph {
+            sources: vec![source(-1.0), source(1.0)],
+            photos: PhotoStore::from_images(vec![RgbaImage::new(40, 40); 2]),
+            proxy: Proxy::Points { within },
+            points: (-20..20).map(point).collect(),
+            visibility: None,
+        }
+    }
+
+    fn ahead(center: DVec3, distortion: Distortion) -> View {
+        View {
+            lens: Lens::new(DVec2::splat(20.0), DVec2::splat(20.0), distortion),
+            width: 40,
+            height: 40,
+            camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, DVec3::NEG_Y),
+        }
+    }
+
+    /// Straight rays, bent ones, and some that look back, which are not known beforehand.
+    fn blank_views() -> [View; 3] {
+        let fisheye = Distortion::Fisheye { k: [0.0; 4] };
+        let mut views = [Distortion::None, fisheye, fisheye].map(|d| ahead(DVec3::ZERO, d));
+        views[2].lens = Lens::new(DVec2::splat(11.0), DVec2::splat(20.0), fisheye);
+        let are_known = views.each_ref().map(|v| rays(v).is_some());
+        assert_eq!(are_known, [true, true, false]);
+        views
+    }
+
+    fn rays(view: &View) -> Option<Rays> {
+        Rays::of(&view.lens, (view.width, view.height))
+    }
+
+    #[test]
+    fn a_view_of_no_points_looks_at_a_plane() {
+        let lumigraph = lumigraph(None);
+        let [pinhole, ..] = blank_views();
+        let surface = Surface::of(&lumigraph, &pinhole, &[]);
+        for at in [0.5, 20.0, 39.5] {
+            let q = surface.plane_at(Pixel::new(at, at)).unwrap();
+            assert!((1.0 / q.z - 5.0).abs() < 0.3, "{at}: {q}");
+        }
+        // Nobody knows where anything is.
+        let nothing = Lumigraph {
+            points: Vec::new(),
+            ..lumigraph
+        };
+        assert_eq!(Surface::of(&nothing, &pinhole, &[]), Surface::Nothing);
+    }
+
+    #[test]
+    fn a_plane_for_want_of_points_stays_within_the_hull() {
+        // A box before the plane, one unit to either side of the axis.
+        let corner = |i: u32| {
+            let pick = |bit: u32, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
+            DVec3::new(pick(0, -1.0, 1.0), pick(1, -1.0, 1.0), pick(2, 2.0, 3.0))
+        };
+        let faces = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = faces.map(|[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]]);
+        let mesh = Mesh {
+            positions: (0..8).map(corner).collect(),
+            triangles: triangles.concat(),
+        };
+        let hull = Arc::new(Solid::new(MeshKind::Hull, mesh));
+        let lumigraph = lumigraph(Some(hull));
+        let [pinhole, ..] = blank_views();
+        let surface = Surface::of(&lumigraph, &pinhole, &[]);
+        let q = surface.plane_at(Pixel::new(20.5, 19.5)).unwrap();
+        assert!((1.0 / q.z - 3.0).abs() < 1e-9, "{q}");
+        assert_eq!(surface.plane_at(Pixel::new(1.5, 20.5)), None);
+        // Of a plane through the box, ray by ray it is the same.
+        let q = DVec3::new(0.3, 0.0, 0.35);
+        for view in blank_views() {
+            let within = lumigraph.proxy.within();
+            let map = FacetMap::of_plane(q, &view, rays(&view).as_ref(), within);
+            let one_by_one = FacetMap::of_plane(q, &view, None, within);
+            let mut seen = 0;
+            for i in 0..1600 {
+                let ray = view.lens.unproject(Pixel::center_of(i % 40, i / 40));
+                let s = [&map, &one_by_one].map(|map| {
+                    let plane = map.plane_of(map.facet_of[i as usize])?;
+                    Some(plane.dot(ray?))
+                });
+                match s {
+                    [Some(a), Some(b)] => {
+                        assert!((a - b).abs() < 1e-9, "{i}: {a} {b}");
+                        seen += 1;
+                    }
+                    other => assert_eq!(other, [None, None], "{i}"),
+                }
+            }
+            assert!((50..800).contains(&seen), "{seen}");
+        }
+    }
+
+    #[test]
+    fn a_plane_is_seen_as_far_as_its_horizon() {
+        for view in blank_views() {
+            let map = FacetMap::of_plane(DVec3::Y, &view, rays(&view).as_ref(), None);
+            let rows = map.facet_of.chunks(40).map(|row| row[20] != NO_FACET);
+            assert_eq!(rows.filter(|is_seen| *is_seen).count(), 20);
+        }
+    }
 
     proptest! {
         #[test]

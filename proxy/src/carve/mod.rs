@@ -27,7 +27,7 @@ use flow::Graph;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use lattice::{Lattice, Site};
-use sight::{OTHERS, Sighting, Softness, UNIT};
+use sight::{MOST_QUALITY, OTHERS, Sighting, Softness, UNIT};
 use std::num::NonZero;
 
 /// What can be chosen about carving. The defaults were chosen on ten captures, by the surface's
@@ -35,7 +35,7 @@ use std::num::NonZero;
 /// a point, or solid expected 1 σ behind change the median by −2 to +6 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// At most this many lines of sight of a point count, spread over its photos.
+    /// At most this many lines of sight of a point count, spread over its photos; at least one does.
     pub lines_per_point: usize,
     /// A surface this many σ in front of a point costs a line of sight in earnest; σ is a
     /// multiple of the distance from the point to its neighbours.
@@ -61,9 +61,9 @@ impl Default for Options {
     }
 }
 
-/// Lines of sight at most: more points have fewer each. Their weights must fit 31 bits.
+/// Lines of sight at most, for time: more points have fewer each, but for the fewest of each.
 const MOST_LINES: usize = 2_000_000;
-/// Of each point, whatever the number of points.
+/// Of each point, whatever the number of points, unless fewer were asked for.
 const FEWEST_LINES_PER_POINT: usize = 2;
 /// Points nearer to a camera than this share of the dome's radius are left out; it is a
 /// hundred lattice steps.
@@ -222,7 +222,8 @@ impl Scene {
             .collect();
         snapped.sort_unstable();
         let lines = MOST_LINES / used.len().max(1);
-        let lines = lines.clamp(FEWEST_LINES_PER_POINT, options.lines_per_point.max(1));
+        let lines = lines.max(FEWEST_LINES_PER_POINT);
+        let lines = lines.min(options.lines_per_point.max(1));
         let (mut sites, mut positions, mut sightings) = (Vec::new(), Vec::new(), Vec::new());
         let mut site_of = vec![None; points.len()];
         for same in snapped.chunk_by(|a, b| a.1 == b.1) {
@@ -343,7 +344,7 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
     // 2. The facets' quality, the same both ways. The shell's own facets cost nothing: where
     // nothing is known, space is free as far as the shell.
     let cosines = quality::cosines(delaunay);
-    let most = f64::from(UNIT) * options.quality.clamp(0.0, 1e4);
+    let most = f64::from(UNIT) * options.quality.clamp(0.0, f64::from(MOST_QUALITY));
     for t in 0..delaunay.finite {
         for k in 0..4 {
             let code = delaunay.across[t][k] as usize;

@@ -19,6 +19,12 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// One line of sight's whole weight. Whole numbers add up to the same in any order.
 pub(super) const UNIT: u32 = 256;
+/// What a facet's quality costs at most, in lines.
+pub(super) const MOST_QUALITY: u32 = 10_000;
+/// More than this no cost of a label adds up to: an arc's, the one's the other way and the qualities of
+/// their facet fit 32 bits together. It is four million lines through one facet.
+const MOST: u32 = 1 << 30;
+const _: () = assert!(2 * (MOST as u64 + MOST_QUALITY as u64 * UNIT as u64) <= u32::MAX as u64);
 /// Beyond this many σ a facet counts as far from the point.
 const FAR_SIGMAS: f64 = 6.0;
 /// Chunks of vertices that are worked on at once.
@@ -33,7 +39,7 @@ pub(super) struct Sighting {
     pub(super) cameras: Vec<u32>,
 }
 
-/// Costs of the labels, in units of 1/[`UNIT`] line.
+/// Costs of the labels, in units of 1/[`UNIT`] line, none of which is more than [`MOST`].
 #[derive(Debug)]
 pub(super) struct Votes {
     /// For each arc `4 · tetrahedron + k`: if it is free and the one across is solid.
@@ -42,6 +48,33 @@ pub(super) struct Votes {
     pub(super) free: Vec<AtomicU32>,
     /// If it is free.
     pub(super) solid: Vec<AtomicU32>,
+}
+
+impl Votes {
+    fn new(tetrahedra: usize) -> Self {
+        let zeros = |n: usize| (0..n).map(|_| AtomicU32::new(0)).collect::<Vec<_>>();
+        Self {
+            arcs: zeros(4 * tetrahedra),
+            free: zeros(tetrahedra),
+            solid: zeros(tetrahedra),
+        }
+    }
+
+    fn limit(&mut self) {
+        let [arcs, free, solid] = [&mut self.arcs, &mut self.free, &mut self.solid];
+        for sum in arcs.iter_mut().chain(free).chain(solid) {
+            let sum = sum.get_mut();
+            *sum = MOST.min(*sum);
+        }
+    }
+}
+
+/// Adds a line's cost to a sum that may go a little beyond [`MOST`]. It is beyond in the end where the costs
+/// are in any order: what is added once it is beyond is taken away again.
+fn add(sum: &AtomicU32, cost: u32) {
+    if sum.fetch_add(cost, Relaxed) > MOST {
+        sum.fetch_sub(cost, Relaxed);
+    }
 }
 
 /// How much of a line is believed where.
@@ -64,12 +97,7 @@ pub(super) fn votes(
     is_point: impl Fn(u32) -> bool + Sync,
     softness: Softness,
 ) -> Votes {
-    let zeros = |n: usize| (0..n).map(|_| AtomicU32::new(0)).collect::<Vec<_>>();
-    let votes = Votes {
-        arcs: zeros(4 * delaunay.finite),
-        free: zeros(delaunay.finite),
-        solid: zeros(delaunay.finite),
-    };
+    let mut votes = Votes::new(delaunay.finite);
     let of_vertex = delaunay.tetrahedron_of_vertex();
     let size = sightings.len().div_ceil(CHUNKS).max(1);
     sightings.par_chunks(size).for_each(|chunk| {
@@ -84,6 +112,7 @@ pub(super) fn votes(
             }
         }
     });
+    votes.limit();
     votes
 }
 
@@ -116,12 +145,12 @@ fn in_front(star: &Star<'_>, towards: DVec3, sigma: f64, votes: &Votes) {
         .max(before);
         // Nothing, but close to the point.
         if cost > before {
-            votes.free[walk.at as usize].fetch_add(cost - before, Relaxed);
+            add(&votes.free[walk.at as usize], cost - before);
         }
         if ends {
             return;
         }
-        votes.arcs[walk.exit_arc() as usize].fetch_add(cost, Relaxed);
+        add(&votes.arcs[walk.exit_arc() as usize], cost);
         before = cost;
         if !walk.step() {
             return;
@@ -145,9 +174,9 @@ fn behind(star: &Star<'_>, away: DVec3, sigma: f64, sigmas: f64, votes: &Votes) 
             walk.at = at;
             break;
         }
-        votes.arcs[arc as usize].fetch_add(soft(distance, sigma), Relaxed);
+        add(&votes.arcs[arc as usize], soft(distance, sigma));
     }
-    votes.solid[walk.at as usize].fetch_add(UNIT, Relaxed);
+    add(&votes.solid[walk.at as usize], UNIT);
 }
 
 /// The tetrahedra around a vertex.
@@ -314,5 +343,29 @@ impl<'a> Walk<'a> {
         self.facet[gone] = apex;
         self.corners[gone] = d;
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn costs_beyond_the_most_are_the_most_in_any_order() {
+        let costs = |start: u32| {
+            let mut votes = Votes::new(1);
+            votes.arcs[2] = AtomicU32::new(start);
+            (0..10_000_u32)
+                .into_par_iter()
+                .for_each(|i| add(&votes.arcs[2], i % (UNIT + 1)));
+            votes.limit();
+            votes.arcs[2].load(Relaxed)
+        };
+        let sum: u32 = (0..10_000).map(|i| i % (UNIT + 1)).sum();
+        assert_eq!(costs(0), sum);
+        for beyond in [0, 1, UNIT, sum - 1, sum] {
+            assert_eq!(costs(MOST - sum + beyond), MOST);
+        }
+        assert_eq!(costs(MOST - sum - 1), MOST - 1);
     }
 }

@@ -14,6 +14,7 @@ mod paint;
 mod pieces;
 mod ply;
 mod ply_header;
+mod polygon;
 mod quadric;
 mod simplify;
 mod skin;

@@ -1,5 +1,6 @@
 //! Wavefront OBJ: the corners and faces.
 
+use super::polygon::{Fan, Fans};
 use super::{Mesh, MeshFileError};
 use glam::DVec3;
 use std::path::Path;
@@ -9,6 +10,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     let mut mesh = Mesh::default();
     // The greatest index so far and the line that has it: corners may follow their faces.
     let mut greatest = (0, 0);
+    let mut fans = Fans::default();
     for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
         let line_number = number + 1;
         let failed = |problem: String| MeshFileError::Line {
@@ -54,12 +56,14 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
                     .push(DVec3::new(coordinate()?, coordinate()?, coordinate()?));
             }
             _ => {
+                let first = mesh.triangles.len();
                 let mut polygon = Fan::default();
                 for word in words {
                     let index = index(word, mesh.positions.len()).map_err(&failed)?;
                     greatest = greatest.max((index, line_number));
                     polygon.corner(index, &mut mesh.triangles);
                 }
+                fans.note(first..mesh.triangles.len());
             }
         }
     }
@@ -74,6 +78,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
             ),
         });
     }
+    fans.mend(&mut mesh);
     Ok(mesh)
 }
 
@@ -98,26 +103,5 @@ pub(super) fn shown(word: &str) -> String {
     match word.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &word[..end]),
         None => word.to_owned(),
-    }
-}
-
-/// A polygon cut into triangles that share its first corner.
-#[derive(Default)]
-pub(super) struct Fan {
-    first: Option<u32>,
-    last: Option<u32>,
-}
-
-impl Fan {
-    /// Takes in the next corner.
-    pub(super) fn corner(&mut self, index: u32, triangles: &mut Vec<[u32; 3]>) {
-        match (self.first, self.last) {
-            (None, _) => self.first = Some(index),
-            (Some(first), Some(last)) => {
-                triangles.push([first, last, index]);
-                self.last = Some(index);
-            }
-            (Some(_), None) => self.last = Some(index),
-        }
     }
 }

@@ -1,7 +1,8 @@
 //! PLY, the Stanford triangle format: text and both binary orders.
 
-use super::obj::{Fan, shown};
+use super::obj::shown;
 use super::ply_header::{self, Element, Format, Scalar};
+use super::polygon::{Fan, Fans};
 use super::{Mesh, MeshFileError};
 use glam::DVec3;
 use std::path::Path;
@@ -45,6 +46,7 @@ fn parse_named(
     let mut mesh = Mesh::default();
     // The greatest index and the face and line that have it: faces may come first.
     let mut greatest = (0, 0, 0);
+    let mut fans = Fans::default();
     let mut has_corners = false;
     for element in &header.elements {
         if element.properties.is_empty() {
@@ -64,7 +66,9 @@ fn parse_named(
                     corner(&mut numbers, element, &columns, &mut mesh.positions)
                 }
                 name if name == faces => {
+                    let first = mesh.triangles.len();
                     let read = face(&mut numbers, element, &columns, &mut mesh.triangles);
+                    fans.note(first..mesh.triangles.len());
                     read.map(|index| greatest = greatest.max((index, record, line)))
                 }
                 _ => skip(&mut numbers, element),
@@ -87,6 +91,7 @@ fn parse_named(
             None => MeshFileError::File(path.to_owned(), problem),
         });
     }
+    fans.mend(&mut mesh);
     Ok(Some(mesh))
 }
 

@@ -3,12 +3,13 @@
 //! The points that the source views most like the desired one observe, by part of its picture, are
 //! triangulated over the directions around the desired centre. Inside a triangle inverse distance is
 //! linear, so each is flat. A ring of anchors beyond the image's corners, and one behind the
-//! viewer, make the surface complete. It is the proxy that asks least of a capture: no closed mesh, no agreement
+//! viewer, make the surface complete. Where next to no points are in sight, a plane does. It is the proxy that asks least of a capture: no closed mesh, no agreement
 //! between far views.
 
 mod alike;
 mod chart;
 mod clean;
+mod few;
 mod nearest;
 
 use crate::Facets;
@@ -17,6 +18,7 @@ pub(crate) use alike::{EASY_ANGLE, unlikeness};
 use calibrate::{Pixel, View};
 use chart::{Chart, distinct};
 use clean::{faded, without_odd};
+pub use few::plane_without_facets;
 use glam::{DVec2, DVec3};
 use nearest::{Asked, Nearest};
 
@@ -57,7 +59,7 @@ impl Node {
 }
 
 /// The surface through the points that the `sources` most like `desired` observe, by part of its
-/// picture; `None` where fewer than three are in sight.
+/// picture; `None` where fewer than three are in sight: see [`plane_without_facets`].
 ///
 /// Outliers go: points of which half the neighbours lie clearly nearer are taken to be hidden by
 /// them, and points that stick out of all their neighbours go, too.

@@ -237,6 +237,46 @@ fn too_little_is_no_surface() {
     assert!(facets(&desired, &sources(), &row).is_some());
 }
 
+#[test]
+fn without_facets_a_plane_is_where_what_is_known_lies() {
+    let desired = view(DVec3::ZERO);
+    let depth = |sources: &[View], points: &[SparsePoint]| {
+        assert_eq!(facets(&desired, sources, points), None);
+        let plane = plane_without_facets(&desired, sources, points)?;
+        let q = plane.inverse_distance_from(desired.center())?;
+        Some(1.0 / q.z)
+    };
+    let moved = |offset: DVec3| {
+        let mut points = surface(|_, _| 5.0);
+        points.iter_mut().for_each(|p| p.position += offset);
+        points
+    };
+    // 1. Points beside the image.
+    let beside = depth(&sources(), &moved(DVec3::X * 40.0)).unwrap();
+    assert!((beside - 5.0).abs() < 0.3, "{beside}");
+    // 2. Points in front of the sources alone.
+    let behind: Vec<View> = [-1.0, 0.0, 1.0]
+        .map(|x| view(DVec3::new(x, 0.0, -9.0)))
+        .into();
+    let plane = depth(&behind, &moved(DVec3::NEG_Z * 6.0)).unwrap();
+    assert!((plane + 1.0).abs() < 1e-9, "{plane}");
+    // 3. No points: where the axes meet, if they do.
+    assert_eq!(depth(&sources(), &[]), None);
+    let turned = sources().into_iter().map(|source| View {
+        camera_from_world: Rigid3::looking_at(source.center(), DVec3::Z * 4.0, DVec3::NEG_Y),
+        ..source
+    });
+    let turned: Vec<View> = turned.collect();
+    let axes = depth(&turned, &[]).unwrap();
+    assert!((axes - 4.0).abs() < 1e-9, "{axes}");
+    assert_eq!(depth(&[], &[]), None);
+    // Whoever is said to see points need not be there.
+    let mut points = moved(DVec3::ZERO);
+    points.truncate(2);
+    points.iter_mut().for_each(|p| p.seen_by = vec![]);
+    assert_eq!(depth(&sources(), &points), None);
+}
+
 proptest! {
     /// Whatever the points, the walk finds a facet that holds the ray, and inverse distance
     /// there is positive and no larger than the largest of its corners'.

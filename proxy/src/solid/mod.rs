@@ -7,6 +7,8 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
+use rayon::prelude::*;
+use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -74,6 +76,7 @@ pub struct Solid {
     /// What every ray's point is kept within.
     within: Option<Arc<Solid>>,
     bvh: Bvh2,
+    boxed: Boxed,
     /// Where the hierarchy's origin lies in the world: f32 has digits only around it.
     origin: DVec3,
 }
@@ -94,11 +97,76 @@ const ROUNDING: f64 = 1e-6;
 /// no gap.
 const GAP: f64 = 1e-12;
 
+#[derive(Clone, Copy)]
 struct Bounds(Aabb);
 
 impl Boundable for Bounds {
     fn aabb(&self) -> Aabb {
         self.0
+    }
+}
+
+impl Bounds {
+    /// The same for equal boxes.
+    fn bits(&self) -> [u32; 6] {
+        let [a, b, c] = self.0.min.to_array();
+        let [d, e, f] = self.0.max.to_array();
+        [a, b, c, d, e, f].map(f32::to_bits)
+    }
+}
+
+/// The triangles that rays can meet, by their boxes. A hierarchy of boxes takes time with the square
+/// of how many are equal, so it has each but once.
+struct Boxed {
+    triangles: Vec<u32>,
+    /// Where those of each of the hierarchy's slots begin, and where the last end.
+    first: Vec<u32>,
+}
+
+impl Boxed {
+    /// With the hierarchy around them, the boxes in the order of their first triangles.
+    fn new(mesh: &Mesh, bounds: impl Fn(usize) -> Bounds + Sync) -> (Self, Bvh2) {
+        // 1. What has equal boxes is side by side, in the mesh's order. A point or a line is met
+        //    by no ray.
+        let can_be_met = |i: &u32| {
+            let [a, b, c] = mesh.corners(*i as usize);
+            a != b && b != c && c != a
+        };
+        let mut sorted: Vec<([u32; 6], u32)> = (0..mesh.triangles.len() as u32)
+            .into_par_iter()
+            .filter(can_be_met)
+            .map(|i| (bounds(i as usize).bits(), i))
+            .collect();
+        sorted.par_sort_unstable();
+        let mut groups: Vec<&[([u32; 6], u32)]> = sorted.chunk_by(|a, b| a.0 == b.0).collect();
+        groups.par_sort_unstable_by_key(|group| group[0].1);
+
+        // 2. The hierarchy.
+        let boxes: Vec<Bounds> = groups.iter().map(|g| bounds(g[0].1 as usize)).collect();
+        let mut spent = Duration::default();
+        let bvh = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut spent);
+
+        // 3. What is in its slots. Of triangles with the same corners a ray meets the first.
+        let mut triangles = Vec::with_capacity(sorted.len());
+        let mut first = vec![0];
+        for &place in &bvh.primitive_indices {
+            let group = groups[place as usize];
+            let mut known = HashSet::new();
+            let corners = |i: u32| {
+                let corners = mesh.corners(i as usize);
+                corners.map(|p| p.to_array().map(f64::to_bits))
+            };
+            let mut is_new = |i: &u32| group.len() == 1 || known.insert(corners(*i));
+            triangles.extend(group.iter().map(|(_, i)| *i).filter(|i| is_new(i)));
+            first.push(triangles.len() as u32);
+        }
+        (Self { triangles, first }, bvh)
+    }
+
+    /// The triangles in one of the hierarchy's slots.
+    #[inline]
+    fn within(&self, slot: usize) -> &[u32] {
+        &self.triangles[self.first[slot] as usize..self.first[slot + 1] as usize]
     }
 }
 
@@ -124,15 +192,14 @@ impl Solid {
             let corner = |p: DVec3| Vec3A::from(p.as_vec3());
             Bounds(Aabb::new(corner(least - room), corner(greatest + room)))
         };
-        let bounds: Vec<Bounds> = (0..mesh.triangles.len()).map(bounds).collect();
-        let mut spent = Duration::default();
-        let bvh = build_bvh2(&bounds, BvhBuildParams::fast_build(), &mut spent);
+        let (boxed, bvh) = Boxed::new(&mesh, bounds);
         Self {
             kind,
             occludes: kind.can_occlude_itself(),
             mesh,
             within: None,
             bvh,
+            boxed,
             origin,
         }
     }
@@ -214,7 +281,7 @@ impl Solid {
         front_only: bool,
     ) -> Option<Hit> {
         let from = from_in_world - self.origin;
-        if self.mesh.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
+        if self.boxed.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
             return None;
         }
         // Unit length, so that the distances compared in f32 are those of the world.
@@ -226,23 +293,26 @@ impl Solid {
         let ray = Ray::new_inf(from.as_vec3().into(), unit.as_vec3().into());
         let mut nearest: Option<Hit> = None;
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
-            let triangle_idx = self.bvh.primitive_indices[slot];
-            let corners = self.mesh.corners(triangle_idx as usize);
-            let Some(along) = meet(corners.map(|p| p - from_in_world), unit, front_only) else {
-                return f32::INFINITY;
-            };
-            let first = nearest.is_none_or(|n| {
-                let order = along.total_cmp(&n.along);
-                order.then(triangle_idx.cmp(&n.triangle_idx)).is_lt()
-            });
-            if first {
-                nearest = Some(Hit {
-                    triangle_idx,
-                    along,
+            let mut bound = f32::INFINITY;
+            for &triangle_idx in self.boxed.within(slot) {
+                let corners = self.mesh.corners(triangle_idx as usize);
+                let Some(along) = meet(corners.map(|p| p - from_in_world), unit, front_only) else {
+                    continue;
+                };
+                let first = nearest.is_none_or(|n| {
+                    let order = along.total_cmp(&n.along);
+                    order.then(triangle_idx.cmp(&n.triangle_idx)).is_lt()
                 });
+                if first {
+                    nearest = Some(Hit {
+                        triangle_idx,
+                        along,
+                    });
+                }
+                // A little farther than it is, so that rounding hides nothing nearer.
+                bound = bound.min((along * (1.0 + 4.0 * ROUNDING)) as f32);
             }
-            // A little farther than it is, so that rounding hides nothing nearer.
-            (along * (1.0 + 4.0 * ROUNDING)) as f32
+            bound
         });
         nearest.map(|hit| Hit {
             along: hit.along / length,
@@ -398,5 +468,64 @@ mod tests {
         assert_eq!(globe.first_hit(DVec3::Z * 3.0, DVec3::Z), None);
         assert_eq!(globe.first_hit(DVec3::Z * 3.0, DVec3::ZERO), None);
         assert_eq!(globe.first_hit(DVec3::NAN, DVec3::Z), None);
+    }
+
+    /// Copies of a triangle, triangles that are points, and pages of a book: all have one box.
+    #[test]
+    fn many_triangles_in_one_place_take_no_more_time_than_elsewhere() {
+        const COUNT: u32 = 100_000;
+        let mut mesh = Mesh {
+            positions: vec![
+                DVec3::new(5.0, 5.0, 1.0),
+                DVec3::new(6.0, 5.0, 1.0),
+                DVec3::new(5.0, 6.0, 1.0),
+                DVec3::ZERO,
+                DVec3::ONE,
+            ],
+            triangles: vec![[3; 3]; COUNT as usize],
+        };
+        for i in 0..COUNT {
+            mesh.triangles.push([0, 1, 2]);
+            // Along one side of a cube's diagonal, away from its faces.
+            let share = 0.1 + 0.4 * f64::from(i) / f64::from(COUNT);
+            mesh.triangles.push([3, 4, mesh.positions.len() as u32]);
+            mesh.positions.push(DVec3::new(share, 0.2, 0.8));
+        }
+        // It took minutes.
+        let solid = Solid::new(MeshKind::Mesh, mesh);
+        let hit = |x: f64, y: f64| solid.first_hit(DVec3::new(x, y, -1.0), DVec3::Z);
+        let copy = hit(5.2, 5.2).unwrap();
+        assert_eq!(copy.triangle_idx, COUNT);
+        assert!((copy.along - 2.0).abs() < 1e-12, "{copy:?}");
+        assert!(hit(0.4, 0.3).is_some());
+        assert_eq!(hit(0.0, 0.5), None);
+        assert!(solid.boxed.triangles.len() <= 1 + COUNT as usize);
+    }
+
+    proptest! {
+        /// Of corners on few places many triangles are equal, have equal boxes, or no area.
+        #[test]
+        fn a_ray_meets_the_first_of_all_triangles(
+            triangles in prop::collection::vec(prop::array::uniform3(0..27_u32), 1..60),
+            from in prop::array::uniform3(-3.0..3.0), direction in prop::array::uniform3(-1.0..1.0),
+            carved: bool,
+        ) {
+            let place = |i: u32| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9));
+            let mesh = Mesh { positions: (0..27).map(place).collect(), triangles };
+            let kind = if carved { MeshKind::Carved } else { MeshKind::Mesh };
+            let solid = Solid::new(kind, mesh.clone());
+            let (from, direction) = (DVec3::from_array(from), DVec3::from_array(direction));
+            let unit = direction / direction.length();
+            let meets = |i: usize| {
+                let [a, b, c] = mesh.triangles[i];
+                let corners = mesh.corners(i).map(|p| p - from);
+                let along = meet(corners, unit, carved).filter(|_| a != b && b != c && c != a);
+                along.map(|along| (along, i as u32))
+            };
+            let all = (0..mesh.triangles.len()).filter_map(meets);
+            let expected = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let found = solid.first_hit(from, direction).map(|hit| hit.triangle_idx);
+            prop_assert_eq!(found, expected.map(|(_, i)| i));
+        }
     }
 }

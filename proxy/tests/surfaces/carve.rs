@@ -271,6 +271,21 @@ fn degenerate_points_give_a_closed_surface() {
 }
 
 #[test]
+fn one_line_of_each_point_is_enough_to_carve_with() {
+    let room = Room::new(5);
+    let points = room.points(300, 0.0, &mut Random(5));
+    for lines_per_point in [0, 1, 2] {
+        let options = Options {
+            lines_per_point,
+            ..Options::default()
+        };
+        let mesh = carve::surface(&room.views, &points, &options).unwrap().mesh;
+        assert_closed(&mesh);
+        assert_covers(&mesh, &room.views, 4);
+    }
+}
+
+#[test]
 fn what_cannot_be_carved_is_an_error_that_says_why() {
     let room = Room::new(2);
     let options = Options::default();

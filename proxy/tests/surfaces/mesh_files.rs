@@ -352,6 +352,112 @@ fn obj_faces_take_every_form() {
     );
 }
 
+/// An L of area 5, at a slant and far from the origin; and a square with a hole, joined to its outline.
+const CONCAVE: [(&[[f64; 2]], f64); 2] = [
+    (
+        &[[0., 0.], [3., 0.], [3., 1.], [1., 1.], [1., 3.], [0., 3.]],
+        5.0,
+    ),
+    (
+        &[
+            [0., 0.],
+            [4., 0.],
+            [4., 4.],
+            [0., 4.],
+            [0., 0.],
+            [1., 1.],
+            [1., 3.],
+            [3., 3.],
+            [3., 1.],
+            [1., 1.],
+        ],
+        12.0,
+    ),
+];
+
+#[test]
+fn a_polygon_that_is_not_convex_covers_itself_alone() {
+    let mut cases = 0;
+    for (corners, area) in CONCAVE {
+        for start in 0..corners.len() {
+            for is_reversed in [false, true] {
+                let count = corners.len();
+                let mut around: Vec<usize> = (0..count).map(|i| (i + start) % count).collect();
+                if is_reversed {
+                    around.reverse();
+                }
+                let place = |&[x, y]: &[f64; 2]| format!("{} {} {}\n", 5e5 + x, 5e6 + y, x + y);
+                let places: Vec<String> = corners.iter().map(place).collect();
+                let places = places.concat();
+                // Faces may come before their corners.
+                let face: String = around.iter().map(|i| format!(" {}", i + 1)).collect();
+                let obj = format!("f{face}\nv {}\n", places.trim_end().replace('\n', "\nv "));
+                let face: String = around.iter().map(|i| format!(" {i}")).collect();
+                let ply = format!(
+                    "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n\
+                     element vertex {count}\nproperty double x\nproperty double y\nproperty double z\n\
+                     end_header\n{count}{face}\n{places}"
+                );
+                for (name, text) in [("a.obj", obj), ("a.ply", ply)] {
+                    let mesh = parse(name, text).unwrap();
+                    assert_eq!(mesh.triangles.len(), count - 2);
+                    let flat: Vec<f64> = normals(&mesh).iter().map(|n| n.z / 2.0).collect();
+                    let sign = if is_reversed { -1.0 } else { 1.0 };
+                    assert!(
+                        flat.iter().all(|a| sign * a > 0.0),
+                        "{name} {start}: {flat:?}"
+                    );
+                    let sum: f64 = flat.iter().sum();
+                    assert!((sum - sign * area).abs() < 1e-6, "{name} {start}: {sum}");
+                    cases += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(cases, 2 * 2 * (6 + 10));
+}
+
+/// An OBJ file of one polygon in the plane z = 0.
+fn polygon(corners: &[[f64; 2]]) -> Mesh {
+    let lines = corners.iter().map(|[x, y]| format!("v {x} {y} 0\n"));
+    let face: String = (1..=corners.len()).map(|i| format!(" {i}")).collect();
+    parse("a.obj", lines.collect::<String>() + "f" + &face).unwrap()
+}
+
+fn fan(corners: u32) -> Vec<[u32; 3]> {
+    (1..corners - 1).map(|i| [0, i, i + 1]).collect()
+}
+
+#[test]
+fn a_polygon_that_its_first_corner_sees_whole_is_a_fan() {
+    // Convex, with a corner on a side, but for digits; and an arrow, from its tip.
+    let almost = [[0., 0.], [1., 1e-7], [2., 0.], [2., 2.], [0., 2.]];
+    assert_eq!(polygon(&almost).triangles, fan(5));
+    let arrow = [[0., 0.], [2., -1.], [1., 0.], [2., 1.]];
+    assert_eq!(polygon(&arrow).triangles, fan(4));
+    // What encloses nothing, or crosses itself.
+    let line = [[0., 0.], [1., 1.], [2., 2.], [1., 1.]];
+    assert_eq!(polygon(&line).triangles, fan(4));
+    let eight = [[0., 0.], [1., 1.], [1., 0.], [0., 1.]];
+    assert_eq!(polygon(&eight).triangles, fan(4));
+}
+
+#[test]
+fn polygons_of_many_corners_take_no_time() {
+    // A comb of so many teeth.
+    let comb = |teeth: u32| {
+        let tooth = |i: u32| [[f64::from(i) + 0.5, 5.0], [f64::from(i), 0.0]];
+        let mut corners = vec![[0.0, -1.0], [f64::from(teeth), -1.0]];
+        corners.extend((0..teeth).rev().flat_map(tooth));
+        corners
+    };
+    let mesh = polygon(&comb(2000));
+    assert_eq!(mesh.triangles.len(), 4000);
+    assert!(normals(&mesh).iter().all(|n| n.z > 0.0));
+    // It is too large to be cut well.
+    assert_eq!(polygon(&comb(200_000)).triangles, fan(400_002));
+}
+
 #[test]
 fn bad_obj_files_say_where() {
     let with = |rest: &str| message("a.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{rest}"));
@@ -536,6 +642,26 @@ fn a_house_is_imported_and_lies_around_its_cameras() {
 }
 
 proptest! {
+    /// Whatever its first corner sees of it, the triangles of a star are it: they are all the same way
+    /// round, and their areas add up to its.
+    #[test]
+    fn stars_are_cut_into_themselves(
+        radii in prop::collection::vec(0.05..1.0_f64, 3..60), down: bool,
+    ) {
+        let turn = std::f64::consts::TAU / radii.len() as f64;
+        let corner = |(i, radius): (usize, &f64)| {
+            let (sin, cos) = (turn * i as f64).sin_cos();
+            [radius * cos, if down { -radius * sin } else { radius * sin }]
+        };
+        let corners: Vec<[f64; 2]> = radii.iter().enumerate().map(corner).collect();
+        let flat: Vec<f64> = normals(&polygon(&corners)).iter().map(|n| n.z).collect();
+        prop_assert_eq!(flat.len(), corners.len() - 2);
+        let covered: f64 = flat.iter().map(|a| a.abs()).sum();
+        let next = radii.iter().cycle().skip(1);
+        let area: f64 = radii.iter().zip(next).map(|(a, b)| a * b * turn.sin()).sum();
+        prop_assert!((covered / area - 1.0).abs() < 5e-5, "{} {}", covered, area);
+    }
+
     #[test]
     fn any_mesh_survives_every_file(
         corners in prop::collection::vec(prop::array::uniform3(-1e7..1e7_f64), 3..40),
