@@ -21,6 +21,19 @@ pub(crate) const TOLERANCE: f64 = 0.02;
 /// How much farther still until it is hidden, in tolerances.
 pub(crate) const FADE: f64 = 1.75;
 
+/// How many times as far as the nearest a texel may be with its distance stored to a quarter of the
+/// tolerance: the smallest numbers of 16 bits are 2⁻²⁴ apart.
+const WIDEST: f64 = 1.6e5;
+
+/// Where more are farther than one in so many, the first of those counts as far, and the unit is so
+/// many times as near. That leaves it three digits, and what is a thousand times as far two; what is
+/// more than six million times as near is stored as if it were not.
+const FAR_SHARE: usize = 16;
+const FAR_UNITS: f64 = 100.0;
+
+/// The largest value stored; 16 bits hold it just as it is.
+const MOST: f64 = 6e4;
+
 /// Photo pixels a texel of a map, across and down.
 pub(crate) const REDUCTION: u32 = 2;
 
@@ -31,7 +44,8 @@ pub struct DistanceMap {
     pub size: [u32; 2],
     /// Row by row, 1/distance over [`Self::unit`]; zero where there is nothing. These are
     /// the largest of 3 × 3 rays, so that what lies beside something nearer, where no proxy
-    /// is exact, counts as hidden by it. They fit 16 bits.
+    /// is exact, counts as hidden by it. They fit 16 bits: at most one as a rule, and 6e4
+    /// where something all but touches the camera.
     pub values: Vec<f32>,
     /// What the values are in units of, 1/world units.
     pub unit: f64,
@@ -122,20 +136,21 @@ impl DistanceMap {
         };
         let rows: Vec<Vec<f64>> = (0..height).map(row).collect();
 
+        Self::of(size, &rows)
+    }
+
+    /// Of the inverse distances of texels, row by row.
+    fn of(size: [u32; 2], rows: &[Vec<f64>]) -> Self {
+        let [width, height] = size.map(|side| side as usize);
         // The unit keeps the values within what 16 bits hold.
-        let nearest = rows.iter().flatten().copied().fold(0.0, f64::max);
-        let unit = if nearest > 0.0 && nearest.is_finite() {
-            nearest
-        } else {
-            1.0
-        };
+        let unit = unit_of(rows);
         let around = |i: usize, side: usize| i.saturating_sub(1)..(i + 2).min(side);
         let values = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x, y)))
             .map(|(x, y)| {
                 let block = around(y, height).flat_map(|y| around(x, width).map(move |x| (x, y)));
                 let value = block.map(|(x, y)| rows[y][x]).fold(0.0, f64::max);
-                f16::from_f64(value / unit).to_f32()
+                f16::from_f64((value / unit).min(MOST)).to_f32()
             });
         let values: Vec<f32> = values.collect();
         Self {
@@ -194,6 +209,29 @@ impl DistanceMap {
     }
 }
 
+/// What inverse distances are stored in units of: the nearest, or less where that is so near that
+/// 16 bits would not tell the rest from nothing.
+fn unit_of(rows: &[Vec<f64>]) -> f64 {
+    let seen = || rows.iter().flatten().copied().filter(|s| *s > 0.0);
+    // On the proxy itself it is infinite.
+    let nearest = seen().filter(|s| s.is_finite()).fold(0.0, f64::max);
+    if nearest == 0.0 {
+        return 1.0;
+    }
+    if nearest <= WIDEST * seen().fold(f64::INFINITY, f64::min) {
+        return nearest;
+    }
+    // Rather than the farthest of all, which may be a speck at the horizon.
+    let mut all: Vec<f64> = seen().collect();
+    let rank = all.len() / FAR_SHARE;
+    let (_, &mut far, _) = all.select_nth_unstable_by(rank, f64::total_cmp);
+    if nearest <= WIDEST * far {
+        nearest
+    } else {
+        FAR_UNITS * far
+    }
+}
+
 /// The largest of 2 × 2 values of a map that is so wide, of 2 × 2 of those, and so on to the whole.
 fn largest_of(values: &[f32], mut width: usize) -> Vec<Vec<f32>> {
     let mut levels: Vec<Vec<f32>> = Vec::new();
@@ -230,3 +268,55 @@ pub(crate) fn visible(inverse_distance: f64, nearest: f64) -> f64 {
 
 /// The reduction, for the twins that sample the maps by pixels of the photo.
 pub(crate) const TEXEL_PER_PIXEL: f32 = 1.0 / REDUCTION as f32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map of a wall at a distance, but for some texels in the upper left corner.
+    fn map(distance: f64, corner: usize, inverse_distance: f64) -> DistanceMap {
+        let at = |x: usize, y: usize| match x.max(y) < corner {
+            true => inverse_distance,
+            false => 1.0 / distance,
+        };
+        let row = |y| (0..32).map(|x| at(x, y)).collect();
+        let rows: Vec<Vec<f64>> = (0..24).map(row).collect();
+        DistanceMap::of([32, 24], &rows)
+    }
+
+    #[test]
+    fn the_unit_is_the_nearest() {
+        for inverse_distance in [0.0, 0.3, 1.0, 1e4] {
+            let map = map(5.0, 3, inverse_distance);
+            assert_eq!(map.unit, inverse_distance.max(0.2));
+            let value = |s: f64| f16::from_f64(s / map.unit).to_f32();
+            assert_eq!(map.values[0], value(inverse_distance));
+            assert_eq!(map.values[31], value(0.2));
+        }
+        // Nor does a speck at the horizon change it.
+        let map = map(5.0, 1, 1e-9);
+        assert_eq!(map.unit, 0.2);
+        assert_eq!(DistanceMap::of([2, 1], &[vec![0.0; 2]]).unit, 1.0);
+    }
+
+    #[test]
+    fn a_camera_that_touches_the_proxy_does_not_see_through_the_rest() {
+        for distance in [0.05, 5.0, 5e6] {
+            for nearer in [1e4, 1e5, 1e6, 1e8, 1e12, f64::INFINITY] {
+                for corner in [1, 4, 12, 20] {
+                    let map = map(distance, corner, nearer / distance);
+                    let stored = map.inverse_distance(Pixel::new(62.0, 46.0));
+                    assert!((stored * distance - 1.0).abs() < 0.3 * TOLERANCE);
+                    assert_eq!(visible(1.0 / distance, stored), 1.0);
+                    assert!(visible(0.9 / distance, stored) < 1e-2);
+                    // The corner hides what is behind it.
+                    let near = map.inverse_distance(Pixel::new(1.0, 1.0));
+                    assert!(near.is_finite() && visible(1.0 / distance, near) < 1e-2);
+                    assert!(visible(nearer / distance, near) > 0.99);
+                    assert!(map.values.iter().all(|v| f64::from(*v) <= MOST));
+                    assert!(map.largest_within([0.0, 0.0], [60.0, 40.0]) >= near);
+                }
+            }
+        }
+    }
+}

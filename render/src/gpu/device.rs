@@ -68,6 +68,12 @@ impl Trouble {
         }
     }
 
+    /// As if the device had said so.
+    #[cfg(test)]
+    pub(super) fn say(&self, error: RenderError) {
+        self.note(|said| said.error = Some(error));
+    }
+
     /// Whether the device is gone for good, and why.
     pub(super) fn lost(&self) -> Option<String> {
         self.said.lock().ok().and_then(|said| said.lost.clone())
@@ -204,16 +210,8 @@ fn missing(adapter: &wgpu::Adapter) -> Vec<String> {
 
 fn missing_of(limits: &Limits, flags: DownlevelFlags) -> Vec<String> {
     let mut missing = Vec::new();
-    for (flag, what) in [
-        (DownlevelFlags::COMPUTE_SHADERS, "compute shaders"),
-        (
-            DownlevelFlags::FRAGMENT_STORAGE,
-            "storage buffers for pixels",
-        ),
-    ] {
-        if !flags.contains(flag) {
-            missing.push(what.to_owned());
-        }
+    if !flags.contains(DownlevelFlags::COMPUTE_SHADERS) {
+        missing.push("compute shaders".to_owned());
     }
     for (has, needed, what) in [
         (
@@ -256,16 +254,21 @@ fn missing_of(limits: &Limits, flags: DownlevelFlags) -> Vec<String> {
     missing
 }
 
+/// What a device says, for callers.
+pub(super) fn error_of(error: &wgpu::Error) -> RenderError {
+    let message = error.to_string();
+    match error {
+        wgpu::Error::OutOfMemory { .. } => RenderError::DeviceFull(message),
+        _ => RenderError::Gpu(message),
+    }
+}
+
 /// Errors that no call returns are kept for the next one that can.
 fn listen(device: &wgpu::Device) -> Trouble {
     let trouble = Trouble::default();
     let of_errors = trouble.clone();
     device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-        let message = error.to_string();
-        let error = match error {
-            wgpu::Error::OutOfMemory { .. } => RenderError::DeviceFull(message),
-            _ => RenderError::Gpu(message),
-        };
+        let error = error_of(&error);
         of_errors.note(|said| {
             said.error.get_or_insert(error);
         });
@@ -284,13 +287,46 @@ fn listen(device: &wgpu::Device) -> Trouble {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pipelines::SHADERS;
     use super::*;
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+    use naga::{AddressSpace, ImageClass, ShaderStage, TypeInner};
+
+    /// Some devices have none for them, and none is asked of any.
+    #[test]
+    fn pixels_and_corners_have_no_storage() {
+        let own = SHADERS.map(|(_, parts)| parts.concat());
+        let raster = include_str!("raster/raster.wgsl").to_owned();
+        for source in own.into_iter().chain([raster]) {
+            let module = naga::front::wgsl::parse_str(&source).unwrap();
+            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+            let info = validator.validate(&module).unwrap();
+            for (i, entry) in module.entry_points.iter().enumerate() {
+                if entry.stage == ShaderStage::Compute {
+                    continue;
+                }
+                for (handle, global) in module.global_variables.iter() {
+                    let class = match module.types[global.ty].inner {
+                        TypeInner::Image { class, .. } => Some(class),
+                        _ => None,
+                    };
+                    let is_stored = matches!(global.space, AddressSpace::Storage { .. })
+                        || matches!(class, Some(ImageClass::Storage { .. }));
+                    let is_used = !info.get_entry_point(i)[handle].is_empty();
+                    assert!(!(is_stored && is_used), "{}: {:?}", entry.name, global.name);
+                }
+            }
+        }
+    }
 
     #[test]
     fn what_is_missing_is_named_with_what_there_is() {
         assert!(missing_of(&Limits::default(), DownlevelFlags::all()).is_empty());
         // What WebGPU asks of every device, also of the oldest with compute shaders.
         assert!(missing_of(&Limits::downlevel_defaults(), DownlevelFlags::all()).is_empty());
+        // Only workgroups read and write buffers.
+        let flags = DownlevelFlags::COMPUTE_SHADERS;
+        assert!(missing_of(&Limits::default(), flags).is_empty());
         let poor = Limits {
             max_texture_array_layers: 8,
             ..Limits::downlevel_webgl2_defaults()

@@ -30,6 +30,8 @@ pub(crate) struct Layers {
     /// By layer.
     slots: Vec<Slot>,
     capacity: u32,
+    /// How many layers there is memory for: `u32::MAX` until it was once for fewer than asked.
+    affordable: u32,
     /// Counts frames.
     clock: u64,
 }
@@ -88,6 +90,19 @@ impl From<RenderError> for Shortage {
     }
 }
 
+/// Layers of an array that so many need: half as many more, because each time that it grows all of
+/// them are brought again.
+fn grown(needed: u32) -> u32 {
+    (needed + needed / 2).next_multiple_of(8)
+}
+
+/// Layers to make do with where there is no memory for `count`: three quarters as many, though not
+/// at once fewer than any of `stops` that are less.
+fn fewer(count: u32, stops: [u32; 3]) -> u32 {
+    let stops = stops.into_iter().filter(|stop| *stop < count);
+    stops.fold(count - count.div_ceil(4), u32::max)
+}
+
 impl Layers {
     /// Makes sure that the photos or masks of the given source views are on the device, within
     /// the room that their frame has. Those that are there already stay if there is room, else
@@ -131,8 +146,14 @@ impl Layers {
                 content.name()
             ))));
         }
-        let fits =
-            |p: &Self| p.store_id == store_id && p.finest == room.finest && p.capacity <= room.most;
+        let alike = |p: &Self| p.store_id == store_id && p.finest == room.finest;
+        let known = current.as_ref().filter(|p| alike(p));
+        let (mut affordable, there) = known.map_or((u32::MAX, 0), |p| (p.affordable, p.capacity));
+        if !room.grouped {
+            // To try for more again would cost all that is there, frame after frame.
+            most = most.min(affordable.max(wanted.len() as u32));
+        }
+        let fits = |p: &Self| alike(p) && p.capacity <= room.most;
         let missing = |p: &Self| wanted.iter().filter(|&&i| p.layers[i].is_none()).count() as u32;
         let enough = |p: &Self| p.used() + missing(p) <= p.capacity || p.capacity >= most;
         if !current.as_ref().is_some_and(|p| fits(p) && enough(p)) {
@@ -141,27 +162,30 @@ impl Layers {
             let keep = old
                 .filter(|p| fits(p))
                 .map_or_else(Vec::new, |p| p.by_age(wanted));
-            let mut keep_count = keep.len().min(most as usize - wanted.len());
+            let keep_count = keep.len().min(most as usize - wanted.len());
             let others = old.map_or(0, |p| p.others(wanted));
             Self::release(current, residency, maker);
-            let needed = (wanted.len() + keep_count).max(1) as u32;
-            let capacity = if residency.budget.is_some() || room.grouped {
+            let least = wanted.len() as u32;
+            let needed = least + keep_count as u32;
+            let mut capacity = if residency.budget.is_some() || room.grouped {
                 // Made once, it need not be filled again when more comes.
                 most
             } else {
-                needed.next_multiple_of(8).min(most)
+                grown(needed).min(most)
             };
             let allocate =
                 |count| Self::allocate(content, maker, frame, store_id, room.finest, count);
-            let mut layers = match allocate(capacity) {
-                Err(Shortage::Memory { .. })
-                    if capacity as usize > wanted.len() && !room.grouped =>
-                {
-                    keep_count = 0;
-                    allocate(wanted.len() as u32)?
+            let mut layers = loop {
+                match allocate(capacity) {
+                    Err(Shortage::Memory { .. }) if capacity > least && !room.grouped => {
+                        capacity = fewer(capacity, [needed, there, least]);
+                        affordable = capacity;
+                    }
+                    made => break made?,
                 }
-                made => made?,
             };
+            layers.affordable = affordable.max(capacity);
+            let keep_count = keep_count.min((capacity - least) as usize);
             residency.evictions += others - keep_count as u64;
             residency.change(layers.bytes(), 0);
             let mut all = keep[keep.len() - keep_count..].to_vec();
@@ -248,6 +272,7 @@ impl Layers {
             layers: vec![None; frame.lumigraph.sources.len()],
             slots: Vec::new(),
             capacity,
+            affordable: u32::MAX,
             clock: 0,
         })
     }
@@ -505,4 +530,38 @@ fn pad<P: Pixel>(
     ImageBuffer::from_fn(padded_width, padded_height, |x, y| {
         *image.get_pixel(x.min(width - 1), y.min(height - 1))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_grow_by_half() {
+        let (mut capacity, mut loads) = (0, 0);
+        while capacity < 2000 {
+            capacity = grown(capacity + 1);
+            loads += capacity;
+        }
+        assert!(capacity < 3000 && loads < 3 * capacity + 100, "{loads}");
+        assert_eq!((grown(1), grown(6), grown(9)), (8, 16, 16));
+    }
+
+    #[test]
+    fn without_memory_fewer_layers_are_tried_until_the_least() {
+        let tried = |from, stops: [u32; 3]| {
+            let next = |&count: &u32| (count > stops[2]).then(|| fewer(count, stops));
+            std::iter::successors(Some(from), next).collect::<Vec<_>>()
+        };
+        assert_eq!(tried(48, [30, 0, 10]), [48, 36, 30, 22, 16, 12, 10]);
+        // Also just as many as are needed, and as there were.
+        assert_eq!(tried(16, [9, 8, 6]), [16, 12, 9, 8, 6]);
+        assert_eq!(tried(16, [9, 9, 9]), [16, 12, 9]);
+        assert_eq!(tried(2, [1, 0, 1]), [2, 1]);
+        for (from, stops) in [(450, [300, 250, 1]), (7, [6, 7, 5]), (8, [1, 0, 1])] {
+            let tried = tried(from, stops);
+            assert!(tried.is_sorted_by(|a, b| a > b) && tried.contains(&stops[0]));
+            assert_eq!(tried.last(), Some(&stops[2]));
+        }
+    }
 }

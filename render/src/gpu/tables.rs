@@ -1,6 +1,7 @@
 //! What shaders read besides photos: parameters and tables, made for each frame or part of one.
 
 use super::Gpu;
+use super::device::error_of;
 use super::groups::Rect;
 use super::layout::{self, Params, Source};
 use super::load::Order;
@@ -47,7 +48,7 @@ impl Gpu {
         let table_row_bits = side.ilog2();
         let [planes, facets] = self.planes(frame, table_row_bits)?;
         Ok(Tables {
-            rays: self.rays(frame),
+            rays: self.rays(frame)?,
             planes,
             facets,
             table_row_bits,
@@ -104,13 +105,16 @@ impl Gpu {
     }
 
     /// The table of rays of a lens that is not a pinhole; a single texel otherwise.
-    fn rays(&mut self, frame: &Frame<'_>) -> wgpu::TextureView {
+    ///
+    /// # Errors
+    /// The device has no room for it. It is not kept then.
+    fn rays(&mut self, frame: &Frame<'_>) -> Result<wgpu::TextureView, RenderError> {
         let desired = &frame.desired;
         let size = [desired.width, desired.height];
         if let Some((lens, of_size, view)) = &self.rays
             && (*lens, *of_size) == (desired.lens, size)
         {
-            return view.clone();
+            return Ok(view.clone());
         }
         let (width, height, texels) = match RayMap::of(desired) {
             RayMap::Pinhole { .. } => (1, 1, vec![[0.0; 4]]),
@@ -122,9 +126,16 @@ impl Gpu {
                 (size[0], size[1], rays)
             }
         };
+        let out_of_memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let refused = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let view = self.texels("rays", width, height, &texels);
+        // What follows from a lack of memory is refused, too: the lack goes before.
+        let refused = pollster::block_on(refused.pop());
+        if let Some(error) = pollster::block_on(out_of_memory.pop()).or(refused) {
+            return Err(error_of(&error));
+        }
         self.rays = Some((desired.lens, size, view.clone()));
-        view
+        Ok(view)
     }
 
     /// The planes that pixels see, after that of none, and which of them each pixel sees, as [`Packed`]
@@ -224,5 +235,55 @@ impl Gpu {
         });
         self.queue.write_buffer(&buffer, 0, contents);
         buffer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::every_lens;
+    use crate::gpu::DeviceLimits;
+
+    #[test]
+    fn rays_that_a_device_refused_are_asked_for_again() {
+        let lumigraph = every_lens::lumigraph();
+        let frame = every_lens::frame(&lumigraph);
+        let wide = |side: u32| {
+            let view = frame.desired.resized(side, side);
+            let camera = calibrate::Camera {
+                model: calibrate::ModelKind::SimpleFisheye,
+                width: side,
+                height: side,
+                params: vec![
+                    f64::from(side),
+                    0.5 * f64::from(side),
+                    0.5 * f64::from(side),
+                ],
+            };
+            let lens = camera.lens().unwrap();
+            Frame::new(&lumigraph, calibrate::View { lens, ..view }, frame.options)
+        };
+        let limits = DeviceLimits {
+            texture_side: Some(64),
+            ..DeviceLimits::default()
+        };
+        let mut gpu = match Gpu::open_within(limits) {
+            Ok(gpu) => gpu,
+            Err(error) if std::env::var("LUMIGRAPH_REQUIRE_GPU").as_deref() == Ok("1") => {
+                panic!("LUMIGRAPH_REQUIRE_GPU is 1, but: {error}")
+            }
+            Err(error) => {
+                eprintln!("SKIPPED: tables on the graphics device: {error}");
+                return;
+            }
+        };
+        let (large, small) = (wide(100), wide(40));
+        for _ in 0..2 {
+            assert!(gpu.rays(&large).is_err() && gpu.rays.is_none());
+        }
+        gpu.rays(&small).unwrap();
+        assert!(gpu.rays.is_some());
+        // Whoever asked was told, and nobody else is.
+        gpu.trouble.take().unwrap();
     }
 }

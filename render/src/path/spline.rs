@@ -11,13 +11,21 @@ use glam::{DQuat, DVec3};
 /// splines"), so speeds are those that the times ask for. Rotations follow the cubic
 /// Hermite curve of Kim, Kim & Shin 1995 ("A general construction scheme for unit
 /// quaternion curves with simple high order derivatives", §4). In both, the velocity at a
-/// keyframe is that of the parabola through it and its neighbours. Velocities are
-/// continuous, angular ones as well.
+/// keyframe is that of the parabola through it and its neighbours, but at most
+/// [`MOST_SPEED`] times the slower of the mean speeds before and after it: beside a stretch
+/// that asks for little motion a parabola runs far beyond, and a pause is no pause.
+/// Velocities are continuous, angular ones as well.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     knots: Vec<Knot>,
     interpolation: Interpolation,
 }
+
+/// How fast a knot may be passed, in mean speeds of the slower stretch beside it. Up to this a
+/// cubic between two values stays between them (Fritsch & Carlson 1980, "Monotone piecewise cubic
+/// interpolation"). At times that are spaced evenly only stretches that are more than five times as
+/// long as the one before or after are affected.
+const MOST_SPEED: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug)]
 struct Knot {
@@ -56,7 +64,11 @@ impl Curve {
             (knot.velocity, knot.angular_velocity) = match (before, chords.get(i)) {
                 (Some(a), Some(b)) => {
                     let share = a.0 / (a.0 + b.0);
-                    (a.1.lerp(b.1, share), a.2.lerp(b.2, share))
+                    let through = |a: DVec3, b: DVec3| {
+                        let most = MOST_SPEED * a.length().min(b.length());
+                        no_faster_than(most, a.lerp(b, share))
+                    };
+                    (through(a.1, b.1), through(a.2, b.2))
                 }
                 (Some(only), None) | (None, Some(only)) => (only.1, only.2),
                 (None, None) => (DVec3::ZERO, DVec3::ZERO),
@@ -116,6 +128,17 @@ impl Curve {
             rotation,
             translation: -(rotation * center),
         }
+    }
+}
+
+/// A velocity, slowed down to a speed if it is faster.
+fn no_faster_than(most: f64, velocity: DVec3) -> DVec3 {
+    let speed = velocity.length();
+    // Untouched otherwise, to the last bit.
+    if speed > most {
+        velocity * (most / speed)
+    } else {
+        velocity
     }
 }
 
@@ -225,6 +248,60 @@ mod tests {
             let right = log(key.rotation * after.rotation.conjugate()) / STEP;
             assert!((left - right).length() < 1e-4 * left.length());
         }
+    }
+
+    fn at(t: f64, x: f64, turn: f64) -> (f64, Rigid3) {
+        let rotation = exp(DVec3::new(0.3 * turn, turn, 0.0));
+        let center = DVec3::new(x, 2.0 * x, 1.0);
+        (t, Rigid3::new(rotation, -(rotation * center)))
+    }
+
+    #[test]
+    fn between_two_keyframes_of_one_pose_the_camera_stands_still() {
+        let (before, pause, after) = (at(0.0, 0.0, 0.0), at(1.0, 2.0, 1.2), at(6.0, 0.5, -0.7));
+        let poses = vec![before, pause, (5.0, pause.1), after];
+        let curve = Curve::new(poses, Interpolation::Spline);
+        for i in 0..=400 {
+            let pose = curve.at(1.0 + f64::from(i) / 100.0);
+            assert!(pose.center().distance(pause.1.center()) < 1e-14);
+            assert!(log(pose.rotation * pause.1.rotation.conjugate()).length() < 1e-14);
+        }
+        // It comes to rest and sets off without a jerk.
+        const STEP: f64 = 1e-6;
+        for t in [1.0 - STEP, 5.0 + STEP] {
+            assert!(curve.at(t).center().distance(pause.1.center()) < 1e-10);
+        }
+    }
+
+    #[test]
+    fn keyframes_at_uneven_times_are_not_overshot() {
+        for times in [[0.0, 0.1, 10.0], [0.0, 9.9, 10.0], [0.0, 1e-6, 1.0]] {
+            let keys = [0.0, 1.0, 2.0];
+            let key = |(t, x): (f64, f64)| at(t, x, 0.5 * x);
+            let poses = times.into_iter().zip(keys).map(key).collect();
+            let curve = Curve::new(poses, Interpolation::Spline);
+            let (mut x, mut turn) = (0.0, 0.0);
+            for i in 0..=1000 {
+                let pose = curve.at(times[2] * f64::from(i) / 1000.0);
+                let (next_x, next_turn) = (pose.center().x, log(pose.rotation).y);
+                // Onwards all the time.
+                assert!(next_x > x - 1e-12 && next_x < 2.0 + 1e-12, "{next_x}");
+                assert!(next_turn > turn - 1e-12 && next_turn < 1.0 + 1e-12);
+                (x, turn) = (next_x, next_turn);
+            }
+        }
+    }
+
+    #[test]
+    fn a_velocity_that_is_slow_enough_stays_as_it_is() {
+        let (a, b) = (DVec3::new(0.1, -0.7, 0.3), DVec3::new(0.9, 0.2, -0.1));
+        let most = MOST_SPEED * a.length().min(b.length());
+        for share in [0.0, 0.3, 0.5, 1.0] {
+            let velocity = a.lerp(b, share);
+            assert_eq!(no_faster_than(most, velocity), velocity);
+        }
+        assert_eq!(no_faster_than(0.0, b), DVec3::ZERO);
+        assert!((no_faster_than(0.2, b).length() - 0.2).abs() < 1e-15);
     }
 
     #[test]

@@ -143,6 +143,41 @@ fn pictures_do_not_depend_on_what_a_device_holds() {
 }
 
 #[test]
+fn where_memory_is_full_photos_of_the_frame_before_stay() {
+    let shot = shot();
+    let lumigraph = shot.lumigraph();
+    // Along the wall, so that each photo comes and goes once.
+    let views: Vec<View> = (0..57).map(|i| view(0.25 * f64::from(i), 2.0)).collect();
+    let listed: Vec<Vec<usize>> = views
+        .iter()
+        .map(|view| {
+            let frame = frame(&lumigraph, view);
+            Prepared::new(&frame, Method::TRIANGULATED)
+                .unwrap()
+                .listed()
+        })
+        .collect();
+    let most = listed.iter().map(Vec::len).max().unwrap() as u64;
+    assert!(most < 16, "{most} photos a frame");
+    for spare in 1..4 {
+        let limits = DeviceLimits {
+            array_bytes: Some((most + spare) * LAYER),
+            ..DeviceLimits::default()
+        };
+        let Some(mut gpu) = open(limits) else { return };
+        for view in &views {
+            let frame = frame(&lumigraph, view);
+            gpu.render(&frame, Method::TRIANGULATED).unwrap();
+        }
+        let took = gpu.residency();
+        println!("{most} photos a frame, room for {spare} more: {took:?}");
+        assert!(took.held <= (most + spare) * LAYER);
+        // Each once, those again that were there when memory ran out, and a few that come and go.
+        assert!(took.loads <= COUNT as u64 + 2 * (most + spare), "{took:?}");
+    }
+}
+
+#[test]
 fn frames_in_flight_are_what_they_are_one_by_one() {
     let shot = shot();
     let lumigraph = shot.lumigraph();

@@ -42,6 +42,10 @@ impl Shot {
 }
 
 fn shot() -> Shot {
+    shot_of(COUNT)
+}
+
+fn shot_of(count: usize) -> Shot {
     let view = |i: usize| {
         let x = 0.5 * i as f64;
         pinhole(
@@ -58,8 +62,8 @@ fn shot() -> Shot {
         RgbaImage::from_fn(SIZE.0, SIZE.1, pixel)
     };
     Shot {
-        views: (0..COUNT).map(view).collect(),
-        photos: (0..COUNT).map(photo).collect(),
+        views: (0..count).map(view).collect(),
+        photos: (0..count).map(photo).collect(),
     }
 }
 
@@ -393,6 +397,21 @@ fn the_device_draws_a_path_within_its_budget() {
         let (again, _) = on_device(&lumigraph, &views[..2], method, None).unwrap();
         assert!(again[..] == expected[..2]);
     }
+}
+
+#[test]
+fn without_a_budget_photos_are_not_brought_again_and_again() {
+    const MANY: usize = 128;
+    let shot = shot_of(MANY);
+    let pair = |i: usize| shot.views[i].between(&shot.views[i + 1], 0.4);
+    let views: Vec<View> = (0..MANY - 1).map(pair).collect();
+    let lumigraph = within(&shot, None);
+    let Some((_, took)) = on_device(&lumigraph, &views, Method::TRIANGULATED, None) else {
+        return;
+    };
+    println!("{MANY} photos: {took:?}");
+    // All that are there, each time that there are half as many more.
+    assert!(took.loads <= 4 * MANY as u64, "{took:?}");
 }
 
 #[test]

@@ -123,7 +123,12 @@ impl GpuRaster {
     ) -> Result<(), RenderError> {
         let drawn = self.try_draw(model, parts, camera, into);
         // What the device said goes before what came of it.
-        self.opened.trouble.take().and(drawn)
+        let drawn = self.opened.trouble.take().and(drawn);
+        if drawn.is_err() {
+            // Where memory ran out they are no pictures, nor would be for later frames.
+            self.frame = None;
+        }
+        drawn
     }
 
     fn try_draw(
@@ -304,7 +309,10 @@ impl FrameTextures {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calibrate::{Lens, Rigid3, View};
+    use glam::{DVec2, DVec3};
     use naga::valid::{Capabilities, ValidationFlags, Validator};
+    use proxy::mesh::Mesh;
     use std::mem::size_of;
 
     #[test]
@@ -324,5 +332,43 @@ mod tests {
             panic!("a struct");
         };
         assert_eq!(span as usize, size_of::<Camera>());
+    }
+    #[test]
+    fn after_an_error_a_frame_is_made_again() {
+        let model = Model {
+            mesh: Mesh {
+                positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+                triangles: vec![[0, 1, 2]],
+            },
+            uvs: vec![[0.0; 2]; 3],
+            colors: vec![[255; 4]; 3],
+            ..Model::default()
+        };
+        let mut raster = match GpuRaster::open(&model, &DeviceLimits::default(), false) {
+            Ok(raster) => raster,
+            Err(error) if std::env::var("LUMIGRAPH_REQUIRE_GPU").as_deref() == Ok("1") => {
+                panic!("LUMIGRAPH_REQUIRE_GPU is 1, but: {error}")
+            }
+            Err(error) => {
+                eprintln!("SKIPPED: rasters on the graphics device: {error}");
+                return;
+            }
+        };
+        let camera = Pinhole::new(&View {
+            lens: Lens::pinhole(DVec2::splat(16.0), DVec2::new(8.0, 6.0)),
+            width: 16,
+            height: 12,
+            camera_from_world: Rigid3::looking_at(DVec3::NEG_Z, DVec3::Z, DVec3::Y),
+        });
+        let camera = camera.unwrap();
+        let mut into = Target::new(16, 12);
+        raster.draw(&model, &[], &camera, &mut into).unwrap();
+        assert!(raster.frame.is_some());
+        let full = RenderError::DeviceFull("full".to_owned());
+        raster.opened.trouble.say(full.clone());
+        let drawn = raster.draw(&model, &[], &camera, &mut into);
+        assert!(drawn == Err(full) && raster.frame.is_none());
+        raster.draw(&model, &[], &camera, &mut into).unwrap();
+        assert!(raster.frame.is_some());
     }
 }

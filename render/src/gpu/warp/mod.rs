@@ -190,7 +190,11 @@ impl GpuWarp {
         };
         let shown = self.shown(ldi, columns, desired, [&across, &down], options, &mut cost);
         // What the device said goes before what came of it.
-        let shown = self.opened.trouble.take().and(shown)?;
+        let said = self.opened.trouble.take();
+        if said.is_err() {
+            self.forget();
+        }
+        let shown = said.and(shown)?;
 
         // Into the picture.
         let (words, _) = shown.as_chunks::<4>();
@@ -280,15 +284,26 @@ impl GpuWarp {
         let count_at = 4 * PIXEL_WORDS * pixels;
         encoder.copy_buffer_to_buffer(&room.words, count_at, &room.shown, shown, 4);
         let submitted = queue.submit([encoder.finish()]);
-        self.opened.trouble.take()?;
+        if let Err(error) = self.opened.trouble.take() {
+            self.forget();
+            return Err(error);
+        }
 
         // 3. The way back.
-        let mut shown = read(device, &room.shown, shown + 4, submitted)?;
+        let read = read(device, &room.shown, shown + 4, submitted);
+        let mut shown = read.inspect_err(|_| self.forget())?;
         let end = (4 * SHOWN_WORDS * pixels) as usize;
         let drawn: [u8; 4] = shown[end..end + 4].try_into().expect("four bytes");
         cost.drawn = u32::from_le_bytes(drawn) as usize;
         shown.truncate(end);
         Ok(shown)
+    }
+
+    /// Lets go of all that is on the device. Where an error came with a buffer, the buffer is none,
+    /// and whatever used it later would fail as well.
+    fn forget(&mut self) {
+        self.held.clear();
+        self.pixels = None;
     }
 
     /// Brings an LDI to the device, if it is not there, and to the end of those held. Those that were
@@ -404,6 +419,9 @@ fn params(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ldi::{Ends, Look, Sample};
+    use calibrate::{Lens, Rigid3, View};
+    use glam::{DVec2, DVec3};
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     use std::collections::HashSet;
 
@@ -425,5 +443,63 @@ mod tests {
         assert_eq!(names, PASSES.iter().map(|(name, _)| *name).collect());
         let groups = module.entry_points.iter().map(|e| e.workgroup_size);
         assert!(groups.into_iter().all(|size| size == [GROUP, 1, 1]));
+    }
+    /// A wall over the whole picture, a sample a pixel.
+    fn wall(side: u32) -> Layered {
+        let middle = DVec2::splat(0.5 * f64::from(side));
+        let view = View {
+            lens: Lens::pinhole(2.0 * middle, middle),
+            width: side,
+            height: side,
+            camera_from_world: Rigid3::looking_at(DVec3::ZERO, DVec3::Z, DVec3::Y),
+        };
+        let sample = Sample {
+            color: [200, 100, 50, 255],
+            inverse_depth: 0.5,
+            offset: [0; 2],
+            look: Look::new(DVec3::NEG_Z, 1.0),
+            ends: Ends(0),
+        };
+        let count = side as usize * side as usize;
+        let samples = vec![sample; count].into_iter();
+        Layered::new(view, 0, &vec![1; count], samples).unwrap()
+    }
+
+    #[test]
+    fn after_an_error_an_image_is_brought_again() {
+        let limits = DeviceLimits {
+            buffer_bytes: Some(1 << 18),
+            ..DeviceLimits::default()
+        };
+        let mut warp = match GpuWarp::open(&limits, false) {
+            Ok(warp) => warp,
+            Err(error) if std::env::var("LUMIGRAPH_REQUIRE_GPU").as_deref() == Ok("1") => {
+                panic!("LUMIGRAPH_REQUIRE_GPU is 1, but: {error}")
+            }
+            Err(error) => {
+                eprintln!("SKIPPED: LDIs on the graphics device: {error}");
+                return;
+            }
+        };
+        let (ldi, too_large) = (wall(16), wall(200));
+        let camera = ldi.camera.clone();
+        let window = Window::whole(16, 16);
+        let draw = |warp: &mut GpuWarp, ldi: &Layered| {
+            let mut target = Target::new(16, 16);
+            let (all, options) = (Clipped::whole(ldi), FreeOptions::default());
+            let drawn = warp.free(ldi, &all, &camera, &window, &options, &mut target);
+            drawn.map(|_| target)
+        };
+        let expected = draw(&mut warp, &ldi).unwrap();
+        // What is refused before the device was asked leaves what is there.
+        draw(&mut warp, &too_large).unwrap_err();
+        assert!(warp.held.len() == 1 && warp.pixels.is_some());
+        // What the device fails at may have been the making of any of it.
+        let full = RenderError::DeviceFull("full".to_owned());
+        warp.opened.trouble.say(full.clone());
+        assert!(draw(&mut warp, &ldi) == Err(full));
+        assert!(warp.held.is_empty() && warp.pixels.is_none());
+        assert!(draw(&mut warp, &ldi).unwrap() == expected);
+        assert!(warp.held.len() == 1 && warp.pixels.is_some());
     }
 }

@@ -48,6 +48,7 @@ struct StoredKeyframe {
 
 /// Frames a second where the file says neither that nor how long it lasts.
 const FPS: f64 = 30.0;
+
 /// Whether a file's content is a path of nerfstudio's.
 pub(crate) fn is_nerfstudio(bytes: &[u8]) -> bool {
     #[derive(Deserialize)]
@@ -80,8 +81,10 @@ fn stored(path: &Path, bytes: &[u8]) -> Result<(Stored, (u32, u32), f64), PathFi
     };
     let width = side("render_width", stored.render_width)?;
     let height = side("render_height", stored.render_height)?;
-    let count = stored.camera_path.len() as f64;
-    let fps = stored.fps.or(stored.duration_s().map(|s| count / s));
+    // Without frames a duration says nothing of their rate.
+    let count = Some(stored.camera_path.len()).filter(|count| *count > 0);
+    let by_duration = || Some(count? as f64 / stored.duration_s()?);
+    let fps = stored.fps.or_else(by_duration);
     let fps = fps.unwrap_or(FPS);
     Ok((stored, (width, height), fps))
 }
@@ -146,6 +149,8 @@ pub(crate) fn keyframes(
     let default_s = stored.default_transition_sec.or(even_s);
     let default_s = default_s.unwrap_or(TRANSITION_S);
     let mut t_s = 0.0;
+    // Of a cycle, how long the way back to the first takes.
+    let mut back_s = default_s;
     let mut keyframes: Vec<Keyframe> = Vec::new();
     for (index, value) in stored.keyframes.into_iter().enumerate() {
         let malformed = |reason| {
@@ -161,8 +166,10 @@ pub(crate) fn keyframes(
         // How long the way to it takes.
         let own_s = stored.override_transition_sec;
         let own_s = own_s.filter(|_| stored.override_transition_enabled == Some(true));
-        if index > 0 {
-            t_s += own_s.unwrap_or(default_s);
+        let way_s = own_s.unwrap_or(default_s);
+        match index {
+            0 => back_s = way_s,
+            _ => t_s += way_s,
         }
         keyframes.push(Keyframe {
             t_s,
@@ -172,7 +179,7 @@ pub(crate) fn keyframes(
         });
     }
     if let (true, Some(first)) = (stored.is_cycle, keyframes.first().cloned()) {
-        t_s += default_s;
+        t_s += back_s;
         keyframes.push(Keyframe { t_s, ..first });
     }
     let file = KeyframeFile {

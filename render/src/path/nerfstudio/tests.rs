@@ -131,6 +131,46 @@ fn keyframes_of_both_viewers_are_read() {
 }
 
 #[test]
+fn a_cycle_closes_in_the_first_keyframes_own_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.json");
+    let plain = json!({"matrix": IDENTITY, "fov": 50.0});
+    let own = |is_enabled: bool| {
+        json!({"matrix": IDENTITY, "fov": 50.0,
+            "override_transition_enabled": is_enabled, "override_transition_sec": 0.5})
+    };
+    for (first, is_cycle, expected) in [
+        (own(true), true, &[0.0, 2.0, 4.0, 4.5][..]),
+        (own(false), true, &[0.0, 2.0, 4.0, 6.0]),
+        (plain.clone(), true, &[0.0, 2.0, 4.0, 6.0]),
+        (own(true), false, &[0.0, 2.0, 4.0]),
+    ] {
+        let mut content = file(json!([frame(50.0)]), json!([first, plain, plain]));
+        content["default_transition_sec"] = json!(2);
+        content["is_cycle"] = json!(is_cycle);
+        std::fs::write(&path, content.to_string()).unwrap();
+        let read = read_keyframes(&path, &NerfstudioFrame::default()).unwrap();
+        let times: Vec<f64> = read.unwrap().keyframes.iter().map(|k| k.t_s).collect();
+        assert_eq!(times, expected);
+    }
+}
+
+#[test]
+fn a_duration_without_frames_is_no_frame_rate() {
+    let plain = json!({"matrix": IDENTITY, "fov": 50.0});
+    let mut content = file(json!([]), json!([plain, plain]));
+    content.as_object_mut().unwrap().remove("fps");
+    assert_eq!(message(&content), "DIR/p.json: the path has no frames");
+    // Its keyframes are there all the same.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.json");
+    std::fs::write(&path, content.to_string()).unwrap();
+    let read = read_keyframes(&path, &NerfstudioFrame::default()).unwrap();
+    let read = read.unwrap();
+    assert_eq!((read.fps, read.keyframes.len()), (30.0, 3));
+}
+
+#[test]
 fn what_the_dataparser_did_is_undone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dataparser_transforms.json");
