@@ -37,6 +37,7 @@ pub use library::{LdiCost, LdiSource, Library, LibraryOptions, PortalLdi};
 pub use neighbourhood::Shown;
 pub use painter::Painter;
 pub use photographed::DepthMaps;
+pub(crate) use pinhole::MAX_SIDE;
 pub use pinhole::{Pinhole, PinholeError};
 pub use raster::{Beyond, DrawOptions, Met, Raster};
 pub use reference::{CAPTURED_REFERENCE_SIZE, REFERENCE_SIZE, Reference};

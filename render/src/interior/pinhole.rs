@@ -42,7 +42,7 @@ pub enum PinholeError {
 }
 
 /// Pixels are counted in 16 bits.
-const MAX_SIDE: u32 = 16_384;
+pub(crate) const MAX_SIDE: u32 = 16_384;
 
 impl Pinhole {
     /// The camera of a view.

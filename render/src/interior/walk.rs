@@ -1,7 +1,8 @@
 //! A frame of a walk: the viewer's cell as geometry, what is beyond its portals as one chooses.
 //!
 //! 1. Every portal that is visible and not near is filled out of reference images, in the pixels
-//!    where one sees through it.
+//!    where one sees through it. Beyond one that is near the next cell is geometry, and its portals are
+//!    filled in their turn: so crossing a doorway changes nothing.
 //! 2. The triangles of the viewer's cell, and of what is beyond portals that are near, are met,
 //!    but for those that images or other triangles hide.
 //! 3. A pixel shows the cell's own surface where that is before the portal, else the fill, else
@@ -82,7 +83,8 @@ pub struct FrameCost {
     pub visible_cells: usize,
     /// Portals of the viewer's cell that one sees through to a cell.
     pub portals: usize,
-    /// Those among them filled with images, even if mixed with geometry.
+    /// Portals filled with images, even if mixed with geometry: those among them, and those seen through one
+    /// that is near.
     pub filled: usize,
     /// Triangles of the cells that are drawn as geometry.
     pub triangles_in_cells: usize,
@@ -261,28 +263,34 @@ impl<'a> Walk<'a> {
         };
         cost.cell = cell;
         cost.visible_cells = visibility.cells.len();
-        let own: Vec<&Pass> = visibility.passes.iter().filter(|p| p.depth == 0).collect();
-        let open: Vec<(&Pass, CellId)> = own.iter().filter_map(|p| Some((*p, p.into?))).collect();
-        cost.portals = open.len();
+        let passes = &visibility.passes;
+        let is_open = |pass: &&Pass| pass.depth == 0 && pass.into.is_some();
+        cost.portals = passes.iter().filter(is_open).count();
         // Where there are too many portals to tell what one sees through them, all is geometry.
-        let is_known = !own.is_empty() || visibility.cells.len() <= 1;
+        let is_known = !passes.is_empty() || visibility.cells.len() <= 1;
         let has_images = fill.references() > 0 || fill == PortalFill::Ldi;
         let has_images = has_images && cell.is_some() && is_known;
-        let fills = match has_images {
-            true => self.fills(fill, cell, &open, &camera),
-            false => Vec::new(),
+        let (openings, mut fills) = match has_images {
+            true => self.fills(fill, cell, passes, &camera),
+            false => Default::default(),
         };
         cost.filled = fills.len();
         cost.visibility = start.elapsed();
         // 2. Fills.
         let start = Instant::now();
         let images = self.images(fill, &fills, eye, &mut cost)?;
+        for (f, images) in fills.iter_mut().zip(&images) {
+            if images.make_nothing() {
+                // Geometry rather than a hole.
+                f.share = 0.0;
+            }
+        }
         if fill == PortalFill::Ldi {
             self.ask_ahead(&fills, eye)?;
         }
         cost.references = start.elapsed();
         let start = Instant::now();
-        let apart = self.share_out(&fills, &own, &camera);
+        let apart = self.share_out(&openings, &fills, &camera);
         self.fill(fill, &fills, &images, &camera, apart, &mut cost);
         cost.fill = start.elapsed();
         // 3. Triangles.
@@ -297,7 +305,7 @@ impl<'a> Walk<'a> {
             camera: &camera,
         };
         let windows = match has_images {
-            true => asked.runs_beside(&fills, &open, &visibility),
+            true => asked.runs_beside(&fills, &openings, &visibility),
             false => asked.runs(visibility.clone()),
         };
         cost.triangles_in_cells = windows.iter().map(|(runs, _)| runs.asked).sum();

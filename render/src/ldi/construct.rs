@@ -4,7 +4,7 @@ use super::ends::quarter_turns;
 use super::fit::{Offered, fitted};
 use super::layered::pinhole_view;
 use super::{Ends, Layered, LdiError, Look, Sample};
-use crate::interior::{Pinhole, Reference, Warp, normal_at};
+use crate::interior::{MAX_SIDE, Pinhole, Reference, Warp, normal_at};
 use glam::{DVec2, DVec3};
 use proxy::interior::SemicircleView;
 use rayon::prelude::*;
@@ -201,8 +201,15 @@ fn made(
         (low, high) = rows.reduce(|| (low, high), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     }
     let most = (room * size).floor();
-    let low = low.floor().max(-most);
-    let size = (high.ceil().min(size + most) - low).max(DVec2::ONE);
+    let [mut left, mut right] = [-low.floor().max(-most), high.ceil().min(size + most) - size];
+    for axis in 0..2 {
+        // No larger than pictures may be: the side that is farther from the central image gives way.
+        let spare = (f64::from(MAX_SIDE) - size[axis]).max(0.0);
+        left[axis] = left[axis].min((0.5 * spare).floor().max(spare - right[axis]));
+        right[axis] = right[axis].min(spare - left[axis]);
+    }
+    let low = -left;
+    let size = (size + left + right).max(DVec2::ONE);
     let view = pinhole_view(
         place.camera_from_world,
         camera.focal,

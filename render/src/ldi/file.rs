@@ -258,7 +258,7 @@ pub fn parse(path: &Path, content: &[u8]) -> Result<Layered, LdiFileError> {
     Layered::new(view, u32::from_le(header.portal), counts, samples).map_err(content_error)
 }
 
-/// Writes an LDI: to a temporary name beside it, which is then renamed.
+/// Writes an LDI: to a temporary name beside it, the process's own, which is then renamed.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -267,7 +267,7 @@ pub fn write(path: &Path, ldi: &Layered) -> Result<(), LdiFileError> {
         path: path.to_owned(),
         source,
     };
-    let beside = path.with_extension("ldi.part");
+    let beside = path.with_extension(format!("{}.ldi.part", std::process::id()));
     let written = std::fs::File::create(&beside)
         .and_then(|mut file| file.write_all(&bytes(ldi)))
         .and_then(|()| std::fs::rename(&beside, path));

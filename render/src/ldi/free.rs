@@ -45,11 +45,20 @@ pub struct FreeOptions {
     pub fill: u32,
 }
 
+/// The width of pictures that the defaults are for.
+const USUAL_WIDTH: u32 = 640;
+
 impl FreeOptions {
     /// How far from its place a sample is drawn at most, in pixels.
     pub fn reach(&self) -> f32 {
         // What is beyond a patch counts only where another covers.
         BEYOND * self.within_bounds().most
+    }
+
+    /// The same for a picture so wide: where the same holes are of more pixels, as many more are filled.
+    pub fn for_width(mut self, width: u32) -> Self {
+        self.fill = self.fill.saturating_mul(width.div_ceil(USUAL_WIDTH).max(1));
+        self
     }
 
     pub(crate) fn within_bounds(&self) -> Options {

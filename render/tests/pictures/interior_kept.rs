@@ -185,3 +185,57 @@ fn nothing_pops_on_the_way_through_a_doorway() {
         }
     }
 }
+
+/// From one cell into the next, by a millimetre: what other portals show, seen from the first and through the
+/// doorway, stays.
+#[test]
+fn nothing_pops_where_one_changes_cells() {
+    let (house, contents) = small_house(6, 1);
+    let interior = &house.interior;
+    let mut options = WalkOptions::default();
+    options.library.size = [64; 2];
+    let new = || Walk::new(interior, &contents, &house.model, options);
+    let (mut truth, mut walk) = (new(), new());
+    let mut shown = 0;
+    for (id, portal) in interior.portals.iter().enumerate() {
+        let [Some(a), Some(b)] = portal.cells else {
+            continue;
+        };
+        let step = 5e-4 * portal.normal_into(Some(b));
+        let center = portal.polygon.center();
+        let others = interior.portals.iter().enumerate();
+        let others = others.filter(|(other, portal)| {
+            let of_cells = portal.cells.iter().flatten();
+            *other != id && of_cells.clone().any(|cell| *cell == a || *cell == b)
+        });
+        for (_, other) in others {
+            let target = other.polygon.center();
+            let views = [center - step, center + step].map(|eye| view(eye, target, [80, 64]));
+            for fill in [PortalFill::Texture, PortalFill::Warp1, PortalFill::Ldi] {
+                let mut drawn = Vec::new();
+                for view in &views {
+                    truth.draw(view, PortalFill::Geometry).unwrap();
+                    let cost = walk.draw(view, fill).unwrap();
+                    drawn.push((
+                        cost.cell,
+                        cost.filled,
+                        truth.picture().clone(),
+                        walk.picture().clone(),
+                    ));
+                }
+                if (drawn[0].0, drawn[1].0) != (Some(a), Some(b)) {
+                    continue;
+                }
+                shown += drawn[0].1.min(drawn[1].1);
+                let motion = change(&drawn[0].2, &drawn[1].2);
+                let pop = change(&drawn[0].3, &drawn[1].3);
+                assert!(
+                    pop < motion + 0.3,
+                    "portal {id} to {target}, {}: {pop:.2} codes, motion alone {motion:.2}",
+                    fill.name()
+                );
+            }
+        }
+    }
+    assert!(shown > 10, "{shown} portals were filled on both sides");
+}

@@ -5,6 +5,7 @@ use super::{FrameCost, Walk, WalkError};
 use crate::interior::background::Background;
 use crate::interior::{Reference, Shown};
 use glam::DVec3;
+use proxy::interior::{CellId, PortalId};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -104,26 +105,48 @@ impl<'a> Walk<'a> {
             let Some(from) = self.contents.locate(self.interior, eye) else {
                 continue;
             };
-            for (id, portal) in self.interior.portals_of(Some(from)) {
-                let Some(Some(into)) = portal.beyond(Some(from)) else {
-                    continue;
+            self.each_filled(from, eye, |from, id, into| {
+                let is_in_view = fills.iter().any(|f| f.pass.portal == id);
+                let soon = if is_in_view {
+                    &mut in_view
+                } else {
+                    &mut others
                 };
-                if self.share_of_image(portal, eye, self.options.near) > 0.0 {
-                    let is_in_view = fills.iter().any(|f| f.pass.portal == id);
-                    let soon = if is_in_view {
-                        &mut in_view
-                    } else {
-                        &mut others
-                    };
-                    let shown = self.library.shown(self.interior, id, from, into, eye);
-                    soon.extend(shown.into_iter().flat_map(Shown::places));
-                }
-            }
+                let shown = self.library.shown(self.interior, id, from, into, eye);
+                soon.extend(shown.into_iter().flat_map(Shown::places));
+            });
         }
         // Whichever way one turns.
         let shown = fills.iter().filter_map(|f| f.shown);
         let beside = shown.flat_map(|shown| self.library.beside(shown.place));
         in_view.into_iter().chain(others).chain(beside).collect()
+    }
+}
+
+impl Walk<'_> {
+    /// The portals that are filled for an eye in a cell, whichever way it looks: those of the cell, and those of
+    /// cells beyond portals that are near.
+    fn each_filled(
+        &self,
+        cell: CellId,
+        eye: DVec3,
+        mut with: impl FnMut(CellId, PortalId, CellId),
+    ) {
+        let mut cells = vec![cell];
+        let mut next = 0;
+        while let Some(&from) = cells.get(next) {
+            next += 1;
+            for (id, portal) in self.interior.portals_of(Some(from)) {
+                let Some(Some(into)) = portal.beyond(Some(from)) else {
+                    continue;
+                };
+                if self.share_of_image(portal, eye, self.options.near) > 0.0 {
+                    with(from, id, into);
+                } else if !cells.contains(&into) {
+                    cells.push(into);
+                }
+            }
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! The triangles that a frame asks for.
 
-use super::{everywhere, filled::Filled};
+use super::everywhere;
+use super::filled::{Filled, Opening};
 use crate::interior::{CellGeometry, Pinhole, Runs, Window};
-use proxy::interior::{CellId, Interior, Pass, Region, Visibility, visible_through};
+use proxy::interior::{Interior, Region, Visibility, VisibleCell, visible_through};
 
 /// What is asked of an interior's geometry.
 pub(super) struct Asked<'g> {
@@ -33,24 +34,29 @@ impl<'g> Asked<'g> {
     pub(super) fn runs_beside(
         &self,
         fills: &[Filled<'_>],
-        open: &[(&Pass, CellId)],
+        openings: &[Opening<'_>],
         visibility: &Visibility,
     ) -> Vec<(Runs<'g>, Window)> {
-        let mut windows = self.runs(Visibility {
-            cells: visibility.cells.first().into_iter().cloned().collect(),
-            passes: Vec::new(),
-        });
+        let mut windows = self.runs(only(visibility.cells.first().cloned()));
         if self.is_captured {
             return windows;
         }
         let eye = self.camera.center;
-        for &(pass, into) in open {
-            let (id, region) = (pass.portal, &pass.region);
-            let is_filled = |f: &Filled<'_>| std::ptr::eq(f.pass, pass) && f.share >= 1.0;
-            if !fills.iter().any(is_filled) {
-                let beyond = visible_through(self.interior, id, into, eye, region);
-                windows.push((self.seen(beyond), Window::of(region, self.camera)));
-            }
+        for opening in openings {
+            let (id, region) = (opening.pass.portal, &opening.pass.region);
+            let share = opening.fill.map_or(0.0, |k| fills[k].share);
+            let Some(into) = opening.pass.into.filter(|_| share < 1.0) else {
+                continue;
+            };
+            let beyond = match opening.is_entered {
+                // What is beyond its own portals is theirs to say.
+                true => only(Some(VisibleCell {
+                    cell: into,
+                    regions: vec![region.clone()],
+                })),
+                false => visible_through(self.interior, id, into, eye, region),
+            };
+            windows.push((self.seen(beyond), Window::of(region, self.camera)));
         }
         windows
     }
@@ -63,5 +69,13 @@ impl<'g> Asked<'g> {
                 .geometry
                 .seen(eye, &everywhere(visibility), &Region::ALL),
         }
+    }
+}
+
+/// One cell, or none.
+fn only(cell: Option<VisibleCell>) -> Visibility {
+    Visibility {
+        cells: cell.into_iter().collect(),
+        passes: Vec::new(),
     }
 }

@@ -28,6 +28,7 @@ impl Walk<'_> {
             true => std::mem::take(&mut self.picture),
             false => Target::default(),
         };
+        let is_alike = (last.width, last.height) == (camera.width, camera.height);
         self.picture.clear(camera.width, camera.height);
         let is_wanted = |pixel: usize, inverse_depth: f32| match fill_of(pixel) {
             None => true,
@@ -64,7 +65,7 @@ impl Walk<'_> {
                 }
                 if image[3] == 0 {
                     holes += usize::from(own.is_none());
-                    if last.color.len() == owners.len() {
+                    if is_alike {
                         image = last.color[pixel];
                     }
                 }
