@@ -1,11 +1,12 @@
 //! Lines over an axis, as SVG.
 
 use std::fmt::Write;
+use std::ops::RangeInclusive;
 
-/// A line: its name, and a value for each step.
+/// A line: its name, and the steps that it has values at, one after the other, with those.
 pub(super) struct Line<'a> {
     pub(super) name: &'a str,
-    pub(super) values: &'a [f64],
+    pub(super) values: &'a [(usize, f64)],
 }
 
 const SIZE: (f64, f64) = (960.0, 420.0);
@@ -13,19 +14,23 @@ const SIZE: (f64, f64) = (960.0, 420.0);
 const ROOM: (f64, f64, f64, f64) = (64.0, 24.0, 24.0, 44.0);
 const COLORS: [&str; 5] = ["#c0392b", "#2c6fbb", "#2e8b57", "#b8860b", "#7d3c98"];
 
-/// A plot of lines that share both axes, from zero.
-pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
-    let greatest = lines
-        .iter()
-        .flat_map(|l| l.values)
-        .copied()
-        .fold(0.0, f64::max);
+/// A plot of lines that share both axes: across those steps, and up from zero. A line is broken where
+/// steps have no values.
+pub(super) fn plot(
+    lines: &[Line<'_>],
+    steps: RangeInclusive<usize>,
+    across: &str,
+    up: &str,
+) -> String {
+    let values = lines.iter().flat_map(|l| l.values);
+    let greatest = values.map(|(_, value)| *value).fold(0.0, f64::max);
     let step = step(greatest);
     let top = (greatest / step).ceil().max(1.0) * step;
-    let count = lines.iter().map(|l| l.values.len()).max().unwrap_or(0);
+    let (first, last) = steps.into_inner();
     let (width, height) = SIZE;
     let (left, above, right, below) = ROOM;
-    let x = |i: f64| left + (width - left - right) * i / count.saturating_sub(1).max(1) as f64;
+    let length = last.saturating_sub(first).max(1) as f64;
+    let x = |i: usize| left + (width - left - right) * (i as f64 - first as f64) / length;
     let y = |v: f64| height - below - (height - above - below) * v / top;
     let mut svg = opened(SIZE);
     // Writing to a string cannot fail.
@@ -47,24 +52,30 @@ pub(super) fn plot(lines: &[Line<'_>], across: &str, up: &str) -> String {
     let _ = writeln!(
         svg,
         "<text x=\"{left}\" y=\"14\">{up}</text>\
-         <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{across} (0 to {})</text>",
+         <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{across} ({first} to {last})</text>",
         width - right,
         height - below + 30.0,
-        count.saturating_sub(1)
     );
     for (k, line) in lines.iter().enumerate() {
         let color = COLORS[k % COLORS.len()];
-        let points: String = line
-            .values
-            .iter()
-            .enumerate()
-            .map(|(i, v)| format!("{:.1},{:.1} ", x(i as f64), y(*v)))
-            .collect();
+        for stretch in line.values.chunk_by(|a, b| b.0 == a.0 + 1) {
+            // One alone is a dot: a line from it to itself, with round ends.
+            let alone = stretch.first().filter(|_| stretch.len() == 1);
+            let points: String = stretch
+                .iter()
+                .chain(alone)
+                .map(|(i, v)| format!("{:.1},{:.1} ", x(*i), y(*v)))
+                .collect();
+            let _ = writeln!(
+                svg,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" \
+                 stroke-width=\"1.5\" stroke-linecap=\"round\"/>",
+                points.trim_end()
+            );
+        }
         let _ = writeln!(
             svg,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\
-             <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
-            points.trim_end(),
+            "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
             left + 90.0 * k as f64,
             height - below + 30.0,
             line.name
@@ -103,11 +114,32 @@ mod tests {
     fn axes_have_round_steps_and_lines_stay_within() {
         assert_eq!([step(0.0), step(9.0), step(95.0)], [1.0, 1.0, 10.0]);
         assert_eq!([step(130.0), step(0.3)], [20.0, 0.05]);
-        let (a, b) = ([1.0, 4.0, 2.0], [0.5, 0.5, 3.9]);
+        let (a, b) = (
+            [(0, 1.0), (1, 4.0), (2, 2.0)],
+            [(0, 0.5), (1, 0.5), (2, 3.9)],
+        );
         let lines = [("one", &a[..]), ("two", &b[..])].map(|(name, values)| Line { name, values });
-        let svg = plot(&lines, "frame", "ms");
+        let svg = plot(&lines, 0..=2, "frame", "ms");
         assert_eq!(svg.matches("<polyline").count(), 2);
         assert!(svg.contains("64.0,") && svg.contains(">one<") && svg.ends_with("</svg>\n"));
-        assert!(plot(&[], "frame", "ms").contains("</svg>"));
+        assert!(plot(&[], 0..=0, "frame", "ms").contains("</svg>"));
+    }
+
+    #[test]
+    fn values_are_at_their_own_steps_and_nothing_is_drawn_between_those_that_are_apart() {
+        let values = [(120, 1.0), (121, 1.0), (180, 1.0), (240, 1.0)];
+        let line = Line {
+            name: "one",
+            values: &values,
+        };
+        let svg = plot(&[line], 120..=240, "frame", "ms");
+        assert!(svg.contains("frame (120 to 240)"), "{svg}");
+        for points in [
+            "64.0,24.0 71.3,24.0",
+            "500.0,24.0 500.0,24.0",
+            "936.0,24.0 936.0,24.0",
+        ] {
+            assert!(svg.contains(&format!("points=\"{points}\"")), "{svg}");
+        }
     }
 }

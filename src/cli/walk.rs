@@ -127,7 +127,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return Err(Usage(text).into());
     }
     let chosen = args.chosen();
-    chosen.check(args.path.is_none())?;
+    if args.path.as_ref().is_none_or(|path| path.exists()) {
+        // Of a path that is not there nobody can say how many frames it has; that is said below.
+        chosen.check(args.path.is_none())?;
+    }
     if args.persist && chosen.is_part() {
         let text = "--persist: what a frame keeps is of the one before; draw all of the path";
         return Err(Usage(text.to_owned()).into());
@@ -197,7 +200,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         for note in walk.painter().notes() {
             say!("note: {note}");
         }
-        report(args, &opened, &walk, &walks, frames.len())
+        report(args, &opened, &walk, &walks, &frames)
     })
 }
 
@@ -240,23 +243,27 @@ fn report(
     opened: &Opened,
     walk: &Walk<'_>,
     walks: &[Walked],
-    frame_count: usize,
+    frames: &[Named],
 ) -> anyhow::Result<()> {
     let (interior, model) = (&opened.interior, &opened.model);
     let device = walk.painter().description();
     let references = walk.library().residency();
     let photos = walk.painter().captured();
     let decoded = photos.map(|captured| captured.lumigraph().photos.residency());
-    let times: Vec<Vec<f64>> = walks.iter().map(Walked::times_ms).collect();
+    let times: Vec<Vec<(usize, f64)>> = walks.iter().map(Walked::times_ms).collect();
     let lines = walks.iter().zip(&times);
     let lines: Vec<Line<'_>> = lines
+        .filter(|(_, values)| !values.is_empty())
         .map(|(walk, values)| Line {
             name: walk.fill.name(),
             values,
         })
         .collect();
-    let svg = plot(&lines, "frame", "ms a frame");
-    write_file(&args.output.join("times.svg"), svg.as_bytes())?;
+    // Where all frames are from before, so is their plot.
+    if let (Some(first), Some(last), false) = (frames.first(), frames.last(), lines.is_empty()) {
+        let svg = plot(&lines, first.index..=last.index, "frame", "ms a frame");
+        write_file(&args.output.join("times.svg"), svg.as_bytes())?;
+    }
     if args.json {
         let walks: Vec<Value> = walks.iter().map(|w| w.json(interior)).collect();
         return print_json(&json!({
@@ -275,8 +282,16 @@ fn report(
         }));
     }
     let mut text = format!(
-        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7}",
-        "portals", "median ms", "95 % ms", "worst ms", "triangles", "samples", "holes", "images"
+        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7} {:>5}",
+        "portals",
+        "median ms",
+        "95 % ms",
+        "worst ms",
+        "triangles",
+        "samples",
+        "holes",
+        "images",
+        "LDIs"
     );
     if args.held_out {
         let titles = ["psnr", "ssim", "coverage", "cpu ms"];
@@ -286,17 +301,26 @@ fn report(
     for walk in walks {
         text += &walk.line();
     }
-    let drawn = walks.iter().map(|w| w.frames.len()).max();
-    let before = frame_count - drawn.unwrap_or(0);
     print(&format!(
         "{text}{}: {} frames{}, drawn by {device}\n",
         args.output.display(),
-        frame_count,
-        match before {
-            0 => String::new(),
-            _ => format!(", {before} of them from before"),
-        }
+        frames.len(),
+        from_before(walks)
     ))
+}
+
+/// How many frames were there before, for people: of each kind of portals, if that differs.
+fn from_before(walks: &[Walked]) -> String {
+    let count = walks.first().map_or(0, Walked::before);
+    if walks.iter().any(|walk| walk.before() != count) {
+        let of_kind = |walk: &Walked| format!("{} of {}", walk.before(), walk.fill.name());
+        let counts: Vec<String> = walks.iter().map(of_kind).collect();
+        return format!(", from before {}", counts.join(", "));
+    }
+    match count {
+        0 => String::new(),
+        _ => format!(", {count} of them from before"),
+    }
 }
 
 fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
@@ -322,6 +346,8 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
 }
 
 struct Named {
+    /// In the path, counted from 0.
+    index: usize,
     name: String,
     view: View,
     /// What the frame is to be compared with.
@@ -332,12 +358,14 @@ struct Named {
 fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result<Vec<Named>> {
     let held_out = photos.map(|photos| photos.held_out(|view| resized(view, size)));
     let held_out = held_out.transpose()?;
-    let named = |(name, view, truth): (String, View, Truth)| Named {
+    let named = |(index, (name, view, truth)): (usize, (String, View, Truth))| Named {
+        index,
         name,
         view,
         truth: Some(truth),
     };
-    let named: Vec<Named> = held_out.into_iter().flatten().map(named).collect();
+    let held_out = held_out.into_iter().flatten().enumerate();
+    let named: Vec<Named> = held_out.map(named).collect();
     if named.is_empty() {
         bail!(
             "no photos were held out when it was made; make it with `interior --hold-out SPLIT.json`"
@@ -352,12 +380,15 @@ fn frames(args: &Args, opened: &Opened) -> anyhow::Result<(Vec<Named>, f64)> {
         Some(file) => path::read_in(file, &args.nerfstudio.frame()?)?,
         None => tour::plan(args, opened)?,
     };
-    let named = |frame: path::PathFrame| Named {
+    let named = |(index, frame): (usize, path::PathFrame)| Named {
+        index,
         name: frame.name,
         view: resized(frame.view, args.size),
         truth: None,
     };
-    let frames = args.chosen().of(path.frames)?;
+    let frames = args
+        .chosen()
+        .of(path.frames.into_iter().enumerate().collect())?;
     Ok((frames.into_iter().map(named).collect(), path.fps))
 }
 
@@ -374,6 +405,7 @@ fn draw(
     let is_there = film.begin(folder, &files, inputs)?;
     let missing = is_there.iter().filter(|is_there| !**is_there).count();
     let bar = progress(missing, fill.name());
+    let made_before = walk.library().residency().loads;
     let mut drawn = Vec::new();
     for ((frame, file), is_there) in frames.iter().zip(&files).zip(is_there) {
         if is_there {
@@ -391,11 +423,13 @@ fn draw(
             cost.references_made += first.references_made;
             cost.ldis_made += first.ldis_made;
             cost.ldis_read += first.ldis_read;
+            cost.ldis_ahead += first.ldis_ahead;
             let score = truth.score(&walk.picture().picture())?;
             scored = Some(Scored { score, cpu_ms });
         }
         film.write(file, walk.picture().picture())?;
         drawn.push(Drawn {
+            index: frame.index,
             name: frame.name.clone(),
             file: file.clone(),
             cost,
@@ -404,10 +438,18 @@ fn draw(
         bar.inc(1);
     }
     bar.finish_and_clear();
+    // Portals that LDIs fill show no image itself, and others no LDI.
+    let (references_used, ldis_used) = match (fill, walk.references_used()) {
+        (PortalFill::Ldi, used) => (0, used),
+        (_, used) => (used, 0),
+    };
+    let made = walk.library().residency().loads - made_before;
     Ok(Walked {
         fill,
         frames: drawn,
         files,
-        references: walk.references_used(),
+        references_used,
+        ldis_used,
+        references_made: made as usize,
     })
 }

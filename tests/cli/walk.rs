@@ -29,8 +29,10 @@ fn a_house_is_walked_through() {
             assert!(frame["cell"].is_string() && frame["ms"].as_f64().unwrap() > 0.0);
             skipped += frame["triangles_skipped"].as_u64().unwrap();
         }
-        let used = walk["references_used"].as_u64().unwrap();
-        assert_eq!(used > 0, walk["portals"] != "geometry");
+        let [images, ldis] = ["references_used", "ldis_used"].map(|of| walk[of].as_u64().unwrap());
+        let kind = walk["portals"].as_str().unwrap();
+        assert_eq!(images > 0, ["texture", "warp1", "warp2"].contains(&kind));
+        assert_eq!(ldis > 0, kind == "ldi");
     }
     assert!(skipped > 0);
     // Images are made once for all kinds.
@@ -42,7 +44,7 @@ fn a_house_is_walked_through() {
     assert_eq!(of_images, warp2["references_used"].as_u64().unwrap());
     // Of each LDI's 13 those that are there serve it, too.
     let ldi = &walks[4];
-    assert!(made(ldi) > 0 && made(ldi) < 13 * ldi["references_used"].as_u64().unwrap());
+    assert!(made(ldi) > 0 && made(ldi) < 13 * ldi["ldis_used"].as_u64().unwrap());
     assert_eq!(of_images + made(ldi), made(&report));
     assert_eq!(report["device"], "CPU");
     let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
@@ -145,6 +147,106 @@ fn a_walk_becomes_a_film() {
             ran.stderr
         );
     }
+}
+
+/// What a plot says of its frames, and how far right the points of each of its lines are.
+fn plotted(file: &Path) -> (String, Vec<Vec<String>>) {
+    let svg = std::fs::read_to_string(file).unwrap();
+    let lines = svg.split("<polyline points=\"").skip(1);
+    let x = |point: &str| point.split(',').next().unwrap().to_owned();
+    let points = lines.map(|line| line.split('"').next().unwrap().split(' ').map(x).collect());
+    let across = svg.split(">frame ").nth(1).unwrap();
+    let across = across.split('<').next().unwrap().to_owned();
+    (across, points.collect())
+}
+
+#[test]
+fn times_are_plotted_where_frames_are_in_their_path_and_stay_where_none_is_drawn() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --size 32x24";
+    let film = format!("{walk} --frames 6 -o film --resume");
+    lumigraph(here, &film).ok();
+    let times = here.join("film/times.svg");
+    let whole = std::fs::read(&times).unwrap();
+    let (across, lines) = plotted(&times);
+    assert_eq!(across, "(0 to 5)");
+    assert_eq!(
+        lines,
+        [["64.0", "238.4", "412.8", "587.2", "761.6", "936.0"]]
+    );
+    // Nothing is drawn.
+    let said = lumigraph(here, &film).ok().stdout;
+    assert!(said.contains("6 frames, 6 of them from before"), "{said}");
+    let row = said.lines().find(|line| line.starts_with("geometry"));
+    let cells: Vec<&str> = row.unwrap().split_whitespace().skip(1).collect();
+    assert_eq!(cells, ["-"; 8]);
+    let report = lumigraph(here, &format!("{film} --json")).ok().json();
+    assert!(report["walks"][0]["median_ms"].is_null(), "{report}");
+    assert!(std::fs::read(&times).unwrap() == whole);
+    // Some are.
+    for i in [0, 1, 3] {
+        std::fs::remove_file(here.join(format!("film/frame_000{i}.png"))).unwrap();
+    }
+    lumigraph(here, &film).ok();
+    let (across, lines) = plotted(&times);
+    assert_eq!(across, "(0 to 5)");
+    assert_eq!(lines, [["64.0", "238.4"], ["587.2", "587.2"]]);
+    // A part of a path.
+    lumigraph(here, &format!("{walk} --frames 2..5/6 -o part")).ok();
+    let (across, lines) = plotted(&here.join("part/times.svg"));
+    assert_eq!(across, "(2 to 4)");
+    assert_eq!(lines, [["64.0", "500.0", "936.0"]]);
+}
+
+#[test]
+fn frames_from_before_are_counted_by_kind() {
+    let folder = with_house();
+    let here = folder.path();
+    let line = "walk house --portals ldi,warp1 --frames 6 --size 32x24 --reference-size 24x24 \
+                -o out --resume";
+    let said = lumigraph(here, line).ok().stdout;
+    assert!(said.contains("out: 6 frames, drawn by CPU"), "{said}");
+    for i in [1, 4] {
+        std::fs::remove_file(here.join(format!("out/ldi/frame_000{i}.png"))).unwrap();
+    }
+    let said = lumigraph(here, line).ok().stdout;
+    let expected = "out: 6 frames, from before 4 of ldi, 6 of warp1, drawn by";
+    assert!(said.contains(expected), "{said}");
+    let svg = std::fs::read_to_string(here.join("out/times.svg")).unwrap();
+    assert!(svg.contains(">ldi<") && !svg.contains(">warp1<"), "{svg}");
+}
+
+#[test]
+fn images_and_layered_images_are_counted_apart_and_those_made_ahead_with_them() {
+    let folder = with_house();
+    let here = folder.path();
+    let line = "walk house --portals warp1,ldi --frames 12 --size 32x24 --reference-size 24x24 \
+                --ldi-views 3 --json -o out";
+    let report = lumigraph(here, line).ok().json();
+    let [warp, ldi] = [0_usize, 1].map(|i| &report["walks"][i]);
+    let count = |of: &Value, what: &str| of[what].as_u64().unwrap();
+    for walk in [warp, ldi] {
+        let sum = |what: &str| -> u64 {
+            let frames = walk["frames"].as_array().unwrap();
+            frames.iter().map(|frame| count(frame, what)).sum()
+        };
+        for what in ["ldis_made", "ldis_read", "ldis_ahead"] {
+            assert_eq!(count(walk, what), sum(what), "{what}");
+        }
+        let made = sum("references_made") + count(walk, "references_made_ahead");
+        assert_eq!(count(walk, "references_made"), made);
+        assert!(count(walk, "references_used") <= count(&report, "references_possible"));
+    }
+    let of_walks = [warp, ldi].map(|walk| count(walk, "references_made"));
+    assert_eq!(
+        of_walks.iter().sum::<u64>(),
+        count(&report, "references_made")
+    );
+    let used = |of: &Value| [count(of, "references_used") > 0, count(of, "ldis_used") > 0];
+    assert_eq!((used(warp), used(ldi)), ([true, false], [false, true]));
+    let ahead = ["references_made_ahead", "ldis_ahead"].map(|what| count(warp, what));
+    assert_eq!(ahead, [0, 0]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use image::RgbaImage;
 use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, Walk, WalkOptions};
 use render::path::write_shot;
 use render::{DeviceChoice, Engine, Lumigraph};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -295,13 +296,10 @@ impl<'s> Desk<'s> {
             if let Some(folder) = house.ldis() {
                 walk.use_ldi_files(folder);
             }
-            let mut notes = 0;
+            let mut said = BTreeSet::new();
             self.serve(|tell, request, reduction| {
                 let drawn = draw_house(house, &mut walk, request, reduction);
-                for note in walk.painter().notes().iter().skip(notes) {
-                    tell(News::Trouble((*note).to_owned()));
-                }
-                notes = walk.painter().notes().len();
+                say_new(&walk.painter().notes(), &mut said, tell);
                 drawn.map_err(|error| error.to_string())
             })
         })
@@ -383,6 +381,16 @@ impl<'s> Desk<'s> {
             self.reduction = self.reduction.max(needed.ceil() as u32).min(MOST_REDUCED);
         } else if ms < FAST_MS && request.is_moving {
             self.reduction = (self.reduction - 1).max(1);
+        }
+    }
+}
+
+/// Says those notes that were not said yet, wherever among the others they stand: those of photos that are
+/// left out stand before the engine's.
+fn say_new(notes: &[&str], said: &mut BTreeSet<String>, tell: &dyn Fn(News)) {
+    for note in notes {
+        if said.insert((*note).to_owned()) {
+            tell(News::Trouble((*note).to_owned()));
         }
     }
 }
@@ -529,6 +537,31 @@ mod tests {
         let start = Instant::now();
         worker.end(Duration::ZERO);
         assert!(start.elapsed() < SHOT_PATIENCE / 2);
+    }
+
+    #[test]
+    fn each_note_is_said_once_wherever_it_stands() {
+        let (send, news) = channel();
+        let tell = move |news| send.send(news).unwrap();
+        let mut said = BTreeSet::new();
+        let mut heard = |notes: &[&str]| -> Vec<String> {
+            say_new(notes, &mut said, &tell);
+            let text = |news| match news {
+                News::Trouble(text) => text,
+                other => panic!("{other:?}"),
+            };
+            news.try_iter().map(text).collect()
+        };
+        assert_eq!(heard(&["the device is lost"]), ["the device is lost"]);
+        let notes = ["photo a is left out", "the device is lost"];
+        assert_eq!(heard(&notes), ["photo a is left out"]);
+        assert!(heard(&notes).is_empty());
+        let notes = [
+            "photo a is left out",
+            "photo b is left out",
+            "the device is lost",
+        ];
+        assert_eq!(heard(&notes), ["photo b is left out"]);
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! What a walk says of itself: a line for people, and JSON.
 
+use super::super::stamp::in_unicode;
 use lumigraph::scene::TruthScore;
 use proxy::interior::Interior;
 use render::interior::{FrameCost, PortalFill};
 use render::score::mean_of;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A walk with one kind of portals.
 pub(super) struct Walked {
@@ -15,12 +16,18 @@ pub(super) struct Walked {
     pub(super) frames: Vec<Drawn>,
     /// Of all frames.
     pub(super) files: Vec<PathBuf>,
-    /// How many reference images it used.
-    pub(super) references: usize,
+    /// How many reference images portals showed.
+    pub(super) references_used: usize,
+    /// How many LDIs they showed.
+    pub(super) ldis_used: usize,
+    /// How many reference images were made meanwhile, for a frame or ahead of need.
+    pub(super) references_made: usize,
 }
 
 /// A frame of a walk.
 pub(super) struct Drawn {
+    /// In the path, counted from 0.
+    pub(super) index: usize,
     pub(super) name: String,
     pub(super) file: PathBuf,
     pub(super) cost: FrameCost,
@@ -37,7 +44,7 @@ pub(super) struct Scored {
 #[derive(Serialize)]
 struct FrameReport<'a> {
     name: &'a str,
-    file: &'a Path,
+    file: PathBuf,
     cell: Option<&'a str>,
     ms: f64,
     visibility_ms: f64,
@@ -84,24 +91,34 @@ pub(super) fn ms(time: std::time::Duration) -> f64 {
 }
 
 impl Walked {
-    pub(super) fn times_ms(&self) -> Vec<f64> {
-        self.frames.iter().map(|f| ms(f.cost.time())).collect()
+    /// Of each frame that was drawn, its place in the path and its time.
+    pub(super) fn times_ms(&self) -> Vec<(usize, f64)> {
+        let times = self.frames.iter().map(|f| (f.index, ms(f.cost.time())));
+        times.collect()
     }
 
-    /// The median, what 95 % stay below, and the worst.
-    fn spread(&self) -> [f64; 3] {
-        let mut times = self.times_ms();
+    /// How many frames were there before.
+    pub(super) fn before(&self) -> usize {
+        self.files.len() - self.frames.len()
+    }
+
+    /// The median, what 95 % stay below, and the worst; nothing where no frame was drawn.
+    fn spread(&self) -> Option<[f64; 3]> {
+        let mut times: Vec<f64> = self.times_ms().into_iter().map(|(_, time)| time).collect();
         times.sort_by(f64::total_cmp);
         let at = |share: f64| {
             let i = (share * times.len() as f64).ceil() as usize;
-            times.get(i.saturating_sub(1)).copied().unwrap_or(0.0)
+            times.get(i.saturating_sub(1)).copied()
         };
-        [at(0.5), at(0.95), at(1.0)]
+        Some([at(0.5)?, at(0.95)?, at(1.0)?])
+    }
+
+    fn sum(&self, of: impl Fn(&FrameCost) -> usize) -> usize {
+        self.frames.iter().map(|f| of(&f.cost)).sum()
     }
 
     fn mean(&self, of: impl Fn(&FrameCost) -> usize) -> f64 {
-        let sum: usize = self.frames.iter().map(|f| of(&f.cost)).sum();
-        sum as f64 / self.frames.len().max(1) as f64
+        self.sum(of) as f64 / self.frames.len().max(1) as f64
     }
 
     /// The means over the photos that were held out: their scores, and the processor's time.
@@ -126,22 +143,30 @@ impl Walked {
             let (psnr, ssim, coverage) = (score.psnr, score.ssim, score.coverage);
             format!(" {psnr:>8.2} {ssim:>8.4} {coverage:>8.4} {cpu_ms:>8.1}")
         });
-        let [median, most, worst] = self.spread();
+        let name = self.fill.name();
+        let Some([median, most, worst]) = self.spread() else {
+            let none = "-";
+            return format!(
+                "{name:<10} {none:>9} {none:>9} {none:>9} {none:>9} {none:>9} {none:>8} {none:>7} \
+                 {none:>5}\n"
+            );
+        };
         format!(
-            "{:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7}{scored}\n",
-            self.fill.name(),
+            "{name:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7} {:>5}\
+             {scored}\n",
             self.mean(|c| c.triangles_tried),
             self.mean(|c| c.samples),
             self.mean(|c| c.holes),
-            self.references
+            self.references_used,
+            self.ldis_used
         )
     }
 
     pub(super) fn json<'a>(&'a self, interior: &'a Interior) -> Value {
-        let [median, most, worst] = self.spread();
+        let spread = self.spread();
         let report = |f: &'a Drawn, c: &'a FrameCost| FrameReport {
             name: &f.name,
-            file: &f.file,
+            file: in_unicode(&f.file),
             scored: f.scored.as_ref().map(|s| ScoreReport {
                 score: s.score,
                 cpu_ms: s.cpu_ms,
@@ -172,13 +197,16 @@ impl Walked {
         let frames: Vec<FrameReport<'_>> = frames.collect();
         json!({
             "portals": self.fill.name(),
-            "median_ms": median,
-            "percentile_95_ms": most,
-            "worst_ms": worst,
-            "references_used": self.references,
-            "references_made": self.frames.iter().map(|f| f.cost.references_made).sum::<usize>(),
-            "ldis_made": self.frames.iter().map(|f| f.cost.ldis_made).sum::<usize>(),
-            "ldis_read": self.frames.iter().map(|f| f.cost.ldis_read).sum::<usize>(),
+            "median_ms": spread.map(|s| s[0]),
+            "percentile_95_ms": spread.map(|s| s[1]),
+            "worst_ms": spread.map(|s| s[2]),
+            "references_used": self.references_used,
+            "references_made": self.references_made,
+            "references_made_ahead": self.references_made - self.sum(|c| c.references_made),
+            "ldis_used": self.ldis_used,
+            "ldis_made": self.sum(|c| c.ldis_made),
+            "ldis_read": self.sum(|c| c.ldis_read),
+            "ldis_ahead": self.sum(|c| c.ldis_ahead),
             "mean": self.scored(),
             "frames": frames,
         })

@@ -184,18 +184,63 @@ impl State {
                 Mode::Orbit | Mode::Fly => moved(&pose, way),
                 Mode::Walk => {
                     let (forward, right) = level_axes(&pose, up);
-                    self.pose = pose;
+                    // Who turns moves, though walls let one go nowhere.
+                    if yaw != 0.0 || pitch != 0.0 {
+                        self.be_at(pose);
+                    }
                     self.walked(forward * way.z + right * way.x)
                 }
             };
         }
         self.glide = None;
         self.playing = None;
-        // Walking into a wall turns nothing.
-        let (before, stop) = (self.pose, self.stop);
         self.be_at(pose);
-        if before == self.pose {
-            self.stop = stop;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::content::{Content, House, Space};
+    use crate::picture::Look;
+    use datasets::house::{HouseOptions, house};
+    use proxy::interior::Contents;
+    use std::sync::Arc;
+
+    #[test]
+    fn who_turns_before_a_wall_moves() {
+        let options = HouseOptions {
+            rooms: 2,
+            triangles: Some(1),
+            ..HouseOptions::default()
+        };
+        let made = house(&options).unwrap();
+        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
+        let house = House::new(made.interior, contents, made.model);
+        let content = Content::Interior(Arc::new(house));
+        let space = Arc::new(Space::of(&content));
+        let mut state = State::new(Look::default());
+        state.resize(320, 240);
+        let _ = state.show(content, space);
+        assert_eq!(state.mode, Mode::Walk);
+        // Into a corner, and against the ceiling: nobody walks upwards.
+        state.hold(Motion::Forward, true);
+        for _ in 0..500 {
+            state.step(0.02);
+        }
+        for way in [Motion::Forward, Motion::Up] {
+            state.let_go();
+            state.hold(way, true);
+            state.hold(Motion::TurnLeft, true);
+            for _ in 0..100 {
+                // As if one had stood at a stop.
+                (state.stop, state.still_s) = (Some(0), 1.0);
+                let before = state.pose.rotation;
+                state.step(0.02);
+                assert!(state.pose.rotation != before);
+                assert_eq!((state.stop, state.still_s), (None, 0.0), "{way:?}");
+                assert!(state.wanted().is_some_and(|request| request.is_moving));
+            }
         }
     }
 }
