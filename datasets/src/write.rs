@@ -5,6 +5,7 @@ use crate::{Dataset, DatasetError, Photo};
 use calibrate::{Reconstruction, colmap};
 use capture::folder::{beside, place_of, take_place};
 use image::{DynamicImage, ImageBuffer, Luma};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Depth maps hold this many steps to a world unit: millimetres where units are metres.
@@ -44,7 +45,7 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
 /// # Errors
 /// The folder is there and not empty, and `may_be_replaced` does not say that it may go; the path
 /// ends in no name, as `/` does; whatever `fill` fails with; the file system's. Then nothing stays
-/// behind.
+/// behind. What a process that is killed leaves is removed by the next that fills this folder.
 pub fn in_new_folder<E: From<DatasetError>>(
     folder: &Path,
     may_be_replaced: impl Fn(&Path) -> bool,
@@ -60,6 +61,7 @@ pub fn in_new_folder<E: From<DatasetError>>(
         Ok(())
     };
     check_free()?;
+    remove_left(&place);
     let partial = beside(&place, &format!("partial-{}", std::process::id()));
     if partial.exists() {
         // In containers processes share their numbers: one that was killed had this one's.
@@ -76,6 +78,32 @@ pub fn in_new_folder<E: From<DatasetError>>(
         let _ = std::fs::remove_dir_all(&partial);
     }
     done
+}
+
+/// Removes what processes that are gone have left of the same folder.
+fn remove_left(place: &Path) {
+    let unnumbered = beside(place, "partial-");
+    let unnumbered = unnumbered.file_name().and_then(OsStr::to_str);
+    let (Some(unnumbered), Some(above)) = (unnumbered, place.parent()) else {
+        return;
+    };
+    for entry in std::fs::read_dir(above).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let process = name.to_str().and_then(|name| name.strip_prefix(unnumbered));
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_folder && process.is_some_and(is_gone) {
+            // Others' that may not be removed are in nobody's way.
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
+/// Whether a process of that number is known not to run. Linux alone tells, where its `/proc` is to be seen.
+fn is_gone(process: &str) -> bool {
+    let is_number = !process.is_empty() && process.bytes().all(|byte| byte.is_ascii_digit());
+    let all = Path::new("/proc");
+    let tells = cfg!(target_os = "linux") && all.join("self").exists();
+    tells && is_number && !all.join(process).exists()
 }
 
 fn fill<'a>(dataset: &'a Dataset, folder: &Path) -> Result<(), DatasetError> {

@@ -50,6 +50,35 @@ fn a_folder_is_filled_and_replaced_whatever_its_path_ends_in() {
     assert!(error.starts_with(said), "{error}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_process_left_is_removed_by_the_next() {
+    let here = tempfile::tempdir().unwrap();
+    let mut gone = std::process::Command::new("true").spawn().unwrap();
+    gone.wait().unwrap();
+    let gone = gone.id();
+    let left = format!(".house.partial-{gone}");
+    let theirs = [
+        // The first process runs as long as the system does.
+        ".house.partial-1".to_owned(),
+        format!(".house.partial-{gone}-mine"),
+        ".house.partial-".to_owned(),
+        format!(".house.replaced-{gone}"),
+        format!(".houses.partial-{gone}"),
+        format!("house.partial-{gone}"),
+    ];
+    for name in theirs.iter().chain([&left]) {
+        fs::create_dir(here.path().join(name)).unwrap();
+        fs::write(here.path().join(name).join("half"), "").unwrap();
+    }
+    fill(&here.path().join("house"), false, "whole").unwrap();
+    let mut expected = theirs.to_vec();
+    expected.push("house".to_owned());
+    expected.sort();
+    assert_eq!(names(here.path()), expected);
+    assert_eq!(names(&here.path().join("house")), ["whole"]);
+}
+
 #[test]
 fn what_others_write_meanwhile_stays() {
     let here = tempfile::tempdir().unwrap();

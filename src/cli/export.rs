@@ -1,17 +1,18 @@
 //! `lumigraph export`
 
 use super::Usage;
-use super::inputs::{calibration_in, calibration_of, model_files, parts_of};
+use super::inputs::{calibration_of, files_behind_scene, model_files};
 use super::options::SceneArgs;
 use super::output::{print, write_file};
+use super::targets::check_apart;
 use anyhow::bail;
 use calibrate::export::{
     FrameFiles, check_colmap, check_colmap_text, has_board, opencv_yaml, transforms_json,
 };
 use calibrate::{Image, colmap};
 use clap::ValueEnum;
-use lumigraph::scene::{Photo, Scene, relative};
-use std::collections::BTreeMap;
+use lumigraph::scene::{Photo, Scene, SceneError, relative};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Write a scene's cameras, poses and points for other programs
@@ -57,7 +58,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return Err(Usage(format!("{} {message}", output.display())).into());
     }
     let scene = args.scene.open_whole()?;
-    check_calibration(&scene, &args.scene.scene, output, is_file)?;
+    let written = match is_file {
+        true => vec![output.to_owned()],
+        false => model_files(output),
+    };
+    // Over the calibration, above all: what is written lacks the photos that were left out, whose poses are nowhere
+    // else.
+    let inputs = files_behind_scene(&args.scene.scene, &scene);
+    check_apart(
+        "the scene is",
+        written.iter().map(PathBuf::as_path),
+        &inputs,
+    )?;
+    if !is_file {
+        check_model_folder(&scene, output)?;
+    }
     let whole = &scene.reconstruction;
     match args.format {
         Format::Colmap => {
@@ -69,13 +84,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             colmap::write_text(whole, output)?;
         }
         Format::Transforms => {
-            let files = Files::new(&scene, output);
-            let text = transforms_json(whole, &|image| files.of(image))?;
+            let files = files(&scene, output)?;
+            let text = transforms_json(whole, &|image| of(&files, image))?;
             write_file(output, text.as_bytes())?;
         }
         Format::OpenCv => {
-            let files = Files::new(&scene, output);
-            let text = opencv_yaml(whole, &|image| files.of(image).photo)?;
+            let files = files(&scene, output)?;
+            let text = opencv_yaml(whole, &|image| of(&files, image).photo)?;
             write_file(output, text.as_bytes())?;
         }
     }
@@ -93,64 +108,58 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Fails where the output would take the place of the scene's calibration: what is written
-/// lacks the photos that were left out, whose poses are nowhere else.
-fn check_calibration(
-    scene: &Scene,
-    given: &Path,
-    output: &Path,
-    is_file: bool,
-) -> anyhow::Result<()> {
-    let written = match is_file {
-        true => vec![output.to_owned()],
-        false => model_files(output),
+/// Fails where a COLMAP model would lie among the scene's photos, or with the model of any scene: of one in binary
+/// and one in text beside it nobody knows which is read.
+fn check_model_folder<'a>(scene: &'a Scene, output: &Path) -> anyhow::Result<()> {
+    let Ok(real) = output.canonicalize() else {
+        return Ok(());
     };
-    let origin = scene.calibration.as_deref().or(scene.capture.as_deref());
-    let read = [calibration_of(given), origin.and_then(calibration_in)];
-    let real = |path: PathBuf| path.canonicalize().ok();
-    let kept: Vec<PathBuf> = read
-        .into_iter()
-        .flatten()
-        .flat_map(|path| parts_of(&path))
-        .filter_map(real)
-        .collect();
-    let is_kept = |path: &PathBuf| real(path.clone()).is_some_and(|path| kept.contains(&path));
-    if let Some(file) = written.iter().find(|path| is_kept(path)) {
+    let is_output = |folder: &Path| folder.canonicalize().is_ok_and(|folder| folder == real);
+    // From the one that a photo lies in up to the one that its name counts from.
+    let around = |photo: &'a Photo| {
+        let count = Path::new(&photo.name).components().count();
+        photo.path.ancestors().skip(1).take(count)
+    };
+    let folders: BTreeSet<&Path> = scene.photos.iter().flat_map(around).collect();
+    if folders.into_iter().any(is_output) {
         bail!(
-            "{}: the scene's calibration is this very file; nothing was written: choose another -o",
-            file.display()
+            "{}: the scene's photos are in this very folder; nothing was written: choose another -o",
+            output.display()
+        );
+    }
+    let beside = real.parent().filter(|folder| Scene::is_scene(folder));
+    let own = beside.and_then(calibration_of);
+    if own.is_some_and(|own| is_output(&own)) {
+        bail!(
+            "{}: a scene's own model is in this very folder; nothing was written: choose another -o",
+            output.display()
         );
     }
     Ok(())
 }
 
-/// Where a scene's photos and masks lie, as seen from a file's folder.
-struct Files<'a> {
-    photos: BTreeMap<&'a str, &'a Photo>,
-    folder: PathBuf,
+/// The files of a scene's photos by the photos' names, as seen from a file's folder.
+fn files<'a>(scene: &'a Scene, file: &Path) -> Result<BTreeMap<&'a str, FrameFiles>, SceneError> {
+    let folder = match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let of_photo = |photo: &'a Photo| {
+        let mask = photo.ignore_mask.as_deref();
+        let files = FrameFiles {
+            photo: relative(folder, &photo.path)?,
+            mask: mask.map(|mask| relative(folder, mask)).transpose()?,
+        };
+        Ok((photo.name.as_str(), files))
+    };
+    scene.photos.iter().map(of_photo).collect()
 }
 
-impl<'a> Files<'a> {
-    fn new(scene: &'a Scene, file: &Path) -> Self {
-        let folder = match file.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        Self {
-            photos: scene.photos.iter().map(|p| (p.name.as_str(), p)).collect(),
-            folder: folder.to_owned(),
-        }
-    }
-
-    fn of(&self, image: &Image) -> FrameFiles {
-        let photo = self.photos.get(image.name.as_str());
-        let mask = photo.and_then(|photo| photo.ignore_mask.as_deref());
-        FrameFiles {
-            photo: photo.map_or_else(
-                || image.name.clone(),
-                |photo| relative(&self.folder, &photo.path),
-            ),
-            mask: mask.map(|mask| relative(&self.folder, mask)),
-        }
-    }
+/// Those of an image; one without a photo has its name alone.
+fn of(files: &BTreeMap<&str, FrameFiles>, image: &Image) -> FrameFiles {
+    let known = files.get(image.name.as_str()).cloned();
+    known.unwrap_or_else(|| FrameFiles {
+        photo: image.name.clone(),
+        mask: None,
+    })
 }

@@ -120,6 +120,14 @@ pub(super) struct FilmArgs {
     resume: bool,
 }
 
+/// What the names of films usually end in; ffmpeg may know others.
+const FILMS: [&str; 5] = ["mp4", "webm", "mkv", "mov", "avi"];
+
+fn is_film(video: &Path) -> bool {
+    let end = video.extension().unwrap_or_default();
+    FILMS.iter().any(|film| end.eq_ignore_ascii_case(film))
+}
+
 /// What is behind the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Background(pub(super) Option<[u8; 3]>);
@@ -214,9 +222,18 @@ impl FilmArgs {
         let folder = tempfile::tempdir()?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());
         let (size, fps) = ((16, 16), self.fps.unwrap_or(30.0));
-        let frames = [Ok(vec![0; 3 * 16 * 16])].into_iter();
-        capture::video::encode(&trial, size, fps, frames)
-            .with_context(|| format!("--video {}", video.display()))
+        // Of one frame alone ffmpeg makes a picture, too (.png).
+        let frames = [(); 2].map(|()| Ok(vec![0; 3 * 16 * 16])).into_iter();
+        let made = capture::video::encode(&trial, size, fps, frames);
+        let named = format!("--video {}", video.display());
+        match made {
+            Err(_) if !is_film(video) => Err(Usage(format!(
+                "{named}: ffmpeg makes no film of that name; films end in {}, …",
+                FILMS.map(|end| format!(".{end}")).join(", ")
+            ))
+            .into()),
+            made => made.context(named),
+        }
     }
 
     /// Which frames are there already. `inputs` are the files that frames are made of, over which none is
@@ -298,9 +315,9 @@ impl FilmArgs {
             .with_context(|| video.display().to_string())
     }
 
-    /// The film, if one is asked for.
-    pub(super) fn video(&self) -> Option<&Path> {
-        self.video.as_deref()
+    /// The film as JSON names it, if one is asked for.
+    pub(super) fn video(&self) -> Option<PathBuf> {
+        self.video.as_deref().map(in_unicode)
     }
 }
 

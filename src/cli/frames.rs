@@ -22,14 +22,6 @@ pub(super) struct ViewArgs {
     pub(super) path: Option<String>,
 }
 
-impl ViewArgs {
-    /// Whether the path is derived, or is asked for by no name that one has.
-    pub(super) fn is_derived(&self) -> bool {
-        let is_file = |path: &str| derived(path).is_none() && !is_misspelt(path);
-        self.views.is_none() && !self.path.as_deref().is_some_and(is_file)
-    }
-}
-
 /// The kind of derived path that has a name.
 fn derived(asked: &str) -> Option<Trajectory> {
     match asked {
@@ -43,7 +35,7 @@ fn derived(asked: &str) -> Option<Trajectory> {
 /// Whether what is no kind of path cannot be meant as a file either.
 fn is_misspelt(asked: &str) -> bool {
     let file = Path::new(asked);
-    file.extension().is_none() && !file.exists()
+    file.is_dir() || file.extension().is_none() && !file.exists()
 }
 
 /// A view to render and what to call it.
@@ -98,6 +90,11 @@ impl Asked {
             return Err(Usage(message).into());
         }
         of_file(Path::new(asked), frame)
+    }
+
+    /// Whether it is a derived path, which has as many frames as one asks for.
+    pub(super) fn is_derived(&self) -> bool {
+        matches!(self, Self::Derived(_))
     }
 
     /// The views, and how many a second a film shows: of a derived path so many, `points_in_world` are

@@ -12,6 +12,7 @@ use capture::find_photos_folder;
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
     DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
+    relative,
 };
 use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
@@ -82,8 +83,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE.csv")]
     times: Option<PathBuf>,
     /// The photos are frames of a video, counted in their names, so many a second
-    #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "times",
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "times")]
     frame_rate: Option<f64>,
     #[command(flatten)]
     uncalibrated: UncalibratedArgs,
@@ -95,7 +95,7 @@ pub(super) struct Args {
     /// clockwise. Silhouettes come from --mattes, the photos' alpha or a plain background. The
     /// scene has their hull as its proxy.
     #[arg(long, value_name = "DEGREES", value_parser = turntable_step,
-        allow_negative_numbers = true, conflicts_with_all = ["calibration", "camera_matrix",
+        conflicts_with_all = ["calibration", "camera_matrix",
         "distortion", "fisheye", "matching", "frames", "fps", "undistort", "depth"])]
     turntable: Option<f64>,
     /// Fail on a missing or corrupt photo instead of leaving it out
@@ -115,6 +115,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let given = [&args.calibration, &args.masks, &args.mattes, &args.depth];
     let inputs = given.into_iter().flatten().chain([&args.photos]).cloned();
     Scene::check_apart(&args.output, inputs.chain(find_photos_folder(&args.photos)))?;
+    // What every scene names: the photos' folder, if they are not of a video, and what was given beside it.
+    let folder = Some(&args.photos).filter(|photos| photos.is_dir());
+    for named in folder.into_iter().chain(&args.calibration) {
+        relative(&args.output, named)?;
+    }
 
     // 1. The photos.
     check_no_interior(&args.photos)?;

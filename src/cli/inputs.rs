@@ -1,6 +1,7 @@
 //! The files that pictures and calibrations follow from.
 
 use calibrate::{colmap, formats, opencv};
+use capture::{PhotoSet, find_photos_folder};
 use lumigraph::scene::file::SceneFile;
 use lumigraph::scene::{Photo, Scene};
 use proxy::interior::Interior;
@@ -21,6 +22,23 @@ pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
         proxy.chain([folder.join("scene.json")])
     });
     own.chain(scene.photos.iter().flat_map(of_photo)).collect()
+}
+
+/// All files that belong to a scene or a capture, whether or not they decide any picture: its photos, those
+/// left out, too, its calibration, its splits.
+pub(super) fn files_behind_scene(given: &Path, scene: &Scene) -> Vec<PathBuf> {
+    let mut all = files_of(scene);
+    all.extend(files_of_places(given));
+    let origin = scene.calibration.as_deref().or(scene.capture.as_deref());
+    let origin = origin.and_then(calibration_in);
+    all.extend(origin.iter().flat_map(|path| parts_of(path)));
+    for folder in [&scene.folder, &scene.capture].into_iter().flatten() {
+        all.push(folder.join("split.json"));
+        // What cannot be listed holds none that could be told from other files.
+        let found = find_photos_folder(folder).and_then(|folder| PhotoSet::open(&folder).ok());
+        all.extend(found.into_iter().flat_map(|set| set.photos).map(|p| p.path));
+    }
+    all
 }
 
 /// The files that frames are made of, besides photos and what lies beside these: those that options name (of a

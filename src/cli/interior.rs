@@ -17,6 +17,7 @@ use proxy::interior::{
     interior_from_nodes, read_interior, read_rooms, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
+use std::ffi::OsString;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -100,12 +101,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// Fails where an interior would be replaced that was not asked to be: people correct them by hand.
+/// Fails where an interior would be replaced that was not asked to be, as people correct them by hand, or that
+/// cannot be, as other things lie beside it.
 fn check_free(args: &Args) -> anyhow::Result<()> {
-    if args.output.join(INTERIOR).exists() && !args.force {
+    let folder = args.output.display();
+    if !args.output.join(INTERIOR).exists() {
+        return Ok(());
+    }
+    if let Some(other) = beside_interior(&args.output)? {
         bail!(
-            "{}: holds an interior already; replace it with --force, or choose another folder",
-            args.output.display()
+            "{folder}: the folder is not empty: it holds an interior, and {other}; choose another, or move that away \
+             first"
+        );
+    }
+    if !args.force {
+        bail!(
+            "{folder}: holds an interior already; replace it with --force, or choose another folder"
         );
     }
     Ok(())
@@ -113,6 +124,7 @@ fn check_free(args: &Args) -> anyhow::Result<()> {
 
 fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     let named = || args.model.display().to_string();
+    let photos = relative(&args.output, &args.model)?;
     let (mut scene, warnings) = Scene::open(&args.model, false)?;
     super::options::print_warnings(&warnings);
     super::options::drop_weak_of_interior(&mut scene);
@@ -140,7 +152,7 @@ fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     };
     let rooms_s = start.elapsed().as_secs_f64();
     // 3. The photos that show them.
-    interior.show_photos(&relative(&args.output, &args.model));
+    interior.show_photos(&photos);
     interior.held_out = without.into_iter().collect();
     let model = &surface.model;
     let bytes = model_to_glb(model).with_context(named)?;
@@ -351,23 +363,46 @@ pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether a folder holds an interior, one model and perhaps a floor plan and LDIs, and nothing else.
+/// Whether a folder holds an interior and nothing else.
 fn is_ours(folder: &Path) -> bool {
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return false;
+    folder.join(INTERIOR).exists() && matches!(beside_interior(folder), Ok(None))
+}
+
+/// What a folder holds besides an interior, one model and perhaps a floor plan, LDIs and what `generate` says of its
+/// house: the first thing by name, for people.
+fn beside_interior(folder: &Path) -> anyhow::Result<Option<String>> {
+    let entries = std::fs::read_dir(folder)
+        .and_then(|entries| entries.map(|e| e.map(|e| e.file_name())).collect());
+    let mut names: Vec<OsString> =
+        entries.with_context(|| format!("{}: cannot read", folder.display()))?;
+    names.sort();
+    let is_known = |name: &OsString, path: &Path| {
+        let is_own = name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG;
+        is_own || (name == README && is_generated(path))
     };
-    let Ok(names) = entries
-        .map(|e| e.map(|e| e.file_name()))
-        .collect::<Result<Vec<_>, _>>()
-    else {
-        return false;
-    };
-    let is_model =
-        |name: &std::ffi::OsString| Path::new(name).extension().is_some_and(|e| e == "glb");
-    let is_known = |name: &std::ffi::OsString| {
-        let is_file = name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG || is_model(name);
-        is_file || (name == made::FOLDER && made::is_ours(&folder.join(name)))
-    };
-    let models = names.iter().filter(|name| is_model(name)).count();
-    names.iter().any(|name| name == INTERIOR) && models <= 1 && names.iter().all(is_known)
+    let mut models = Vec::new();
+    for name in &names {
+        let (path, shown) = (folder.join(name), name.to_string_lossy());
+        if name == made::FOLDER {
+            if !made::is_ours(&path) {
+                return Ok(Some(format!("what is no LDI in {shown}")));
+            }
+        } else if path.extension().is_some_and(|e| e == "glb") {
+            models.push(shown);
+        } else if !is_known(name, &path) {
+            return Ok(Some(shown.into_owned()));
+        }
+    }
+    Ok((models.len() > 1).then(|| format!("{} models ({})", models.len(), models.join(", "))))
+}
+
+/// What `generate house` says of itself.
+const README: &str = "README.md";
+const README_BEGINS: &str = "# house\n\n- Source: `lumigraph generate house`, a procedural house.";
+const README_LINES: usize = 5;
+
+/// Whether a file is what `generate house` wrote, and nobody has added to it.
+fn is_generated(file: &Path) -> bool {
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    text.starts_with(README_BEGINS) && text.lines().count() == README_LINES
 }

@@ -5,11 +5,12 @@ use super::made::{FOLDER, Made, folder_of};
 use super::output::{print, print_json, say};
 use super::references::ReferenceArgs;
 use super::session::progress;
+use super::stamp::in_unicode;
 use anyhow::Context;
 use render::RenderError;
 use render::interior::{Painter, Walk, WalkOptions};
 use render::ldi::write;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -38,6 +39,7 @@ pub(super) struct Args {
 /// What was made.
 #[derive(Serialize)]
 struct Report {
+    #[serde(serialize_with = "as_unicode")]
     folder: PathBuf,
     /// All that there are now, and their size.
     files: usize,
@@ -48,6 +50,10 @@ struct Report {
     none: usize,
     seconds: f64,
     device: String,
+}
+
+fn as_unicode<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
+    in_unicode(path).serialize(to)
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {

@@ -4,7 +4,7 @@ use super::captured::Photos;
 use super::output::write_file;
 use super::stamp::{Stamp, changes, stamps};
 use anyhow::Context;
-use lumigraph::scene::relative;
+use lumigraph::scene::relative_lossy;
 use render::interior::{LdiSource, LibraryOptions, Painter};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -75,7 +75,7 @@ impl Made {
             put("cpu_memory", json!(options.budget));
         }
         let folder = folder_of(file);
-        let name = |file: &Path| PathBuf::from(relative(folder, file));
+        let name = |file: &Path| PathBuf::from(relative_lossy(folder, file));
         Ok(Self {
             version: VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),

@@ -52,7 +52,7 @@ use std::process::ExitCode;
 #[command(name = "lumigraph", version, arg_required_else_help = true)]
 struct Cli {
     /// Worker threads [default: one a processor core]; pictures do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<NonZero<usize>>,
     #[command(subcommand)]
     command: Command,
@@ -87,15 +87,18 @@ struct Usage(String);
 /// Parses the command line, runs the command, and says what went wrong: exit code 2 for
 /// usage, 1 for bad data.
 pub(super) fn main() -> ExitCode {
-    let matches = Cli::command().get_matches();
+    let matches = command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    if let Some((_, given)) = matches.subcommand() {
+        options::say_unused(given);
+    }
     let done = start_threads(cli.threads).and_then(|()| run(cli));
     let Err(error) = done else {
         return ExitCode::SUCCESS;
     };
     if let Some(Usage(message)) = error.downcast_ref() {
         // With the usage of the command that was given.
-        let mut all = Cli::command();
+        let mut all = command();
         all.build();
         let name = matches.subcommand_name().unwrap_or_default();
         let command = match all.find_subcommand_mut(name) {
@@ -110,6 +113,36 @@ pub(super) fn main() -> ExitCode {
     }
     say!("error: {}", one_line(&error));
     ExitCode::from(1)
+}
+
+/// The command line. A negative number after an option is its value, which it may refuse, and no option that
+/// nobody knows.
+fn command() -> clap::Command {
+    let of_option = |arg: clap::Arg| match arg.get_long().is_some() && !arg.is_positional() {
+        true if arg.get_action().takes_values() => arg.allow_negative_numbers(true),
+        _ => arg,
+    };
+    let mut all = Cli::command().mut_args(of_option);
+    let names = all.get_subcommands().map(|c| c.get_name().to_owned());
+    for name in names.collect::<Vec<String>>() {
+        all = all.mut_subcommand(name, |command| command.mut_args(of_option));
+    }
+    all
+}
+
+/// More worker threads than these are refused, unless there are cores for them: looking for work at one another, a
+/// thousand on two cores took half a minute for what two did at once, and four thousand minutes.
+const MOST_THREADS: usize = 256;
+const MOST_THREADS_PER_CORE: usize = 16;
+
+/// How many worker threads.
+fn threads(text: &str) -> Result<NonZero<usize>, String> {
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let most = MOST_THREADS.max(MOST_THREADS_PER_CORE * cores);
+    match text.parse::<NonZero<usize>>() {
+        Ok(count) if count.get() <= most => Ok(count),
+        _ => Err(format!("expected a whole number in 1..={most}")),
+    }
 }
 
 /// At once, as later there is nobody to tell that no more threads can be had.
@@ -163,7 +196,20 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        command().debug_assert();
+    }
+
+    #[test]
+    fn as_many_threads_are_started_as_have_work() {
+        assert_eq!(threads("1"), Ok(NonZero::<usize>::MIN));
+        assert_eq!(threads("256").map(NonZero::get), Ok(256));
+        for bad in ["0", "-1", "nan", "1000000", "99999999999999999999"] {
+            let error = threads(bad).unwrap_err();
+            assert!(
+                error.starts_with("expected a whole number in 1..="),
+                "{error}"
+            );
+        }
     }
 
     #[test]

@@ -5,8 +5,8 @@ use super::output::say;
 use calibrate::View;
 use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
-use clap::builder::RangedU64ValueParser;
-use clap::{Args, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{Photo, Scene, Warning};
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
@@ -154,7 +154,7 @@ pub(super) struct FieldArgs {
     #[arg(long, value_enum, default_value = "triangulated")]
     renderer: Renderer,
     /// Cells of the triangulation's grid across the image's longer side
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = cells_across)]
     pub(super) grid: u32,
     /// The formula for the weights
     #[arg(long, value_enum, default_value = "consistent")]
@@ -163,11 +163,10 @@ pub(super) struct FieldArgs {
     #[arg(long, value_enum, default_value = "footprint")]
     resolution: ResolutionName,
     /// How many photos share a ray, roughly: Buehler's k
-    #[arg(long, default_value_t = 5,
-        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CONTRIBUTORS as u64))]
+    #[arg(long, default_value_t = 5, value_parser = contributors)]
     k: usize,
     /// Radians of angular difference that half the resolution is worth: Buehler's β/α
-    #[arg(long, default_value_t = 0.1, value_parser = zero_or_more, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.1, value_parser = zero_or_more)]
     beta: f64,
 }
 
@@ -195,6 +194,18 @@ enum ResolutionName {
     Distance,
     /// The difference of distances, in world units: Buehler et al. 2001, literally
     Length,
+}
+
+/// Says which of a command's options were given for nothing, as another leaves them no effect.
+pub(super) fn say_unused(given: &ArgMatches) {
+    // Of options that the command does not have nobody may ask.
+    let has = |id: &str| matches!(given.try_contains_id(id), Ok(true));
+    let is_given = |id: &str| has(id) && given.value_source(id) == Some(ValueSource::CommandLine);
+    let renderer = given.try_get_one::<Renderer>("renderer");
+    // A triangulation that is drawn has a grid, whatever renders.
+    if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {
+        say!("note: --grid changes nothing: --renderer exact has no grid");
+    }
 }
 
 impl FieldArgs {
@@ -393,6 +404,19 @@ pub(super) fn triple(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// How many cells of a grid.
+fn cells_across(text: &str) -> Result<u32, String> {
+    let count = text.parse::<u32>().ok().filter(|&count| count > 0);
+    count.ok_or_else(|| "expected a whole number above zero, as in 32".to_owned())
+}
+
+/// How many photos share a ray.
+fn contributors(text: &str) -> Result<usize, String> {
+    let count = text.parse::<usize>().ok();
+    let count = count.filter(|count| (1..=MAX_CONTRIBUTORS).contains(count));
+    count.ok_or_else(|| format!("expected a whole number in 1..={MAX_CONTRIBUTORS}"))
+}
+
 /// A number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     zero_or_more(text)
@@ -456,5 +480,16 @@ mod tests {
                 .all(|bad| max_error(bad).is_err())
         );
         assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());
+        assert_eq!((cells_across("1"), contributors("16")), (Ok(1), Ok(16)));
+        assert!(
+            ["0", "-1", "x", ""]
+                .iter()
+                .all(|bad| cells_across(bad).is_err())
+        );
+        assert!(
+            ["0", "17", "nan", "1.5"]
+                .iter()
+                .all(|bad| contributors(bad).is_err())
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! `lumigraph path`
 
 use super::output::{make_parent, print};
+use super::targets::check_apart;
 use clap::ValueEnum;
 use render::path::{self, NerfstudioFrame, read_in, read_keyframes, write_nerfstudio};
 use std::path::PathBuf;
@@ -62,6 +63,9 @@ impl NerfstudioArgs {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
+    let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();
+    check_apart("the path is", [args.output.as_path()], &inputs)?;
     let frame = args.nerfstudio.frame()?;
     let read = read_in(&args.path, &frame)?;
     make_parent(&args.output)?;

@@ -10,6 +10,7 @@ use super::output::{print, print_json};
 use super::path::NerfstudioArgs;
 use super::report::{Report, Start};
 use super::session::{Session, progress};
+use super::stamp::in_unicode;
 use super::surface::ProxyArgs;
 use super::targets::{check_folder, others};
 use super::time::{AtArgs, TimeArgs};
@@ -46,7 +47,7 @@ pub(super) struct Args {
     /// Keep each frame's difference from --renderer exact within so many steps of 255 (the root
     /// of the mean square over pixels and channels; 1 is 48 dB, half of it 6 dB more): by
     /// measuring, the coarsest grid that does is taken, else exact [default: inf, not measured]
-    #[arg(long, value_name = "STEPS", value_parser = max_error, allow_negative_numbers = true,
+    #[arg(long, value_name = "STEPS", value_parser = max_error,
         conflicts_with_all = ["renderer", "grid"])]
     max_error: Option<f64>,
     #[command(flatten)]
@@ -71,10 +72,11 @@ const FRAMES: u32 = 30;
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
     let chosen = args.frames.clone().unwrap_or_default();
-    chosen.check(args.views.is_derived())?;
+    // Of a path that is not there nobody can say how many frames it has.
+    let asked = Asked::new(&args.views, &args.nerfstudio.frame()?)?;
+    chosen.check(asked.is_derived())?;
     check_folder(&args.output)?;
     args.film.check()?;
-    let asked = Asked::new(&args.views, &args.nerfstudio.frame()?)?;
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,
@@ -139,7 +141,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                     .binary_search(&i)
                     .ok()
                     .map(|drawn| session.cost_json(drawn));
-                json!({"name": frame.name, "file": file, "cost": cost})
+                json!({"name": frame.name, "file": in_unicode(file), "cost": cost})
             });
         return print_json(&json!({
             "frames": listed.collect::<Vec<_>>(),

@@ -4,6 +4,7 @@ use super::session::Session;
 use super::time::InWindow;
 use calibrate::Distortion;
 use cpu_time::ProcessTime;
+use image::RgbaImage;
 use render::gpu::Gpu;
 use render::{Bounded, Engine, Frame, Ready, Residency, SourceView, photo_bytes};
 use serde::{Serialize, Serializer};
@@ -37,8 +38,10 @@ pub(super) struct Report {
     /// Where a graphics processor draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     gpu_memory: Option<Memory>,
-    /// What the graphics device did not do, and what became of it.
+    /// What the graphics device did not do, and what became of it; and what is odd about the frames.
     notes: Vec<String>,
+    /// Those that show nothing at all.
+    frames_empty: usize,
     /// As many as say so themselves, whatever device was asked for.
     frames_by_cpu: usize,
     /// Those that a graphics device was to draw.
@@ -77,8 +80,10 @@ impl Report {
         let costs = &session.costs;
         let stages = session.ledger.total();
         let drawn = !costs.frames.is_empty();
+        let notes = engine.map(Engine::notes).unwrap_or_default().iter();
         Self {
-            notes: engine.map_or_else(Vec::new, |engine| engine.notes().to_vec()),
+            notes: notes.cloned().chain(session.note_of_empty()).collect(),
+            frames_empty: costs.empty(),
             frames_by_cpu: costs.frames.iter().filter(|frame| frame.by_cpu).count(),
             frames_instead: engine.map_or(0, Engine::frames_by_cpu),
             stages: drawn.then(|| stages.json()),
@@ -166,6 +171,8 @@ struct FrameCost {
     scorings: Option<u64>,
     scorings_omitted: u64,
     by_cpu: bool,
+    /// No pixel is covered, not even in part.
+    is_empty: bool,
 }
 
 impl Costs {
@@ -176,6 +183,7 @@ impl Costs {
         chosen: &Bounded,
         engine: &Engine,
         ready: &Ready,
+        picture: &RgbaImage,
     ) {
         let scored = frame.scored();
         let taking_part = frame.taking_part().count();
@@ -211,7 +219,24 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
+            // Of most pictures the first pixels tell.
+            is_empty: picture.pixels().all(|pixel| pixel.0[3] == 0),
         });
+    }
+
+    /// How many frames show nothing at all.
+    fn empty(&self) -> usize {
+        self.frames.iter().filter(|frame| frame.is_empty).count()
+    }
+
+    /// What to say of frames that show nothing at all, if there are any, where there are so many photos.
+    pub(super) fn note_of_empty(&self, photos: usize) -> Option<String> {
+        let (empty, all) = (self.empty(), self.frames.len());
+        let why = match photos {
+            0 | 1 => "one photo alone does not tell where things are",
+            _ => "does the path lie in this scene's world (see --dataparser-transforms)?",
+        };
+        (empty > 0).then(|| format!("{empty} of {all} frames show nothing: {why}"))
     }
 
     /// A frame's, for `--json`.

@@ -172,6 +172,9 @@ impl Session {
         if self.device == DeviceChoice::Auto && engine.gpu().is_none() {
             say!("note: no graphics processor answers; drawing on the CPU");
         }
+        if self.gpu_memory.is_some() && engine.gpu().is_none() {
+            say!("note: --gpu-memory changes nothing: no graphics processor draws");
+        }
         self.engine = Some(engine);
         let mut source_idx = 0;
         while self.decodes_all && source_idx < self.lumigraph.photos.len() {
@@ -249,7 +252,15 @@ impl Session {
                 Ok(()) => break,
             }
         }
+        if let Some(note) = self.note_of_empty() {
+            say!("note: {note}");
+        }
         Ok(())
+    }
+
+    /// What to say of frames of [`Self::draw_all`] that show nothing, if there are any.
+    pub(super) fn note_of_empty(&self) -> Option<String> {
+        self.costs.note_of_empty(self.lumigraph.photos.len())
     }
 
     /// Draws all views from `done` on, and counts them there.
@@ -322,7 +333,8 @@ impl Session {
             });
             say_notes(engine, &mut self.notes_said);
             let (picture, was_ready) = picture?;
-            self.costs.note(&frame, &chosen, engine, &was_ready);
+            self.costs
+                .note(&frame, &chosen, engine, &was_ready, &picture);
             ledger.time(*done, Stage::Write, || take(*done, picture))?;
             *done += 1;
             next = match coming.transpose() {

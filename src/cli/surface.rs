@@ -69,7 +69,7 @@ impl ProxyArgs {
     pub(super) fn is_searched(&self, scene: &Scene, without: &BTreeSet<String>) -> bool {
         match (self.proxy.as_deref(), &scene.proxy) {
             (Some(asked), _) => asked == "auto",
-            (None, Some(own)) => seen_by(own, without).is_some(),
+            (None, Some(own)) => seen_by(own, without).is_some() && kind_of(own, scene).is_none(),
             (None, None) => true,
         }
     }
@@ -95,11 +95,20 @@ impl ProxyArgs {
                 "--proxy {file}: there is no such file; `lumigraph proxy SCENE KIND -o {file}` makes one"
             ))
             .into()),
-            Some(file) if is_proxy_file(file) => Ok(ChosenProxy {
-                proxy: proxy::read(Path::new(file))?,
-                origin: file.to_owned(),
-                trials: Vec::new(),
-            }),
+            Some(file) if is_proxy_file(file) => {
+                let proxy = proxy::read(Path::new(file))?;
+                if !without.is_empty() {
+                    say!(
+                        "note: nothing tells whether {file} was fitted with held-out photos, too; \
+                         --proxy KIND fits one without"
+                    );
+                }
+                Ok(ChosenProxy {
+                    proxy,
+                    origin: file.to_owned(),
+                    trials: Vec::new(),
+                })
+            }
             Some(other) => Err(Usage(format!(
                 "--proxy {other}: expected {}, auto, or a file ending in {}",
                 Kind::ALL.map(Kind::name).join(", "),
@@ -109,11 +118,14 @@ impl ProxyArgs {
             None => match &scene.proxy {
                 Some(own) => {
                     if let Some(name) = seen_by(own, without) {
+                        let kind = kind_of(own, scene);
+                        let named = |kind: Kind| format!(" {}", kind.name());
+                        let another = kind.map_or_else(String::new, named);
                         say!(
                             "note: the scene's own proxy was fitted with held-out {name}; \
-                             fitting another without"
+                             fitting another{another} without"
                         );
-                        return fitted(None);
+                        return fitted(kind);
                     }
                     Ok(ChosenProxy {
                         proxy: own.proxy.clone(),
@@ -136,8 +148,34 @@ impl ProxyArgs {
 
 /// A photo among some that a scene's own proxy was fitted with, if there is one.
 fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n String> {
+    // Of what the photos that are left see, for every view.
+    if matches!(own.proxy, Proxy::ViewPlane | Proxy::Points { within: None }) {
+        return None;
+    }
     let unseen = own.fitted_without.as_ref()?;
     names.iter().find(|name| !unseen.contains(name))
+}
+
+/// The kind that a scene's own proxy was fitted as; `None` where kinds are to be compared anew.
+fn kind_of(own: &SceneProxy, scene: &Scene) -> Option<Kind> {
+    match &own.proxy {
+        // Two kinds are planes, and files do not say which: it is the one that gives this plane.
+        Proxy::Plane(plane) => {
+            let names = own.fitted_without.iter().flatten();
+            let without: BTreeSet<String> = names.cloned().collect();
+            let off = |kind: Kind| {
+                let again = scene.fit(kind, &without).ok()?.proxy.plane()?;
+                let turned = again.normal().distance(plane.normal());
+                Some((kind, turned + again.signed_distance(plane.point()).abs()))
+            };
+            let kinds = [Kind::Plane, Kind::DominantPlane].into_iter();
+            let nearest = kinds.filter_map(off).min_by(|a, b| a.1.total_cmp(&b.1));
+            nearest.map(|(kind, _)| kind)
+        }
+        // Comparing kinds alone finds that a mesh is to hide nothing.
+        Proxy::Mesh(solid) if solid.kind().can_occlude_itself() && !solid.occludes() => None,
+        proxy => Kind::from_name(proxy.kind()),
+    }
 }
 
 /// What proxies' files end in.

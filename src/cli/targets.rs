@@ -21,6 +21,15 @@ pub(super) fn check_inputs<'a>(
     files: impl IntoIterator<Item = &'a Path>,
     inputs: &[PathBuf],
 ) -> anyhow::Result<()> {
+    check_apart("pictures are", files, inputs)
+}
+
+/// The same of whatever else is made: `what` begins the sentence, as in `the path is`.
+pub(super) fn check_apart<'a>(
+    what: &str,
+    files: impl IntoIterator<Item = &'a Path>,
+    inputs: &[PathBuf],
+) -> anyhow::Result<()> {
     let there: Vec<&Path> = files.into_iter().filter(|file| file.exists()).collect();
     if there.is_empty() {
         return Ok(());
@@ -31,7 +40,7 @@ pub(super) fn check_inputs<'a>(
     match there.iter().find(is_input) {
         None => Ok(()),
         Some(file) => bail!(
-            "{}: pictures are made of this very file; nothing was written: choose another -o",
+            "{}: {what} made of this very file; nothing was written: choose another -o",
             file.display()
         ),
     }

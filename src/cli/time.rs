@@ -12,11 +12,11 @@ use serde_json::{Value, json};
 #[derive(Args, Clone)]
 pub(super) struct TimeArgs {
     /// Everything repeats after so many seconds; auto finds the period in the photos
-    #[arg(long, value_name = "SECONDS|auto", value_parser = period, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS|auto", value_parser = period)]
     period: Option<PeriodChoice>,
     /// Photos count within so many seconds of the moment, and the k nearest in time always
     /// [default: a sixteenth of the period, else just the k nearest]
-    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
     time_window: Option<f64>,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct TimeArgs {
 pub(super) struct AtArgs {
     /// Show the scene as it was at this time, in seconds [default: each frame's time_s, if
     /// there is a period or a time window]
-    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
     pub(super) time: Option<f64>,
 }
 

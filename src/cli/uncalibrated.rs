@@ -20,8 +20,7 @@ pub(super) struct UncalibratedArgs {
     matching: Option<MatchingName>,
     /// Of a video: take the sharpest frames of so many equal stretches [default: 3 a second,
     /// at least 20 and at most 150]
-    #[arg(long, value_name = "N", conflicts_with = "fps",
-        value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..))]
+    #[arg(long, value_name = "N", conflicts_with = "fps", value_parser = frame_count)]
     frames: Option<usize>,
     /// Of a video: take so many frames a second
     #[arg(long, value_parser = positive)]
@@ -34,6 +33,12 @@ enum MatchingName {
     Sequential,
     /// All pairs
     Exhaustive,
+}
+
+/// How many frames: of one alone no calibration is had.
+fn frame_count(text: &str) -> Result<usize, String> {
+    let count = text.parse::<usize>().ok().filter(|&count| count > 1);
+    count.ok_or_else(|| "expected a whole number above one, as in 60".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

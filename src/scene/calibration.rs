@@ -2,7 +2,7 @@
 
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
-use calibrate::opencv::{self, OpenCvCalibration};
+use calibrate::opencv::{self, Keys, OpenCvCalibration};
 use calibrate::{Reconstruction, colmap, colmap::ColmapError};
 use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
 use std::cell::Cell;
@@ -33,6 +33,41 @@ impl Source {
 /// The calibration of a capture: the file or folder given, else what the capture's folder
 /// holds. A COLMAP model comes before an OpenCV file; what is passed over is noted.
 pub(super) fn find(
+    capture: &Path,
+    options: &ImportOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Source, SceneError> {
+    let source = search(capture, options, warnings)?;
+    warnings.extend(unused_keys(&options.keys, &source));
+    Ok(source)
+}
+
+/// What to say of options for OpenCV's files that were given with another calibration, if any.
+fn unused_keys(keys: &Keys, source: &Source) -> Option<Warning> {
+    if matches!(source, Source::OpenCv(_)) {
+        return None;
+    }
+    let options = [
+        ("--camera-matrix", keys.camera_matrix.is_some()),
+        ("--distortion", keys.distortion.is_some()),
+        ("--fisheye", keys.fisheye),
+    ];
+    let given = options.into_iter().filter(|(_, is_given)| *is_given);
+    let given: Vec<&str> = given.map(|(name, _)| name).collect();
+    let change = match given.len() {
+        0 => return None,
+        1 => "changes",
+        _ => "change",
+    };
+    Some(Warning::Note(format!(
+        "{} {change} nothing: the calibration is {}, none of OpenCV's",
+        given.join(" and "),
+        source.text()
+    )))
+}
+
+/// As [`find`], whatever other options there are.
+fn search(
     capture: &Path,
     options: &ImportOptions,
     warnings: &mut Vec<Warning>,

@@ -145,6 +145,12 @@ pub enum SceneError {
         /// Why not.
         source: std::io::Error,
     },
+    /// A file or folder that is to be named in a file has a path that no JSON holds.
+    #[error(
+        "{}: the path is not UTF-8, and scene files hold UTF-8 names; rename what is not, or choose \
+         another folder", .0.display()
+    )]
+    NotUnicode(PathBuf),
     /// A file is not the JSON that was expected.
     #[error("{}: not {expected}: {source}", path.display())]
     Json {

@@ -106,7 +106,13 @@ impl Scene {
                 example: example.name.clone(),
             });
         }
-        set_times(&mut scene.photos, capture, &options.times, &found)?;
+        set_times(
+            &mut scene.photos,
+            capture,
+            &options.times,
+            &found,
+            &mut warnings,
+        )?;
 
         // 3. Are they what was calibrated?
         warnings.extend(scene.leave_out_unusable(options.strict)?);
@@ -115,6 +121,7 @@ impl Scene {
         scene.find_beside(capture, options, &mut warnings)?;
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);
+        scene.judge_depth(&mut warnings);
         Ok((scene, warnings))
     }
 

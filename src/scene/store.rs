@@ -370,27 +370,33 @@ impl Scene {
 
     /// Writes `scene.json` to `path`, its paths relative to `folder`.
     fn write_file(&self, path: &Path, folder: &Path) -> Result<(), SceneError> {
-        let from_here = |path: &Option<PathBuf>| path.as_ref().map(|p| relative(folder, p));
-        let entry = |photo: &Photo| PhotoEntry {
-            name: photo.name.clone(),
-            path: relative(folder, &photo.path),
-            original: photo.original.clone(),
-            ignore_mask: from_here(&photo.ignore_mask),
-            object_matte: from_here(&photo.object_matte),
-            silhouette: from_here(&photo.silhouette),
-            depth_map: from_here(&photo.depth_map),
-            depth_scale: photo.depth_scale,
-            time_s: photo.time_s,
-            gain: photo.gain,
-            depth_bounds: photo.depth_bounds,
-            other: photo.other.clone(),
+        let from_here = |path: &Option<PathBuf>| {
+            let path = path.as_ref().map(|p| relative(folder, p));
+            path.transpose()
         };
+        let entry = |photo: &Photo| {
+            Ok(PhotoEntry {
+                name: photo.name.clone(),
+                path: relative(folder, &photo.path)?,
+                original: photo.original.clone(),
+                ignore_mask: from_here(&photo.ignore_mask)?,
+                object_matte: from_here(&photo.object_matte)?,
+                silhouette: from_here(&photo.silhouette)?,
+                depth_map: from_here(&photo.depth_map)?,
+                depth_scale: photo.depth_scale,
+                time_s: photo.time_s,
+                gain: photo.gain,
+                depth_bounds: photo.depth_bounds,
+                other: photo.other.clone(),
+            })
+        };
+        let photos: Result<Vec<PhotoEntry>, SceneError> = self.photos.iter().map(entry).collect();
         let mut settings = self.settings.clone();
-        settings.capture = from_here(&self.capture);
-        settings.calibration = from_here(&self.calibration);
+        settings.capture = from_here(&self.capture)?;
+        settings.calibration = from_here(&self.calibration)?;
         let file = SceneFile {
             version: 1,
-            photos: self.photos.iter().map(entry).collect(),
+            photos: photos?,
             left_out: self.left_out.clone(),
             model: MODEL_FOLDER.to_owned(),
             proxy: self.proxy.as_ref().map(proxy_entry),

@@ -1,6 +1,6 @@
 //! When the photos were taken: from a list, a frame rate, the cameras or the names.
 
-use super::{Photo, SceneError};
+use super::{Photo, SceneError, Warning};
 use capture::{PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
 use std::path::{Path, PathBuf};
 
@@ -21,17 +21,18 @@ pub enum TimeSource {
 const TIMES_FILE: &str = "times.csv";
 
 /// Gives the photos their times. `found` are all there are, calibrated or not: a list may
-/// name those as well.
+/// name those as well. Where a list lacks some, a note says so: at a moment they take no part.
 pub(super) fn set_times(
     photos: &mut [Photo],
     capture: &Path,
     source: &TimeSource,
     found: &PhotoSet,
+    warnings: &mut Vec<Warning>,
 ) -> Result<(), SceneError> {
     let own = capture.join(TIMES_FILE);
     let times: Times = match source {
-        TimeSource::List(file) => from_list(photos, file, found)?,
-        TimeSource::Found if own.is_file() => from_list(photos, &own, found)?,
+        TimeSource::List(file) => from_list(photos, file, found, warnings)?,
+        TimeSource::Found if own.is_file() => from_list(photos, &own, found, warnings)?,
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
         TimeSource::Found => {
             let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
@@ -55,9 +56,24 @@ pub(super) fn set_times(
     Ok(())
 }
 
-fn from_list(photos: &[Photo], file: &Path, found: &PhotoSet) -> Result<Times, SceneError> {
+fn from_list(
+    photos: &[Photo],
+    file: &Path,
+    found: &PhotoSet,
+    warnings: &mut Vec<Warning>,
+) -> Result<Times, SceneError> {
     let is_photo = |name: &str| found.find(name).is_some() || photos.iter().any(|p| p.name == name);
     let listed = read_times(file, is_photo)?;
+    let lacks = |photo: &&Photo| !listed.contains_key(&photo.name);
+    if let Some(example) = photos.iter().find(lacks) {
+        warnings.push(Warning::Note(format!(
+            "{}: no time for {} of {} photos ({}, for one): in views at a moment they take no part",
+            file.display(),
+            photos.iter().filter(lacks).count(),
+            photos.len(),
+            example.name
+        )));
+    }
     let times = photos.iter().map(|p| listed.get(&p.name).copied());
     Ok(times.collect())
 }

@@ -47,7 +47,13 @@ impl Scene {
         let unposed = reconstruction(&names, |_| Rigid3::IDENTITY, size, 1.0);
         let mut scene = Self::of(unposed, capture, &found, &BTreeMap::new(), options);
         scene.settings.turntable_degrees = Some(step_degrees);
-        times::set_times(&mut scene.photos, capture, &options.times, &found)?;
+        times::set_times(
+            &mut scene.photos,
+            capture,
+            &options.times,
+            &found,
+            &mut warnings,
+        )?;
         warnings.extend(scene.leave_out_unusable(options.strict)?);
         scene.find_beside(capture, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);

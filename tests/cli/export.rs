@@ -121,7 +121,7 @@ fn the_calibration_is_not_written_over() {
     let refused = |line: &str| {
         let before = files(folder.path());
         let error = lumigraph(folder.path(), line).error(1);
-        assert!(error.contains("calibration is this very file"), "{error}");
+        assert!(error.contains("made of this very file"), "{error}");
         assert!(files(folder.path()) == before, "{line}");
     };
     refused("export wall --format colmap -o wall/sparse/0");
@@ -131,6 +131,99 @@ fn the_calibration_is_not_written_over() {
     fs::remove_dir_all(wall.join("sparse")).unwrap();
     refused(to_file);
     lumigraph(folder.path(), "export wall --format transforms -o t.json").ok();
+}
+
+#[test]
+fn nothing_that_belongs_to_a_scene_is_written_over() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::write(here.join("wall/times.csv"), "0000.png,0\n0001.png,1\n").unwrap();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "import wall -o other").ok();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    lumigraph(here, "proxy scene carved").ok();
+    // A photo without a camera is a photo, too.
+    fs::copy(
+        here.join("wall/images/0003.png"),
+        here.join("wall/images/more.png"),
+    )
+    .unwrap();
+    let refused = |line: &str, said: &str| {
+        let before = files(here);
+        let error = lumigraph(here, &format!("export {line}")).error(1);
+        assert!(
+            error.contains(said) && error.contains("nothing was written"),
+            "{error}"
+        );
+        assert!(files(here) == before, "{line}");
+    };
+    for (scene, file) in [
+        ("wall", "wall/images/0003.png"),
+        ("wall", "wall/images/more.png"),
+        ("wall", "wall/depth/0003.png"),
+        ("wall", "wall/split.json"),
+        ("wall", "wall/times.csv"),
+        ("scene", "wall/images/0003.png"),
+        ("scene", "wall/split.json"),
+        ("scene", "scene/scene.json"),
+        ("scene", "scene/proxy.ply"),
+        ("scene", "other/../scene/model/images.txt"),
+        ("flat", "flat/images/0003.png"),
+    ] {
+        for format in ["transforms", "opencv"] {
+            let line = format!("{scene} --format {format} -o {file}");
+            refused(&line, &format!("{file}: the scene is made of this very"));
+        }
+    }
+    for format in ["colmap", "colmap-text"] {
+        for (folder, what) in [
+            ("wall/images", "the scene's photos are in"),
+            ("other/model", "a scene's own model is in"),
+        ] {
+            let line = format!("scene --format {format} -o {folder}");
+            refused(&line, &format!("{folder}: {what} this very folder"));
+        }
+    }
+    // What is nobody's is.
+    for _ in 0..2 {
+        lumigraph(here, "export scene --format transforms -o wall/t.json").ok();
+        lumigraph(here, "export scene --format colmap -o other/model/more").ok();
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_name_no_path_that_is_not_utf_8() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = with_wall();
+    let odd = folder.path().join(std::ffi::OsStr::from_bytes(b"odd\xff"));
+    fs::create_dir(&odd).unwrap();
+    fs::rename(folder.path().join("wall"), odd.join("wall")).unwrap();
+    let before = files(folder.path());
+    for line in [
+        "import wall -o ../scene",
+        "import wall --undistort -o ../scene",
+        "import wall/images --calibration wall/sparse/0 -o ../scene",
+        "export wall --format transforms -o ../new/t.json",
+        "export wall --format opencv -o ../new/camera.yml",
+    ] {
+        let error = lumigraph(&odd, line).error(1);
+        let said = "the path is not UTF-8, and scene files hold UTF-8 names; rename";
+        assert!(
+            error.contains("/odd\u{fffd}/wall") && error.contains(said),
+            "{line}: {error}"
+        );
+        assert!(files(folder.path()) == before, "{line}");
+    }
+    // Ways within that folder have no such part.
+    lumigraph(&odd, "import wall -o scene").ok();
+    let scene = fs::read_to_string(odd.join("scene/scene.json")).unwrap();
+    assert!(
+        scene.contains("\"../wall/images/0000.png\"") && !scene.contains('\u{fffd}'),
+        "{scene}"
+    );
+    lumigraph(&odd, "export scene --format transforms -o t.json").ok();
+    lumigraph(&odd, "export scene --format colmap -o ../model").ok();
 }
 
 #[test]

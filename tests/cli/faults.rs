@@ -325,7 +325,7 @@ fn where_results_cannot_go_is_said_before_any_work() {
         );
     }
     let line = "render wall --path sweep --frames 1 -o out --video film.nothing";
-    let error = lumigraph(here, line).error(1);
+    let error = lumigraph(here, line).error(2);
     assert!(error.contains("--video film.nothing"), "{error}");
     assert!(!here.join("out").exists());
     assert_eq!(fs::read(here.join("file")).unwrap(), b"mine");

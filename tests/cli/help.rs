@@ -1,4 +1,4 @@
-//! Usage: exit code 2, and what to do.
+//! Usage: exit code 2, and what to do. What is said of options and paths that do not do what was meant.
 
 use crate::run::{lumigraph, with_wall};
 
@@ -19,6 +19,12 @@ fn usage_errors_exit_with_2() {
         ("render wall --path orbit --size 0x9 -o out", "1..=16384"),
         ("render wall --path orbit --frames 0 -o out", "--frames"),
         ("evaluate wall --k 17", "1..=16"),
+        ("evaluate wall --k nan", "expected a whole number in 1..=16"),
+        ("evaluate wall --grid 0", "a whole number above zero"),
+        ("evaluate wall --grid x", "a whole number above zero"),
+        ("evaluate wall --threads 0", "a whole number in 1..="),
+        ("evaluate wall --threads 100000", "a whole number in 1..="),
+        ("import wall --frames 1 -o out", "a whole number above one"),
         ("evaluate wall --beta -1", "zero or more"),
         ("evaluate wall --proxy sphere", "plane, dominant-plane"),
         ("evaluate wall --every 1", "--every"),
@@ -56,6 +62,78 @@ fn usage_errors_exit_with_2() {
         let has_usage = ran.stderr.contains("Usage: ") && command != "evalute";
         assert!(own || !has_usage, "{line}: {}", ran.stderr);
     }
+}
+
+#[test]
+fn options_that_change_nothing_are_said_to() {
+    let folder = with_wall();
+    let said = |line: &str| lumigraph(folder.path(), line).ok().stderr;
+    let grid = "note: --grid changes nothing: --renderer exact has no grid";
+    let field = "field wall --proxy plane --view 0004.png --size 24x18 -o f.png";
+    let evaluate = "evaluate wall --proxy plane --size 24x18";
+    for (line, is_idle) in [
+        (format!("{evaluate} --renderer exact --grid 32"), true),
+        (format!("{evaluate} --renderer exact"), false),
+        (format!("{evaluate} --grid 32"), false),
+        (format!("{field} --renderer exact --grid 8"), true),
+        (
+            format!("{field} --renderer exact --grid 8 --triangulation t.svg"),
+            false,
+        ),
+    ] {
+        let stderr = said(&line);
+        assert_eq!(stderr.contains(grid), is_idle, "{line}: {stderr}");
+    }
+    let gpu = "note: --gpu-memory changes nothing: no graphics processor draws";
+    let stderr = said(&format!("{evaluate} --gpu-memory 1GB"));
+    assert!(stderr.contains(gpu), "{stderr}");
+    assert!(!said(&format!("{evaluate} --cpu-memory 1GB")).contains("changes nothing"));
+    for (options, start) in [
+        ("--fisheye", "--fisheye changes"),
+        ("--distortion D", "--distortion changes"),
+        (
+            "--camera-matrix K --fisheye",
+            "--camera-matrix and --fisheye change",
+        ),
+    ] {
+        let stderr = said(&format!("import wall {options} --force -o scene"));
+        let note = format!("note: {start} nothing: the calibration is the COLMAP model in ");
+        assert!(stderr.contains(&note), "{stderr}");
+    }
+}
+
+#[test]
+fn frames_that_show_nothing_are_told() {
+    let folder = with_wall();
+    let far = r#"{"version": 1, "fps": 30, "frames": [{"name": "far", "camera_from_world":
+        [1, 0, 0, 9000, 0, 1, 0, 9000, 0, 0, 1, 9000, 0, 0, 0, 1],
+        "width": 32, "height": 24, "model": "PINHOLE", "params": [30, 30, 16, 12]}]}"#;
+    let but_one: Vec<String> = (0..8).map(|i| format!("\"000{i}.png\"")).collect();
+    let split = format!("{{\"test\": [{}]}}", but_one.join(", "));
+    std::fs::write(folder.path().join("far.json"), far).unwrap();
+    std::fs::write(folder.path().join("one.json"), split).unwrap();
+    let render = |options: &str| {
+        let line = format!("render wall --proxy points --size 32x24 --json -o out {options}");
+        let ran = lumigraph(folder.path(), &line).ok();
+        let report = &ran.json()["report"];
+        let notes = report["notes"].as_array().unwrap().iter();
+        let notes: Vec<String> = notes.map(|n| n.as_str().unwrap().to_owned()).collect();
+        for note in &notes {
+            assert!(ran.stderr.contains(&format!("note: {note}\n")), "{note}");
+        }
+        (report["frames_empty"].as_u64().unwrap(), notes.join("\n"))
+    };
+    let (empty, notes) = render("--path far.json");
+    let lost = "1 of 1 frames show nothing: does the path lie in this scene's world (see \
+                --dataparser-transforms)?";
+    assert_eq!((empty, notes.as_str()), (1, lost));
+    let (empty, notes) = render("--path orbit --frames 2 --hold-out one.json");
+    assert_eq!(empty, 2);
+    assert!(
+        notes.contains("2 of 2 frames show nothing: one photo alone"),
+        "{notes}"
+    );
+    assert_eq!(render("--path orbit --frames 2"), (0, String::new()));
 }
 
 #[test]

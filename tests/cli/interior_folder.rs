@@ -30,6 +30,42 @@ fn the_folder_one_stands_in_is_filled_and_replaced_like_any_other() {
     assert!(files(&two) == expected);
 }
 
+#[test]
+fn a_generated_house_is_replaced_with_what_it_says_of_itself_and_nothing_of_ones_own() {
+    let folder = with_house();
+    let here = folder.path();
+    let house = here.join("house");
+    let replace = "interior house/house.glb --find -o house";
+    let error = lumigraph(here, replace).error(1);
+    assert!(error.contains("replace it with --force"), "{error}");
+    // What somebody wrote is in the way, and named, before --force is advised.
+    let own = std::fs::read_to_string(house.join("README.md")).unwrap();
+    for (file, text) in [
+        ("README.md", "# house\n\nMine.\n".to_owned()),
+        ("README.md", format!("{own}- My notes.\n")),
+        ("notes.txt", String::new()),
+    ] {
+        std::fs::write(house.join(file), text).unwrap();
+        let before = files(&house);
+        for force in ["", " --force"] {
+            let error = lumigraph(here, &format!("{replace}{force}")).error(1);
+            let said = format!("house: the folder is not empty: it holds an interior, and {file};");
+            assert!(error.contains(&said), "{error}");
+        }
+        assert!(files(&house) == before);
+        std::fs::write(house.join("README.md"), &own).unwrap();
+    }
+    std::fs::remove_file(house.join("notes.txt")).unwrap();
+    lumigraph(here, &format!("{replace} --force")).ok();
+    let expected = [
+        "floor-plan.png",
+        "floor-plan.svg",
+        "house.glb",
+        "interior.json",
+    ];
+    assert_eq!(names(&house), expected);
+}
+
 #[cfg(unix)]
 #[test]
 fn who_stands_in_a_folder_that_is_replaced_stays_in_it() {

@@ -321,13 +321,18 @@ fn silhouettes_are_no_ignore_masks_unless_asked_for() {
 #[test]
 fn depth_maps_are_recorded_with_their_scale() {
     let folder = with_wall();
-    lumigraph(folder.path(), "import wall -o scene").ok();
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(!ran.stderr.contains("--depth-scale"), "{}", ran.stderr);
     let photo = scene_json(&folder)["photos"][1].clone();
     assert_eq!(photo["depth_map"], "../wall/depth/0001.png");
     assert_eq!(photo["depth_scale"], 0.001);
     let line = "import wall --depth wall/depth --depth-scale 0.25 -o scene --force";
-    lumigraph(folder.path(), line).ok();
+    let ran = lumigraph(folder.path(), line).ok();
     assert_eq!(scene_json(&folder)["photos"][1]["depth_scale"], 0.25);
+    let note = "250 times those of the sparse points";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    let remedy = "--depth-scale 0.001 makes them agree";
+    assert!(ran.stderr.contains(remedy), "{}", ran.stderr);
 
     // Bytes are no depths.
     save(at(&folder, "wall/depth/0001.png"), &mask_of(1));

@@ -1,6 +1,6 @@
 //! `lumigraph path`, and paths of nerfstudio.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use image::RgbaImage;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -69,4 +69,30 @@ fn paths_go_to_nerfstudio_and_back() {
         &format!("{render} own.json --dataparser-transforms own.json -o x"),
     );
     assert!(error.error(1).contains("dataparser_transforms.json"));
+}
+
+#[test]
+fn a_path_is_not_written_over_what_it_is_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("own.json"), keyframes().to_string()).unwrap();
+    let transform = json!({"transform": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], "scale": 1});
+    std::fs::write(here.join("dp.json"), transform.to_string()).unwrap();
+    let there = "--dataparser-transforms dp.json";
+    let line = format!("path own.json --format nerfstudio {there} -o theirs.json");
+    lumigraph(here, &line).ok();
+    let before = files(here);
+    for (path, format, output) in [
+        ("own.json", "lumigraph", "own.json"),
+        ("own.json", "nerfstudio", "./own.json"),
+        ("theirs.json", "lumigraph", "theirs.json"),
+        ("theirs.json", "nerfstudio", "theirs.json"),
+        ("theirs.json", "lumigraph", "dp.json"),
+    ] {
+        let line = format!("path {path} --format {format} {there} -o {output}");
+        let error = lumigraph(here, &line).error(1);
+        let said = format!("{output}: the path is made of this very file; nothing was written");
+        assert!(error.starts_with(&said), "{line}: {error}");
+        assert!(files(here) == before, "{line}");
+    }
 }

@@ -1,5 +1,6 @@
 //! Frames and where they come from.
 
+use crate::interior::with_house;
 use crate::run::{files, lumigraph, run, with_wall};
 use calibrate::{Rigid3, colmap};
 use render::path::{CameraPath, PathFrame};
@@ -351,6 +352,86 @@ fn a_path_with_its_own_frames_is_not_asked_for_so_many() {
     let misspelt = "render wall --proxy plane --path orbti --frames 2 -o out";
     let error = lumigraph(folder.path(), misspelt).error(2);
     assert!(error.contains("--path orbti: expected orbit"), "{error}");
+}
+
+#[test]
+fn of_a_path_that_is_not_there_no_frames_are_told() {
+    let folder = with_wall();
+    for (views, code, said) in [
+        ("--path nowhere.json", 1, "nowhere.json: No such file"),
+        ("--path wall", 2, "--path wall: expected orbit"),
+        (
+            "--views nowhere",
+            2,
+            "--views nowhere: there is no such file",
+        ),
+    ] {
+        let line = format!("render wall --proxy plane {views} --frames 2 -o out");
+        let error = lumigraph(folder.path(), &line).error(code);
+        assert!(
+            error.contains(said) && !error.contains("--frames"),
+            "{views}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_film_by_no_name_of_films_is_refused_before_anything_is_drawn() {
+    let folder = with_wall();
+    let render = |video: &str| {
+        let line = "render wall --proxy plane --path sweep --frames 2 --size 48x36 -o out --video";
+        lumigraph(folder.path(), &format!("{line} {video}"))
+    };
+    // A name of pictures is good for one frame at most.
+    for video in ["a", "a.xyz", "a.png"] {
+        let error = render(video).error(2);
+        let said = format!(
+            "--video {video}: ffmpeg makes no film of that name; films end in .mp4, .webm, .mkv,"
+        );
+        assert!(error.starts_with(&said), "{error}");
+        assert!(!folder.path().join("out").exists(), "{video}");
+    }
+    for video in ["a.MP4", "a.mov"] {
+        render(video).ok();
+        assert!(folder.path().join(video).is_file(), "{video}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn json_holds_paths_that_are_not_utf_8_with_that_replaced() {
+    use std::os::unix::ffi::OsStringExt;
+    // ODD stands for such a name.
+    let json = |folder: &std::path::Path, line: &str| -> serde_json::Value {
+        let word = |word: &str| {
+            let parts: Vec<&[u8]> = word.split("ODD").map(str::as_bytes).collect();
+            std::ffi::OsString::from_vec(parts.join(&b"odd\xff"[..]))
+        };
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_lumigraph"));
+        command.current_dir(folder).args(line.split(' ').map(word));
+        let ran = command
+            .args(["--device", "cpu", "--json"])
+            .output()
+            .unwrap();
+        assert!(
+            ran.status.success(),
+            "{}",
+            String::from_utf8_lossy(&ran.stderr)
+        );
+        serde_json::from_slice(&ran.stdout).unwrap()
+    };
+    let folder = with_wall();
+    let views = "--views wall --frames 0..1 --size 48x36";
+    let line = format!("render wall --proxy plane {views} -o ODD --video ODD.mp4");
+    let result = json(folder.path(), &line);
+    assert_eq!(result["frames"][0]["file"], "odd\u{fffd}/0000.png");
+    assert_eq!(result["video"], "odd\u{fffd}.mp4");
+
+    let folder = with_house();
+    let odd = std::ffi::OsString::from_vec(b"odd\xff".to_vec());
+    fs::rename(folder.path().join("house"), folder.path().join(odd)).unwrap();
+    let result = json(folder.path(), "ldis ODD --reference-size 24x24");
+    assert_eq!(result["folder"], "odd\u{fffd}/ldi");
 }
 
 #[test]

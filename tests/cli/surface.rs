@@ -191,6 +191,36 @@ fn meshes_go_out_and_come_in() {
 }
 
 #[test]
+fn a_proxy_is_not_written_over_what_it_is_made_of() {
+    let folder = with("shelf");
+    let here = folder.path();
+    lumigraph(here, "import shelf -o scene").ok();
+    lumigraph(here, "proxy scene plane").ok();
+    lumigraph(here, "proxy shelf carved -o h.glb").ok();
+    std::fs::write(here.join("sp.json"), r#"{"test": ["0003.png"]}"#).unwrap();
+    std::fs::write(here.join("shelf/split.json"), r#"{"test": ["0003.png"]}"#).unwrap();
+    let before = files(here);
+    for (line, output) in [
+        ("shelf mesh h.glb", "h.glb"),
+        ("scene mesh h.glb", "scene/../h.glb"),
+        ("scene plane", "scene/scene.json"),
+        ("scene plane", "scene/proxy.json"),
+        ("scene plane", "shelf/split.json"),
+        ("shelf plane", "shelf/split.json"),
+        ("shelf plane --hold-out sp.json", "sp.json"),
+    ] {
+        let error = lumigraph(here, &format!("proxy {line} -o {output}")).error(1);
+        let said = format!("{output}: the proxy is made of this very file; nothing was written");
+        assert!(error.starts_with(&said), "{line}: {error}");
+        assert!(files(here) == before, "{line}");
+    }
+    // One of before is nothing that it is made of.
+    for _ in 0..2 {
+        lumigraph(here, "proxy scene plane -o p.json").ok();
+    }
+}
+
+#[test]
 fn dense_points_do_without_depth_maps_that_are_damaged() {
     let folder = with("wall");
     let map = folder.path().join("wall/depth/0001.png");

@@ -101,7 +101,9 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
     import(" --frame-rate 8", "rate").ok();
     assert_eq!(times("rate")[..3], [0.0, 0.125, 0.25].map(Some));
     fs::write(folder.path().join("two.csv"), "0001.png,7\n0002.png,9\n").unwrap();
-    import(" --times two.csv", "list").ok();
+    let ran = import(" --times two.csv", "list").ok();
+    let note = "two.csv: no time for 58 of 60 photos (";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
     assert_eq!(times("list")[..4], [None, Some(7.0), Some(9.0), None]);
     let info = lumigraph(folder.path(), "info list --json").ok().json();
     assert_eq!(

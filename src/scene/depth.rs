@@ -1,0 +1,92 @@
+//! Whether depth maps are in the units of the scene.
+
+use super::beside::DEPTH_UNITS_PER_STEP;
+use super::{Photo, Scene, Warning};
+use calibrate::Image;
+
+/// So many depth maps, spread over the photos, tell for all.
+const JUDGED: usize = 4;
+/// Fewer sparse points tell nothing.
+const ENOUGH: usize = 20;
+/// Depths that are so many times another's are in other units. Maps and points may both be far off here and
+/// there, but not half of them.
+const OTHER_UNITS: f64 = 1.5;
+/// Within this factor of a power of ten, that is meant.
+const NEARLY: f64 = 1.1;
+
+impl Scene {
+    /// Says so where depth maps are in other units than the sparse points that are seen in their photos: a
+    /// scale that is wrong moves all surfaces made of them, and nothing else tells.
+    pub(super) fn judge_depth(&self, warnings: &mut Vec<Warning>) {
+        let with_maps: Vec<&Photo> = self
+            .photos
+            .iter()
+            .filter(|p| p.depth_map.is_some())
+            .collect();
+        let images = self.images_by_name();
+        let step = with_maps.len().div_ceil(JUDGED).max(1);
+        let mut ratios: Vec<f64> = Vec::new();
+        for photo in with_maps.iter().step_by(step) {
+            let image = images[photo.name.as_str()];
+            ratios.extend(self.depths_over_points(photo, image).unwrap_or_default());
+        }
+        if ratios.len() < ENOUGH {
+            return;
+        }
+        let middle = ratios.len() / 2;
+        let (_, ratio, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
+        let ratio = *ratio;
+        if (1.0 / OTHER_UNITS..=OTHER_UNITS).contains(&ratio) {
+            return;
+        }
+        let scale = with_maps[0].depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
+        let meant = rounded(scale / ratio);
+        warnings.push(Warning::Note(format!(
+            "the depth maps' depths are {} times those of the sparse points in their photos (median of {} points): \
+             were they not meant, --depth-scale {meant} makes them agree",
+            rounded(ratio),
+            ratios.len(),
+        )));
+    }
+
+    /// What a photo's map says, over how deep the sparse points are that were observed there. What is wrong
+    /// with the map is said when it is needed.
+    fn depths_over_points(&self, photo: &Photo, image: &Image) -> Option<Vec<f64>> {
+        let camera = &self.reconstruction.cameras[&image.camera_id];
+        let map = photo.decode_depth((camera.width, camera.height)).ok()??;
+        let ratio = |keypoint: &calibrate::Keypoint| {
+            let point = self.reconstruction.points.get(&keypoint.point?)?;
+            let depth = (image.camera_from_world * point.position).z;
+            let is_within = |at: f64, side: u32| at >= 0.0 && at < f64::from(side);
+            let is_seen = is_within(keypoint.x, map.width) && is_within(keypoint.y, map.height);
+            let measured = is_seen.then(|| map.at(keypoint.x as u32, keypoint.y as u32))??;
+            let ratio = f64::from(measured) / depth;
+            (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
+        };
+        Some(image.keypoints.iter().filter_map(ratio).collect())
+    }
+}
+
+/// The power of ten that is nearly as much, else two digits.
+fn rounded(value: f64) -> f64 {
+    let digits = |value: f64, decimals: usize| -> f64 {
+        let text = format!("{value:.decimals$e}");
+        text.parse().expect("a number as it was written")
+    };
+    let power = digits(10_f64.powf(value.log10().round()), 0);
+    match (value / power).max(power / value) <= NEARLY {
+        true => power,
+        false => digits(value, 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    #[test]
+    fn scales_are_told_as_they_are_meant() {
+        let told = [0.001_03, 980.0, 0.000_254, 39.4, 1e-300].map(rounded);
+        assert_eq!(told, [0.001, 1000.0, 0.000_25, 39.0, 1e-300]);
+    }
+}
