@@ -1,7 +1,7 @@
 //! `lumigraph evaluate`
 
 use super::exposure::ExposureArgs;
-use super::inputs::files_of;
+use super::inputs::files_behind_scene;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};
@@ -80,6 +80,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     output.map_or(Ok(()), check_folder)?;
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
+    let kept = files_behind_scene(&args.scene.scene, &scene);
     let mut session = Session::new(
         scene,
         held_out.clone(),
@@ -92,7 +93,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         None,
     )?;
     let size = args.draw.size;
-    let lines = score_photos(&mut session, &held_out, size, output)?;
+    let lines = score_photos(&mut session, &held_out, size, output, &kept)?;
     let result = json(&session, &lines);
     if args.json {
         return print_json(&result);
@@ -123,18 +124,19 @@ fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
 }
 
 /// Renders and scores each of the given photos; where one turns out corrupt it is left out,
-/// unless `--strict`.
+/// unless `--strict`. No picture takes the place of a file that is to be `kept`.
 fn score_photos(
     session: &mut Session,
     names: &BTreeSet<String>,
     size: Option<(u32, u32)>,
     output: Option<&std::path::Path>,
+    kept: &[PathBuf],
 ) -> anyhow::Result<Vec<Line>> {
     let folder = output.unwrap_or(std::path::Path::new(""));
     let files = picture_files("view", names.iter().map(|n| (n.as_str(), true)), folder)?;
     if output.is_some() {
         let files = files.iter().map(PathBuf::as_path);
-        check_inputs(files, &files_of(&session.scene))?;
+        check_inputs(files, kept)?;
     }
     session.prepare()?;
     let bar = progress(names.len(), "evaluating");

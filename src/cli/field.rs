@@ -3,7 +3,7 @@
 use super::Usage;
 use super::exposure::ExposureArgs;
 use super::frames::{Asked, NamedView};
-use super::inputs::files_of;
+use super::inputs::files_behind_scene;
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
 use super::output::{make_parent, print, write_file};
@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut scene = args.scene.open()?;
     let others = [&args.weights, &args.triangulation].into_iter().flatten();
     let files = others.chain([&args.output]).map(PathBuf::as_path);
-    check_inputs(files, &files_of(&scene))?;
+    check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
     let mut without = args.hold_out.names(&scene)?;
     if args.without_view {
         without.insert(args.view.clone());

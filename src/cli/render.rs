@@ -3,7 +3,7 @@
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{Asked, NamedView, ViewArgs};
-use super::inputs::{files_behind, files_of};
+use super::inputs::{files_behind, files_behind_scene, files_of};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
@@ -12,7 +12,7 @@ use super::report::{Report, Start};
 use super::session::{Session, progress};
 use super::stamp::in_unicode;
 use super::surface::ProxyArgs;
-use super::targets::{check_folder, others};
+use super::targets::{check_folder, check_inputs, others};
 use super::time::{AtArgs, TimeArgs};
 use lumigraph::scene::picture_files;
 use serde_json::json;
@@ -99,6 +99,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
+    // Photos that are left out, too, are nobody's to replace.
+    let kept = files_behind_scene(&args.scene.scene, &session.scene);
+    check_inputs(files.iter().map(PathBuf::as_path), &kept)?;
     let kind_or_file = [&args.views.path, &args.proxy.proxy].into_iter().flatten();
     let named = [&args.views.views, &args.hold_out.hold_out].into_iter();
     let named = named.flatten().chain(args.nerfstudio.file()).cloned();

@@ -147,7 +147,7 @@ impl ProxyArgs {
 }
 
 /// A photo among some that a scene's own proxy was fitted with, if there is one.
-fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n String> {
+pub(super) fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n String> {
     // Of what the photos that are left see, for every view.
     if matches!(own.proxy, Proxy::ViewPlane | Proxy::Points { within: None }) {
         return None;
@@ -157,7 +157,7 @@ fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n Stri
 }
 
 /// The kind that a scene's own proxy was fitted as; `None` where kinds are to be compared anew.
-fn kind_of(own: &SceneProxy, scene: &Scene) -> Option<Kind> {
+pub(super) fn kind_of(own: &SceneProxy, scene: &Scene) -> Option<Kind> {
     match &own.proxy {
         // Two kinds are planes, and files do not say which: it is the one that gives this plane.
         Proxy::Plane(plane) => {

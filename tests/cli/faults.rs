@@ -250,6 +250,13 @@ fn photos_are_not_written_over() {
         assert!(error.contains("pictures are made of this"), "{error}");
         assert!(files(here) == before, "{line}");
     }
+    // Nor one that is left out.
+    let damaged = here.join("wall/images/0008.png");
+    fs::write(&damaged, b"no picture any more").unwrap();
+    let line = format!("field wall --view 0000.png {size} -o wall/images/0008.png");
+    let error = lumigraph(here, &line).error(1);
+    assert!(error.contains("pictures are made of this"), "{error}");
+    assert_eq!(fs::read(&damaged).unwrap(), b"no picture any more");
     // Beside them is room.
     let line = format!("render wall --path sweep --frames 1 {size} -o wall/images");
     lumigraph(here, &line).ok();

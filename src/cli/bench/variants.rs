@@ -1,5 +1,6 @@
 //! A scene with what can be changed of it, and the photos that judge.
 
+use super::super::surface::{kind_of, seen_by};
 use super::measured::Effort;
 use super::settings::{Renderer, Setting};
 use anyhow::Context;
@@ -94,14 +95,14 @@ pub(super) fn default_proxy(
     without: &BTreeSet<String>,
     thorough: bool,
 ) -> anyhow::Result<(Proxy, Option<String>, String)> {
-    let own = scene.proxy.as_ref().filter(|own| {
-        let unseen = own.fitted_without.as_ref();
-        unseen.is_none_or(|unseen| without.iter().all(|name| unseen.contains(name)))
-    });
-    if let Some(own) = own {
+    let own = scene.proxy.as_ref();
+    if let Some(own) = own.filter(|own| seen_by(own, without).is_none()) {
         return Ok((own.proxy.clone(), None, "the scene's own".to_owned()));
     }
-    let fitted = if thorough {
+    let again = own.and_then(|own| kind_of(own, scene));
+    let fitted = if let Some(kind) = again {
+        scene.fit(kind, without)?
+    } else if thorough {
         scene.fit_best(without)?
     } else {
         let kinds = [Kind::Points, Kind::Hull, Kind::Plane];
