@@ -171,7 +171,8 @@ fn where_memory_is_full_photos_of_the_frame_before_stay() {
         }
         let took = gpu.residency();
         println!("{most} photos a frame, room for {spare} more: {took:?}");
-        assert!(took.held <= (most + spare) * LAYER);
+        // OpenGL takes an array of six layers, or twelve, for cubes: such have one more.
+        assert!(took.held <= (most + spare + 1) * LAYER);
         // Each once, those again that were there when memory ran out, and a few that come and go.
         assert!(took.loads <= COUNT as u64 + 2 * (most + spare), "{took:?}");
     }
