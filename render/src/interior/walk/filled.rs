@@ -16,8 +16,8 @@ use std::sync::Arc;
 /// Where geometry is alone, in shares of where it begins to be mixed in.
 const ALONE: f64 = 2.0 / 3.0;
 
-/// Of the distance from which on geometry is alone beyond a portal: from there on the portals of the cell beyond
-/// are filled with images in their turn, more and more, and from [`NESTED_ALONE`] of it on alone. Whoever changes cells sees
+/// From where geometry is alone beyond a portal the portals of the cell beyond are filled with images in their turn,
+/// with LDIs from [`ENTERED`] on: more and more, and from so much of that distance on alone. Whoever changes cells sees
 /// the same images before and after.
 const NESTED_ALONE: f64 = 0.75;
 
@@ -122,7 +122,7 @@ impl Walk<'_> {
             };
             let is_near = pass.into.is_some() && of_image <= 0.0;
             let beyond = match is_near && !is_captured {
-                true => most * self.share_of_nested(portal, eye, near),
+                true => most * self.share_of_nested(fill, portal, eye, near),
                 false => 0.0,
             };
             let share = most * of_image;
@@ -227,8 +227,13 @@ impl Walk<'_> {
 
     /// Of images in what is beyond the portals of a cell that is geometry beyond this one, 0 to 1, by the eye's
     /// distance from it.
-    fn share_of_nested(&self, portal: &Portal, eye: DVec3, near: f64) -> f64 {
-        let far = ALONE * near * portal.semicircle_radius(self.interior.up);
+    fn share_of_nested(&self, fill: PortalFill, portal: &Portal, eye: DVec3, near: f64) -> f64 {
+        let most = match fill {
+            // They take longer than the geometry beyond.
+            PortalFill::Ldi => ENTERED,
+            _ => f64::INFINITY,
+        };
+        let far = (ALONE * near).min(most) * portal.semicircle_radius(self.interior.up);
         let near = NESTED_ALONE * far;
         let distance = portal.polygon.distance(eye);
         match far > near {
