@@ -10,6 +10,7 @@
 
 mod camera;
 pub mod colmap;
+mod excerpt;
 pub mod export;
 pub mod exposure;
 pub mod formats;

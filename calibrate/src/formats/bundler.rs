@@ -11,7 +11,8 @@
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
-use super::words::{WORD, Words, excerpt};
+use super::words::{WORD, Words};
+use crate::excerpt::excerpt;
 use crate::{Camera, ImageId, ModelKind, Pixel, Point3DId, Reconstruction};
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};

@@ -14,7 +14,8 @@
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
-use super::words::{LINE, WORD, Words, excerpt};
+use super::words::{LINE, WORD, Words};
+use crate::excerpt::excerpt;
 use crate::{Camera, Distortion, ImageId, Lens, Pixel, Point3DId, Reconstruction};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! A text file as a stream of words, each known by its line.
 
 use super::error::{FormatError, Problem};
+use crate::excerpt::excerpt;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -8,15 +9,6 @@ use std::str::FromStr;
 pub(super) const WORD: usize = 40;
 /// And of a line.
 pub(super) const LINE: usize = 80;
-
-/// The beginning of a text in quotation marks, for a message.
-pub(super) fn excerpt(text: &str, most: usize) -> String {
-    let mut shown: String = text.chars().take(most).collect();
-    if shown.len() < text.len() {
-        shown.push('…');
-    }
-    format!("{shown:?}")
-}
 
 /// The words that have not been read yet.
 pub(super) struct Words<'a> {

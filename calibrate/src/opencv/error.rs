@@ -114,10 +114,5 @@ impl Problem {
 /// A piece of the input for a message: its first few characters.
 pub(super) fn excerpt(text: &str) -> String {
     const SHOWN: usize = 40;
-    let line = text.lines().next().unwrap_or_default().trim();
-    let mut shown: String = line.chars().take(SHOWN).collect();
-    if shown.len() < line.len() {
-        shown.push('…');
-    }
-    format!("{shown:?}")
+    crate::excerpt::excerpt(text.lines().next().unwrap_or_default().trim(), SHOWN)
 }

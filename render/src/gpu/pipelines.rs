@@ -94,7 +94,7 @@ impl Pipelines {
             view_dimension,
             multisampled: false,
         };
-        // Not the vertices': some devices have no storage buffers for them.
+        // Not the vertices', which read no table.
         let all = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
         let compute = ShaderStages::COMPUTE;
         let layout = |label, visibility, bindings: &[wgpu::BindingType]| {

@@ -124,14 +124,15 @@ impl<'a> Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// The portals that are filled for an eye in a cell, whichever way it looks: those of the cell, and those of
-    /// cells beyond portals that are near.
+    /// The portals that are filled for an eye in a cell, whichever way it looks: those of the cell, and in a model
+    /// those of cells beyond portals that are near.
     fn each_filled(
         &self,
         cell: CellId,
         eye: DVec3,
         mut with: impl FnMut(CellId, PortalId, CellId),
     ) {
+        let is_captured = self.painter.captured().is_some();
         let mut cells = vec![cell];
         let mut next = 0;
         while let Some(&from) = cells.get(next) {
@@ -142,7 +143,7 @@ impl Walk<'_> {
                 };
                 if self.share_of_image(portal, eye, self.options.near) > 0.0 {
                     with(from, id, into);
-                } else if !cells.contains(&into) {
+                } else if !is_captured && !cells.contains(&into) {
                     cells.push(into);
                 }
             }
