@@ -16,7 +16,7 @@ use super::project::Projection;
 use super::{Clipped, Layered};
 use crate::cpu::lanes::vectorised;
 use crate::interior::{Pinhole, Target, Window};
-use band::{BAND, Band, MARGIN};
+use band::{BAND, Band};
 pub(super) use band::{gaussian, narrowness};
 use place::{Chunk, Work};
 use rayon::prelude::*;
@@ -163,7 +163,6 @@ pub fn free(
     let width = across.len();
     let open: Vec<[u32; 2]> = open_by_band(window, into, [&across, &down]);
     let band_count = open.len();
-    let stride = width + 2 * MARGIN;
     // 1.
     let origin = [across.start as i32, down.start as i32];
     let projection = Projection::new(ldi, desired, origin);
@@ -202,7 +201,7 @@ pub fn free(
         let lists = chunks.iter().map(|chunk| chunk.bands[i].as_slice());
         vectorised(
             #[inline(always)]
-            || band.draw(lists, i, stride, open[i], work.options),
+            || band.draw(lists, i, width, open[i], work.options),
         );
     };
     let bands = &mut scratch.bands[..band_count];
@@ -211,36 +210,69 @@ pub fn free(
     let bands = &scratch.bands[..band_count];
     let picture = into.width as usize;
     let rows = down.start as usize * picture..down.end as usize * picture;
-    let colors = into.color[rows.clone()].par_chunks_mut(picture);
-    let rows = colors.zip(into.inverse_depth[rows].par_chunks_mut(picture));
-    let resolve = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
-        let open = window.row(down.start + y as u32);
-        let open = open.start as usize..open.end.min(across.end) as usize;
-        let start = (y % BAND) * stride + MARGIN;
-        let band = &bands[y / BAND];
-        let mut holes = 0;
-        for x in open.clone() {
-            let i = start + x - across.start as usize;
-            let weight = band.sums[3][i];
-            if weight > 0.0 {
-                let scale = 1.0 / weight;
-                let channel = |k: usize| (band.sums[k][i] * scale + 0.5) as u8;
-                colors[x] = [channel(0), channel(1), channel(2), 255];
-                depths[x] = band.nearest[i];
-            } else {
-                holes += 1;
-                (colors[x], depths[x]) = ([0; 4], 0.0);
-            }
+    let colors = into.color[rows.clone()].par_chunks_mut(BAND * picture);
+    let depths = into.inverse_depth[rows].par_chunks_mut(BAND * picture);
+    let resolve = |(i, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
+        let first = down.start + (i * BAND) as u32;
+        let mut open = [const { 0..0 }; BAND];
+        for (y, open) in open.iter_mut().enumerate().take(colors.len() / picture) {
+            let row = window.row(first + y as u32);
+            *open = row.start as usize..row.end.min(across.end) as usize;
         }
-        (open.len(), holes)
+        resolve(
+            &bands[i],
+            &open,
+            across.start as usize,
+            picture,
+            colors,
+            depths,
+        )
     };
-    let counts = rows.enumerate().map(resolve);
+    let counts = colors.zip(depths).enumerate().map(resolve);
     (cost.pixels, cost.holes) = counts.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     cost.unfilled = match (options.fill, cost.holes) {
         (0, _) | (_, 0) => cost.holes,
         (reach, _) => fill(window, [&across, &down], reach, into),
     };
     cost
+}
+
+/// Colours and depths of a band's rows where they are open, out of a band that begins at a column of the
+/// picture; how many pixels, and how many of them are holes.
+fn resolve(
+    band: &Band,
+    open: &[Range<usize>; BAND],
+    start: usize,
+    width: usize,
+    colors: &mut [[u8; 4]],
+    depths: &mut [f32],
+) -> (usize, usize) {
+    let (mut pixels, mut holes) = (0, 0);
+    let is_any = open.iter().filter(|row| !row.is_empty());
+    let (from, to) = is_any.fold((usize::MAX, 0), |(from, to), row| {
+        (from.min(row.start), to.max(row.end))
+    });
+    // As numbers lie in the band.
+    for x in from..to {
+        for (y, open) in open.iter().enumerate() {
+            if !open.contains(&x) {
+                continue;
+            }
+            pixels += 1;
+            let i = y * width + x;
+            let ([r, g, b, weight], nearest) = band.at(x - start, y);
+            if weight > 0.0 {
+                let scale = 1.0 / weight;
+                let code = |sum: f32| (sum * scale + 0.5) as u8;
+                colors[i] = [code(r), code(g), code(b), 255];
+                depths[i] = nearest;
+            } else {
+                holes += 1;
+                (colors[i], depths[i]) = ([0; 4], 0.0);
+            }
+        }
+    }
+    (pixels, holes)
 }
 
 /// The options, within their bounds.

@@ -1,17 +1,24 @@
 //! Drawing samples into the rows of a band: the nearest depths, then the means.
+//!
+//! What pixels keep lies column by column, a column's planes one after the other, so that all that a
+//! sample may change is at places that are known when this is compiled.
 
 use super::{BEYOND, Options};
+use crate::cpu::lanes::whole;
 use crate::ldi::Ends;
-use std::ops::Range;
+use glam::{Vec4, Vec4Swizzles};
+use std::ops::Mul;
 
 /// A sample as it will be drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drawn {
-    pub(super) x: f32,
-    pub(super) y: f32,
+    /// From its place to the middle of the first column and row within reach.
+    pub(super) offset: [f32; 2],
     pub(super) inverse_depth: f32,
     /// Half a side of the patch.
     pub(super) half: [f32; 2],
+    /// See [`narrowness`].
+    pub(super) narrow: [f32; 2],
     /// The first column and row within reach, from the margin's.
     pub(super) first: [i16; 2],
     pub(super) color: [u8; 3],
@@ -22,27 +29,43 @@ pub(super) struct Drawn {
 /// Rows of the picture.
 #[derive(Debug, Default)]
 pub(super) struct Band {
-    /// The nearest inverse depth, then what is behind that the same surface.
-    pub(super) nearest: Vec<f32>,
-    /// The same of wide patches.
+    /// By column of pixels, margins included, [`COLUMN`] numbers.
+    columns: Vec<f32>,
+    /// The same of wide patches: their nearest depths alone.
     widest: Vec<f32>,
-    /// By columns of pixels, whether there is a hole in or beside them, and the samples there.
-    holes: Vec<bool>,
+    /// By column of pixels, margins included, the rows with holes as bits, and those from which a wide patch
+    /// may reach one.
+    holes: Vec<u64>,
+    near_holes: Vec<u64>,
+    /// Wide patches that may reach one.
     beside: Vec<Drawn>,
-    /// Red, green, blue, weight: plane by plane.
-    pub(super) sums: [Vec<f32>; 4],
 }
 
 /// Rows of the picture in a band.
 pub(super) const BAND: usize = 16;
-/// Pixels worked on together, and those beside the picture that may be written to.
+/// Pixels across, and down, that are worked on together.
 const WIDE: usize = 4;
+/// Pixels beside the picture that may be written to, and rows above and below a band.
 pub(super) const MARGIN: usize = 16;
-/// Pixels across that have their holes found together.
-const COLUMN: usize = 8;
+const EDGE: usize = WIDE - 1;
+const ROWS: usize = BAND + 2 * EDGE;
+/// What is kept of each pixel, in as many planes: the nearest inverse depth, then the least that is of the
+/// same surface, infinite where nothing is; red, green, blue; and the weight.
+const PLANES: usize = 5;
+const COLUMN: usize = PLANES * ROWS;
+/// Samples that are looked at together.
+const TOGETHER: usize = 128;
+/// The bit of a band's first row; rows so far above it have one, too.
+const FIRST_BIT: i32 = 16;
+/// From what a sample is known by, two columns and rows beyond the first of its patch, a wide patch reaches holes
+/// so many pixels before that, or after it: places are up to half a pixel less than 5 from the first,
+/// and wide patches reach 4 from there.
+const HOLE_BEFORE: usize = 6;
+const HOLE_AFTER: usize = 7;
 
-/// Rows of the tiles that a splat may reach, rounded up.
-const MOST_ROWS: usize = 16;
+/// From the first to the last number of a tile: of all its planes, and of one.
+const TILE: usize = (WIDE - 1) * COLUMN + (PLANES - 1) * ROWS + WIDE;
+const TILE_OF_ONE: usize = (WIDE - 1) * ROWS + WIDE;
 
 /// Within less than 2, 4 and 6 pixels are no more than 4, 8 and 12 middles.
 #[inline(always)]
@@ -50,203 +73,373 @@ fn tile_count(reach: f32) -> i32 {
     1 + i32::from(reach >= 2.0) + i32::from(reach >= 4.0)
 }
 
-/// From a place to the middle of a pixel, counted from the margin's first.
+/// Whether all is in one tile.
 #[inline(always)]
-fn off(first: i32, at: f32) -> f32 {
-    (first - MARGIN as i32) as f32 + 0.5 - at
+fn is_small([x, y]: [f32; 2]) -> bool {
+    tile_count(x.max(y)) == 1
 }
 
 /// The first pixel whose middle is within reach of a place, counted from the margin's; places
-/// are within the margin, so it is not negative.
+/// are within the margin, so it is not negative. And from the place to that middle.
 #[inline(always)]
-pub(super) fn first_within(at: f32, reach: f32) -> i32 {
-    (at - reach + (MARGIN as f32 + 0.5)) as i32
+pub(super) fn first_within(at: f32, reach: f32) -> (i32, f32) {
+    let (first, idx) = whole(at - reach + (MARGIN as f32 + 0.5));
+    (idx, first - (MARGIN as f32 - 0.5) - at)
 }
 
-/// The tiles of [`WIDE`] by [`WIDE`] pixels that a splat may reach.
-struct Tiles {
-    /// The first column, with the margin, and the first row, from the band's.
-    first: [i32; 2],
-    count: [i32; 2],
-    /// The first column's and row's middle from the sample.
+/// [`WIDE`] by [`WIDE`] pixels that a splat may reach, some of them the band's.
+#[derive(Clone, Copy)]
+struct Tile {
+    /// Its first column, with the margin, and its first row, with the edge.
+    first: [usize; 2],
+    /// Its first column's and row's middle from the sample.
     offset: [f32; 2],
 }
 
-impl Drawn {
-    /// Of a reach, within which a pixel is the first.
+impl Tile {
+    /// The numbers of its pixels; see [`near`] and [`add`] for where they are.
     #[inline(always)]
-    fn tiles(&self, first: [i32; 2], reach: [f32; 2], top: i32) -> Tiles {
-        Tiles {
-            first: [first[0], first[1] - MARGIN as i32 - top],
-            count: [tile_count(reach[0]), tile_count(reach[1])],
-            offset: [off(first[0], self.x), off(first[1], self.y)],
+    fn of_all(self, columns: &mut [f32]) -> &mut [f32; TILE] {
+        let start = self.first[0] * COLUMN + self.first[1];
+        (&mut columns[start..start + TILE])
+            .try_into()
+            .expect("as many")
+    }
+
+    #[inline(always)]
+    fn of_one(self, plane: &mut [f32]) -> &mut [f32; TILE_OF_ONE] {
+        let start = self.first[0] * ROWS + self.first[1];
+        (&mut plane[start..start + TILE_OF_ONE])
+            .try_into()
+            .expect("as many")
+    }
+}
+
+impl Drawn {
+    /// Its first row, from the band's.
+    #[inline(always)]
+    fn row(&self, top: i32) -> i32 {
+        i32::from(self.first[1]) - MARGIN as i32 - top
+    }
+
+    /// Its one tile, if it has no more: `None` if no row of that is the band's.
+    #[inline(always)]
+    fn one_tile(&self, top: i32) -> Option<Tile> {
+        let row = self.row(top);
+        (row > -(WIDE as i32) && row < BAND as i32).then(|| Tile {
+            first: [self.first[0] as usize, (row + EDGE as i32) as usize],
+            offset: self.offset,
+        })
+    }
+
+    /// Calls a function with each of the tiles within reach that have rows of the band.
+    #[inline(always)]
+    fn for_each_tile(&self, reach: [f32; 2], top: i32, mut f: impl FnMut(Tile)) {
+        if is_small(reach) {
+            if let Some(tile) = self.one_tile(top) {
+                f(tile);
+            }
+            return;
+        }
+        let [across, down] = reach.map(tile_count);
+        for down in (0..down).map(|tile| tile * WIDE as i32) {
+            let row = self.row(top) + down;
+            if row <= -(WIDE as i32) || row >= BAND as i32 {
+                continue;
+            }
+            for right in (0..across).map(|tile| tile * WIDE as i32) {
+                let column = i32::from(self.first[0]) + right;
+                f(Tile {
+                    first: [column as usize, (row + EDGE as i32) as usize],
+                    offset: [self.offset[0] + right as f32, self.offset[1] + down as f32],
+                });
+            }
         }
     }
 
+    /// Whether it may count in some pixel of the band.
     #[inline(always)]
-    fn narrow_tiles(&self, top: i32) -> Tiles {
-        let [x, y] = self.half;
-        let [left, above] = self.first;
-        let reach = [BEYOND * x, BEYOND * y];
-        self.tiles([i32::from(left), i32::from(above)], reach, top)
+    fn may_count(&self, top: i32, columns: &mut [f32]) -> bool {
+        if !is_small(self.reach()) {
+            return true;
+        }
+        let Some(tile) = self.one_tile(top) else {
+            return false;
+        };
+        let s = Vec4::splat(self.inverse_depth);
+        let [a, b, c, d] = depths_of::<COLUMN>(tile.of_all(columns));
+        a.min(b).min(c.min(d)).cmple(s).any()
     }
 
+    /// How far it counts.
     #[inline(always)]
-    fn wide_tiles(&self, [x, y]: [f32; 2], top: i32) -> Tiles {
-        let first = [first_within(self.x, x), first_within(self.y, y)];
-        self.tiles(first, [x, y], top)
+    fn reach(&self) -> [f32; 2] {
+        self.half.map(|half| BEYOND * half)
     }
 
-    /// Half a side of what it covers if nothing else does.
+    /// Whether a wide patch may reach a hole.
     #[inline(always)]
-    fn wide(&self, options: Options) -> [f32; 2] {
-        let [x, y] = self.half;
-        [options.wide_half(x), options.wide_half(y)]
+    fn is_near_hole(&self, top: i32, near_holes: &[u64]) -> bool {
+        let bit = self.row(top) + (2 + FIRST_BIT);
+        near_holes[self.first[0] as usize + 2] >> bit.clamp(0, 63) & 1 != 0
+    }
+
+    /// What it covers if nothing else does, which is all that it counts in.
+    #[inline(always)]
+    fn widened(&self, options: Options) -> Self {
+        let half = self.half.map(|half| options.wide_half(half));
+        let (mut first, mut offset) = ([0; 2], [0.0; 2]);
+        for k in 0..2 {
+            let place = f32::from(self.first[k]) - (MARGIN as f32 - 0.5) - self.offset[k];
+            let (idx, from) = first_within(place, half[k]);
+            (first[k], offset[k]) = (idx as i16, from);
+        }
+        Self {
+            half,
+            narrow: half.map(|half| narrowness(options.deviation, half)),
+            first,
+            offset,
+            ..*self
+        }
+    }
+
+    /// Whether there is a hole in the tiles of a wide patch.
+    #[inline(always)]
+    fn meets_hole(&self, top: i32, holes: &[u64]) -> bool {
+        let [across, down] = self.half.map(|half| WIDE * tile_count(half) as usize);
+        let first = self.first[0] as usize;
+        let any = holes[first..first + across].iter().fold(0, |a, b| a | b);
+        any >> (self.row(top) + FIRST_BIT).clamp(0, 63) & ((1 << down) - 1) != 0
     }
 }
 
 impl Band {
+    /// Draws samples into a band so many pixels wide of which some columns are open, from … to.
     #[inline(always)]
     pub(super) fn draw<'a>(
         &mut self,
         lists: impl Iterator<Item = &'a [Drawn]> + Clone,
         index: usize,
-        stride: usize,
+        width: usize,
         open: [u32; 2],
         options: Options,
     ) {
-        let size = stride * BAND + WIDE;
-        for plane in self
-            .sums
-            .iter_mut()
-            .chain([&mut self.nearest, &mut self.widest])
-        {
-            plane.clear();
-            plane.resize(size, 0.0);
-        }
+        let count = width + 2 * MARGIN;
+        self.columns.clear();
+        self.columns.resize(count * COLUMN, 0.0);
         let covered = options.covered();
-        let at = Place {
-            top: (index * BAND) as i32,
-            stride,
-            deviation: options.deviation,
-        };
+        let top = (index * BAND) as i32;
         // What patches cover.
+        let columns = &mut self.columns[..];
         for list in lists.clone() {
             for drawn in list {
-                let tiles = drawn.narrow_tiles(at.top);
-                let covered = &covered[usize::from(drawn.ends.0 & 15)];
-                near(drawn, &tiles, drawn.half, covered, at, &mut self.nearest);
+                let sides = &covered[usize::from(drawn.ends.0 & 15)];
+                let near = Near::new(drawn, sides);
+                drawn.for_each_tile(
+                    drawn.reach(),
+                    top,
+                    #[inline(always)]
+                    |tile| near.draw::<COLUMN>(tile, tile.of_all(columns)),
+                );
             }
         }
-        for nearest in &mut self.nearest {
-            *nearest *= options.nearer;
+        for column in columns.chunks_exact_mut(COLUMN) {
+            for nearest in &mut column[..ROWS] {
+                *nearest = farthest(*nearest, options);
+            }
         }
+        let mut seen = [0; TOGETHER];
         for list in lists.clone() {
-            for drawn in list {
-                let [x, y] = drawn.half;
-                let reach = [BEYOND * x, BEYOND * y];
-                let tiles = drawn.narrow_tiles(at.top);
-                let (half, depths) = (drawn.half, &mut self.nearest);
-                add(drawn, &tiles, half, reach, at, depths, &mut self.sums);
+            for some in list.chunks(TOGETHER) {
+                // Most of what is behind something is so all over: found without a branch that no one foresees.
+                let mut count = 0;
+                for (i, drawn) in some.iter().enumerate() {
+                    seen[count] = i as u8;
+                    count += usize::from(drawn.may_count(top, columns));
+                }
+                for i in &seen[..count] {
+                    let drawn = &some[usize::from(*i)];
+                    let reach = drawn.reach();
+                    drawn.for_each_tile(
+                        reach,
+                        top,
+                        #[inline(always)]
+                        |tile| {
+                            let pixels = tile.of_all(columns);
+                            let depths = depths_of::<COLUMN>(pixels);
+                            add(drawn, tile, reach, depths, pixels);
+                        },
+                    );
+                }
             }
         }
         // What only wide ones do: of samples near a hole.
-        self.find_holes(stride, open);
-        let holes = &self.holes;
-        let is_near_hole =
-            |drawn: &&Drawn| holes[(drawn.x + MARGIN as f32) as i32 as usize / COLUMN];
+        if self.find_holes(open) {
+            self.draw_wide(lists, top, &covered, options);
+        }
+        for column in self.columns.chunks_exact_mut(COLUMN) {
+            for nearest in &mut column[..ROWS] {
+                *nearest /= options.nearer;
+            }
+        }
+    }
+
+    /// Draws wide patches where no others are.
+    #[inline(always)]
+    fn draw_wide<'a>(
+        &mut self,
+        lists: impl Iterator<Item = &'a [Drawn]> + Clone,
+        top: i32,
+        covered: &[[f32; 4]; 16],
+        options: Options,
+    ) {
+        let columns = &mut self.columns[..];
+        let holes = &self.near_holes;
         self.beside.clear();
         for list in lists {
-            for drawn in list.iter().filter(is_near_hole) {
-                let tiles = drawn.wide_tiles(drawn.wide(options), at.top);
-                if meets_hole(&tiles, at, &self.nearest) {
-                    self.beside.push(*drawn);
+            for some in list.chunks(TOGETHER) {
+                let (mut near, mut count) = ([0; TOGETHER], 0);
+                for (i, drawn) in some.iter().enumerate() {
+                    near[count] = i as u8;
+                    count += usize::from(drawn.is_near_hole(top, holes));
+                }
+                for i in &near[..count] {
+                    let wide = some[usize::from(*i)].widened(options);
+                    if wide.meets_hole(top, &self.holes) {
+                        self.beside.push(wide);
+                    }
                 }
             }
         }
-        for drawn in &self.beside {
-            let wide = drawn.wide(options);
-            let tiles = drawn.wide_tiles(wide, at.top);
-            let covered = &covered[usize::from(drawn.ends.0 & 15)];
-            near(drawn, &tiles, wide, covered, at, &mut self.widest);
+        // Where others are nothing is near enough.
+        self.widest.clear();
+        self.widest.resize(columns.len() / PLANES, f32::INFINITY);
+        let widest = &mut self.widest[..];
+        let by_column = columns
+            .chunks_exact(COLUMN)
+            .zip(widest.chunks_exact_mut(ROWS));
+        for ((column, widest), _) in by_column.zip(holes).filter(|(_, holes)| **holes != 0) {
+            for (nearest, wide) in column[..ROWS].iter().zip(widest) {
+                let is_hole = *nearest == f32::INFINITY;
+                *wide = if is_hole { 0.0 } else { f32::INFINITY };
+            }
         }
-        for (nearest, wide) in self.nearest.iter().zip(&mut self.widest) {
-            *wide = if *nearest > 0.0 {
-                f32::INFINITY
-            } else {
-                options.nearer * *wide
-            };
-        }
-        for drawn in &self.beside {
-            let wide = drawn.wide(options);
-            let tiles = drawn.wide_tiles(wide, at.top);
-            add(
-                drawn,
-                &tiles,
-                wide,
-                wide,
-                at,
-                &mut self.widest,
-                &mut self.sums,
+        for wide in &self.beside {
+            let sides = &covered[usize::from(wide.ends.0 & 15)];
+            let near = Near::new(wide, sides);
+            wide.for_each_tile(
+                wide.half,
+                top,
+                #[inline(always)]
+                |tile| near.draw::<ROWS>(tile, tile.of_one(widest)),
             );
         }
-        for (nearest, wide) in self.nearest.iter_mut().zip(&self.widest) {
-            *nearest = if *nearest > 0.0 { *nearest } else { *wide } / options.nearer;
+        let by_column = widest.chunks_exact_mut(ROWS).zip(holes);
+        for (widest, _) in by_column.filter(|(_, holes)| **holes != 0) {
+            for wide in widest {
+                *wide = farthest(*wide, options);
+            }
         }
-    }
-
-    /// Marks the columns with holes, among those that are open, and those beside them.
-    #[inline(always)]
-    fn find_holes(&mut self, stride: usize, [from, to]: [u32; 2]) {
-        let count = stride / COLUMN + 2;
-        self.holes.clear();
-        self.holes.resize(count, false);
-        // Whole columns of pixels that are worked on together.
-        let first = from as usize / COLUMN;
-        for row in self.nearest.chunks_exact(stride).take(BAND) {
-            let row = &row[MARGIN + first * COLUMN..MARGIN + to as usize];
-            for (i, part) in row.chunks(COLUMN).enumerate() {
-                if part.iter().fold(false, |any, s| any | (*s == 0.0)) {
-                    let i = first + i + MARGIN / COLUMN;
-                    self.holes[i - 1..=i + 1].fill(true);
-                }
+        for wide in &self.beside {
+            wide.for_each_tile(
+                wide.half,
+                top,
+                #[inline(always)]
+                |tile| {
+                    let depths = depths_of::<ROWS>(tile.of_one(widest));
+                    add(wide, tile, wide.half, depths, tile.of_all(columns));
+                },
+            );
+        }
+        let by_column = columns
+            .chunks_exact_mut(COLUMN)
+            .zip(widest.chunks_exact(ROWS));
+        for ((column, widest), _) in by_column.zip(holes).filter(|(_, holes)| **holes != 0) {
+            for (nearest, wide) in column[..ROWS].iter_mut().zip(widest) {
+                *nearest = nearest.min(*wide);
             }
         }
     }
-}
 
-/// Where a band is.
-#[derive(Clone, Copy)]
-struct Place {
-    top: i32,
-    stride: usize,
-    deviation: f32,
-}
-
-impl Place {
-    /// The band's rows whose middles are within reach above and below a place.
+    /// Finds holes in the columns that are open; whether there are any.
     #[inline(always)]
-    fn rows(&self, y: f32, [above, below]: [f32; 2]) -> Range<i32> {
-        let top = self.top + MARGIN as i32;
-        let past = (y + below + (MARGIN as f32 + 0.5)) as i32;
-        (first_within(y, above) - top).max(0)..(past - top).min(BAND as i32)
+    fn find_holes(&mut self, [from, to]: [u32; 2]) -> bool {
+        let count = self.columns.len() / COLUMN;
+        for holes in [&mut self.holes, &mut self.near_holes] {
+            holes.clear();
+            holes.resize(count, 0);
+        }
+        let mut is_any = false;
+        for x in MARGIN + from as usize..MARGIN + to as usize {
+            let column = &self.columns[x * COLUMN + EDGE..][..BAND];
+            let is_hole = |nearest: &f32| *nearest == f32::INFINITY;
+            if !column.iter().fold(false, |any, n| any | is_hole(n)) {
+                continue;
+            }
+            is_any = true;
+            let bits = column.iter().enumerate();
+            let bits: u64 = bits.map(|(y, n)| u64::from(is_hole(n)) << y).sum();
+            self.holes[x] = bits << FIRST_BIT;
+            // In rows, then in columns.
+            let (mut rows, from) = (0, FIRST_BIT as usize - HOLE_AFTER);
+            for row in from..=from + HOLE_AFTER + HOLE_BEFORE {
+                rows |= bits << row;
+            }
+            let before = x.saturating_sub(HOLE_AFTER);
+            for holes in &mut self.near_holes[before..=(x + HOLE_BEFORE).min(count - 1)] {
+                *holes |= rows;
+            }
+        }
+        is_any
+    }
+
+    /// What a pixel of the window shows: red, green, blue and the sum of weights, and the nearest inverse
+    /// depth.
+    #[inline(always)]
+    pub(super) fn at(&self, x: usize, y: usize) -> ([f32; 4], f32) {
+        let column = &self.columns[(MARGIN + x) * COLUMN..][..COLUMN];
+        let plane = |k: usize| column[k * ROWS + EDGE + y];
+        ([plane(1), plane(2), plane(3), plane(4)], plane(0))
     }
 }
 
-/// A plane's pixels in a row of a tile.
+/// The least inverse depth that is of the same surface as the nearest; infinite where nothing is.
 #[inline(always)]
-fn row_of(plane: &mut [f32], i: usize) -> &mut [f32; WIDE] {
-    (&mut plane[i..i + WIDE]).try_into().expect("as many")
+fn farthest(nearest: f32, options: Options) -> f32 {
+    match nearest > 0.0 {
+        true => nearest * options.nearer,
+        false => f32::INFINITY,
+    }
 }
 
-/// Adds weights times a value.
+/// The columns, or rows, of a tile from its first.
+const STEPS: Vec4 = Vec4::new(0.0, 1.0, 2.0, 3.0);
+
+/// A column's pixels in a tile, in one plane.
 #[inline(always)]
-fn more(row: &mut [f32; WIDE], weights: [f32; WIDE], value: f32) {
-    let mut sums = *row;
-    for k in 0..WIDE {
-        sums[k] += weights[k] * value;
-    }
-    *row = sums;
+fn read(numbers: &[f32], i: usize) -> Vec4 {
+    Vec4::from_slice(&numbers[i..i + WIDE])
+}
+
+/// Sets them.
+#[inline(always)]
+fn write(numbers: &mut [f32], i: usize, pixels: Vec4) {
+    pixels.write_to_slice(&mut numbers[i..i + WIDE]);
+}
+
+/// Column by column the depths of a tile, whose columns are so many numbers apart.
+#[inline(always)]
+fn depths_of<const APART: usize>(numbers: &[f32]) -> [Vec4; WIDE] {
+    [0, 1, 2, 3].map(
+        #[inline(always)]
+        |column| read(numbers, column * APART),
+    )
+}
+
+/// Each of four numbers, four times.
+#[inline(always)]
+fn each(v: Vec4) -> [Vec4; WIDE] {
+    [v.xxxx(), v.yyyy(), v.zzzz(), v.wwww()]
 }
 
 /// What a squared distance is multiplied by in the exponent, of a patch of that half side.
@@ -258,138 +451,91 @@ pub(in crate::ldi) fn narrowness(deviation: f32, half: f32) -> f32 {
 
 /// The weights of a tile's columns, or rows.
 #[inline(always)]
-fn weights(offset: f32, tile: i32, narrow: f32, reach: f32) -> [f32; WIDE] {
-    let first = offset + (tile * WIDE as i32) as f32;
-    let mut weights = [0.0; WIDE];
-    for k in 0..WIDE {
-        let d = first + k as f32;
-        let weight = gaussian(d * d * narrow);
-        weights[k] = if d.abs() <= reach { weight } else { 0.0 };
-    }
-    weights
+fn weights(offset: f32, narrow: f32, reach: f32) -> Vec4 {
+    let d = STEPS + Vec4::splat(offset);
+    let base = Vec4::ONE - d * d * Vec4::splat(narrow) * Vec4::splat(1.0 / 16.0);
+    let weights = to_the_16th(base.max(Vec4::ZERO));
+    Vec4::select(d.abs().cmple(Vec4::splat(reach)), weights, Vec4::ZERO)
 }
 
-/// Keeps the nearest depths of what a box around a sample covers: of half a side some part to the right,
-/// below, to the left and above.
-#[inline(always)]
-fn near(
-    drawn: &Drawn,
-    tiles: &Tiles,
-    half: [f32; 2],
-    [right, below, left, above]: &[f32; 4],
-    at: Place,
-    plane: &mut [f32],
-) {
-    let s = drawn.inverse_depth;
-    let low = [-left * half[0], -above * half[1]];
-    let high = [right * half[0], below * half[1]];
-    let rows = at.rows(drawn.y, [-low[1], high[1]]);
-    for tile in 0..tiles.count[0] {
-        let mut here = [0.0; WIDE];
-        for k in 0..WIDE {
-            let d = tiles.offset[0] + (tile * WIDE as i32 + k as i32) as f32;
-            here[k] = if (d >= low[0]) & (d <= high[0]) {
-                s
-            } else {
-                0.0
-            };
-        }
-        let column = (tiles.first[0] + tile * WIDE as i32) as usize;
-        for y in rows.clone() {
-            let depths = row_of(plane, y as usize * at.stride + column);
-            // As a value: a vector is stored, not parts of one.
-            let mut nearest = *depths;
-            for k in 0..WIDE {
-                nearest[k] = nearest[k].max(here[k]);
-            }
-            *depths = nearest;
-        }
-    }
+/// A box around a sample, and how near it is.
+struct Near {
+    inverse_depth: Vec4,
+    low: [Vec4; 2],
+    high: [Vec4; 2],
 }
 
-/// Whether nothing is in some pixel of tiles.
-#[inline(always)]
-fn meets_hole(tiles: &Tiles, at: Place, plane: &[f32]) -> bool {
-    let mut least = [f32::INFINITY; WIDE];
-    for right in 0..tiles.count[0] {
-        let column = (tiles.first[0] + right * WIDE as i32) as usize;
-        for row in 0..tiles.count[1] * WIDE as i32 {
-            let y = (tiles.first[1] + row) as usize;
-            if y < BAND {
-                let i = y * at.stride + column;
-                let depths: &[f32; WIDE] = plane[i..i + WIDE].try_into().expect("as many");
-                for k in 0..WIDE {
-                    least[k] = least[k].min(depths[k]);
-                }
-            }
+impl Near {
+    /// Of half a side some part to the right, below, to the left and above.
+    #[inline(always)]
+    fn new(drawn: &Drawn, [right, below, left, above]: &[f32; 4]) -> Self {
+        let half = drawn.half;
+        Self {
+            inverse_depth: Vec4::splat(drawn.inverse_depth),
+            low: [-left * half[0], -above * half[1]].map(Vec4::splat),
+            high: [right * half[0], below * half[1]].map(Vec4::splat),
         }
     }
-    least.iter().fold(false, |any, s| any | (*s == 0.0))
+
+    /// Keeps the nearest depths of what it covers.
+    #[inline(always)]
+    fn draw<const APART: usize>(&self, tile: Tile, numbers: &mut [f32]) {
+        let [across, down] = [0, 1].map(
+            #[inline(always)]
+            |k| {
+                let d = STEPS + Vec4::splat(tile.offset[k]);
+                let is_covered = d.cmpge(self.low[k]) & d.cmple(self.high[k]);
+                Vec4::select(is_covered, self.inverse_depth, Vec4::ZERO)
+            },
+        );
+        for (column, across) in each(across).into_iter().enumerate() {
+            let i = column * APART;
+            let nearest = read(numbers, i).max(across.min(down));
+            write(numbers, i, nearest);
+        }
+    }
 }
 
 /// Adds a sample to the pixels within its reach where it is no farther than a depth.
 #[inline(always)]
 fn add(
     drawn: &Drawn,
-    tiles: &Tiles,
-    half: [f32; 2],
+    tile: Tile,
     reach: [f32; 2],
-    at: Place,
-    depths: &mut [f32],
-    sums: &mut [Vec<f32>; 4],
+    depths: [Vec4; WIDE],
+    numbers: &mut [f32; TILE],
 ) {
-    let s = drawn.inverse_depth;
-    let narrow = [
-        narrowness(at.deviation, half[0]),
-        narrowness(at.deviation, half[1]),
-    ];
+    let s = Vec4::splat(drawn.inverse_depth);
+    let same = depths.map(
+        #[inline(always)]
+        |farthest| s.cmpge(farthest),
+    );
+    // Most of what is behind something is so all over.
+    if !(same[0] | same[1] | same[2] | same[3]).any() {
+        return;
+    }
+    let across = weights(tile.offset[0], drawn.narrow[0], reach[0]);
+    let down = weights(tile.offset[1], drawn.narrow[1], reach[1]);
     let [r, g, b] = drawn.color.map(f32::from);
-    let [red, green, blue, sum] = sums;
-    let mut down = [0.0; MOST_ROWS];
-    for (tile, down) in (0..tiles.count[1]).zip(down.chunks_exact_mut(WIDE)) {
-        down.copy_from_slice(&weights(tiles.offset[1], tile, narrow[1], reach[1]));
-    }
-    let rows = at.rows(drawn.y, [reach[1]; 2]);
-    for tile in 0..tiles.count[0] {
-        let column = (tiles.first[0] + tile * WIDE as i32) as usize;
-        let start = |y: i32| y as usize * at.stride + column;
-        // Most of what is behind something is so all over.
-        let mut is_any = false;
-        for y in rows.clone() {
-            let nearest = *row_of(depths, start(y));
-            is_any |= nearest.iter().fold(false, |any, n| any | is_same(s, *n));
-        }
-        if !is_any {
-            continue;
-        }
-        let across = weights(tiles.offset[0], tile, narrow[0], reach[0]);
-        for y in rows.clone() {
-            let i = start(y);
-            let down = down[(y - tiles.first[1]) as usize % MOST_ROWS];
-            let nearest = *row_of(depths, i);
-            let mut here = [0.0; WIDE];
-            for k in 0..WIDE {
-                let weight = down * across[k];
-                here[k] = if is_same(s, nearest[k]) { weight } else { 0.0 };
-            }
-            more(row_of(red, i), here, r);
-            more(row_of(green, i), here, g);
-            more(row_of(blue, i), here, b);
-            more(row_of(sum, i), here, 1.0);
+    let color = [r, g, b, 1.0].map(Vec4::splat);
+    for (column, across) in each(across).into_iter().enumerate() {
+        let here = Vec4::select(same[column], across * down, Vec4::ZERO);
+        for (k, color) in color.iter().enumerate() {
+            let i = column * COLUMN + (1 + k) * ROWS;
+            let sum = read(numbers, i) + here * *color;
+            write(numbers, i, sum);
         }
     }
-}
-
-/// Whether a sample counts where that is the farthest that does; 0 where nothing is.
-#[inline(always)]
-fn is_same(s: f32, farthest: f32) -> bool {
-    (s >= farthest) & (farthest > 0.0)
 }
 
 /// e⁻ᵗ within 6 % of 1 for t ≥ 0: (1 − t/16)¹⁶, zero from 16 on.
 #[inline(always)]
 pub(in crate::ldi) fn gaussian(t: f32) -> f32 {
-    let base = (1.0 - t * (1.0 / 16.0)).max(0.0);
+    to_the_16th((1.0 - t * (1.0 / 16.0)).max(0.0))
+}
+
+#[inline(always)]
+fn to_the_16th<T: Mul<Output = T> + Copy>(base: T) -> T {
     let two = base * base;
     let four = two * two;
     let eight = four * four;

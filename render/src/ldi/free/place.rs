@@ -1,7 +1,8 @@
 //! Where samples fall and how large they are there.
 
-use super::band::{BAND, Drawn, first_within};
+use super::band::{BAND, Drawn, first_within, narrowness};
 use super::{BEYOND, Options};
+use crate::cpu::lanes::whole;
 use crate::ldi::look::Sizes;
 use crate::ldi::project::{Block, LANES, Projection};
 use crate::ldi::{Clipped, Layered};
@@ -66,8 +67,10 @@ impl Work<'_> {
                             let half = ready.half[axis][k] * (grow * block.scale[k]);
                             let half = half.max(least).min(most);
                             ready.half[axis][k] = half;
+                            ready.narrow[axis][k] = narrowness(self.options.deviation, half);
                             let at = if ready.is_seen[k] { at[k] } else { 0.0 };
-                            ready.first[axis][k] = first_within(at, BEYOND * half);
+                            (ready.first[axis][k], ready.offset[axis][k]) =
+                                first_within(at, BEYOND * half);
                         }
                     }
                     for k in 0..LANES {
@@ -76,8 +79,10 @@ impl Work<'_> {
                             |half: f32| (BEYOND * half).max(self.options.wide_half(half)) + 0.51;
                         let y = if ready.is_seen[k] { block.y[k] } else { 0.0 };
                         let down = reach(ready.half[1][k]);
-                        ready.bands[0][k] = (y - down) as i32 / BAND as i32;
-                        ready.bands[1][k] = (y + down) as i32 / BAND as i32;
+                        // Less than a band above the first one.
+                        let band_of = |y: f32| whole(y + BAND as f32).1 / BAND as i32 - 1;
+                        ready.bands[0][k] = band_of(y - down);
+                        ready.bands[1][k] = band_of(y + down);
                         let across = reach(ready.half[0][k]);
                         ready.sides[0][k] = block.x[k] - across;
                         ready.sides[1][k] = block.x[k] + across;
@@ -90,10 +95,10 @@ impl Work<'_> {
                         let [r, g, b, _] = self.ldi.color[first + k];
                         let ends = self.ldi.ends[first + k].turned(self.projection.turn);
                         let drawn = Drawn {
-                            x: block.x[k],
-                            y: block.y[k],
+                            offset: [ready.offset[0][k], ready.offset[1][k]],
                             inverse_depth: block.inverse_depth[k],
                             half: [ready.half[0][k], ready.half[1][k]],
+                            narrow: [ready.narrow[0][k], ready.narrow[1][k]],
                             first: [ready.first[0][k] as i16, ready.first[1][k] as i16],
                             color: [r, g, b],
                             ends,
@@ -119,7 +124,9 @@ impl Work<'_> {
 struct Ready {
     is_seen: [bool; LANES],
     half: [[f32; LANES]; 2],
+    narrow: [[f32; LANES]; 2],
     first: [[i32; LANES]; 2],
+    offset: [[f32; LANES]; 2],
     /// The first and the last band it may reach.
     bands: [[i32; LANES]; 2],
     /// From where to where it reaches across.
@@ -130,7 +137,9 @@ impl Ready {
     const EMPTY: Self = Self {
         is_seen: [false; LANES],
         half: [[0.0; LANES]; 2],
+        narrow: [[0.0; LANES]; 2],
         first: [[0; LANES]; 2],
+        offset: [[0.0; LANES]; 2],
         bands: [[0; LANES]; 2],
         sides: [[0.0; LANES]; 2],
     };
