@@ -79,7 +79,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16))]
     splat: Option<u32>,
     /// Nearer to a portal than this, in radii of its semicircle (of 1.5 widths), what is beyond is
-    /// geometry; images are mixed in from 2/3 of it on [default: 1; of LDIs made of photos 0.55]
+    /// geometry; images are mixed in from 5/6 of it on [default: 1; of LDIs made of photos 0.55]
     #[arg(long, value_name = "RADII")]
     near: Option<f64>,
     /// Keep the last frame's colours where no image shows anything

@@ -45,7 +45,7 @@ pub struct WalkOptions {
     /// Whether columns of an LDI that are out of sight are drawn, too. The pictures are the same.
     pub whole_ldis: bool,
     /// Nearer to a portal than this, in radii of its semicircle, geometry is mixed into what is
-    /// beyond, and from two thirds of it on it is alone: from there one sees farther aside than
+    /// beyond, and from five sixths of it on it is alone: from there one sees farther aside than
     /// the images do.
     pub near: f64,
     /// The same of LDIs that are made of photos: those show what is aside from wherever they were
@@ -309,10 +309,7 @@ impl<'a> Walk<'a> {
             false => asked.runs(visibility.clone()),
         };
         cost.triangles_in_cells = windows.iter().map(|(runs, _)| runs.asked).sum();
-        let floor = match may_skip {
-            true => self.floor(&fills, &camera),
-            false => Vec::new(),
-        };
+        let floor = self.floor(&fills, &camera);
         let met = self.painter.meet(
             self.model,
             &windows,
@@ -324,7 +321,7 @@ impl<'a> Walk<'a> {
         cost.geometry = start.elapsed();
         // 4. Colours.
         let start = Instant::now();
-        cost.holes = self.compose(view, &camera, &fills)?;
+        cost.holes = self.compose(view, &camera, &fills, &floor)?;
         cost.shade = start.elapsed();
         Ok(cost)
     }
@@ -337,7 +334,7 @@ impl<'a> Walk<'a> {
         };
         let width = camera.width as usize;
         let (owners, filled) = (&self.owners, &self.filled);
-        let mut floor = vec![0.0; owners.len()];
+        let mut floor = vec![0.0_f32; owners.len()];
         let row = |(y, floor): (usize, &mut [f32])| {
             let start = y * width;
             for (x, floor) in floor.iter_mut().enumerate() {

@@ -7,36 +7,30 @@ use crate::interior::{Pinhole, Target};
 use calibrate::View;
 use rayon::prelude::*;
 
+/// What counts as on a plane, in shares of its inverse depth: some steps of f32.
+const ON_PLANE: f32 = 1e-6;
+
 impl Walk<'_> {
-    /// The picture; how many pixels of portals nothing was drawn in.
+    /// The picture; how many pixels of portals nothing was drawn in. `floor` is [`Walk::floor`].
     pub(super) fn compose(
         &mut self,
         view: &View,
         camera: &Pinhole,
         fills: &[Filled<'_>],
+        floor: &[f32],
     ) -> Result<usize, RenderError> {
         let width = camera.width as usize;
         let (owners, filled) = (&self.owners, &self.filled);
-        let fill_of = |pixel: usize| fills.get(usize::from(owners[pixel]).wrapping_sub(1));
-        let is_before = |pixel: usize, f: &Filled<'_>, inverse_depth: f32| {
-            // Narrow numbers divide faster.
-            let (pixel, width) = (pixel as u32, camera.width);
-            let ray = camera.ray(pixel % width, pixel / width);
-            !f.plane.has(ray, f64::from(inverse_depth))
-        };
         let last = match self.options.persist {
             true => std::mem::take(&mut self.picture),
             false => Target::default(),
         };
         let is_alike = (last.width, last.height) == (camera.width, camera.height);
         self.picture.clear(camera.width, camera.height);
-        let is_wanted = |pixel: usize, inverse_depth: f32| match fill_of(pixel) {
+        // What is behind an image that leaves nothing open is not seen.
+        let is_wanted = |pixel: usize, inverse_depth: f32| match floor.get(pixel) {
+            Some(plane) => inverse_depth > *plane * (1.0 + ON_PLANE),
             None => true,
-            Some(f) => {
-                f.share < 1.0
-                    || f.leaves_open(filled.color[pixel][3])
-                    || is_before(pixel, f, inverse_depth)
-            }
         };
         self.painter
             .shade(self.model, view, camera, &mut self.picture, is_wanted)?;
@@ -49,13 +43,18 @@ impl Walk<'_> {
         let rows = colors.zip(self.picture.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
             let mut holes = 0;
+            let owners = &owners[y * width..][..width];
             for (x, (color, depth)) in colors.iter_mut().zip(depths).enumerate() {
-                let pixel = y * width + x;
-                let Some(f) = fill_of(pixel) else {
+                let Some(f) = fills.get(usize::from(owners[x]).wrapping_sub(1)) else {
                     continue;
                 };
+                let pixel = y * width + x;
                 let own = painter.inverse_depth(pixel);
-                if own.is_some_and(|s| is_before(pixel, f, s)) {
+                let is_before = |s: f32| match floor.get(pixel) {
+                    Some(plane) if *plane > 0.0 => s > *plane * (1.0 + ON_PLANE),
+                    _ => !f.plane.has(camera.ray(x as u32, y as u32), f64::from(s)),
+                };
+                if own.is_some_and(is_before) {
                     continue;
                 }
                 let mut image = filled.color[pixel];
@@ -91,12 +90,14 @@ impl Walk<'_> {
 
 /// Colours with coverage mixed, `share` of the second.
 pub(super) fn mixed(a: [u8; 4], b: [u8; 4], share: f64) -> [u8; 4] {
-    let weights = [(1.0 - share) * f64::from(a[3]), share * f64::from(b[3])];
+    let share = share as f32;
+    let weights = [(1.0 - share) * f32::from(a[3]), share * f32::from(b[3])];
     let alpha = weights[0] + weights[1];
     if alpha < 0.5 {
         return [0; 4];
     }
     let part = weights[1] / alpha;
-    let mix = |k: usize| f64::from(a[k]) + part * (f64::from(b[k]) - f64::from(a[k]));
-    [mix(0), mix(1), mix(2), alpha].map(|v| v.round() as u8)
+    let mix = |k: usize| f32::from(a[k]) + part * (f32::from(b[k]) - f32::from(a[k]));
+    // Rounded without a call: they are not negative.
+    [mix(0), mix(1), mix(2), alpha].map(|v| (v + 0.5) as u8)
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Where geometry is alone, in shares of where it begins to be mixed in.
-const ALONE: f64 = 2.0 / 3.0;
+const ALONE: f64 = 5.0 / 6.0;
 
 /// From where geometry is alone beyond a portal the portals of the cell beyond are filled with images in their turn,
 /// with LDIs from [`ENTERED`] on: more and more, and from so much of that distance on alone. Whoever changes cells sees
