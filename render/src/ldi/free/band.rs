@@ -57,11 +57,10 @@ const COLUMN: usize = PLANES * ROWS;
 const TOGETHER: usize = 128;
 /// The bit of a band's first row; rows so far above it have one, too.
 const FIRST_BIT: i32 = 16;
-/// From what a sample is known by, two columns and rows beyond the first of its patch, a wide patch reaches holes
-/// so many pixels before that, or after it: places are up to half a pixel less than 5 from the first,
-/// and wide patches reach 4 from there.
-const HOLE_BEFORE: usize = 6;
-const HOLE_AFTER: usize = 7;
+/// A wide patch reaches at most 4 pixels from its place, which is up to 5.5 beyond the first pixel that the sample counts in.
+/// So what it reaches is within six pixels of the second one after that, by which a sample is looked up;
+/// and one more for rounding.
+const NEAR_HOLE: usize = 7;
 
 /// From the first to the last number of a tile: of all its planes, and of one.
 const TILE: usize = (WIDE - 1) * COLUMN + (PLANES - 1) * ROWS + WIDE;
@@ -97,7 +96,7 @@ struct Tile {
 }
 
 impl Tile {
-    /// The numbers of its pixels; see [`near`] and [`add`] for where they are.
+    /// The numbers of its pixels in all planes: a column's are [`COLUMN`] apart, a plane's [`ROWS`].
     #[inline(always)]
     fn of_all(self, columns: &mut [f32]) -> &mut [f32; TILE] {
         let start = self.first[0] * COLUMN + self.first[1];
@@ -106,6 +105,7 @@ impl Tile {
             .expect("as many")
     }
 
+    /// The same of one plane by itself.
     #[inline(always)]
     fn of_one(self, plane: &mut [f32]) -> &mut [f32; TILE_OF_ONE] {
         let start = self.first[0] * ROWS + self.first[1];
@@ -381,12 +381,12 @@ impl Band {
             let bits: u64 = bits.map(|(y, n)| u64::from(is_hole(n)) << y).sum();
             self.holes[x] = bits << FIRST_BIT;
             // In rows, then in columns.
-            let (mut rows, from) = (0, FIRST_BIT as usize - HOLE_AFTER);
-            for row in from..=from + HOLE_AFTER + HOLE_BEFORE {
+            let (mut rows, from) = (0, FIRST_BIT as usize - NEAR_HOLE);
+            for row in from..=from + 2 * NEAR_HOLE {
                 rows |= bits << row;
             }
-            let before = x.saturating_sub(HOLE_AFTER);
-            for holes in &mut self.near_holes[before..=(x + HOLE_BEFORE).min(count - 1)] {
+            let before = x.saturating_sub(NEAR_HOLE);
+            for holes in &mut self.near_holes[before..=(x + NEAR_HOLE).min(count - 1)] {
                 *holes |= rows;
             }
         }
