@@ -206,6 +206,39 @@ pub(super) fn say_unused(given: &ArgMatches) {
     if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {
         say!("note: --grid changes nothing: --renderer exact has no grid");
     }
+    if has("portals") && has("splat") {
+        let portals = given.try_get_many::<String>("portals");
+        let portals = portals.ok().flatten().unwrap_or_default();
+        say_unused_of_walk(&portals.map(String::as_str).collect::<Vec<_>>(), is_given);
+    }
+}
+
+/// Of `walk`, by what portals show.
+fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
+    let images = ["texture", "warp1", "warp2", "ldi"];
+    let of_images = ["near", "persist", "reference_size", "reference_views"];
+    let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files"];
+    for (kinds, ids, why) in [
+        (&images[..], &of_images[..], "portals show no images"),
+        (&images[1..3], &["splat"], "no image is warped"),
+        (&images[3..], &of_ldis, "portals show no LDIs"),
+    ] {
+        if portals.iter().any(|p| *p == "all" || kinds.contains(p)) {
+            continue;
+        }
+        let given = ids.iter().filter(|id| is_given(id));
+        let given: Vec<String> = given
+            .map(|id| format!("--{}", id.replace('_', "-")))
+            .collect();
+        let (of, verb) = (
+            kinds.join(", "),
+            if given.len() > 1 { "change" } else { "changes" },
+        );
+        if !given.is_empty() {
+            let given = given.join(" and ");
+            say!("note: {given} {verb} nothing: {why} (--portals {of} or all)");
+        }
+    }
 }
 
 impl FieldArgs {

@@ -6,6 +6,35 @@ use serde_json::Value;
 use std::path::Path;
 
 #[test]
+fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
+    let folder = with_house();
+    let walk = "walk house --frames 1 --size 16x12 --reference-size 8x8";
+    let said = |options: &str| {
+        let line = format!("{walk} {options} -o out");
+        let stderr = lumigraph(folder.path(), &line).ok().stderr;
+        let notes = stderr.lines().filter(|line| line.contains("nothing: "));
+        notes.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let images = "--persist and --reference-size change nothing: portals show no images \
+         (--portals texture, warp1, warp2, ldi or all)";
+    let splat = "--splat changes nothing: no image is warped (--portals warp1, warp2 or all)";
+    let ldis = "--ldi-views changes nothing: portals show no LDIs (--portals ldi or all)";
+    let given = "--persist --splat 2 --ldi-views 3";
+    for (portals, expected) in [
+        ("geometry,whole", &[images, splat, ldis][..]),
+        ("texture", &[splat, ldis]),
+        ("geometry,warp2", &[ldis]),
+        ("ldi", &[splat]),
+        ("all", &[]),
+    ] {
+        let expected: Vec<String> = expected.iter().map(|e| format!("note: {e}")).collect();
+        let found = said(&format!("{given} --portals {portals}"));
+        assert_eq!(found, expected, "{portals}");
+    }
+    assert_eq!(said("--portals ldi --near 0.5"), Vec::<String>::new());
+}
+
+#[test]
 fn a_house_is_walked_through() {
     let folder = with_house();
     let here = folder.path();
