@@ -38,7 +38,7 @@ pub struct Beyond {
 }
 
 /// What counts as on the plane, in shares of the inverse depth.
-const ON_PLANE: f64 = 1e-6;
+pub(super) const ON_PLANE: f64 = 1e-6;
 
 impl Beyond {
     /// What is beyond a plane through a point, as a camera sees it; `normal` points away from the

@@ -3,12 +3,10 @@
 use super::Walk;
 use super::filled::Filled;
 use crate::RenderError;
+use crate::interior::raster::ON_PLANE;
 use crate::interior::{Pinhole, Target};
 use calibrate::View;
 use rayon::prelude::*;
-
-/// What counts as on a plane, in shares of its inverse depth: some steps of f32.
-const ON_PLANE: f32 = 1e-6;
 
 impl Walk<'_> {
     /// The picture; how many pixels of portals nothing was drawn in. `floor` is [`Walk::floor`].
@@ -28,8 +26,9 @@ impl Walk<'_> {
         let is_alike = (last.width, last.height) == (camera.width, camera.height);
         self.picture.clear(camera.width, camera.height);
         // What is behind an image that leaves nothing open is not seen.
-        let is_wanted = |pixel: usize, inverse_depth: f32| match floor.get(pixel) {
-            Some(plane) => inverse_depth > *plane * (1.0 + ON_PLANE),
+        let is_before_floor = |plane: f32, s: f32| s > plane * (1.0 + ON_PLANE as f32);
+        let is_wanted = |pixel: usize, s: f32| match floor.get(pixel) {
+            Some(plane) => is_before_floor(*plane, s),
             None => true,
         };
         self.painter
@@ -51,7 +50,7 @@ impl Walk<'_> {
                 let pixel = y * width + x;
                 let own = painter.inverse_depth(pixel);
                 let is_before = |s: f32| match floor.get(pixel) {
-                    Some(plane) if *plane > 0.0 => s > *plane * (1.0 + ON_PLANE),
+                    Some(plane) if *plane > 0.0 => is_before_floor(*plane, s),
                     _ => !f.plane.has(camera.ray(x as u32, y as u32), f64::from(s)),
                 };
                 if own.is_some_and(is_before) {

@@ -96,22 +96,25 @@ struct Tile {
 }
 
 impl Tile {
-    /// The numbers of its pixels in all planes: a column's are [`COLUMN`] apart, a plane's [`ROWS`].
+    /// The numbers of its pixels, in columns of so many.
     #[inline(always)]
-    fn of_all(self, columns: &mut [f32]) -> &mut [f32; TILE] {
-        let start = self.first[0] * COLUMN + self.first[1];
-        (&mut columns[start..start + TILE])
+    fn of<const APART: usize, const COUNT: usize>(self, columns: &mut [f32]) -> &mut [f32; COUNT] {
+        let start = self.first[0] * APART + self.first[1];
+        (&mut columns[start..start + COUNT])
             .try_into()
             .expect("as many")
     }
 
-    /// The same of one plane by itself.
+    /// Of all planes: a column's are [`COLUMN`] apart, a plane's [`ROWS`].
+    #[inline(always)]
+    fn of_all(self, columns: &mut [f32]) -> &mut [f32; TILE] {
+        self.of::<COLUMN, TILE>(columns)
+    }
+
+    /// Of one plane by itself.
     #[inline(always)]
     fn of_one(self, plane: &mut [f32]) -> &mut [f32; TILE_OF_ONE] {
-        let start = self.first[0] * ROWS + self.first[1];
-        (&mut plane[start..start + TILE_OF_ONE])
-            .try_into()
-            .expect("as many")
+        self.of::<ROWS, TILE_OF_ONE>(plane)
     }
 }
 
@@ -122,13 +125,13 @@ impl Drawn {
         i32::from(self.first[1]) - MARGIN as i32 - top
     }
 
-    /// Its one tile, if it has no more: `None` if no row of that is the band's.
+    /// Its tile so many columns and rows beyond the first; `None` if no row of that is the band's.
     #[inline(always)]
-    fn one_tile(&self, top: i32) -> Option<Tile> {
-        let row = self.row(top);
+    fn tile(&self, top: i32, [right, down]: [i32; 2]) -> Option<Tile> {
+        let (column, row) = (i32::from(self.first[0]) + right, self.row(top) + down);
         (row > -(WIDE as i32) && row < BAND as i32).then(|| Tile {
-            first: [self.first[0] as usize, (row + EDGE as i32) as usize],
-            offset: self.offset,
+            first: [column as usize, (row + EDGE as i32) as usize],
+            offset: [self.offset[0] + right as f32, self.offset[1] + down as f32],
         })
     }
 
@@ -136,23 +139,17 @@ impl Drawn {
     #[inline(always)]
     fn for_each_tile(&self, reach: [f32; 2], top: i32, mut f: impl FnMut(Tile)) {
         if is_small(reach) {
-            if let Some(tile) = self.one_tile(top) {
+            if let Some(tile) = self.tile(top, [0; 2]) {
                 f(tile);
             }
             return;
         }
-        let [across, down] = reach.map(tile_count);
-        for down in (0..down).map(|tile| tile * WIDE as i32) {
-            let row = self.row(top) + down;
-            if row <= -(WIDE as i32) || row >= BAND as i32 {
-                continue;
-            }
-            for right in (0..across).map(|tile| tile * WIDE as i32) {
-                let column = i32::from(self.first[0]) + right;
-                f(Tile {
-                    first: [column as usize, (row + EDGE as i32) as usize],
-                    offset: [self.offset[0] + right as f32, self.offset[1] + down as f32],
-                });
+        let [across, down] = reach.map(|reach| tile_count(reach) * WIDE as i32);
+        for down in (0..down).step_by(WIDE) {
+            for right in (0..across).step_by(WIDE) {
+                if let Some(tile) = self.tile(top, [right, down]) {
+                    f(tile);
+                }
             }
         }
     }
@@ -163,7 +160,7 @@ impl Drawn {
         if !is_small(self.reach()) {
             return true;
         }
-        let Some(tile) = self.one_tile(top) else {
+        let Some(tile) = self.tile(top, [0; 2]) else {
             return false;
         };
         let s = Vec4::splat(self.inverse_depth);
