@@ -9,6 +9,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{Photo, Scene, Warning};
+use render::interior::PortalFill;
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
 
 use std::collections::BTreeSet;
@@ -215,29 +216,32 @@ pub(super) fn say_unused(given: &ArgMatches) {
 
 /// Of `walk`, by what portals show.
 fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
-    let images = ["texture", "warp1", "warp2", "ldi"];
+    type Holds = fn(&PortalFill) -> bool;
+    let is_ldi: Holds = |fill| *fill == PortalFill::Ldi;
+    let is_warped: Holds = |fill| matches!(fill, PortalFill::Warp1 | PortalFill::Warp2);
+    let is_image: Holds = |fill| *fill == PortalFill::Ldi || fill.references() > 0;
     let of_images = ["near", "persist", "reference_size", "reference_views"];
     let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files"];
-    for (kinds, ids, why) in [
-        (&images[..], &of_images[..], "portals show no images"),
-        (&images[1..3], &["splat"], "no image is warped"),
-        (&images[3..], &of_ldis, "portals show no LDIs"),
+    for (is_meant, ids, why) in [
+        (is_image, &of_images[..], "portals show no images"),
+        (is_warped, &["splat"], "no image is warped"),
+        (is_ldi, &of_ldis, "portals show no LDIs"),
     ] {
+        let kinds = PortalFill::ALL.into_iter().filter(is_meant);
+        let kinds: Vec<&str> = kinds.map(PortalFill::name).collect();
         if portals.iter().any(|p| *p == "all" || kinds.contains(p)) {
             continue;
         }
         let given = ids.iter().filter(|id| is_given(id));
-        let given: Vec<String> = given
-            .map(|id| format!("--{}", id.replace('_', "-")))
-            .collect();
-        let (of, verb) = (
-            kinds.join(", "),
-            if given.len() > 1 { "change" } else { "changes" },
-        );
-        if !given.is_empty() {
-            let given = given.join(" and ");
-            say!("note: {given} {verb} nothing: {why} (--portals {of} or all)");
-        }
+        let option = |id: &&str| format!("--{}", id.replace('_', "-"));
+        let given: Vec<String> = given.map(option).collect();
+        let change = match given.len() {
+            0 => continue,
+            1 => "changes",
+            _ => "change",
+        };
+        let (given, kinds) = (given.join(" and "), kinds.join(", "));
+        say!("note: {given} {change} nothing: {why} (--portals {kinds} or all)");
     }
 }
 
