@@ -43,10 +43,11 @@ impl Plan {
             }
         });
         let cells: Vec<Vec<DVec2>> = cells.collect();
+        let is_door = |p: &Portal| house.contents.is_door(interior, p);
         let portals = interior
             .portals
             .iter()
-            .map(|p| (ends(p, up, flat), is_door(house, p)));
+            .map(|p| (ends(p, up, flat), is_door(p)));
         let portals: Vec<_> = portals.collect();
         let places = || {
             cells
@@ -162,17 +163,6 @@ fn ends(portal: &Portal, up: DVec3, flat: impl Fn(DVec3) -> DVec2) -> [DVec2; 2]
     let first = corners.iter().min_by(|a, b| along(a).total_cmp(&along(b)));
     let last = corners.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
     [first, last].map(|p| flat(*p.unwrap_or(&DVec3::ZERO)))
-}
-
-fn is_door(house: &House, portal: &Portal) -> bool {
-    let interior = &house.interior;
-    let heights = portal.polygon.corners().iter().map(|p| p.dot(interior.up));
-    let sill = heights.fold(f64::INFINITY, f64::min);
-    let floors = portal.cells.iter().flatten();
-    let floors =
-        floors.filter_map(|id| crate::walker::floor_height(interior, &house.contents, *id));
-    let floor = floors.fold(f64::NEG_INFINITY, f64::max);
-    sill - floor <= 0.25 * interior.eye_height
 }
 
 /// Where the plan is drawn: in a corner, at most a third of the picture.

@@ -46,7 +46,7 @@ impl Obstacles {
         let eye_height = interior.eye_height.abs().max(1e-9);
         let ids = (0..interior.cells.len() as u32).map(CellId);
         let floor_of_cell: Vec<Option<f64>> =
-            ids.map(|id| floor_height(interior, contents, id)).collect();
+            ids.map(|id| contents.floor_of(interior, id)).collect();
         let mut walker = Self {
             up,
             axes: [across, up.cross(across)],
@@ -180,18 +180,6 @@ impl Obstacles {
         let below = |f: &&Floor| f.height <= height - 0.3 * self.eye_height;
         self.floors.iter().rev().find(below)
     }
-}
-
-/// How high a cell's floor is, along `up`; none where the cell's place is unknown.
-pub(crate) fn floor_height(interior: &Interior, contents: &Contents, id: CellId) -> Option<f64> {
-    let up = interior.up;
-    if let Some(floor) = &interior.cell(id).floor {
-        let heights = floor.corners().iter().map(|p| p.dot(up));
-        return Some(heights.fold(f64::INFINITY, f64::min));
-    }
-    let room = contents.bounds.get(id.0 as usize).copied().flatten()?;
-    let half = 0.5 * (room.max - room.min);
-    Some(room.min.midpoint(room.max).dot(up) - half.dot(up.abs()))
 }
 
 /// Where a triangle meets a level; `heights` are its corners'.

@@ -11,6 +11,7 @@ mod contents;
 mod error;
 mod file;
 pub mod find;
+mod floors;
 mod locate;
 mod overlap;
 mod polygon;

@@ -49,9 +49,9 @@ pub struct SemicircleView {
 /// The cameras before every portal and on each of its sides from which a cell can be seen, in
 /// the portals' order, from left to right.
 ///
-/// They stand on the viewer's side at eye height over its floor: the lowest point of the
-/// viewer's cell, or where it has neither a box nor a floor, of the portal. Before a portal that
-/// lies flat (a hatch), they stand on a semicircle across it whatever the floor.
+/// They stand on the viewer's side at eye height over the floor that is before the portal there; see
+/// [`Interior::floor_height`]. Before a portal that lies flat (a hatch), they stand on a semicircle
+/// across it whatever the floor.
 pub fn semicircles(interior: &Interior, options: &SemicircleOptions) -> Vec<SemicircleView> {
     let ids = (0..).map(PortalId);
     let portals = ids.zip(&interior.portals);
@@ -163,29 +163,4 @@ fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
             .floor
             .as_ref()
             .is_none_or(|floor| floor.covers(place, 0.0))
-}
-
-impl Interior {
-    /// How high the floor is before a portal on the side of a cell, along `up`: the lowest point of
-    /// the cell, or where it has neither a box nor a floor, of the portal.
-    pub fn floor_height(&self, from: Option<CellId>, portal: &Portal) -> f64 {
-        let up = self.up;
-        let cell = from.and_then(|id| self.cells.get(id.0 as usize));
-        let lowest = |corners: &[DVec3]| {
-            let heights = corners.iter().map(|p| p.dot(up));
-            heights.fold(f64::INFINITY, f64::min)
-        };
-        match cell.map(|cell| (&cell.floor, cell.content.room())) {
-            Some((Some(floor), _)) => lowest(floor.corners()),
-            Some((None, Some(room))) => {
-                // The corner farthest down.
-                let corner = |k: usize| match up[k] > 0.0 {
-                    true => room.min[k],
-                    false => room.max[k],
-                };
-                DVec3::new(corner(0), corner(1), corner(2)).dot(up)
-            }
-            _ => lowest(portal.polygon.corners()),
-        }
-    }
 }

@@ -4,7 +4,7 @@ use super::floor_map::FloorMap;
 use crate::path::{CameraPath, PathError, PathFrame};
 use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
-use proxy::interior::{CellId, Contents, Interior, Portal, PortalId, RoomBox};
+use proxy::interior::{CellId, Contents, Interior, PortalId};
 use proxy::mesh::Model;
 use std::collections::{BTreeSet, VecDeque};
 
@@ -26,8 +26,8 @@ const LOOK_AHEAD: f64 = 0.8;
 const TURN: f64 = 0.6;
 /// Room enough on both sides of who goes through an opening.
 const ENOUGH: f64 = 0.16;
-/// How high a threshold one steps over, likewise.
-const STEP: f64 = 0.25;
+/// Heights that are nearer to one another are of one storey, likewise.
+const STOREY: f64 = 0.5;
 
 /// A walk through an interior, and what is not as one would walk.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,8 +133,9 @@ struct Rooms<'a> {
     interior: &'a Interior,
     contents: &'a Contents,
     model: &'a Model,
-    /// By cell, when it is first walked through.
-    maps: Vec<Option<FloorMap>>,
+    /// By cell, when it is first walked through: at which height, as a cell may have several storeys,
+    /// and what is there.
+    maps: Vec<Vec<(f64, Option<FloorMap>)>>,
     /// See [`Tour::blocked`].
     blocked: BTreeSet<CellId>,
     /// See [`Tour::shut`].
@@ -150,7 +151,7 @@ impl<'a> Rooms<'a> {
             interior,
             contents,
             model,
-            maps: interior.cells.iter().map(|_| None).collect(),
+            maps: interior.cells.iter().map(|_| Vec::new()).collect(),
             blocked: BTreeSet::new(),
             shut: BTreeSet::new(),
         }
@@ -160,14 +161,21 @@ impl<'a> Rooms<'a> {
         self.interior.eye_height.abs().max(1e-9)
     }
 
-    /// A room's map at the height of a point; nothing for a room without bounds.
+    /// A room's map at about the height of a point; nothing for a room without bounds.
     fn map(&mut self, id: CellId, eye: DVec3) -> Option<&FloorMap> {
-        let unit = self.unit();
-        let map = &mut self.maps[id.0 as usize];
-        if map.is_none() {
-            *map = FloorMap::new(self.interior, self.contents, self.model, id, eye, unit);
-        }
-        map.as_ref()
+        let (unit, height) = (self.unit(), eye.dot(self.interior.up));
+        let maps = &mut self.maps[id.0 as usize];
+        let is_near =
+            |(other, _): &(f64, Option<FloorMap>)| (other - height).abs() <= STOREY * unit;
+        let i = match maps.iter().position(is_near) {
+            Some(i) => i,
+            None => {
+                let map = FloorMap::new(self.interior, self.contents, self.model, id, eye, unit);
+                maps.push((height, map));
+                maps.len() - 1
+            }
+        };
+        maps[i].1.as_ref()
     }
 
     /// The tour, room by room.
@@ -240,7 +248,7 @@ impl<'a> Rooms<'a> {
         let portal = interior.portal(id);
         let up = interior.up;
         let center = portal.polygon.center();
-        let height = floor(interior, contents, from, portal) + unit;
+        let height = contents.floor_height(interior, Some(from), portal) + unit;
         let center = center + up * (height - center.dot(up));
         let normal = portal.normal_into(Some(from));
         let level = (normal - up * normal.dot(up)).normalize_or_zero();
@@ -282,15 +290,20 @@ impl<'a> Rooms<'a> {
     /// asked reach, or less.
     fn smoothness(&mut self, legs: &[Leg], asked: f64) -> f64 {
         let way = Way::new(legs.iter().flat_map(|leg| leg.stops.clone()).collect());
-        let used: Vec<&FloorMap> = self.maps.iter().flatten().collect();
+        let (up, unit) = (self.interior.up, self.unit());
+        let used = self.maps.iter().flatten();
+        let used = used.filter_map(|(height, map)| Some((*height, map.as_ref()?)));
+        let used: Vec<(f64, &FloorMap)> = used.collect();
         let count = (way.length() / (0.02 * self.interior.eye_height.abs()).max(1e-9)).min(2e4);
         let is_free = |reach: f64| {
             (0..=count as usize).all(|i| {
                 let along = way.length() * i as f64 / count.max(1.0);
                 let [rough, smooth] = [way.at(along), way.smoothed(along, reach)];
                 let least = |p: DVec3| {
-                    used.iter()
-                        .map(|m| m.clearance(p))
+                    // What stands in another storey is not in the way.
+                    let is_near = |height: f64| (height - p.dot(up)).abs() <= STOREY * unit;
+                    let near = used.iter().filter(|(height, _)| is_near(*height));
+                    near.map(|(_, map)| map.clearance(p))
                         .fold(f64::INFINITY, f64::min)
                 };
                 least(smooth) > 0.0 || least(rough) == 0.0
@@ -308,37 +321,15 @@ impl<'a> Rooms<'a> {
 /// The middle of a room, at eye height.
 fn place(interior: &Interior, contents: &Contents, id: CellId) -> Option<DVec3> {
     let up = interior.up;
-    let middle = match (&interior.cell(id).floor, bounds(contents, id)) {
+    let room = contents.bounds.get(id.0 as usize).copied().flatten();
+    let middle = match (&interior.cell(id).floor, room) {
         (Some(floor), _) => floor.center(),
         (None, Some(room)) => room.min.midpoint(room.max),
         (None, None) => return None,
     };
-    let lowest = lowest(interior, contents, id)?;
-    let at = middle + up * (lowest + interior.eye_height - middle.dot(up));
+    let floor = contents.floor_of(interior, id)?;
+    let at = middle + up * (floor + interior.eye_height - middle.dot(up));
     at.is_finite().then_some(at)
-}
-
-fn bounds(contents: &Contents, id: CellId) -> Option<RoomBox> {
-    contents.bounds.get(id.0 as usize).copied().flatten()
-}
-
-/// How high a room's lowest point is, of its floor if that is known.
-fn lowest(interior: &Interior, contents: &Contents, id: CellId) -> Option<f64> {
-    let up = interior.up;
-    if let Some(floor) = &interior.cell(id).floor {
-        let heights = floor.corners().iter().map(|p| p.dot(up));
-        return Some(heights.fold(f64::INFINITY, f64::min));
-    }
-    let room = bounds(contents, id)?;
-    let half = 0.5 * (room.max - room.min);
-    Some(room.min.midpoint(room.max).dot(up) - half.dot(up.abs()))
-}
-
-/// How high the floor is before a portal: the room's, or where nothing is known of that, what
-/// the interior takes it for.
-fn floor(interior: &Interior, contents: &Contents, id: CellId, portal: &Portal) -> f64 {
-    let of_room = lowest(interior, contents, id);
-    of_room.unwrap_or_else(|| interior.floor_height(Some(id), portal))
 }
 
 /// The portals to pass to the nearest room not seen yet.
@@ -349,12 +340,6 @@ fn route(
     is_seen: &[bool],
     from: CellId,
 ) -> Option<Vec<(PortalId, CellId)>> {
-    let is_door = |cell: CellId, portal: &Portal| {
-        let up = interior.up;
-        let heights = portal.polygon.corners().iter().map(|p| p.dot(up));
-        let sill = heights.fold(f64::INFINITY, f64::min);
-        sill - floor(interior, contents, cell, portal) <= STEP * interior.eye_height
-    };
     let search = |doors_only: bool| {
         let mut came: Vec<Option<(CellId, PortalId)>> = vec![None; places.len()];
         let mut queue = VecDeque::from([from]);
@@ -365,7 +350,7 @@ fn route(
                 };
                 let i = into.0 as usize;
                 let is_new = into != from && came[i].is_none();
-                if !is_new || (doors_only && !is_door(cell, portal)) {
+                if !is_new || (doors_only && !contents.is_door(interior, portal)) {
                     continue;
                 }
                 came[i] = Some((cell, id));

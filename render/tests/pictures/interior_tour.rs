@@ -278,3 +278,66 @@ fn tours_say_where_something_is_in_the_way() {
     walls(&mut model, &[[6.0, -0.5], [6.0, 4.5]]);
     assert_eq!(amiss(&interior, &model), (vec![], vec![CellId(1)], vec![]));
 }
+
+/// A stairwell of two storeys, and in its wall at x = 4 m a door to a room beside each of them.
+fn stairwell() -> (Interior, Model) {
+    let mut mesh = Mesh::default();
+    // What is closed of the wall, from (y, z) to (y, z).
+    for [[y, z], [top, end]] in [
+        [[0.0, 0.0], [2.8, 0.5]],
+        [[2.0, 0.5], [2.8, 1.5]],
+        [[0.0, 1.5], [2.8, 4.0]],
+        [[2.8, 0.0], [5.4, 2.5]],
+        [[4.8, 2.5], [5.4, 3.5]],
+        [[2.8, 3.5], [5.4, 4.0]],
+    ] {
+        let first = mesh.positions.len() as u32;
+        let corners = [[y, z], [top, z], [top, end], [y, end]];
+        let corners = corners.map(|[y, z]| DVec3::new(4.0, y, z));
+        mesh.positions.extend(corners);
+        let halves = [[0, 1, 2], [0, 2, 3]].map(|half| half.map(|i| first + i));
+        mesh.triangles.extend(halves);
+    }
+    let mut model = Model::default();
+    model.append(&mesh, "wall");
+    let text = r#"{"version": 1, "rooms": [
+        {"name": "stairwell", "min": [0, 0, 0], "max": [4, 5.4, 4]},
+        {"name": "lower", "min": [4, 0, 0], "max": [9, 2.6, 4]},
+        {"name": "upper", "min": [4, 2.8, 0], "max": [9, 5.4, 4]}],
+        "openings": [
+        {"name": "down", "between": ["stairwell", "lower"],
+            "polygon": [[4, 0, 0.5], [4, 0, 1.5], [4, 2, 1.5], [4, 2, 0.5]]},
+        {"name": "up", "between": ["stairwell", "upper"],
+            "polygon": [[4, 2.8, 2.5], [4, 2.8, 3.5], [4, 4.8, 3.5], [4, 4.8, 2.5]]}]}"#;
+    let read = parse_rooms(Path::new("r.json"), text.as_bytes(), "m.glb");
+    (read.unwrap().0, model)
+}
+
+#[test]
+fn doors_of_an_upper_storey_are_passed_at_eye_height_over_its_floor() {
+    let (interior, model) = stairwell();
+    assert_eq!(crossings(&interior, &model), (0, 3));
+    assert_eq!(amiss(&interior, &model), (vec![], vec![], vec![]));
+    let (contents, _) = Contents::new(&interior, &model).unwrap();
+    let lens = Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0));
+    let camera = Camera::of(&lens, 64, 64);
+    let tour = Tour::new(&interior, &contents, &model, &camera, 400, 15.0).unwrap();
+    let eyes: Vec<DVec3> = tour.path.frames.iter().map(|f| f.view.center()).collect();
+    // In each door, and well into the room behind it.
+    for (floor, middle) in [(0.0, 1.0), (2.8, 3.0)] {
+        let is_passed = |e: &[DVec3]| {
+            let [a, b] = [e[0], e[1]];
+            let at = a.lerp(b, (4.0 - a.x) / (b.x - a.x));
+            let off = DVec2::new(at.y - floor - 1.6, at.z - middle);
+            (a.x < 4.0) != (b.x < 4.0) && off.abs().max_element() < 0.1
+        };
+        assert!(eyes.windows(2).any(is_passed), "{floor}");
+        let is_behind = |eye: &DVec3| eye.x > 5.0 && (eye.y - floor - 1.6).abs() < 1e-9;
+        assert!(eyes.iter().any(is_behind), "{floor}");
+    }
+    let behind = eyes.iter().filter(|eye| eye.x > 5.0);
+    for eye in behind {
+        let off = [1.6, 4.4].map(|height| (eye.y - height).abs());
+        assert!(off[0].min(off[1]) < 1e-9, "{eye}");
+    }
+}
