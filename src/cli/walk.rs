@@ -21,10 +21,10 @@ use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
 use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
-use render::path;
+use render::{CameraPath, path};
 use report::{Drawn, Scored, Walked, ms};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Walk through an interior
 ///
@@ -160,12 +160,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut opened = Opened::new(&args.interior, exposure, warn)?;
     let named = || args.interior.display().to_string();
     options.library = references.options(opened.photos.is_some());
-    let (frames, fps) = match args.held_out {
-        true => (
-            held_out(opened.photos.as_ref(), args.size).with_context(named)?,
-            FPS,
-        ),
-        false => frames(args, &opened)?,
+    let way = match args.held_out {
+        true => Way {
+            frames: held_out(opened.photos.as_ref(), args.size).with_context(named)?,
+            fps: FPS,
+            tour: None,
+        },
+        false => way(args, &opened)?,
     };
     let mut inputs = opened.files();
     let scenes = match opened.photos {
@@ -193,14 +194,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         if let Some(folder) = &ldis {
             walk.use_ldi_files(folder);
         }
-        let walks = walk_all(args, &mut walk, &fills, &frames, &inputs)?;
+        let walks = walk_all(args, &mut walk, &fills, &way, &inputs)?;
         if let [walked] = &walks[..] {
-            args.film.finish(&walked.files, fps)?;
+            args.film.finish(&walked.files, way.fps)?;
         }
         for note in walk.painter().notes() {
             say!("note: {note}");
         }
-        report(args, &opened, &walk, &walks, &frames)
+        report(args, &opened, &walk, &walks, &way.frames)
     })
 }
 
@@ -222,17 +223,30 @@ fn walk_all(
     args: &Args,
     walk: &mut Walk<'_>,
     fills: &[PortalFill],
-    frames: &[Named],
+    way: &Way,
     inputs: &[PathBuf],
 ) -> anyhow::Result<Vec<Walked>> {
-    let mut walks = Vec::new();
+    // 1. Which frames are there.
+    let mut begun = Vec::new();
     for fill in fills {
         let folder = match fills.len() {
             1 => args.output.clone(),
             _ => args.output.join(fill.name()),
         };
+        let names = way.frames.iter().map(|f| (f.name.as_str(), true));
+        let files = picture_files("frame", names, &folder)?;
+        let is_there = args.film.begin(&folder, &files, inputs)?;
+        begun.push((*fill, files, is_there));
+    }
+    // 2. The path, not before: beside frames that are not of this walk stays theirs.
+    if let Some(tour) = &way.tour {
+        tour::keep(args, tour)?;
+    }
+    // 3. The others.
+    let mut walks = Vec::new();
+    for (fill, files, is_there) in begun {
         walk.begin();
-        walks.push(draw(walk, *fill, frames, &folder, &args.film, inputs)?);
+        walks.push(draw(walk, fill, &way.frames, files, &is_there, &args.film)?);
     }
     Ok(walks)
 }
@@ -345,6 +359,15 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
     Ok(once)
 }
 
+/// What is to be drawn.
+struct Way {
+    frames: Vec<Named>,
+    /// How many of them a film shows a second.
+    fps: f64,
+    /// The whole tour that they are of, if they are of one.
+    tour: Option<CameraPath>,
+}
+
 struct Named {
     /// In the path, counted from 0.
     index: usize,
@@ -374,11 +397,14 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
     Ok(named)
 }
 
-/// The frames to draw, and how many a second a film of them shows.
-fn frames(args: &Args, opened: &Opened) -> anyhow::Result<(Vec<Named>, f64)> {
-    let path = match &args.path {
-        Some(file) => path::read_in(file, &args.nerfstudio.frame()?)?,
-        None => tour::plan(args, opened)?,
+/// The frames of a path, or of a tour.
+fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
+    let (path, tour) = match &args.path {
+        Some(file) => (path::read_in(file, &args.nerfstudio.frame()?)?, None),
+        None => {
+            let tour = tour::plan(args, opened)?;
+            (tour.clone(), Some(tour))
+        }
     };
     let named = |(index, frame): (usize, path::PathFrame)| Named {
         index,
@@ -389,26 +415,28 @@ fn frames(args: &Args, opened: &Opened) -> anyhow::Result<(Vec<Named>, f64)> {
     let frames = args
         .chosen()
         .of(path.frames.into_iter().enumerate().collect())?;
-    Ok((frames.into_iter().map(named).collect(), path.fps))
+    Ok(Way {
+        frames: frames.into_iter().map(named).collect(),
+        fps: path.fps,
+        tour,
+    })
 }
 
+/// Draws those frames that are not there, into their files.
 fn draw(
     walk: &mut Walk<'_>,
     fill: PortalFill,
     frames: &[Named],
-    folder: &Path,
+    files: Vec<PathBuf>,
+    is_there: &[bool],
     film: &FilmArgs,
-    inputs: &[PathBuf],
 ) -> anyhow::Result<Walked> {
-    let names = frames.iter().map(|f| (f.name.as_str(), true));
-    let files = picture_files("frame", names, folder)?;
-    let is_there = film.begin(folder, &files, inputs)?;
     let missing = is_there.iter().filter(|is_there| !**is_there).count();
     let bar = progress(missing, fill.name());
     let made_before = walk.library().residency().loads;
     let mut drawn = Vec::new();
     for ((frame, file), is_there) in frames.iter().zip(&files).zip(is_there) {
-        if is_there {
+        if *is_there {
             continue;
         }
         let named = || format!("frame {}", frame.name);

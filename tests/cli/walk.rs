@@ -1,7 +1,7 @@
 //! Walks through a house, frame by frame and as films.
 
 use crate::interior::{HALVES, names, with_house};
-use crate::run::lumigraph;
+use crate::run::{files, lumigraph};
 use serde_json::Value;
 use std::path::Path;
 
@@ -363,6 +363,30 @@ fn a_tour_is_written_over_no_path_but_a_tour() {
         assert!(std::fs::read(&film).unwrap() == kept);
         assert!(!here.join("film/frame_0000.png").exists());
     }
+}
+
+#[test]
+fn a_walk_that_is_refused_leaves_the_tour_of_the_frames_that_are_there() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --size 24x18";
+    lumigraph(here, &format!("{walk} --frames 2 -o film --resume")).ok();
+    let before = files(&here.join("film"));
+    let error = lumigraph(here, &format!("{walk} --frames 3 -o film --resume")).error(1);
+    assert!(error.contains("another command line"), "{error}");
+    assert!(files(&here.join("film")) == before);
+    // Of several kinds, where one alone is refused: the others are not begun.
+    let both = format!("{walk} --portals geometry,whole");
+    lumigraph(here, &format!("{both} --frames 2 -o both")).ok();
+    let tour = std::fs::read(here.join("both/path.json")).unwrap();
+    std::fs::remove_dir_all(here.join("both/geometry")).unwrap();
+    let error = lumigraph(here, &format!("{both} --frames 3 -o both --resume")).error(1);
+    assert!(
+        error.contains("both/whole: there are frames here"),
+        "{error}"
+    );
+    assert!(std::fs::read(here.join("both/path.json")).unwrap() == tour);
+    assert!(!here.join("both/geometry/frame_0000.png").exists());
 }
 
 #[test]

@@ -22,7 +22,10 @@ const FILE: &str = "path.json";
 /// What that file says of itself: a hash of the rest, which a path that people made does not have.
 const KEY: &str = "tour";
 
-/// Plans a tour through an interior, says what is odd about it, and writes it beside the frames.
+/// Plans a tour through an interior, and says what is odd about it.
+///
+/// # Errors
+/// There is no tour, or no place for its file; see [`keep`].
 pub(super) fn plan(args: &Args, opened: &Opened) -> anyhow::Result<CameraPath> {
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     let (width, height) = args.size.unwrap_or(SIZE);
@@ -35,12 +38,14 @@ pub(super) fn plan(args: &Args, opened: &Opened) -> anyhow::Result<CameraPath> {
     for note in notes_of(&planned, interior) {
         say!("note: {note}");
     }
-    keep(&args.output.join(FILE), &planned.path)?;
+    // Before what may take long.
+    check(&args.output.join(FILE), &planned.path)?;
     Ok(planned.path)
 }
 
-/// Writes a tour, but over no path other than a tour: keyframes that `view` saved lie in such a file.
-fn keep(file: &Path, tour: &CameraPath) -> anyhow::Result<()> {
+/// Fails where a tour would be written over a path other than a tour: keyframes that `view` saved lie in such
+/// a file.
+fn check(file: &Path, tour: &CameraPath) -> anyhow::Result<()> {
     if file.exists() && !may_be_replaced(file, tour) {
         let file = file.display();
         bail!(
@@ -48,10 +53,17 @@ fn keep(file: &Path, tour: &CameraPath) -> anyhow::Result<()> {
              it with --path {file}, or choose another -o"
         );
     }
-    make_parent(file)?;
+    Ok(())
+}
+
+/// Writes a tour beside the frames. Its place may be that of an earlier tour, and of nothing else.
+pub(super) fn keep(args: &Args, tour: &CameraPath) -> anyhow::Result<()> {
+    let file = args.output.join(FILE);
+    check(&file, tour)?;
+    make_parent(&file)?;
     let mut marked = tour.clone();
     marked.extra.insert(KEY.to_owned(), mark(tour)?.into());
-    Ok(path::write(file, &marked)?)
+    Ok(path::write(&file, &marked)?)
 }
 
 /// Whether a file is a tour as a walk wrote it, or has the same path as a new one.
