@@ -1,5 +1,7 @@
 //! `lumigraph interior`
 
+mod told;
+
 use super::Usage;
 use super::made;
 use super::options::{HoldOutArgs, triple};
@@ -14,13 +16,14 @@ use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
     Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
-    interior_from_nodes, read_interior, read_rooms, surface_of, write_interior,
+    interior_from_nodes, read_interior, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::ffi::OsString;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use told::{Told, model_name};
 
 /// Make an interior of a model or a capture: cells joined by portals
 ///
@@ -95,9 +98,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_no_interior(&args.model)?;
     // Before what may take long.
     check_free(args)?;
+    let told = Told::read(args)?;
     match args.model.is_dir() {
-        true => run_scene(args, &options),
-        false => run_model(args, &options),
+        true => run_scene(args, &options, told),
+        false => run_model(args, &options, told),
     }
 }
 
@@ -122,7 +126,7 @@ fn check_free(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
+fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<()> {
     let named = || args.model.display().to_string();
     let photos = relative(&args.output, &args.model)?;
     let (mut scene, warnings) = Scene::open(&args.model, false)?;
@@ -138,25 +142,22 @@ fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     let fused_s = start.elapsed().as_secs_f64();
     // 2. Its rooms.
     let start = Instant::now();
-    let (mut interior, warnings, pictures) = match &args.rooms {
-        Some(rooms) => {
-            let (interior, warnings) = read_rooms(rooms, MODEL)?;
-            (interior, warnings, Vec::new())
-        }
+    let mut rooms = match told.rooms {
+        Some((interior, warnings)) => Rooms::given(interior, warnings),
         None => {
             let busy = spinner("finding rooms");
             let found = surface.rooms(MODEL, options);
             busy.finish_and_clear();
-            taken_apart(found.with_context(named)?)?
+            Rooms::found(found.with_context(named)?)?
         }
     };
     let rooms_s = start.elapsed().as_secs_f64();
     // 3. The photos that show them.
-    interior.show_photos(&photos);
-    interior.held_out = without.into_iter().collect();
+    rooms.interior.show_photos(&photos);
+    rooms.interior.held_out = without.into_iter().collect();
     let model = &surface.model;
     let bytes = model_to_glb(model).with_context(named)?;
-    finish(args, MODEL, &bytes, model, interior, warnings, &pictures)?;
+    finish(args, MODEL, &bytes, model, rooms, told.known)?;
     let surface = match surface.maps {
         0 => "the scene's own mesh, coloured".to_owned(),
         maps => format!("{maps} depth maps fused and coloured"),
@@ -165,7 +166,7 @@ fn run_scene(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
+fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<()> {
     if args.hold_out.hold_out.is_some() {
         let text = "--hold-out is for captures; a model has no photos";
         return Err(Usage(text.to_owned()).into());
@@ -192,18 +193,18 @@ fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
     for warning in warnings {
         say!("warning: {}: {warning}", args.model.display());
     }
-    let file = args.model.file_name().unwrap_or_default().to_string_lossy();
+    let file = model_name(args);
     let named = || args.model.display().to_string();
-    let told = match &args.rooms {
-        Some(rooms) => Some(read_rooms(rooms, &file)?),
+    let given = match told.rooms {
+        rooms @ Some(_) => rooms,
         None if args.find || args.up.is_some() => None,
         None => match interior_from_nodes(&model, &file) {
             Err(InteriorError::NoCellNodes) => None,
             told => Some(told.with_context(named)?),
         },
     };
-    let (interior, warnings, pictures) = match told {
-        Some((interior, warnings)) => (interior, warnings, Vec::new()),
+    let rooms = match given {
+        Some((interior, warnings)) => Rooms::given(interior, warnings),
         None => {
             let busy = spinner("finding rooms");
             // Doors that the model marks are open.
@@ -215,23 +216,45 @@ fn run_model(args: &Args, options: &FindOptions) -> anyhow::Result<()> {
             };
             let found = find_interior(&evidence, &file, options);
             busy.finish_and_clear();
-            taken_apart(found.with_context(named)?)?
+            Rooms::found(found.with_context(named)?)?
         }
     };
-    finish(args, &file, &bytes, &model, interior, warnings, &pictures)
+    finish(args, &file, &bytes, &model, rooms, told.known)
 }
 
 /// Files beside the model.
 type Pictures = Vec<(&'static str, Vec<u8>)>;
 
-fn taken_apart(found: FoundInterior) -> anyhow::Result<(Interior, Vec<InteriorWarning>, Pictures)> {
-    let mut png = Cursor::new(Vec::new());
-    found.picture().write_to(&mut png, ImageFormat::Png)?;
-    let pictures = vec![
-        (PLAN_SVG, found.svg().into_bytes()),
-        (PLAN_PNG, png.into_inner()),
-    ];
-    Ok((found.interior, found.warnings, pictures))
+/// An interior's cells and portals, given or found.
+struct Rooms {
+    interior: Interior,
+    warnings: Vec<InteriorWarning>,
+    /// To check by what was found; none of what was given.
+    pictures: Pictures,
+}
+
+impl Rooms {
+    fn given(interior: Interior, warnings: Vec<InteriorWarning>) -> Self {
+        Self {
+            interior,
+            warnings,
+            pictures: Vec::new(),
+        }
+    }
+
+    fn found(found: FoundInterior) -> anyhow::Result<Self> {
+        let mut png = Cursor::new(Vec::new());
+        found.picture().write_to(&mut png, ImageFormat::Png)?;
+        let pictures = vec![
+            (PLAN_SVG, found.svg().into_bytes()),
+            (PLAN_PNG, png.into_inner()),
+        ];
+        Ok(Self {
+            interior: found.interior,
+            warnings: found.warnings,
+            pictures,
+        })
+    }
 }
 
 fn finish(
@@ -239,16 +262,16 @@ fn finish(
     file: &str,
     bytes: &[u8],
     model: &Model,
-    interior: Interior,
-    warnings: Vec<InteriorWarning>,
-    pictures: &Pictures,
+    rooms: Rooms,
+    known: Option<Interior>,
 ) -> anyhow::Result<()> {
+    let Rooms {
+        interior,
+        warnings,
+        pictures,
+    } = rooms;
     let named = || args.model.display().to_string();
-    let known = args.compare.as_ref().map(|known| match known.is_dir() {
-        true => anyhow::Ok(open(known)?.1),
-        false => Ok(read_rooms(known, file)?.0),
-    });
-    let compared = known.transpose()?.map(|known| {
+    let compared = known.map(|known| {
         let tolerance = SAME_PORTAL * args.meter;
         compare(&known, &interior, tolerance).to_string()
     });
@@ -256,7 +279,7 @@ fn finish(
     for warning in warnings.into_iter().chain(more) {
         say!("warning: {warning}");
     }
-    write(args, file, bytes, &interior, pictures)?;
+    write(args, file, bytes, &interior, &pictures)?;
     let mut table = String::new();
     for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
         table += &format!("{:>9} triangles  {}\n", triangles.len(), cell.name);

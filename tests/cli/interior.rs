@@ -119,6 +119,38 @@ fn an_interior_is_made_of_a_model() {
 }
 
 #[test]
+fn files_that_tell_of_rooms_are_read_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // No model and no photos, which would be said later.
+    std::fs::write(here.join("empty.glb"), "").unwrap();
+    std::fs::create_dir(here.join("hall")).unwrap();
+    std::fs::write(here.join("bad.json"), "{").unwrap();
+    for given in ["empty.glb", "hall"] {
+        for (option, expected) in [
+            ("--rooms", "expected a file of rooms and openings"),
+            ("--compare", "or an interior's folder"),
+        ] {
+            let line = |file: &str| format!("interior {given} {option} {file} -o two");
+            let ran = lumigraph(here, &line("nosuch.json"));
+            assert_eq!(ran.code, 2, "{}", ran.stderr);
+            let said = format!("{option} nosuch.json: there is no such file; ");
+            let is_said = ran.stderr.contains(&said) && ran.stderr.contains(expected);
+            assert!(is_said, "{}", ran.stderr);
+            let error = lumigraph(here, &line("bad.json")).error(1);
+            assert!(
+                error.starts_with("bad.json: not a list of rooms"),
+                "{error}"
+            );
+        }
+        let line = format!("interior {given} --compare hall -o two");
+        let error = lumigraph(here, &line).error(1);
+        assert!(error.starts_with("--compare: hall: no interior"), "{error}");
+    }
+    assert_eq!(names(here), ["bad.json", "empty.glb", "hall"]);
+}
+
+#[test]
 fn rooms_that_nobody_names_are_found() {
     let folder = with_house();
     let here = folder.path();
