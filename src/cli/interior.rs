@@ -99,9 +99,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Before what may take long.
     check_free(args)?;
     let told = Told::read(args)?;
+    say_unused(args);
     match args.model.is_dir() {
         true => run_scene(args, &options, told),
         false => run_model(args, &options, told),
+    }
+}
+
+/// Says where an option was given for nothing.
+fn say_unused(args: &Args) {
+    let why = match (args.model.is_dir(), args.up) {
+        (true, _) => "photos have no nodes that name rooms",
+        (false, Some(_)) => "with --up rooms are found anyway",
+        (false, None) => return,
+    };
+    if args.find {
+        say!("note: --find changes nothing: {why}");
     }
 }
 

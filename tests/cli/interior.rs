@@ -151,6 +151,30 @@ fn files_that_tell_of_rooms_are_read_before_any_work() {
 }
 
 #[test]
+fn that_rooms_are_to_be_found_is_said_to_change_nothing_where_they_are_anyway() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("empty.glb"), "").unwrap();
+    std::fs::create_dir(here.join("hall")).unwrap();
+    for (given, why) in [
+        ("hall --find", Some("photos have no nodes that name rooms")),
+        (
+            "empty.glb --find --up 0,1,0",
+            Some("with --up rooms are found anyway"),
+        ),
+        ("empty.glb --find", None),
+        ("empty.glb --up 0,1,0", None),
+        ("hall", None),
+    ] {
+        let ran = lumigraph(here, &format!("interior {given} -o two"));
+        let notes = ran.stderr.lines().filter(|line| line.contains("nothing: "));
+        let notes: Vec<&str> = notes.collect();
+        let why = why.map(|why| format!("note: --find changes nothing: {why}"));
+        assert_eq!(notes, Vec::from_iter(why), "{given}: {}", ran.stderr);
+    }
+}
+
+#[test]
 fn rooms_that_nobody_names_are_found() {
     let folder = with_house();
     let here = folder.path();
@@ -412,6 +436,10 @@ fn usage_errors_exit_with_2() {
         (
             "interior house.glb --hold-out split.json -o x",
             "--hold-out is for captures",
+        ),
+        (
+            "interior house.glb --rooms rooms.json --meter 2 -o x",
+            "cannot be used with",
         ),
         ("plan house --views 4", "an odd number"),
         ("plan house --span 180", "less than 180"),
