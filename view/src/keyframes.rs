@@ -6,15 +6,27 @@ use render::path::{CameraPath, Interpolation, Keyframe, PathError};
 /// Seconds from one keyframe to the next, unless one says otherwise.
 const APART_S: f64 = 2.0;
 
+/// What a file gave a keyframe beside its pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Given {
+    /// Its lens and size; those without one have the window's. All have one, or none has.
+    camera: Option<Camera>,
+    /// The scene's own time.
+    time_s: Option<f64>,
+}
+
 /// Keyframes in order, and which is chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframes {
     poses: Vec<Rigid3>,
-    /// The scene's own time at each, where a file gave one.
-    times_s: Vec<Option<f64>>,
+    given: Vec<Given>,
+    /// When each is passed, in seconds, as long as `apart_s` is `paced_s`.
+    passed_s: Vec<f64>,
+    paced_s: f64,
     /// Which one, while there are any.
     chosen: usize,
-    /// Seconds from one to the next.
+    /// Seconds from one to the next; of a file's, which may be uneven, the mean. Another value makes
+    /// all ways between them longer, or shorter, in the same proportion.
     pub apart_s: f64,
     /// Frames a second.
     pub fps: f64,
@@ -26,7 +38,9 @@ impl Default for Keyframes {
     fn default() -> Self {
         Self {
             poses: Vec::new(),
-            times_s: Vec::new(),
+            given: Vec::new(),
+            passed_s: Vec::new(),
+            paced_s: APART_S,
             chosen: 0,
             apart_s: APART_S,
             fps: 30.0,
@@ -65,23 +79,40 @@ impl Keyframes {
         with_its_choice == *other
     }
 
-    /// Adds one after the chosen one, and chooses it. The scene's time is that of the chosen one:
-    /// with one keyframe that has none, those of all others would not count.
+    /// Adds one after the chosen one, and chooses it. Its lens and the scene's time are those of the
+    /// chosen one: all lenses of a path are of one model and size, and with one keyframe that has no
+    /// time, those of all others would not count.
     pub fn add(&mut self, pose: Rigid3) {
+        (self.passed_s, self.paced_s) = (self.times_s(), self.apart_s);
         let at = self.chosen().map_or(0, |i| i + 1);
-        let time_s = self.times_s.get(self.chosen).copied().flatten();
+        let given = self.given.get(self.chosen).cloned().unwrap_or_default();
+        let before_s = at.checked_sub(1).map(|i| self.passed_s[i]);
+        for later_s in &mut self.passed_s[at..] {
+            *later_s += self.apart_s;
+        }
+        let passed_s = before_s.map_or(0.0, |before_s| before_s + self.apart_s);
         self.poses.insert(at, pose);
-        self.times_s.insert(at, time_s);
+        self.given.insert(at, given);
+        self.passed_s.insert(at, passed_s);
         self.chosen = at;
     }
 
-    /// Deletes the chosen one; the one before is chosen.
+    /// Deletes the chosen one, and the way to it; the one before is chosen.
     pub fn delete(&mut self) {
-        if self.chosen < self.poses.len() {
-            self.poses.remove(self.chosen);
-            self.times_s.remove(self.chosen);
+        let at = self.chosen;
+        if at < self.poses.len() {
+            // To the first there is no way, but from it.
+            let from = at.saturating_sub(1);
+            let to_s = self.passed_s.get(from + 1).copied();
+            let way_s = to_s.map_or(0.0, |to_s| to_s - self.passed_s[from]);
+            self.poses.remove(at);
+            self.given.remove(at);
+            self.passed_s.remove(at);
+            for later_s in &mut self.passed_s[at..] {
+                *later_s -= way_s;
+            }
         }
-        self.chosen = self.chosen.saturating_sub(1);
+        self.chosen = at.saturating_sub(1);
     }
 
     /// Moves the chosen one to a pose.
@@ -91,7 +122,8 @@ impl Keyframes {
         }
     }
 
-    /// Moves the chosen one to an earlier or later place in the order.
+    /// Moves the chosen one to an earlier or later place in the order. When places are passed stays
+    /// as it is.
     pub fn shift(&mut self, later: bool) {
         let to = match later {
             true => self.chosen + 1,
@@ -99,7 +131,7 @@ impl Keyframes {
         };
         if to < self.poses.len() {
             self.poses.swap(self.chosen, to);
-            self.times_s.swap(self.chosen, to);
+            self.given.swap(self.chosen, to);
             self.chosen = to;
         }
     }
@@ -119,22 +151,52 @@ impl Keyframes {
         self.poses.get(self.chosen).copied()
     }
 
-    /// Seconds from the first to the last.
-    pub fn duration_s(&self) -> f64 {
-        self.poses.len().saturating_sub(1) as f64 * self.apart_s
+    /// Whether they have lenses of their own.
+    pub fn has_lenses(&self) -> bool {
+        self.given.iter().any(|given| given.camera.is_some())
     }
 
-    /// As path files have them, for a camera with the lens and size of `view`.
-    pub fn stored(&self, view: &View) -> Vec<Keyframe> {
-        let camera = Camera::of(&view.lens, view.width, view.height);
-        let keyframe = |(i, (pose, time_s)): (usize, (&Rigid3, &Option<f64>))| Keyframe {
-            t_s: i as f64 * self.apart_s,
-            camera_from_world: *pose,
-            camera: camera.clone(),
-            time_s: *time_s,
+    /// The chosen one's view, where it has a lens of its own.
+    pub fn framing(&self) -> Option<View> {
+        let camera = self.given.get(self.chosen)?.camera.as_ref()?;
+        Some(View {
+            lens: camera.lens().ok()?,
+            width: camera.width,
+            height: camera.height,
+            camera_from_world: *self.poses.get(self.chosen)?,
+        })
+    }
+
+    /// When each is passed, in seconds.
+    fn times_s(&self) -> Vec<f64> {
+        let first_s = self.passed_s.first().copied().unwrap_or(0.0);
+        let time_s = |passed_s: &f64| match self.apart_s == self.paced_s {
+            // To the last bit.
+            true => *passed_s,
+            false => first_s + (passed_s - first_s) / self.paced_s * self.apart_s,
         };
-        let keyframes = self.poses.iter().zip(&self.times_s);
-        keyframes.enumerate().map(keyframe).collect()
+        self.passed_s.iter().map(time_s).collect()
+    }
+
+    /// Seconds from the first to the last.
+    pub fn duration_s(&self) -> f64 {
+        match self.times_s()[..] {
+            [first_s, .., last_s] => last_s - first_s,
+            _ => 0.0,
+        }
+    }
+
+    /// As path files have them; those without a lens of their own have that of `view`, and its size.
+    pub fn stored(&self, view: &View) -> Vec<Keyframe> {
+        let of_view = || Camera::of(&view.lens, view.width, view.height);
+        let keyframe = |((pose, given), t_s): ((&Rigid3, &Given), f64)| Keyframe {
+            t_s,
+            camera_from_world: *pose,
+            camera: given.camera.clone().unwrap_or_else(of_view),
+            time_s: given.time_s,
+        };
+        let keyframes = self.poses.iter().zip(&self.given).zip(self.times_s());
+        keyframes.map(keyframe).collect()
     }
 
     /// The frames of the film.
@@ -145,23 +207,29 @@ impl Keyframes {
         CameraPath::from_keyframes(&self.stored(view), self.interpolation, self.fps)
     }
 
-    /// Takes over keyframes of a file, their times made even.
+    /// Takes over keyframes of a file, with their lenses and times.
     pub fn load(&mut self, keyframes: &[Keyframe], interpolation: Interpolation, fps: f64) {
         self.poses = keyframes.iter().map(|k| k.camera_from_world).collect();
-        self.times_s = keyframes.iter().map(|k| k.time_s).collect();
+        let given = |k: &Keyframe| Given {
+            camera: Some(k.camera.clone()),
+            time_s: k.time_s,
+        };
+        self.given = keyframes.iter().map(given).collect();
+        self.passed_s = keyframes.iter().map(|k| k.t_s).collect();
         self.chosen = self.poses.len().saturating_sub(1);
         self.interpolation = interpolation;
         self.fps = fps;
         if let ([first, .., last], count) = (keyframes, keyframes.len()) {
             self.apart_s = (last.t_s - first.t_s) / (count - 1) as f64;
         }
+        self.paced_s = self.apart_s;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::Lens;
+    use calibrate::{Lens, ModelKind};
     use glam::{DVec2, DVec3};
     use render::PathFrame;
 
@@ -230,13 +298,84 @@ mod tests {
         for (i, x) in [(0, 0.0), (60, 1.0), (120, 3.0)] {
             assert_eq!(film.frames[i].view, view(x));
         }
+        let stored = keyframes.stored(&view(0.0));
         let mut again = Keyframes::default();
-        again.load(&keyframes.stored(&view(0.0)), Interpolation::Spline, 30.0);
-        assert_eq!(again, keyframes);
-        again.choose(0);
-        assert!(again.is_same_path(&keyframes) && again != keyframes);
-        again.shift(true);
-        assert!(!again.is_same_path(&keyframes));
+        again.load(&stored, Interpolation::Spline, 30.0);
+        assert_eq!(again.poses(), keyframes.poses());
+        assert_eq!(again.chosen(), keyframes.chosen());
+        // In whatever window.
+        let mut larger = view(0.0);
+        (larger.width, larger.height) = (64, 48);
+        assert_eq!(again.stored(&larger), stored);
+        assert_eq!(again.film(&larger), keyframes.film(&view(0.0)));
+        for mut keyframes in [keyframes, again] {
+            let same = keyframes.clone();
+            keyframes.choose(0);
+            assert!(keyframes.is_same_path(&same) && keyframes != same);
+            keyframes.shift(true);
+            assert!(!keyframes.is_same_path(&same));
+        }
+    }
+
+    #[test]
+    fn lenses_and_times_of_a_file_stay_as_they_are() {
+        let keyframe = |t_s: f64, focal: f64| Keyframe {
+            t_s,
+            camera_from_world: view(t_s).camera_from_world,
+            camera: Camera {
+                model: ModelKind::OpenCv,
+                width: 64,
+                height: 48,
+                params: vec![focal, focal, 32.0, 24.0, 0.01, 0.0, 0.0, 0.0],
+            },
+            time_s: None,
+        };
+        let file = [(1.0, 30.0), (1.5, 60.0), (4.0, 45.0)].map(|(t_s, f)| keyframe(t_s, f));
+        let mut keyframes = Keyframes::default();
+        assert!(!keyframes.has_lenses() && keyframes.framing().is_none());
+        keyframes.load(&file, Interpolation::Linear, 4.0);
+        assert_eq!(keyframes.stored(&view(0.0)), file);
+        assert_eq!(keyframes.duration_s(), 3.0);
+        let film = CameraPath::from_keyframes(&file, Interpolation::Linear, 4.0);
+        assert_eq!(keyframes.film(&view(0.0)), film);
+        assert_eq!(film.unwrap().frames[1].camera.params[0], 45.0);
+        assert_eq!(keyframes.framing().unwrap().lens.mean_focal(), 45.0);
+        // Longer ways, each in its proportion.
+        let passed_s = |keyframes: &Keyframes| {
+            let stored = keyframes.stored(&view(0.0));
+            let rounded = stored.iter().map(|k| (1e6 * k.t_s).round() / 1e6);
+            rounded.collect::<Vec<_>>()
+        };
+        let mut longer = keyframes.clone();
+        longer.apart_s *= 2.0;
+        assert_eq!(passed_s(&longer), [1.0, 2.0, 7.0]);
+        assert!(!longer.is_same_path(&keyframes));
+        longer.apart_s = keyframes.apart_s;
+        assert_eq!(longer, keyframes);
+        // Another has the chosen one's lens, and takes as long as others do in the mean.
+        keyframes.choose(1);
+        keyframes.add(view(9.0).camera_from_world);
+        assert_eq!(passed_s(&keyframes), [1.0, 1.5, 3.0, 5.5]);
+        let focal = |k: &Keyframe| k.camera.params[0];
+        let focals = |keyframes: &Keyframes| -> Vec<f64> {
+            keyframes.stored(&view(0.0)).iter().map(focal).collect()
+        };
+        assert_eq!(focals(&keyframes), [30.0, 60.0, 60.0, 45.0]);
+        assert!(keyframes.film(&view(0.0)).is_ok());
+        // Lenses go with their keyframes, times stay with their places.
+        keyframes.shift(true);
+        assert_eq!(focals(&keyframes), [30.0, 60.0, 45.0, 60.0]);
+        assert_eq!(passed_s(&keyframes), [1.0, 1.5, 3.0, 5.5]);
+        keyframes.delete();
+        keyframes.choose(0);
+        keyframes.delete();
+        assert_eq!(focals(&keyframes), [60.0, 45.0]);
+        assert_eq!(passed_s(&keyframes), [1.0, 2.5]);
+        // Where none is left, those that come have the window's.
+        keyframes.delete();
+        keyframes.delete();
+        keyframes.add(view(0.0).camera_from_world);
+        assert!(!keyframes.has_lenses() && keyframes.duration_s() == 0.0);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use calibrate::{Lens, Pixel, Rigid3, View};
 use glam::{DVec2, DVec3};
 use hands::Drag;
 use proxy::interior::CellId;
+use render::path::CameraPath;
 use render::{Method, PathFrame};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -108,8 +109,9 @@ const STILL_MOST_S: f64 = 0.8;
 
 /// A preview of the film.
 struct Playing {
-    poses: Vec<Rigid3>,
-    fps: f64,
+    film: CameraPath,
+    /// Whether its lenses are a file's, and not the window's.
+    has_lenses: bool,
     at_s: f64,
 }
 
@@ -118,6 +120,9 @@ pub struct State {
     content: Option<Content>,
     space: Option<Arc<Space>>,
     pose: Rigid3,
+    /// As much as this view is shown in place of what the first photo's camera shows: a keyframe that
+    /// has a lens of its own, or a frame of the film between such. Until one moves.
+    framing: Option<View>,
     /// In pixels.
     size: (u32, u32),
     /// How hands move the camera.
@@ -162,6 +167,7 @@ impl State {
             content: None,
             space: None,
             pose: Rigid3::IDENTITY,
+            framing: None,
             size: (0, 0),
             mode: Mode::Orbit,
             alpha: 1.0,
@@ -224,17 +230,19 @@ impl State {
 
     /// The view that is wanted; none while there is nothing to show or nothing to draw on.
     ///
-    /// A pinhole that shows as much as the first photo's camera does.
+    /// A pinhole that shows as much as the first photo's camera does, or the keyframe that one is at
+    /// with its own lens.
     pub fn view(&self) -> Option<View> {
         let (width, height) = self.size;
         let first = &self.space.as_ref()?.stops.first()?.view;
+        let framing = self.framing.as_ref().unwrap_or(first);
         if width == 0 || height == 0 {
             return None;
         }
         let (w, h) = (f64::from(width), f64::from(height));
-        let fit = (w / f64::from(first.width)).min(h / f64::from(first.height));
+        let fit = (w / f64::from(framing.width)).min(h / f64::from(framing.height));
         // Fisheyes and panoramas see more than a pinhole can.
-        let focal = (first.lens.mean_focal() * fit).max(0.35 * w.max(h));
+        let focal = (framing.lens.mean_focal() * fit).max(0.35 * w.max(h));
         let view = View {
             lens: Lens::pinhole(DVec2::splat(focal), DVec2::new(0.5 * w, 0.5 * h)),
             width,
@@ -312,18 +320,15 @@ impl State {
                 self.glide = None;
                 if let Some(pose) = self.keyframes.step(is_later) {
                     self.be_at(pose);
+                    self.frame(self.keyframes.framing());
                 }
             }
             Action::Play => {
                 self.glide = None;
                 self.playing = match (self.playing.take(), self.view()) {
                     (None, Some(view)) => self.keyframes.film(&view).ok().map(|film| Playing {
-                        poses: film
-                            .frames
-                            .iter()
-                            .map(|f| f.view.camera_from_world)
-                            .collect(),
-                        fps: film.fps,
+                        film,
+                        has_lenses: self.keyframes.has_lenses(),
                         at_s: 0.0,
                     }),
                     _ => None,
@@ -370,6 +375,7 @@ impl State {
         self.playing = None;
         self.glide = Some(Glide::new(view, target, duration_s));
         self.stop = Some(stop);
+        self.frame(None);
     }
 
     /// Where one is after walking.
@@ -387,7 +393,16 @@ impl State {
     fn be_at(&mut self, pose: Rigid3) {
         if pose != self.pose {
             self.pose = pose;
+            self.framing = None;
             self.stop = None;
+            self.still_s = 0.0;
+        }
+    }
+
+    /// Shows as much as a view does, until one moves; without one, as ever.
+    fn frame(&mut self, framing: Option<View>) {
+        if framing != self.framing {
+            self.framing = framing;
             self.still_s = 0.0;
         }
     }
@@ -411,9 +426,11 @@ impl State {
         let Some(mut playing) = self.playing.take() else {
             return;
         };
-        let last = playing.poses.len() - 1;
-        let index = ((playing.at_s * playing.fps).round() as usize).min(last);
-        self.be_at(playing.poses[index]);
+        let last = playing.film.frames.len() - 1;
+        let index = ((playing.at_s * playing.film.fps).round() as usize).min(last);
+        let view = &playing.film.frames[index].view;
+        self.be_at(view.camera_from_world);
+        self.frame(playing.has_lenses.then(|| view.clone()));
         playing.at_s += seconds;
         self.playing = (index < last).then_some(playing);
     }

@@ -1,11 +1,13 @@
 use super::*;
 use crate::content::House;
 use crate::picture::{Lines, Support};
+use calibrate::Camera;
 use datasets::house::{HouseOptions, house};
 use egui::ColorImage;
 use image::RgbaImage;
 use proxy::interior::Contents;
 use proxy::{Plane, Proxy};
+use render::path::{Interpolation, Keyframe};
 use render::{Lumigraph, PhotoStore, SourceView};
 
 fn wall() -> Content {
@@ -224,6 +226,53 @@ fn a_film_is_shown_frame_by_frame_and_ends_at_its_end() {
     assert_eq!(state.pose(), &state.keyframes.poses()[1]);
     state.act(Action::StepKeyframe(false));
     assert_eq!(state.pose(), &state.keyframes.poses()[0]);
+}
+
+#[test]
+fn a_film_with_lenses_of_its_own_zooms() {
+    let mut state = looking_at_a_wall();
+    let focal = |state: &State| state.view().unwrap().lens.mean_focal();
+    let own = focal(&state);
+    // On the spot, so that nothing but the lens changes; half as large as the window.
+    let pose = state.view().unwrap().camera_from_world;
+    let keyframe = |t_s: f64, focal: f64| Keyframe {
+        t_s,
+        camera_from_world: pose,
+        camera: Camera::of(
+            &Lens::pinhole(DVec2::splat(focal), DVec2::new(100.0, 75.0)),
+            200,
+            150,
+        ),
+        time_s: None,
+    };
+    let file = [keyframe(0.0, 100.0), keyframe(1.0, 300.0)];
+    state.keyframes.load(&file, Interpolation::Linear, 10.0);
+    let _ = state.wanted();
+    state.act(Action::StepKeyframe(true));
+    assert_eq!(focal(&state), 200.0);
+    step(&mut state, 1.0);
+    let _ = state.wanted();
+    state.act(Action::Play);
+    let (mut last, mut zooms) = (0.0, 0);
+    while state.is_playing() {
+        state.step(0.1);
+        zooms += u32::from(focal(&state) > last);
+        last = focal(&state);
+        if last > 200.0 {
+            assert!(state.wanted().is_some_and(|request| request.is_moving));
+        }
+    }
+    assert_eq!((last, zooms), (600.0, 11));
+    // Where one goes then one has the window's lens again.
+    assert_eq!(state.pose(), &pose);
+    state.hold(Motion::Left, true);
+    step(&mut state, 0.1);
+    state.let_go();
+    assert_eq!(focal(&state), own);
+    state.act(Action::StepKeyframe(false));
+    assert_eq!(focal(&state), 600.0);
+    state.act(Action::Go(0));
+    assert_eq!(focal(&state), own);
 }
 
 #[test]
