@@ -6,6 +6,7 @@ use super::exposure::ExposureArgs;
 use super::film::{Background, background};
 use super::made::{self, Made};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
+use super::output::say;
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text};
 use super::time::{AtArgs, Clock, TimeArgs};
@@ -54,7 +55,8 @@ pub(super) struct Args {
     /// What is behind where nothing is shown: #RRGGBB, or transparent, shown as squares
     #[arg(long, value_name = "COLOR", default_value = "#1c1c20", value_parser = background)]
     background: Background,
-    /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too
+    /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too; they keep
+    /// their lenses and times
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
     #[command(flatten)]
@@ -123,7 +125,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .build()?;
     let failed = Arc::new(Mutex::new(None));
     let of_loading = Arc::clone(&failed);
-    view::run(options, move |teller| {
+    let said = view::run(options, move |teller| {
         teller.say(match pool.install(|| load.run(teller)) {
             Ok(()) => Progress::Done,
             Err(error) => {
@@ -133,6 +135,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             }
         });
     })?;
+    if let Some(said) = said {
+        say!("note: keyframes were in no file: {said}");
+    }
     let failed = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
     failed.map_or(Ok(()), Err)
 }

@@ -5,7 +5,10 @@ use calibrate::{Camera, Lens, Rigid3};
 use glam::{DVec2, DVec3};
 use image::{Rgba, RgbaImage};
 use proxy::interior::{Interior, Portal, read_interior};
-use render::path::{Interpolation, Keyframe, KeyframeFile, PathFrame, write_keyframes};
+use render::path::{
+    Interpolation, Keyframe, KeyframeFile, NerfstudioFrame, PathFrame, read_keyframes,
+    write_keyframes,
+};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -428,7 +431,15 @@ fn a_capture_is_looked_at_and_filmed() {
     screen.do_all("search --name lumigraph windowunmap windowmap --sync windowfocus --sync");
     window.key("n");
     window.wait("it back", |f| is_settled(f) && !f["stop"].is_null());
+    // Esc closes the help first; at the end what is in no file is saved beside what is.
+    window.key("F1 Escape k");
+    window.wait("one more keyframe", |f| f["keyframes"] == 6);
     assert!(window.close().success());
+    let kept = |name: &str| {
+        let file = read_keyframes(&here.join("out").join(name), &NerfstudioFrame::default());
+        file.unwrap().unwrap().keyframes.len()
+    };
+    assert_eq!((kept("path.json"), kept("path_2.json")), (5, 6));
     traced_times_are_there(&here.join("trace.jsonl"));
     // What cannot be loaded is said in the window, and at its end.
     let mut window = Window::start(&screen, here, "view five");

@@ -41,6 +41,8 @@ pub(crate) enum Key {
     SavePath,
     /// Lets the graphics device be lost, where frames are traced: for tests.
     LoseDevice,
+    /// Closes the help where it is open, and the window where it is not.
+    Escape,
     /// Closes the window.
     Close,
 }
@@ -95,7 +97,7 @@ pub(crate) fn of(code: KeyCode, held: ModifiersState) -> Option<Key> {
         KeyCode::KeyH => Key::Hud,
         KeyCode::F1 => Key::Help,
         KeyCode::KeyP => Key::Shoot,
-        KeyCode::Escape => Key::Close,
+        KeyCode::Escape => Key::Escape,
         _ => return None,
     })
 }

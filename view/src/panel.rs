@@ -418,7 +418,7 @@ const HELP: [(&str, &str); 20] = [
     ("P", "screenshot"),
     (
         "Tab, H, M, F1, Esc",
-        "panel, times, floor plan, this help, close",
+        "panel, times, floor plan, this help, close (this help first)",
     ),
 ];
 

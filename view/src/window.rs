@@ -6,6 +6,7 @@ mod hands;
 mod paint;
 mod pane;
 mod panels;
+mod saves;
 
 use crate::content::Content;
 use crate::loader::{Progress, Teller};
@@ -16,10 +17,10 @@ use crate::state::State;
 use crate::trace::{Took, Trace, Watch};
 use crate::worker::{News, Worker, WorkerOptions};
 use calibrate::Pixel;
-use hands::Saves;
 use pane::{Opened, Pane};
 use panels::Panels;
 use render::path::{KeyframeFile, NerfstudioFrame};
+use saves::Saves;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -66,6 +67,9 @@ pub enum ViewError {
     /// The trace cannot be written.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Trace(PathBuf, std::io::Error),
+    /// Keyframes that were in no file could not be written to one at the end.
+    #[error("keyframes that were not saved are lost: {0}")]
+    Keyframes(String),
 }
 
 /// What other threads tell the window.
@@ -93,14 +97,16 @@ const MOST_LOSSES: u32 = 5;
 const STEADY: Duration = Duration::from_secs(10);
 
 /// Opens a window and shows in it what `load`, on a thread of its own, has to show. Returns when
-/// the window is closed; threads may still be at work then.
+/// the window is closed; threads may still be at work then. Keyframes that are in no file by then are
+/// saved: what comes back says where.
 ///
 /// # Errors
-/// No display; no device that can draw in a window; a trace that cannot be written.
+/// No display; no device that can draw in a window; a trace that cannot be written; keyframes that
+/// cannot be saved at the end.
 pub fn run(
     options: ViewOptions,
     load: impl FnOnce(&Teller) + Send + 'static,
-) -> Result<(), ViewError> {
+) -> Result<Option<String>, ViewError> {
     let no_display = |error: winit::error::EventLoopError| {
         ViewError::NoDisplay(without_place(&error.to_string()))
     };
@@ -125,7 +131,7 @@ pub fn run(
     event_loop.run_app(&mut app).map_err(no_display)?;
     match app.error {
         Some(error) => Err(error),
-        None => Ok(()),
+        None => Ok(app.said),
     }
 }
 
@@ -173,6 +179,8 @@ struct App {
     saves: Saves,
     /// When the panels want another frame.
     wake: Option<Instant>,
+    /// What people should know when the window is closed.
+    said: Option<String>,
     error: Option<ViewError>,
 }
 
@@ -217,6 +225,7 @@ impl App {
             opened: Instant::now(),
             saves,
             wake: None,
+            said: None,
             error: None,
         }
     }
@@ -285,8 +294,9 @@ impl App {
 
     fn fail(&mut self, event_loop: &ActiveEventLoop, mut error: ViewError) {
         if let ViewError::NoDevice(text) = &mut error
-            && let Some(said) = self.rescue_path()
+            && let Some(rescued) = self.rescue_path()
         {
+            let said = rescued.unwrap_or_else(|text| ViewError::Keyframes(text).to_string());
             *text = format!("{text}; {said}");
         }
         self.error = Some(error);
@@ -378,13 +388,22 @@ impl App {
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
+        self.end();
+        event_loop.exit();
+    }
+
+    /// All of closing but that the program goes on.
+    fn end(&mut self) {
         if let Some(window) = &self.window {
             window.set_visible(false);
         }
         self.trace = None;
         self.worker.end(PATIENCE);
-        self.saves.wait();
-        event_loop.exit();
+        match self.rescue_path() {
+            Some(Ok(said)) => self.said = Some(said),
+            Some(Err(text)) => self.error = self.error.take().or(Some(ViewError::Keyframes(text))),
+            None => {}
+        }
     }
 }
 
@@ -453,8 +472,8 @@ mod tests {
         assert_eq!(text, "neither is set");
     }
 
-    #[test]
-    fn what_comes_before_there_is_a_device_is_kept() {
+    /// Without a window; what it saves goes to a folder.
+    pub(super) fn app(output: PathBuf, keyframes: Option<KeyframeFile>) -> App {
         let options = ViewOptions {
             title: String::new(),
             size: (320, 240),
@@ -464,13 +483,18 @@ mod tests {
                 gpu_memory: None,
                 skips: render::Skips::ALL,
                 walk: WalkOptions::default(),
-                output: PathBuf::new(),
+                output,
             },
-            keyframes: None,
+            keyframes,
             nerfstudio: NerfstudioFrame::default(),
             trace: None,
         };
-        let mut app = App::new(options, Arc::new(|_| {}), None);
+        App::new(options, Arc::new(|_| {}), None)
+    }
+
+    #[test]
+    fn what_comes_before_there_is_a_device_is_kept() {
+        let mut app = app(PathBuf::new(), None);
         for (width, height) in [(0, 0), (1, 0), (0, 1), (u32::MAX, 1), (320, 240)] {
             app.resize(width, height);
             app.rescale(1.5);
