@@ -1,7 +1,7 @@
 //! What of the model each cell has.
 
 use super::{Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box};
-use crate::mesh::{Mesh, Model};
+use crate::mesh::{Mesh, Model, PORTAL_NODE};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -18,9 +18,6 @@ pub struct Contents {
     /// opening.
     pub elsewhere: Vec<u32>,
 }
-
-/// What the names of nodes begin with that stand for openings, and are not drawn.
-pub(super) const PORTAL_NODE: &str = "portal:";
 
 impl Contents {
     /// Finds what is in each cell, and what is odd about it.

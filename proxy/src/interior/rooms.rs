@@ -26,14 +26,14 @@
 //! flat mesh, is the opening between two of them; `portal:A|` leads outside. What follows
 //! another `|` tells openings between the same cells apart.
 
-use super::contents::{PORTAL_NODE, below};
+use super::contents::below;
 use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
 use super::turned::Seen;
 use super::{
     Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
     InteriorWarning, Polygon, Portal,
 };
-use crate::mesh::Model;
+use crate::mesh::{Model, PORTAL_NODE};
 use glam::DVec3;
 use serde::Deserialize;
 use std::collections::BTreeMap;

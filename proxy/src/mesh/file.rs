@@ -39,7 +39,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
 }
 
 /// Reads a .glb or .gltf file with its looks: textures, colours and the names of its nodes. What
-/// could not be had of the looks, and is a plain colour now, is told beside the model.
+/// could not be had of the looks, and is a plain colour now, is told beside the model; so is what is
+/// drawn opaque and is not, and what is left out, as alpha makes it invisible.
 ///
 /// # Errors
 /// As for [`read()`]; a picture that cannot be decoded.

@@ -25,6 +25,7 @@ pub use error::{ExportError, MeshFileError};
 pub use file::{parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
+pub(crate) use model::PORTAL_NODE;
 pub use model::{Material, Model, ModelNode, Part, Wrap, footprint, linear_from_srgb};
 pub use model_glb::model_to_glb;
 pub use paint::Painting;

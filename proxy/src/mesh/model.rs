@@ -5,11 +5,14 @@ use super::texture::{Level, Texture, level_of};
 use glam::{DVec2, DVec3};
 use std::ops::Range;
 
+/// What the names of nodes begin with that stand for openings, and are not drawn.
+pub(crate) const PORTAL_NODE: &str = "portal:";
+
 /// A mesh, the colours of its surface and the names of its parts.
 ///
 /// Its colour at a place is the product of its material's base colour, its texture there and
 /// its corners' colours, all as sRGB codes: no light is added, because baked light is part of
-/// the corners' colours. Everything is opaque.
+/// the corners' colours. Everything is opaque; what a file's alpha makes invisible is not there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
     /// The triangles, in the world.

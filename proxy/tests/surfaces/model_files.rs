@@ -5,6 +5,7 @@ use crate::common;
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use proxy::mesh::{self, Material, Mesh, Model, ModelNode, Part, Texture, Wrap};
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Two nodes, one below the other; a texture, a base colour and corners' colours.
@@ -215,6 +216,166 @@ fn what_has_no_triangles_takes_nobodys_looks() {
     for i in 0..plain.mesh.triangles.len() as u32 {
         assert_eq!(read.color(i, shares, 0.0), plain.color(i, shares, 0.0));
     }
+}
+
+/// The file with its materials changed.
+fn with_materials(bytes: &[u8], change: impl Fn(&mut Value)) -> Vec<u8> {
+    changed(bytes, |text| {
+        let mut json: Value = serde_json::from_str(&text).unwrap();
+        change(&mut json["materials"]);
+        json.to_string()
+    })
+}
+
+#[test]
+fn specular_glossiness_is_read_as_base_colour() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    let name = "KHR_materials_pbrSpecularGlossiness";
+    let both = with_materials(&bytes, |materials| {
+        let texture = materials[0]["pbrMetallicRoughness"]["baseColorTexture"].take();
+        materials[0]["pbrMetallicRoughness"] = json!({"baseColorFactor": [0, 0, 1, 1]});
+        materials[0]["extensions"] = json!({name: {"diffuseTexture": texture}});
+        materials[1]["extensions"] =
+            json!({name: {"diffuseFactor": [1, 0, 0, 1], "glossinessFactor": 0.5}});
+    });
+    let required = changed(&both, |text| {
+        let mut json: Value = serde_json::from_str(&text).unwrap();
+        json["extensionsRequired"] = json!([name]);
+        json.to_string()
+    });
+    for bytes in [both, required] {
+        let (read, warnings) = read(&bytes).unwrap();
+        assert_eq!(warnings, [""; 0]);
+        assert_eq!(read.materials[0], plain.materials[0]);
+        assert_eq!(read.textures, plain.textures);
+        assert_eq!(read.materials[1].base_color, [1.0, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn what_alpha_makes_invisible_is_left_out_and_told() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    let with_alpha = |alpha: f64, mode: Value| {
+        with_materials(&bytes, |materials| {
+            let glass = &mut materials[1];
+            glass["name"] = "glass".into();
+            glass["pbrMetallicRoughness"]["baseColorFactor"][3] = alpha.into();
+            for (key, value) in mode.as_object().unwrap() {
+                glass[key] = value.clone();
+            }
+        })
+    };
+    for (alpha, mode) in [
+        (0.0, json!({"alphaMode": "BLEND"})),
+        (0.001, json!({"alphaMode": "BLEND"})),
+        (0.4, json!({"alphaMode": "MASK"})),
+        (0.8, json!({"alphaMode": "MASK", "alphaCutoff": 0.9})),
+    ] {
+        let (model, warnings) = read(&with_alpha(alpha, mode)).unwrap();
+        assert_eq!(
+            warnings,
+            ["1 triangle is left out as invisible by alpha (1 material: `glass`)"]
+        );
+        assert_eq!(model.parts, plain.parts[..1]);
+        assert_eq!(model.mesh.triangles, plain.mesh.triangles[..1]);
+        assert_eq!(model.mesh.positions.len(), 3);
+        assert_eq!((model.uvs.len(), model.colors.len()), (3, 3));
+        assert_eq!(model.nodes, plain.nodes);
+    }
+    // What is opaque all the same.
+    for mode in [
+        json!({}),
+        json!({"alphaMode": "OPAQUE"}),
+        json!({"alphaMode": "MASK", "alphaCutoff": 0.0}),
+    ] {
+        let (model, warnings) = read(&with_alpha(0.0, mode)).unwrap();
+        assert_eq!((model.parts, warnings), (plain.parts.clone(), vec![]));
+    }
+    // Openings are not drawn: their outline counts.
+    let invisible = with_alpha(0.0, json!({"alphaMode": "BLEND"}));
+    let opening = changed(&invisible, |t| t.replace("\"cell:a\"", "\"portal:a|\""));
+    let (model, warnings) = read(&opening).unwrap();
+    assert_eq!((model.parts, warnings), (plain.parts.clone(), vec![]));
+    // Nothing is left.
+    let nothing = changed(&invisible, |t| {
+        t.replace("\"material\":0", "\"material\":1")
+    });
+    let error = read(&nothing).unwrap_err();
+    assert!(
+        error.starts_with("m.glb: all its triangles (2) are invisible"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_not_opaque_is_told_once() {
+    let warnings_of = |alpha: u8, materials: [Value; 2]| {
+        let mut model = small();
+        // Corners are written as opaque.
+        let picture = RgbaImage::from_fn(2, 1, |x, _| {
+            Rgba([9, 9, 9, if x == 0 { 255 } else { alpha }])
+        });
+        model.textures = vec![Texture::new(picture)];
+        let bytes = mesh::model_to_glb(&model).unwrap();
+        let changed = with_materials(&bytes, |all| {
+            for (material, more) in all.as_array_mut().unwrap().iter_mut().zip(&materials) {
+                for (key, value) in more.as_object().unwrap() {
+                    material[key] = value.clone();
+                }
+            }
+        });
+        read(&changed).unwrap().1
+    };
+    let opaque = |of: &str| format!("what is transparent or cut out is drawn opaque ({of})");
+    let (blend, mask) = (
+        json!({"alphaMode": "BLEND"}),
+        json!({"alphaMode": "MASK", "name": "leaf"}),
+    );
+    let half = json!({"alphaMode": "BLEND", "name": "glass",
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5]}});
+    for (alpha, materials, expected) in [
+        // They may be opaque whatever they are said to be.
+        (255, [blend.clone(), blend.clone()], vec![]),
+        (128, [mask.clone(), json!({})], vec![]),
+        (0, [json!({}), json!({})], vec![]),
+        // A texture, a factor, both.
+        (
+            254,
+            [blend.clone(), json!({})],
+            vec![opaque("1 material: number 0")],
+        ),
+        (
+            127,
+            [mask.clone(), json!({})],
+            vec![opaque("1 material: `leaf`")],
+        ),
+        (
+            255,
+            [json!({}), half.clone()],
+            vec![opaque("1 material: `glass`")],
+        ),
+        (
+            0,
+            [mask, half],
+            vec![opaque("2 materials: `leaf`, `glass`")],
+        ),
+    ] {
+        assert_eq!(warnings_of(alpha, materials), expected);
+    }
+    // Extensions: those that change no colour without light are no loss.
+    let clear = json!({"name": "pane", "extensions": {
+        "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 0.9}}});
+    let unlit = json!({"extensions": {"KHR_materials_unlit": {}}});
+    assert_eq!(
+        warnings_of(255, [unlit, clear.clone()]),
+        ["KHR_materials_transmission is not applied (1 material: `pane`)"]
+    );
+    assert_eq!(
+        warnings_of(255, [clear.clone(), clear]),
+        ["KHR_materials_transmission is not applied (2 materials: `pane`, `pane`)"]
+    );
 }
 
 /// How the file names its picture's bytes.

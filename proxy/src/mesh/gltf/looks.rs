@@ -2,14 +2,13 @@
 
 use super::accessor::Accessors;
 use super::buffers::fetch;
+use super::materials::{MaterialEntry, TextureUse, not_shown};
+use super::pictures::{Decoded, Picture, decode};
 use super::{Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
-use crate::mesh::{Material, MeshFileError, Model, ModelNode, Part, Texture, Wrap};
-use image::{ImageReader, Limits, RgbaImage};
-use rayon::prelude::*;
+use crate::mesh::{Material, MeshFileError, Model, ModelNode, PORTAL_NODE, Part, Wrap};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
 #[derive(Deserialize)]
@@ -46,30 +45,6 @@ struct Primitive {
     material: Option<usize>,
 }
 
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct MaterialEntry {
-    #[serde(default)]
-    pbr_metallic_roughness: Roughness,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Roughness {
-    base_color_factor: Option<[f64; 4]>,
-    base_color_texture: Option<TextureUse>,
-}
-
-#[derive(Clone, Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct TextureUse {
-    index: usize,
-    #[serde(default)]
-    tex_coord: u32,
-    #[serde(default)]
-    extensions: BTreeMap<String, serde::de::IgnoredAny>,
-}
-
 #[derive(Deserialize)]
 struct TextureEntry {
     source: Option<usize>,
@@ -93,7 +68,7 @@ struct Sampler {
 }
 
 /// Reads a .glb or .gltf file with its looks. What could not be had of them is told beside the
-/// model; it has a plain colour instead.
+/// model, and has a plain colour instead; so is what is drawn opaque or left out.
 pub(in crate::mesh) fn parse_model(
     path: &Path,
     bytes: &[u8],
@@ -108,42 +83,31 @@ pub(in crate::mesh) fn parse_model(
         ..Looks::default()
     };
     let mesh = super::read(path, bytes.len(), &root, blob, &mut looks)?;
+    let hidden: usize = looks.hidden.values().sum();
+    if mesh.triangles.is_empty() && hidden > 0 {
+        return Err(MeshFileError::File(
+            path.to_owned(),
+            format!(
+                "all its triangles ({hidden}) are invisible, as their materials' alpha is 0 or less \
+                 than the cutoff; export the model again with materials that are opaque"
+            ),
+        ));
+    }
+    let decoded = decode(path, &looks.pictures)?;
+    let not_shown = looks.not_shown(&decoded);
     let Looks {
         mut model,
         mut warnings,
-        pictures,
         ..
     } = looks;
     model.uvs.resize(mesh.positions.len(), [0.0; 2]);
     model.colors.resize(mesh.positions.len(), [255; 4]);
     model.mesh = mesh;
-    let mut together = 0;
-    for picture in &pictures {
-        together += decoded_size(&picture.bytes);
-        if together > MAX_PICTURES {
-            return Err(MeshFileError::Record {
-                path: path.to_owned(),
-                record: format!("image {}", picture.number),
-                problem: format!(
-                    "with those before it, it takes {} MiB of memory, more than {} MiB; make the \
-                     model's pictures smaller",
-                    together >> 20,
-                    MAX_PICTURES >> 20
-                ),
-            });
-        }
+    for picture in decoded {
+        model.textures.push(picture.texture);
+        warnings.extend(picture.warning);
     }
-    // On all threads, in order.
-    let texture = |p: &_| {
-        let (picture, warning) = decode(path, p)?;
-        Ok((Texture::new(picture), warning))
-    };
-    let decoded: Vec<Result<_, MeshFileError>> = pictures.par_iter().map(texture).collect();
-    for texture in decoded {
-        let (texture, warning) = texture?;
-        model.textures.push(texture);
-        warnings.extend(warning);
-    }
+    warnings.extend(not_shown);
     Ok((model, warnings))
 }
 
@@ -157,6 +121,12 @@ struct Looks {
     node_idxs: BTreeMap<usize, u32>,
     /// The same of materials; `None` is the one of primitives that name none.
     material_idxs: BTreeMap<Option<usize>, u32>,
+    /// Of each of the model's nodes, whether it stands for an opening, which is not drawn.
+    openings: Vec<bool>,
+    /// How many triangles are left out as nobody could see them, by the file's materials.
+    hidden: BTreeMap<usize, usize>,
+    /// The least alpha of corners that are drawn, by the file's materials.
+    drawn: BTreeMap<usize, f64>,
     /// Of each picture of the file, the model's texture, or none where it is missing.
     picture_idxs: BTreeMap<usize, Option<u32>>,
     /// Textures that are yet to be decoded.
@@ -166,20 +136,29 @@ struct Looks {
     most_encoded: usize,
 }
 
-struct Picture {
-    number: usize,
-    bytes: Vec<u8>,
-}
-
 impl Visitor for Looks {
     fn node(&mut self, number: usize, parent: Option<usize>) {
-        let names = self.root.as_ref().and_then(|root| root.nodes.get(number));
+        let named = self.root.as_ref().and_then(|root| root.nodes.get(number));
+        let name = named.map(|n| n.name.clone()).unwrap_or_default();
         let parent_idx = parent.and_then(|p| self.node_idxs.get(&p).copied());
+        let is_below = parent.is_some_and(|p| self.is_opening(p));
+        self.openings
+            .push(is_below || name.starts_with(PORTAL_NODE));
         self.node_idxs.insert(number, self.model.nodes.len() as u32);
-        self.model.nodes.push(ModelNode {
-            name: names.map(|n| n.name.clone()).unwrap_or_default(),
-            parent_idx,
-        });
+        self.model.nodes.push(ModelNode { name, parent_idx });
+    }
+
+    fn leaves_out(&self, node: usize, mesh: usize, primitive: usize) -> bool {
+        // Of an opening only the outline counts.
+        let material = self.material_of(mesh, primitive);
+        let entry = material.and_then(|number| self.entry(number));
+        entry.is_some_and(MaterialEntry::is_invisible) && !self.is_opening(node)
+    }
+
+    fn left_out(&mut self, mesh: usize, primitive: usize, triangles: usize) {
+        if let (Some(number), true) = (self.material_of(mesh, primitive), triangles > 0) {
+            *self.hidden.entry(number).or_insert(0) += triangles;
+        }
     }
 
     fn primitive(
@@ -216,6 +195,7 @@ impl Visitor for Looks {
             }
         }
         let corners = self.model.uvs.len() + count;
+        let mut least_alpha = 1.0_f64;
         if let Some(accessor) = uvs {
             let finite = |x: f64| if x.is_finite() { x as f32 } else { 0.0 };
             let uv = |[u, v, ..]: [f64; 4]| [finite(u), finite(v)];
@@ -225,7 +205,10 @@ impl Visitor for Looks {
         }
         if let Some(accessor) = colors {
             let code = |x: f64| (255.0 * srgb_from_linear(x)).round() as u8;
-            let color = |[r, g, b, _]: [f64; 4]| [code(r), code(g), code(b), 255];
+            let color = |[r, g, b, alpha]: [f64; 4]| {
+                least_alpha = least_alpha.min(alpha);
+                [code(r), code(g), code(b), 255]
+            };
             let colors = accessors.vectors(accessor)?;
             self.model.colors.extend(colors.map(color));
         } else {
@@ -233,6 +216,10 @@ impl Visitor for Looks {
         }
         // 2. What they are part of.
         let has_uvs = uvs.is_some();
+        if let (Some(number), false) = (number, self.is_opening(place.node)) {
+            let least = self.drawn.entry(number).or_insert(1.0);
+            *least = least.min(least_alpha);
+        }
         let material_idx = self.material(accessors, number)?;
         let is_textured = self.model.materials[material_idx as usize]
             .texture_idx
@@ -252,9 +239,42 @@ impl Visitor for Looks {
 }
 
 impl Looks {
+    /// A material of the file.
+    fn entry(&self, material: usize) -> Option<&MaterialEntry> {
+        self.root.as_ref()?.materials.get(material)
+    }
+
+    /// Which material a primitive names.
+    fn material_of(&self, mesh: usize, primitive: usize) -> Option<usize> {
+        let mesh = self.root.as_ref()?.meshes.get(mesh)?;
+        mesh.primitives.get(primitive)?.material
+    }
+
     fn texture_use(&self, material: Option<usize>) -> Option<&TextureUse> {
-        let entry = self.root.as_ref()?.materials.get(material?)?;
-        entry.pbr_metallic_roughness.base_color_texture.as_ref()
+        self.entry(material?)?.texture()
+    }
+
+    /// Whether a node of the file stands for an opening, or is below one that does.
+    fn is_opening(&self, node: usize) -> bool {
+        let idx = self.node_idxs.get(&node);
+        idx.and_then(|idx| self.openings.get(*idx as usize)) == Some(&true)
+    }
+
+    /// What of the materials is not shown as the file says.
+    fn not_shown(&self, decoded: &[Decoded]) -> Vec<String> {
+        let of_texture = |number: &usize| {
+            let idx = self.material_idxs.get(&Some(*number))?;
+            let material = self.model.materials.get(*idx as usize)?;
+            let picture = decoded.get(material.texture_idx? as usize)?;
+            Some(picture.least_alpha)
+        };
+        let drawn = self.drawn.iter().map(|(number, of_corners)| {
+            let of_texture = of_texture(number).unwrap_or(1.0);
+            (*number, of_corners * of_texture)
+        });
+        let drawn: BTreeMap<usize, f64> = drawn.collect();
+        let materials = self.root.as_ref().map(|root| &root.materials[..]);
+        not_shown(materials.unwrap_or_default(), &self.hidden, &drawn)
     }
 
     /// The model's material for one of the file's.
@@ -273,7 +293,7 @@ impl Looks {
             .and_then(|root| root.materials.get(number?));
         match (entry, number) {
             (Some(entry), _) => {
-                if let Some([r, g, b, _]) = entry.pbr_metallic_roughness.base_color_factor {
+                if let Some([r, g, b, _]) = entry.factor() {
                     material.base_color = [r, g, b].map(|x| srgb_from_linear(x) as f32);
                 }
             }
@@ -364,47 +384,5 @@ impl Looks {
         };
         self.picture_idxs.insert(image, idx);
         Ok((idx, wraps))
-    }
-}
-
-/// Bytes that a picture may take, decoded.
-const MAX_PICTURE: u64 = 1 << 30;
-/// Bytes that all of a model's may take.
-const MAX_PICTURES: u64 = 4 << 30;
-
-/// Bytes that a picture takes as RGBA, with the smaller ones of it, by what it says of itself; none where
-/// it does not.
-fn decoded_size(bytes: &[u8]) -> u64 {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let size = reader.ok().and_then(|r| r.into_dimensions().ok());
-    size.map_or(0, |(width, height)| {
-        16 * u64::from(width) * u64::from(height) / 3
-    })
-}
-
-/// A picture; white, and a warning, where it is of a kind that is not read.
-fn decode(path: &Path, picture: &Picture) -> Result<(RgbaImage, Option<String>), MeshFileError> {
-    let record = format!("image {}", picture.number);
-    let failed = |problem: String| MeshFileError::Record {
-        path: path.to_owned(),
-        record: record.clone(),
-        problem,
-    };
-    let reader = ImageReader::new(Cursor::new(&picture.bytes)).with_guessed_format();
-    let mut reader = reader.map_err(|e| failed(e.to_string()))?;
-    let is_read = |f| matches!(f, image::ImageFormat::Png | image::ImageFormat::Jpeg);
-    if !reader.format().is_some_and(is_read) {
-        let white = RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
-        let warning = format!("{record} is neither PNG nor JPEG: a plain colour instead");
-        return Ok((white, Some(warning)));
-    }
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(MAX_PICTURE);
-    reader.limits(limits);
-    match reader.decode() {
-        Ok(decoded) => Ok((decoded.into_rgba8(), None)),
-        Err(error) => Err(failed(format!(
-            "it cannot be decoded ({error}); export the model again"
-        ))),
     }
 }

@@ -7,6 +7,8 @@
 mod accessor;
 mod buffers;
 mod looks;
+mod materials;
+mod pictures;
 
 pub(super) use looks::parse_model;
 
@@ -80,8 +82,8 @@ struct Attributes {
     position: Option<usize>,
 }
 
-/// Required extensions that change how a surface looks, not where it is, and the one that
-/// only allows positions of whole numbers.
+/// Required extensions that change how a surface looks, not where it is (what of them is not shown is
+/// told with a model), and the one that only allows positions of whole numbers.
 const HARMLESS: [&str; 5] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -97,6 +99,14 @@ const MAX_GROWTH: usize = 64;
 trait Visitor {
     /// A node of the scene, after its parent.
     fn node(&mut self, _number: usize, _parent: Option<usize>) {}
+
+    /// Whether a primitive of a node's mesh is to be left out.
+    fn leaves_out(&self, _node: usize, _mesh: usize, _primitive: usize) -> bool {
+        false
+    }
+
+    /// A primitive that was left out, and how many triangles it has.
+    fn left_out(&mut self, _mesh: usize, _primitive: usize, _triangles: usize) {}
 
     /// A primitive whose triangles have been read.
     fn primitive(
@@ -190,6 +200,11 @@ fn read(
             let entry = root.meshes.get(number as usize);
             let entry = entry.ok_or_else(|| record(format!("there is no mesh {number}")))?;
             for (i, primitive) in entry.primitives.iter().enumerate() {
+                if visitor.leaves_out(node, number as usize, i) {
+                    let triangles = reader.triangle_count(primitive)?;
+                    visitor.left_out(number as usize, i, triangles);
+                    continue;
+                }
                 let name = format!("mesh {number}, primitive {i}");
                 let (corner, triangle) = (reader.mesh.positions.len(), reader.mesh.triangles.len());
                 reader.primitive(primitive, &name, &world_from_node)?;
@@ -335,6 +350,21 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// How many triangles a primitive is made of.
+    fn triangle_count(&mut self, primitive: &Primitive) -> Result<usize, MeshFileError> {
+        let Some(positions) = primitive.attributes.position else {
+            return Ok(0);
+        };
+        let corners = self
+            .accessors
+            .count(primitive.indices.unwrap_or(positions))?;
+        Ok(match primitive.mode.unwrap_or(4) {
+            4 => corners / 3,
+            5 | 6 => corners.saturating_sub(2),
+            _ => 0,
+        })
+    }
+
     /// Takes in a primitive if it is made of triangles.
     fn primitive(
         &mut self,

@@ -1,0 +1,203 @@
+//! What a glTF file says of its materials, and what of that is not shown.
+
+use crate::mesh::obj::shown;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
+
+/// A material of the file.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MaterialEntry {
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    pbr_metallic_roughness: Roughness,
+    #[serde(default)]
+    alpha_mode: AlphaMode,
+    alpha_cutoff: Option<f64>,
+    #[serde(default)]
+    extensions: BTreeMap<String, Extension>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Roughness {
+    base_color_factor: Option<[f64; 4]>,
+    base_color_texture: Option<TextureUse>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+enum AlphaMode {
+    Mask,
+    Blend,
+    #[default]
+    #[serde(other)]
+    Opaque,
+}
+
+/// An extension of a material: what [`GLOSSINESS`] has for looks, all else passed over.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Extension {
+    diffuse_factor: Option<[f64; 4]>,
+    diffuse_texture: Option<TextureUse>,
+}
+
+/// A texture that a material uses.
+#[derive(Clone, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureUse {
+    pub(super) index: usize,
+    #[serde(default)]
+    pub(super) tex_coord: u32,
+    #[serde(default)]
+    pub(super) extensions: BTreeMap<String, IgnoredAny>,
+}
+
+/// The extension whose diffuse colour stands in place of the base colour.
+const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+
+/// Extensions that leave colour and opacity without light as they are, and what is read.
+const NO_LOSS: [&str; 12] = [
+    GLOSSINESS,
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_unlit",
+    // What another lets through.
+    "KHR_materials_volume",
+    "KHR_xmp_json_ld",
+];
+
+/// What no picture of eight bits shows.
+const LEAST_ALPHA: f64 = 0.5 / 255.0;
+
+impl MaterialEntry {
+    fn glossiness(&self) -> Option<&Extension> {
+        self.extensions.get(GLOSSINESS)
+    }
+
+    /// Base colour and alpha, linear, where they are not 1.
+    pub(super) fn factor(&self) -> Option<[f64; 4]> {
+        match self.glossiness() {
+            Some(glossiness) => glossiness.diffuse_factor,
+            None => self.pbr_metallic_roughness.base_color_factor,
+        }
+    }
+
+    /// The texture of the base colour.
+    pub(super) fn texture(&self) -> Option<&TextureUse> {
+        match self.glossiness() {
+            Some(glossiness) => glossiness.diffuse_texture.as_ref(),
+            None => self.pbr_metallic_roughness.base_color_texture.as_ref(),
+        }
+    }
+
+    /// Its own, which textures and corners multiply.
+    fn alpha(&self) -> f64 {
+        self.factor().map_or(1.0, |[.., alpha]| alpha)
+    }
+
+    fn cutoff(&self) -> f64 {
+        self.alpha_cutoff.unwrap_or(0.5)
+    }
+
+    /// Whether nothing with it can be seen, whatever its texture and corners have.
+    pub(super) fn is_invisible(&self) -> bool {
+        match self.alpha_mode {
+            AlphaMode::Opaque => false,
+            AlphaMode::Mask => self.alpha() < self.cutoff(),
+            AlphaMode::Blend => self.alpha() <= LEAST_ALPHA,
+        }
+    }
+
+    /// Whether something is to be seen through it somewhere; `least_alpha` is the least that its
+    /// texture and corners have, multiplied.
+    fn is_seen_through(&self, least_alpha: f64) -> bool {
+        let alpha = self.alpha() * least_alpha;
+        match self.alpha_mode {
+            AlphaMode::Opaque => false,
+            AlphaMode::Mask => alpha < self.cutoff(),
+            AlphaMode::Blend => alpha < 1.0 - LEAST_ALPHA,
+        }
+    }
+}
+
+/// What is not shown of a file's materials as it says, each kind once. `hidden` are triangles left
+/// out, by material; `drawn` is the least alpha of what is drawn, that of textures and corners,
+/// by material.
+pub(super) fn not_shown(
+    materials: &[MaterialEntry],
+    hidden: &BTreeMap<usize, usize>,
+    drawn: &BTreeMap<usize, f64>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    // 1. What is not there.
+    if !hidden.is_empty() {
+        let count: usize = hidden.values().sum();
+        let triangles = match count {
+            1 => "1 triangle is".to_owned(),
+            _ => format!("{count} triangles are"),
+        };
+        let numbers: Vec<usize> = hidden.keys().copied().collect();
+        let of = listed(materials, &numbers);
+        warnings.push(format!("{triangles} left out as invisible by alpha ({of})"));
+    }
+    // 2. What hides what is behind it.
+    let mut seen_through = Vec::new();
+    let mut extended: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (number, least_alpha) in drawn {
+        let Some(material) = materials.get(*number) else {
+            continue;
+        };
+        if material.is_seen_through(*least_alpha) {
+            seen_through.push(*number);
+        }
+        let names = material.extensions.keys().map(String::as_str);
+        for name in names.filter(|name| !NO_LOSS.contains(name)) {
+            extended.entry(name).or_default().push(*number);
+        }
+    }
+    if !seen_through.is_empty() {
+        let of = listed(materials, &seen_through);
+        warnings.push(format!(
+            "what is transparent or cut out is drawn opaque ({of})"
+        ));
+    }
+    // 3. What may look otherwise.
+    for (name, numbers) in extended {
+        let of = listed(materials, &numbers);
+        warnings.push(format!("{} is not applied ({of})", shown(name)));
+    }
+    warnings
+}
+
+/// So many materials are named at most.
+const MOST_NAMES: usize = 3;
+
+/// Materials as messages show them: how many, and the names of the first.
+fn listed(materials: &[MaterialEntry], numbers: &[usize]) -> String {
+    let name = |number: &usize| match materials.get(*number).map(|m| m.name.as_str()) {
+        None | Some("") => format!("number {number}"),
+        Some(name) => format!("`{}`", shown(name)),
+    };
+    let names: Vec<String> = numbers.iter().take(MOST_NAMES).map(name).collect();
+    let noun = if numbers.len() == 1 {
+        "material"
+    } else {
+        "materials"
+    };
+    let more = if numbers.len() > MOST_NAMES {
+        ", …"
+    } else {
+        ""
+    };
+    format!("{} {noun}: {}{more}", numbers.len(), names.join(", "))
+}
