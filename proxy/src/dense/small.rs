@@ -1,9 +1,11 @@
 //! Photos made small and straight for comparing.
 
+use super::windows::WINDOW;
 use calibrate::{Pixel, View};
 use glam::{DMat3, DVec3};
 use image::RgbaImage;
 use image::imageops::{FilterType, resize};
+use std::ops::Range;
 
 /// The widest angle from the axis that a straight photo shows, radians: beyond it a pinhole
 /// spends its pixels on little.
@@ -11,13 +13,15 @@ const WIDEST: f64 = 0.95;
 /// Alpha from which on a pixel is used.
 const OPAQUE: u8 = 128;
 
-/// A reduced photo through a pinhole.
+/// A reduced photo through a pinhole: what is around all that is used of it.
 #[derive(Clone, Debug)]
 pub(super) struct SmallPhoto {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// In pixels; the principal point is the image's middle.
+    /// In pixels.
     pub(super) focal: f64,
+    /// Where the axis meets it, in pixels: the middle of the whole photo.
+    pub(super) principal: [f64; 2],
     /// Turns world directions into the camera's.
     pub(super) rotation: DMat3,
     /// In the world.
@@ -33,7 +37,7 @@ pub(super) struct SmallPhoto {
 }
 
 impl SmallPhoto {
-    /// `None` for a view without any ray to look along.
+    /// `None` for a view without any ray to look along, or a photo of which nothing is used.
     pub(super) fn new(view: &View, photo: &RgbaImage, long_side: u32) -> Option<Self> {
         // 1. The pinhole: as wide as the photo, within reason.
         let long = f64::from(view.width.max(view.height));
@@ -77,9 +81,10 @@ impl SmallPhoto {
         let to_small = [f64::from(small.width()) / w, f64::from(small.height()) / h];
         let mut grays = vec![0.0; width * height];
         let mut used = vec![false; width * height];
+        let principal = [width, height].map(|side| side as f64 / 2.0);
         for y in 0..height {
             for x in 0..width {
-                let ray = ray([x, y], [width, height], focal);
+                let ray = ray([x, y], principal, focal);
                 let Some(pixel) = view.lens.project(ray).filter(|p| view.contains(*p)) else {
                     continue;
                 };
@@ -88,13 +93,21 @@ impl SmallPhoto {
                 used[y * width + x] = alpha >= f32::from(OPAQUE);
             }
         }
+        // 3. What is used, and what windows on it reach.
+        let [columns, rows] = around_used(&used, width)?;
+        let grays = cut(&grays, width, &columns, &rows);
+        let used = cut(&used, width, &columns, &rows);
         Some(Self {
-            width,
-            height,
+            width: columns.len(),
+            height: rows.len(),
             focal,
+            principal: [
+                principal[0] - columns.start as f64,
+                principal[1] - rows.start as f64,
+            ],
             rotation: view.camera_from_world.matrix(),
             center: view.center(),
-            quads: quads(&grays, &used, width),
+            quads: quads(&grays, &used, columns.len()),
             grays,
             used,
         })
@@ -104,8 +117,9 @@ impl SmallPhoto {
     /// along z; `None` behind the camera.
     pub(super) fn project(&self, point_in_world: DVec3) -> Option<([f64; 2], f64)> {
         let p = self.rotation * (point_in_world - self.center);
-        let at = |v: f64, side: usize| self.focal * v / p.z + side as f64 / 2.0;
-        (p.z > 0.0).then(|| ([at(p.x, self.width), at(p.y, self.height)], p.z))
+        let [x, y] = self.principal;
+        let at = |v: f64, principal: f64| self.focal * v / p.z + principal;
+        (p.z > 0.0).then(|| ([at(p.x, x), at(p.y, y)], p.z))
     }
 
     /// The index of the pixel that a position falls on, if it lies in the photo.
@@ -116,7 +130,7 @@ impl SmallPhoto {
 
     /// The ray of a pixel's centre in the camera's frame, at z = 1.
     pub(super) fn ray(&self, x: usize, y: usize) -> DVec3 {
-        ray([x, y], [self.width, self.height], self.focal)
+        ray([x, y], self.principal, self.focal)
     }
 
     /// The point at an inverse depth behind a pixel's centre.
@@ -126,9 +140,39 @@ impl SmallPhoto {
 }
 
 /// See [`SmallPhoto::ray`].
-fn ray([x, y]: [usize; 2], [width, height]: [usize; 2], focal: f64) -> DVec3 {
-    let at = |i: usize, side: usize| (i as f64 + 0.5 - side as f64 / 2.0) / focal;
-    DVec3::new(at(x, width), at(y, height), 1.0)
+fn ray([x, y]: [usize; 2], principal: [f64; 2], focal: f64) -> DVec3 {
+    let at = |i: usize, principal: f64| (i as f64 + 0.5 - principal) / focal;
+    DVec3::new(at(x, principal[0]), at(y, principal[1]), 1.0)
+}
+
+/// The columns and rows that are used of an image so wide, with a border that windows on them reach, and one
+/// pixel more that is not used, so that nothing is repeated beyond it. `None` if nothing is used.
+fn around_used(used: &[bool], width: usize) -> Option<[Range<usize>; 2]> {
+    let height = used.len() / width;
+    let is_used = |row: &&[bool]| row.contains(&true);
+    let rows = used.chunks_exact(width).enumerate();
+    let rows: Vec<(usize, &[bool])> = rows.filter(|(_, row)| is_used(row)).collect();
+    let (top, bottom) = (rows.first()?.0, rows.last()?.0);
+    let left = rows
+        .iter()
+        .filter_map(|(_, row)| row.iter().position(|u| *u));
+    let right = rows
+        .iter()
+        .filter_map(|(_, row)| row.iter().rposition(|u| *u));
+    let border = WINDOW / 2 + 1;
+    let around = |first: usize, last: usize, side: usize| {
+        first.saturating_sub(border)..(last + 1 + border).min(side)
+    };
+    Some([
+        around(left.min()?, right.max()?, width),
+        around(top, bottom, height),
+    ])
+}
+
+/// Some columns and rows of an image so wide.
+fn cut<T: Copy>(image: &[T], width: usize, columns: &Range<usize>, rows: &Range<usize>) -> Vec<T> {
+    let of_row = |y: usize| &image[y * width..][columns.clone()];
+    rows.clone().flat_map(of_row).copied().collect()
 }
 
 /// See [`SmallPhoto::quads`].

@@ -26,8 +26,8 @@ pub(super) fn points(photos: &[Option<SmallPhoto>], ranges: &[[f64; 2]]) -> Vec<
             let share = |k: usize, of: usize| (k as f64 + 0.5) / of as f64;
             let depth = k / (ACROSS * DOWN);
             let inverse = far + (near - far) * depth as f64 / (DEPTHS - 1) as f64;
-            let x = (share(k % ACROSS, ACROSS) - 0.5) * photo.width as f64;
-            let y = (share(k / ACROSS % DOWN, DOWN) - 0.5) * photo.height as f64;
+            let x = share(k % ACROSS, ACROSS) * photo.width as f64 - photo.principal[0];
+            let y = share(k / ACROSS % DOWN, DOWN) * photo.height as f64 - photo.principal[1];
             let in_camera = DVec3::new(x / photo.focal, y / photo.focal, 1.0) / inverse;
             photo.center + photo.rotation.transpose() * in_camera
         });

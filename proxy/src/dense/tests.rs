@@ -245,6 +245,63 @@ fn where_photos_show_nothing_in_common_there_are_no_points() {
 }
 
 #[test]
+fn of_a_photo_what_is_used_is_compared_and_lies_where_it_did() {
+    let (solid, views, sparse) = seen_by_nine();
+    let whole: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();
+    // The right half without its corner, as a matte of an object would have it.
+    let is_used = |x: u32, y: u32| x >= 96 && y >= 24 && (x < 150 || y < 100);
+    let part = |i: usize| {
+        let mut part = whole[i].clone();
+        for (x, y, pixel) in part.enumerate_pixels_mut() {
+            pixel.0[3] = if is_used(x, y) { 255 } else { 0 };
+        }
+        part
+    };
+    let [all, some] =
+        [whole[4].clone(), part(4)].map(|photo| SmallPhoto::new(&views[4], &photo, 192).unwrap());
+    assert_eq!([all.width, all.height], [192, 144]);
+    assert_eq!([some.width, some.height], [192 - 96 + 3, 144 - 24 + 3]);
+    assert_eq!(some.used.iter().filter(|u| **u).count(), 96 * 120 - 42 * 44);
+    for (x, y) in [(0, 0), (50, 70), (98, 122)] {
+        let (at, there) = (y * some.width + x, (y + 21) * all.width + x + 93);
+        assert_eq!(some.grays[at], all.grays[there]);
+        let point = some.point(x, y, 0.2);
+        assert!((point - all.point(x + 93, y + 21, 0.2)).length() < 1e-12);
+        assert_eq!(
+            some.project(point).and_then(|(p, _)| some.index(p)),
+            Some(at)
+        );
+    }
+    // What is used has the depths that it has in whole photos, which differ where others are transparent.
+    let depths = |photo: &dyn Fn(usize) -> RgbaImage| {
+        let photos: Vec<RgbaImage> = (0..9).map(photo).collect();
+        let photo = |i: usize| Some(photos[i].clone());
+        let mut matching = Matching::new(&views, &sparse, photo, |_| None, &SMALL);
+        matching.compare(&[]);
+        matching.maps[4][0].map.clone().unwrap()
+    };
+    let only_four = |i: usize| if i == 4 { part(4) } else { whole[i].clone() };
+    let (of_all, of_some) = (depths(&|i| whole[i].clone()), depths(&only_four));
+    let scale = SmallPhoto::new(&views[4], &whole[4], SMALL.long_side).unwrap();
+    let cut = SmallPhoto::new(&views[4], &part(4), SMALL.long_side).unwrap();
+    let shift = [0, 1].map(|k| (scale.principal[k] - cut.principal[k]).round() as usize);
+    let (mut alike, mut used) = (0, 0);
+    for i in (0..cut.used.len()).filter(|i| cut.used[*i]) {
+        let (x, y) = (i % cut.width + shift[0], i / cut.width + shift[1]);
+        let [a, b] = [
+            of_some.inverse_depths[i],
+            of_all.inverse_depths[y * scale.width + x],
+        ];
+        used += 1;
+        alike += u32::from((a - b).abs() <= 0.01 * b);
+    }
+    assert!(alike > 97 * used / 100, "{alike} of {used}");
+    // Of nothing there is no photo.
+    let nothing = RgbaImage::new(192, 144);
+    assert!(SmallPhoto::new(&views[4], &nothing, 192).is_none());
+}
+
+#[test]
 fn leaving_a_photo_out_is_as_if_it_had_never_been_taken() {
     let (options, (solid, views, sparse)) = (SMALL, seen_by_nine());
     let photos: Vec<RgbaImage> = views.iter().map(|v| photo(&solid, v)).collect();

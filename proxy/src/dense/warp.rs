@@ -22,13 +22,12 @@ impl<'a> Warp<'a> {
         // x' ~ R x + t·w for the ray x through a pixel, z = 1.
         let rotation = other.rotation * reference.rotation.transpose();
         let translation = other.rotation * (reference.center - other.center);
-        let half = |side: usize| side as f64 / 2.0;
         let from_pixel = DMat3::from_cols(
             DVec3::X / reference.focal,
             DVec3::Y / reference.focal,
             DVec3::new(
-                (0.5 - half(reference.width)) / reference.focal,
-                (0.5 - half(reference.height)) / reference.focal,
+                (0.5 - reference.principal[0]) / reference.focal,
+                (0.5 - reference.principal[1]) / reference.focal,
                 1.0,
             ),
         );
@@ -37,7 +36,7 @@ impl<'a> Warp<'a> {
         let to_pixel = DMat3::from_cols(
             DVec3::X * other.focal,
             DVec3::Y * other.focal,
-            DVec3::new(half(other.width) - 0.5, half(other.height) - 0.5, 1.0),
+            DVec3::new(other.principal[0] - 0.5, other.principal[1] - 0.5, 1.0),
         );
         Self {
             other,
