@@ -34,7 +34,7 @@ fuzz_target!(|data: &[u8]| {
                     assert!(color.iter().all(|c| (0.0..=255.0).contains(c)));
                 }
             }
-            if let Ok((interior, _)) = interior_from_nodes(&model, "house.glb") {
+            if let Ok((interior, _)) = interior_from_nodes(&model, "house.glb", 1.0) {
                 assert!(Contents::new(&interior, &model).is_ok());
             }
         }

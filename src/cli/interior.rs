@@ -211,7 +211,7 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     let given = match told.rooms {
         rooms @ Some(_) => rooms,
         None if args.find || args.up.is_some() => None,
-        None => match interior_from_nodes(&model, &file) {
+        None => match interior_from_nodes(&model, &file, args.meter) {
             Err(InteriorError::NoCellNodes) => None,
             told => Some(told.with_context(named)?),
         },

@@ -270,6 +270,27 @@ fn openings_that_nodes_name_are_no_walls() {
     assert_eq!(triangles("named.glb"), triangles("house/house.glb"));
 }
 
+#[test]
+fn a_metre_says_how_high_eyes_are_where_nodes_name_the_rooms() {
+    let folder = with_house();
+    let here = folder.path();
+    let (interior, _) = read_interior(&here.join("house/interior.json")).unwrap();
+    let (mut model, _) = read_model(&here.join("house/house.glb")).unwrap();
+    for node in &mut model.nodes {
+        if interior.cells.iter().any(|cell| cell.name == node.name) {
+            node.name.insert_str(0, "cell:");
+        }
+    }
+    std::fs::write(here.join("cells.glb"), model_to_glb(&model).unwrap()).unwrap();
+    for (more, eye_height) in [("", 1.6), (" --meter 100", 160.0)] {
+        let line = format!("interior cells.glb -o made --force{more}");
+        let ran = lumigraph(here, &line).ok();
+        assert!(ran.stdout.contains("made: 2 cells, "), "{}", ran.stdout);
+        let (made, _) = read_interior(&here.join("made/interior.json")).unwrap();
+        assert_eq!(made.eye_height, eye_height);
+    }
+}
+
 /// How far a box's or a polygon's sides are from another's, at most.
 fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     let extent = |corners: &[DVec3]| {

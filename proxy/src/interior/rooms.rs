@@ -166,13 +166,15 @@ fn turn(portals: &mut [Portal], turned: &[bool]) {
 const CELL_NODE: &str = "cell:";
 
 /// Cells and portals by the names of a model's nodes; `file` is the model's, beside the
-/// `interior.json` to be. Up is y, as glTF has it.
+/// `interior.json` to be, and `meter` a metre in world units: that is how high eyes are told. Up is
+/// y, as glTF has it.
 ///
 /// # Errors
 /// No such nodes, outlines that are none, and what [`Interior::check`] finds.
 pub fn interior_from_nodes(
     model: &Model,
     file: &str,
+    meter: f64,
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
     // 1. Cells.
     let names = model.nodes.iter().map(|n| n.name.as_str());
@@ -192,7 +194,7 @@ pub fn interior_from_nodes(
     let mut interior = Interior {
         model: Some(file.to_owned()),
         up: DVec3::Y,
-        eye_height: EYE_HEIGHT,
+        eye_height: EYE_HEIGHT * meter,
         cells,
         portals: Vec::new(),
         held_out: Vec::new(),

@@ -214,7 +214,7 @@ fn check_model(bytes: &[u8]) {
             }
             assert!(warnings.iter().all(|w| !w.is_empty()));
             // Names of nodes say what they like.
-            if let Ok((interior, _)) = interior_from_nodes(&model, "house.glb") {
+            if let Ok((interior, _)) = interior_from_nodes(&model, "house.glb", 1.0) {
                 assert!(Contents::new(&interior, &model).is_ok());
             }
         }

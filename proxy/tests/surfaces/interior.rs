@@ -320,8 +320,9 @@ fn nodes_name_cells_and_portals() {
         &["cell:a", "cell:b", "portal:a|b"],
     );
     model.parts[3].node_idx = 2;
-    let (interior, warnings) = interior_from_nodes(&model, "m.glb").unwrap();
+    let (interior, warnings) = interior_from_nodes(&model, "m.glb", 1.0).unwrap();
     assert_eq!(warnings, []);
+    assert_eq!(interior.eye_height, 1.6);
     let portal = interior.portal(PortalId(0));
     assert_eq!(portal.cells, [Some(CellId(0)), Some(CellId(1))]);
     assert_eq!(portal.polygon.corners().len(), 4);
@@ -329,6 +330,10 @@ fn nodes_name_cells_and_portals() {
     let (contents, warnings) = Contents::new(&interior, &model).unwrap();
     assert_eq!(contents.triangles, [vec![0], vec![1]]);
     assert_eq!((contents.elsewhere.len(), warnings.len()), (0, 0));
+    // In centimetres.
+    let (fine, _) = interior_from_nodes(&model, "m.glb", 100.0).unwrap();
+    assert_eq!(fine.eye_height, 160.0);
+    assert!(interior_from_nodes(&model, "m.glb", f64::NAN).is_err());
     // What is not there.
     let mut unknown = interior.clone();
     unknown.cells[0].content = Content::Nodes(vec!["moon".to_owned()]);
@@ -338,21 +343,21 @@ fn nodes_name_cells_and_portals() {
         "cell `a` shows the node `moon`, which the model does not have"
     );
     model.nodes[2].name = "portal:a|c".to_owned();
-    let error = interior_from_nodes(&model, "m.glb")
+    let error = interior_from_nodes(&model, "m.glb", 1.0)
         .unwrap_err()
         .to_string();
     assert!(error.contains("leads to the cell `c`"), "{error}");
     model.parts[3].node_idx = 0;
     model.parts[2].node_idx = 0;
     model.nodes[2].name = "portal:a|b".to_owned();
-    let error = interior_from_nodes(&model, "m.glb")
+    let error = interior_from_nodes(&model, "m.glb", 1.0)
         .unwrap_err()
         .to_string();
     assert!(error.contains("it has no triangles"), "{error}");
     for node in &mut model.nodes {
         node.name.clear();
     }
-    assert!(interior_from_nodes(&model, "m.glb").is_err());
+    assert!(interior_from_nodes(&model, "m.glb", 1.0).is_err());
 }
 
 /// An L-shaped corridor, a room in its crook, and what opens between them.
@@ -470,7 +475,8 @@ fn nodes_of_a_door_have_their_sides_where_a_room_goes_around_the_next() {
         ("portal:room|corridor", [d, c, b, a], DVec3::X),
     ] {
         let all = [quads.as_slice(), &[(name, outline)]].concat();
-        let (interior, warnings) = interior_from_nodes(&nodes_of_quads(&all), "m.glb").unwrap();
+        let (interior, warnings) =
+            interior_from_nodes(&nodes_of_quads(&all), "m.glb", 1.0).unwrap();
         assert_eq!(warnings, []);
         let normal = interior.portals[0].polygon.normal();
         assert!((normal - into_first).length() < 1e-12, "{name}: {normal}");

@@ -100,7 +100,7 @@ fn by_boxes() -> Interior {
 #[test]
 fn tours_go_through_doors_and_not_through_windows() {
     let model = model();
-    let (by_nodes, _) = interior_from_nodes(&model, "m.glb").unwrap();
+    let (by_nodes, _) = interior_from_nodes(&model, "m.glb", 1.0).unwrap();
     let camera = Camera::of(
         &Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0)),
         64,
