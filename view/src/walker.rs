@@ -361,11 +361,9 @@ mod tests {
                 max: DVec3::new(9.0, 3.0, 9.0),
             })
         };
-        let contents = Contents {
-            triangles: floors.iter().map(|_| vec![0, 1]).collect(),
-            bounds: floors.iter().map(room).collect(),
-            elsewhere: Vec::new(),
-        };
+        let mut contents = Contents::default();
+        contents.triangles = floors.iter().map(|_| vec![0, 1]).collect();
+        contents.bounds = floors.iter().map(room).collect();
         Obstacles::new(&interior, &contents, &model)
     }
 

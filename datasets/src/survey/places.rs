@@ -73,11 +73,13 @@ fn free_places(interior: &Interior, contents: &Contents, solid: &Solid) -> Vec<(
             });
         let step = SPACING * interior.eye_height;
         let steps = ((high - low) / step).floor();
-        let eye = low.z + interior.eye_height;
+        let id = CellId(i as u32);
+        let floor = contents.floor_height(interior, id).unwrap_or(low.z);
+        let eye = floor + interior.eye_height;
         for a in 1..steps.x as usize {
             for b in 1..steps.y as usize {
                 let at = low + step * DVec3::new(a as f64, b as f64, 0.0);
-                tried.push((CellId(i as u32), at.x * across + at.y * along + eye * up));
+                tried.push((id, at.x * across + at.y * along + eye * up));
             }
         }
     }

@@ -9,7 +9,7 @@ use proxy::Mesh;
 use proxy::interior::find::{
     Evidence, FindError, FindOptions, FoundInterior, find_interior, sights,
 };
-use proxy::interior::{Content, Contents, Interior, RoomBox, compare, parse_rooms};
+use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
 use proxy::mesh::Model;
 
 fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
@@ -149,6 +149,28 @@ fn one_room_is_one_cell_and_two_apart_are_two() {
     let found = find(&two, &FindOptions::default()).unwrap();
     assert_eq!(found.interior.cells.len(), 2);
     assert_eq!(found.interior.portals.len(), 0);
+}
+
+#[test]
+fn the_floor_of_found_rooms_is_where_one_stands() {
+    // Their boxes begin lower; at any height, turned or not.
+    let far = DVec3::new(30.0, -7.0, 12.0);
+    for turn in [0.0, 0.5] {
+        let there = DMat4::from_rotation_translation(DQuat::from_rotation_y(turn), far);
+        let mut mesh = room_around_another();
+        mesh.transform(&there);
+        let found = find(&mesh, &FindOptions::default()).unwrap();
+        let (contents, _) = Contents::new(&found.interior, &Model::default()).unwrap();
+        assert_eq!(found.interior.cells.len(), 2);
+        for i in 0..2 {
+            let id = CellId(i as u32);
+            let floor = contents.floor_height(&found.interior, id).unwrap();
+            assert!((floor - far.y).abs() < 1e-6, "{floor}");
+            assert!(bounds(&found, i).min.y < far.y - 0.05);
+            let door = &found.interior.portals[0];
+            assert_eq!(found.interior.floor_height(Some(id), door), floor);
+        }
+    }
 }
 
 #[test]

@@ -179,6 +179,26 @@ fn tours_go_around_walls_and_furniture() {
     assert_eq!(crossings(&found.interior, &model), (0, 3));
 }
 
+#[test]
+fn tours_of_found_rooms_are_at_eye_height() {
+    let (house, _) = house::small_house(3, 2);
+    let evidence = Evidence {
+        mesh: &house.model.mesh,
+        cameras: &[],
+        sights: &[],
+    };
+    let found = find_interior(&evidence, "house.glb", &FindOptions::default()).unwrap();
+    let (contents, _) = Contents::new(&found.interior, &house.model).unwrap();
+    let lens = Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0));
+    let camera = Camera::of(&lens, 64, 64);
+    let tour = Tour::new(&found.interior, &contents, &house.model, &camera, 100, 15.0);
+    // Rugs count as floor, too.
+    for frame in tour.unwrap().path.frames {
+        let eye = frame.view.center();
+        assert!((eye.y - 1.6).abs() < 0.02, "{eye}");
+    }
+}
+
 /// Walls from the floor to 3 m, along corners.
 fn walls(model: &mut Model, corners: &[[f64; 2]]) {
     let mut mesh = Mesh::default();

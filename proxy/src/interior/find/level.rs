@@ -37,12 +37,6 @@ impl Level {
     pub fn direction(&self, along: DVec2) -> DVec3 {
         self.world_from_level * along.extend(0.0)
     }
-
-    /// Whether each axis is one of the world's.
-    pub(super) fn is_along_world(&self) -> bool {
-        let axes = [0, 1, 2].map(|i| self.world_from_level.col(i));
-        axes.iter().all(|a| a.abs().max_element() >= 1.0 - 1e-12)
-    }
 }
 
 /// A triangle, as far as it matters here.

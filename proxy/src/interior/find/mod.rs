@@ -107,7 +107,7 @@ pub struct FloorPlan {
 /// Rooms and doorways, and how they were found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundInterior {
-    /// Cells with boxes, and floors where rooms are no boxes along the world's axes.
+    /// Cells with boxes, and their floors at the height where one stands: boxes begin below.
     pub interior: Interior,
     /// What is odd about it.
     pub warnings: Vec<InteriorWarning>,
@@ -231,7 +231,6 @@ fn interior(
         .map(|label| outline::outline(columns, &grown.labels, label))
         .collect();
     outline::snap(&mut outlines, &mut openings, 2.5 * columns.step);
-    let along_world = level.is_along_world();
     let mut cells = Vec::new();
     for (i, outline) in outlines.iter().enumerate() {
         let top = columns.top_of(&grown.labels, i as u32 + 1) * options.meter;
@@ -242,18 +241,10 @@ fn interior(
         let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
             (l.min(p), h.max(p))
         });
-        let is_box = along_world && outline.len() == 4;
-        let floor = match is_box {
-            true => None,
-            false => {
-                let corners = outline.iter().map(|p| level.to_world(*p, heights[0]));
-                Polygon::new(corners.collect()).ok()
-            }
-        };
         cells.push(Cell {
             name: format!("room {}", i + 1),
             content: Content::Box(RoomBox { min, max }),
-            floor,
+            floor: floor(&level, outline),
             other: Extra::new(),
         });
     }
@@ -299,4 +290,23 @@ fn interior(
         held_out: Vec::new(),
         other: Extra::new(),
     })
+}
+
+/// The floor of a room with an outline on the plan; where that is no polygon, the rectangle around it.
+fn floor(level: &Level, outline: &[DVec2]) -> Option<Polygon> {
+    let polygon = |corners: &[DVec2]| {
+        let corners = corners.iter().map(|p| level.to_world(*p, 0.0));
+        Polygon::new(corners.collect()).ok()
+    };
+    let corners = outline.iter();
+    let (low, high) = corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| {
+        (l.min(*p), h.max(*p))
+    });
+    let around = [
+        low,
+        DVec2::new(high.x, low.y),
+        high,
+        DVec2::new(low.x, high.y),
+    ];
+    polygon(outline).or_else(|| polygon(&around))
 }
