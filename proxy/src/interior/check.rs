@@ -8,6 +8,15 @@ const ROUNDING: f64 = 1e-6;
 /// Overlaps that are told: of many boxes in one place, there would be their number squared.
 const MAX_OVERLAPS: usize = 64;
 
+impl RoomBox {
+    /// Whether two share more than a side.
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        let shared = self.max.min(other.max) - self.min.max(other.min);
+        let size = (self.max - self.min).min(other.max - other.min);
+        shared.cmpgt(ROUNDING * size).all()
+    }
+}
+
 impl Interior {
     /// Checks an interior that was made or changed in memory, as reading one from a file does.
     ///
@@ -77,9 +86,7 @@ impl Interior {
             .collect();
         for (i, (name, a)) in boxes.iter().enumerate() {
             for (other, b) in &boxes[..i] {
-                let shared = a.max.min(b.max) - a.min.max(b.min);
-                let size = (a.max - a.min).min(b.max - b.min);
-                if found.len() < MAX_OVERLAPS && shared.cmpgt(ROUNDING * size).all() {
+                if found.len() < MAX_OVERLAPS && a.overlaps(b) {
                     let names = ((*other).to_owned(), (*name).to_owned());
                     found.push(InteriorWarning::Overlap(names.0, names.1));
                 }

@@ -1,10 +1,13 @@
 //! What of the model each cell has.
 
+use super::locate::is_loose;
+use super::seen::Seen;
 use super::{Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box};
 use crate::mesh::{Mesh, Model, PORTAL_NODE};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// The triangles of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +20,8 @@ pub struct Contents {
     /// Triangles of no cell, in order: they are drawn whatever is visible. None stands for an
     /// opening.
     pub elsewhere: Vec<u32>,
+    /// What a viewer sees of the cells, where bounds do not tell which of them it is in.
+    pub(super) seen: Option<Arc<Seen>>,
 }
 
 impl Contents {
@@ -25,6 +30,19 @@ impl Contents {
     /// # Errors
     /// A cell shows a node that the model does not have.
     pub fn new(
+        interior: &Interior,
+        model: &Model,
+    ) -> Result<(Self, Vec<InteriorWarning>), InteriorError> {
+        let (mut contents, odd) = Self::listed(interior, model)?;
+        if contents.is_any_bounds_shared(interior) {
+            let seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
+            contents.seen = Some(Arc::new(seen));
+        }
+        Ok((contents, odd))
+    }
+
+    /// The same without what tells where a viewer is.
+    pub(super) fn listed(
         interior: &Interior,
         model: &Model,
     ) -> Result<(Self, Vec<InteriorWarning>), InteriorError> {
@@ -75,6 +93,17 @@ impl Contents {
             odd.push(InteriorWarning::Elsewhere(contents.elsewhere.len()));
         }
         Ok((contents, odd))
+    }
+
+    /// Whether a cell that is where its triangles are reaches into another's bounds.
+    fn is_any_bounds_shared(&self, interior: &Interior) -> bool {
+        let cells = interior.cells.iter().zip(&self.bounds);
+        let cells = cells.filter_map(|(cell, bounds)| Some((is_loose(cell), (*bounds)?)));
+        let cells: Vec<(bool, RoomBox)> = cells.collect();
+        cells.iter().enumerate().any(|(i, (is_loose, a))| {
+            let mut others = cells[..i].iter();
+            others.any(|(is_other_loose, b)| (*is_loose || *is_other_loose) && a.overlaps(b))
+        })
     }
 }
 

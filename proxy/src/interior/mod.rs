@@ -16,6 +16,7 @@ mod locate;
 mod overlap;
 mod polygon;
 mod rooms;
+mod seen;
 mod semicircle;
 mod turned;
 mod visibility;

@@ -28,7 +28,7 @@
 
 use super::contents::below;
 use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
-use super::turned::Seen;
+use super::seen::Seen;
 use super::{
     Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
     InteriorWarning, Polygon, Portal,
@@ -229,10 +229,11 @@ pub fn interior_from_nodes(
     }
     // 3. Their sides, by what of the model one sees through them.
     if !interior.portals.is_empty() {
-        let (contents, _) = Contents::new(&interior, model)?;
-        let seen = Seen::new(&contents, model);
+        let (contents, _) = Contents::listed(&interior, model)?;
+        let seen = Seen::new(model, &contents.triangles, &[]);
         let portals = interior.portals.iter();
-        let turned: Vec<bool> = portals.map(|portal| seen.is_turned(portal)).collect();
+        let turned = portals.map(|portal| contents.is_turned(&seen, portal));
+        let turned: Vec<bool> = turned.collect();
         turn(&mut interior.portals, &turned);
     }
     let warnings = interior.check()?;

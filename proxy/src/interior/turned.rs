@@ -4,11 +4,9 @@
 //! own door, beyond the next room.
 
 use super::locate::height_over;
+use super::seen::{Seen, TURN};
 use super::{CellId, Contents, Interior, Portal};
-use crate::mesh::{Mesh, Model};
-use crate::{MeshKind, Solid};
 use glam::DVec3;
-use std::collections::BTreeMap;
 
 /// The first places that are looked at are so far from a portal's centre, in shares of its size;
 /// each next pair is farther by a factor, up to about its size. Cells may leave out the wall between
@@ -20,10 +18,6 @@ const PLACES: usize = 20;
 const CLEAR: f64 = 0.25;
 /// Rays into the half of all directions that lies ahead.
 const RAYS: u32 = 64;
-/// From one ray to the next around what lies ahead, in radians: the golden angle, (3 − √5) π.
-const TURN: f64 = 2.399_963_229_728_653;
-/// What is farther from the world's origin is not looked at: squares of it must fit into f32.
-const FARTHEST: f64 = 1e15;
 
 /// Whether an outline goes the other way round. `presence` is how much of a cell, from 0 to 1, is
 /// known to be at a place before or behind the portal, looking away from it.
@@ -101,68 +95,34 @@ impl Interior {
     }
 }
 
-/// What of a model's cells one sees, for cells that have neither boxes nor floors.
-pub(super) struct Seen<'a> {
-    contents: &'a Contents,
-    solid: Solid,
-    /// By triangle of `solid`.
-    cells: Vec<Vec<CellId>>,
-}
-
-impl<'a> Seen<'a> {
-    pub(super) fn new(contents: &'a Contents, model: &Model) -> Self {
-        let is_in_reach = |i: u32| {
-            let corners = model.mesh.corners(i as usize);
-            corners.iter().all(|p| p.abs().max_element() < FARTHEST)
-        };
-        let mut cells: BTreeMap<u32, Vec<CellId>> = BTreeMap::new();
-        for (id, triangles) in (0..).map(CellId).zip(&contents.triangles) {
-            for i in triangles.iter().filter(|i| is_in_reach(**i)) {
-                cells.entry(*i).or_default().push(id);
-            }
-        }
-        let triangles = cells.keys().map(|i| model.mesh.triangles[*i as usize]);
-        let mut mesh = Mesh {
-            positions: model.mesh.positions.clone(),
-            triangles: triangles.collect(),
-        };
-        mesh.drop_unused();
-        Self {
-            contents,
-            solid: Solid::new(MeshKind::Mesh, mesh),
-            cells: cells.into_values().collect(),
-        }
-    }
-
-    /// Whether a portal's outline goes the other way round, by what one sees looking out of it.
-    pub(super) fn is_turned(&self, portal: &Portal) -> bool {
+impl Contents {
+    /// Whether a portal's outline goes the other way round, by what one sees looking out of it, for cells
+    /// that have neither boxes nor floors; `seen` are these contents.
+    pub(super) fn is_turned(&self, seen: &Seen, portal: &Portal) -> bool {
         let middle = |id: CellId| {
-            let bounds = self.contents.bounds[id.0 as usize]?;
+            let bounds = self.bounds[id.0 as usize]?;
             Some(bounds.min.midpoint(bounds.max))
         };
         is_turned(
             portal,
-            |id, from, ahead| self.share(id, from, ahead),
+            |id, from, ahead| share(seen, id, from, ahead),
             middle,
         )
     }
+}
 
-    /// In which share of the directions ahead a cell is the first that one sees, those straight
-    /// ahead counting most.
-    fn share(&self, id: CellId, from: DVec3, ahead: DVec3) -> f64 {
-        if !(from.abs().max_element() < FARTHEST) {
-            return 0.0;
-        }
-        let x = ahead.any_orthonormal_vector();
-        let y = ahead.cross(x);
-        let is_seen = |i: &u32| {
-            // Evenly over the disc below a half sphere, so by their cosines on it.
-            let inner = (f64::from(*i) + 0.5) / f64::from(RAYS);
-            let (sin, cos) = (TURN * f64::from(*i)).sin_cos();
-            let ray = inner.sqrt() * (cos * x + sin * y) + (1.0 - inner).sqrt() * ahead;
-            let hit = self.solid.first_hit(from, ray);
-            hit.is_some_and(|hit| self.cells[hit.triangle_idx as usize].contains(&id))
-        };
-        (0..RAYS).filter(is_seen).count() as f64 / f64::from(RAYS)
-    }
+/// In which share of the directions ahead a cell is the first that one sees, those straight
+/// ahead counting most.
+fn share(seen: &Seen, id: CellId, from: DVec3, ahead: DVec3) -> f64 {
+    let x = ahead.any_orthonormal_vector();
+    let y = ahead.cross(x);
+    let is_seen = |i: &u32| {
+        // Evenly over the disc below a half sphere, so by their cosines on it.
+        let inner = (f64::from(*i) + 0.5) / f64::from(RAYS);
+        let (sin, cos) = (TURN * f64::from(*i)).sin_cos();
+        let ray = inner.sqrt() * (cos * x + sin * y) + (1.0 - inner).sqrt() * ahead;
+        let first = seen.first(from, ray);
+        first.is_some_and(|(_, cells)| cells.contains(&id))
+    };
+    (0..RAYS).filter(is_seen).count() as f64 / f64::from(RAYS)
 }

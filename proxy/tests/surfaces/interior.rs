@@ -431,14 +431,18 @@ fn nodes_of_quads(quads: &[(&str, [[f64; 3]; 4])]) -> Model {
     model
 }
 
+/// A piece of floor or ceiling.
+fn level([x0, x1]: [f64; 2], [z0, z1]: [f64; 2], y: f64) -> [[f64; 3]; 4] {
+    [[x0, y, z0], [x1, y, z0], [x1, y, z1], [x0, y, z1]]
+}
+
+/// A wall from one place to another.
+fn wall([x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> [[f64; 3]; 4] {
+    [[x0, 0.0, z0], [x1, 0.0, z1], [x1, 2.5, z1], [x0, 2.5, z0]]
+}
+
 #[test]
 fn nodes_of_a_door_have_their_sides_where_a_room_goes_around_the_next() {
-    let level = |[x0, x1]: [f64; 2], [z0, z1]: [f64; 2], y: f64| {
-        [[x0, y, z0], [x1, y, z0], [x1, y, z1], [x0, y, z1]]
-    };
-    let wall = |[x0, z0]: [f64; 2], [x1, z1]: [f64; 2]| {
-        [[x0, 0.0, z0], [x1, 0.0, z1], [x1, 2.5, z1], [x0, 2.5, z0]]
-    };
     let mut quads = Vec::new();
     for y in [0.0, 2.5] {
         quads.push(("cell:corridor", level([0.0, 6.0], [0.0, 1.5], y)));
@@ -512,6 +516,67 @@ fn viewers_are_found() {
     assert_eq!(contents.locate(&both, at(3.95, 1.0, 1.5)), west);
     assert_eq!(contents.locate(&both, at(4.05, 1.0, 1.5)), east);
     assert_eq!(contents.locate(&both, at(4.05, 1.0, 3.5)), west);
+}
+
+#[test]
+fn viewers_are_in_the_room_that_they_see_where_bounds_interlock() {
+    // Two hooks, each in the other's bounds, and an opening at the end of the first.
+    let hooks = [
+        (
+            "cell:a",
+            [[[0.0, 6.0], [0.0, 2.0]], [[4.0, 6.0], [2.0, 4.0]]],
+            vec![
+                [6.0, 4.0],
+                [6.0, 0.0],
+                [0.0, 0.0],
+                [0.0, 2.0],
+                [4.0, 2.0],
+                [4.0, 4.0],
+            ],
+        ),
+        (
+            "cell:b",
+            [[[0.0, 6.0], [4.0, 6.0]], [[0.0, 2.0], [2.0, 4.0]]],
+            vec![
+                [4.0, 4.0],
+                [2.0, 4.0],
+                [2.0, 2.0],
+                [0.0, 2.0],
+                [0.0, 6.0],
+                [6.0, 6.0],
+                [6.0, 4.0],
+            ],
+        ),
+    ];
+    let mut quads = Vec::new();
+    for (name, floors, walls) in &hooks {
+        for [x, z] in floors {
+            quads.extend([0.0, 2.5].map(|y| (*name, level(*x, *z, y))));
+        }
+        quads.extend(walls.windows(2).map(|ends| (*name, wall(ends[0], ends[1]))));
+    }
+    quads.push(("portal:a|b", wall([4.0, 4.0], [6.0, 4.0])));
+    let model = nodes_of_quads(&quads);
+    let (interior, warnings) = interior_from_nodes(&model, "m.glb", 1.0).unwrap();
+    assert_eq!(warnings, []);
+    let (contents, _) = Contents::new(&interior, &model).unwrap();
+    let [a, b] = [Some(CellId(0)), Some(CellId(1))];
+    for (x, z, cell) in [
+        (1.0, 1.0, a),
+        (3.0, 1.9, a),
+        (5.0, 3.0, a),
+        (5.0, 3.99, a),
+        (5.0, 4.01, b),
+        (3.0, 5.0, b),
+        (1.0, 3.0, b),
+        (1.9, 2.1, b),
+        // Between the hooks, in the bounds of both: nobody knows.
+        (3.0, 3.0, None),
+        (7.0, 3.0, None),
+    ] {
+        let found = contents.locate(&interior, DVec3::new(x, 1.5, z));
+        assert_eq!(found, cell, "{x} {z}");
+    }
 }
 
 #[test]
