@@ -115,6 +115,17 @@ pub enum InteriorWarning {
     /// A cell without a triangle.
     #[error("nothing of the model is in cell `{0}`")]
     Empty(String),
+    /// Rooms were looked for on a coarser floor grid than was asked for.
+    #[error(
+        "the floor plan's squares are {found:.2} m wide, not {asked:.2}, as what stands at eye height \
+         reaches far: narrow openings may be missed; leave out what is far away, or give the rooms by hand"
+    )]
+    Coarse {
+        /// The squares' side, in metres.
+        found: f64,
+        /// What it was to be.
+        asked: f64,
+    },
     /// Triangles that no cell has.
     #[error("{0} triangles are in no cell; they are drawn whatever is visible")]
     Elsewhere(usize),

@@ -444,6 +444,39 @@ fn a_door_has_its_sides_where_a_room_goes_around_the_next() {
 }
 
 #[test]
+fn ground_around_a_house_takes_nothing_from_it() {
+    let alone = find(&room_around_another(), &FindOptions::default()).unwrap();
+    for reach in [30.0, 400.0, 1e6] {
+        let mut mesh = room_around_another();
+        let (min, max) = (DVec3::splat(-reach), DVec3::splat(reach));
+        mesh.append(&open_box(min.with_y(-0.05), max.with_y(-0.05), &[2]));
+        let found = find(&mesh, &FindOptions::default()).unwrap();
+        look_at(&found, &format!("ground-{reach}"));
+        assert_eq!(found.warnings, []);
+        let compared = compare(&alone.interior, &found.interior, 0.1);
+        assert!(compared.cells.iter().all(|c| c.iou > 0.85), "{compared}");
+        assert!(compared.portals.iter().all(|p| p.is_found), "{compared}");
+        assert!(compared.extra_cells.is_empty(), "{compared}");
+        assert!(compared.extra_portals.is_empty(), "{compared}");
+    }
+}
+
+#[test]
+fn a_plan_coarser_than_asked_for_is_told() {
+    let size = DVec3::new(5.0, 2.6, 4.0);
+    let mut mesh = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    // A fence far away.
+    let far = DVec3::X * 500.0;
+    mesh.append(&open_box(far, far + DVec3::new(0.1, 2.0, 4.0), &[0, 1]));
+    let found = find(&mesh, &FindOptions::default()).unwrap();
+    let said: Vec<String> = found.warnings.iter().map(|w| w.to_string()).collect();
+    assert_eq!(said.len(), 1, "{said:?}");
+    let coarse = "the floor plan's squares are 0.06 m wide, not 0.05, as";
+    assert!(said[0].starts_with(coarse), "{said:?}");
+    assert_eq!(found.interior.cells.len(), 1);
+}
+
+#[test]
 fn a_house_in_millimetres_is_told_soon_or_found_if_that_is_said() {
     let mut mesh = room_around_another();
     mesh.transform(&DMat4::from_scale(DVec3::splat(1000.0)));

@@ -1,6 +1,7 @@
 //! What stands over each square of a floor grid.
 
 use super::distance::squared_distances;
+use super::grid::Grid;
 use super::stubs;
 use super::{Evidence, FindError, FindOptions, Level};
 use glam::{DVec2, DVec3};
@@ -10,8 +11,10 @@ use rayon::prelude::*;
 pub(super) const BIN: f64 = 0.05;
 const BELOW: f64 = 0.4;
 const BINS: usize = 128;
+/// What is lower or higher is nothing to a storey; in metres over the floor.
+pub(super) const REACH: [f64; 2] = [-BELOW, BINS as f64 * BIN - BELOW];
 /// What is taken here cannot be looked over by who stands; in metres over the floor.
-const EYE_BAND: [f64; 2] = [1.3, 1.9];
+pub(super) const EYE_BAND: [f64; 2] = [1.3, 1.9];
 /// Lintels and beams begin at this, and so far below the ceiling.
 const LINTEL: f64 = 2.15;
 const BELOW_CEILING: [f64; 2] = [0.6, 0.12];
@@ -25,8 +28,6 @@ const TALL: [f64; 2] = [0.2, 2.0];
 const HIDDEN: f64 = 0.4;
 /// Gaps between lines of sight are filled up to twice this; metres.
 const UNSEEN: f64 = 0.15;
-/// Squares of the floor grid.
-const MOST_COLUMNS: f64 = 4e6;
 /// In a place whose floor has a ceiling over this share of it, where there is none is outside.
 const CEILED: f64 = 0.5;
 
@@ -87,38 +88,14 @@ impl Columns {
         options: &FindOptions,
     ) -> Result<Self, FindError> {
         // 1. The grid.
-        let heights = [-BELOW, BINS as f64 * BIN - BELOW].map(|h| h * options.meter);
-        let in_reach = |p: &DVec3| p.is_finite() && p.z > heights[0] && p.z < heights[1];
-        let places: Vec<DVec3> = evidence
-            .mesh
-            .positions
-            .par_iter()
-            .map(|p| level.to_level(*p))
-            .collect();
-        let (low, high) = places
-            .iter()
-            .filter(|p| in_reach(p))
-            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| {
-                (l.min(p.truncate()), h.max(p.truncate()))
-            });
-        let extent = high - low;
-        if !extent.is_finite() {
-            return Err(FindError::NoSurface);
-        }
-        let vast = (extent.x * extent.y / MOST_COLUMNS).sqrt();
-        let long = extent.max_element() / MOST_COLUMNS.sqrt() / 4.0;
-        if vast.max(long) > options.max_passage * options.meter {
-            // Kilometres: no square is as narrow as a passage between two rooms.
-            return Err(FindError::NoRooms(options.min_area, options.meter));
-        }
-        let step = (options.cell_size * options.meter).max(vast).max(long);
-        // Squares around it, for what grows out of rooms.
-        const MARGIN: f64 = 12.0;
-        let size = [extent.x, extent.y].map(|e| (e / step + 2.0 * MARGIN).ceil() as usize);
+        let positions = evidence.mesh.positions.par_iter();
+        let places: Vec<DVec3> = positions.map(|p| level.to_level(*p)).collect();
+        let grid = Grid::new(evidence, &places, level, options)?;
+        let Grid { size, origin, step } = grid;
         let mut columns = Self {
             level: *level,
             size,
-            origin: low - MARGIN * step,
+            origin,
             step,
             step_m: step / options.meter,
             meter: options.meter,
@@ -129,7 +106,7 @@ impl Columns {
         };
         // 2. What is where.
         for triangle in &evidence.mesh.triangles {
-            columns.add(triangle.map(|i| places[i as usize]));
+            columns.add(&grid, triangle.map(|i| places[i as usize]));
         }
         if !evidence.sights.is_empty() {
             columns.seen = Some(columns.sighted(evidence.sights));
@@ -203,8 +180,8 @@ impl Columns {
         (in_plan, DVec3::new(1.0, 1.0, in_plan / in_height))
     }
 
-    /// Marks what a triangle touches, by samples.
-    fn add(&mut self, corners: [DVec3; 3]) {
+    /// Marks what a triangle touches.
+    fn add(&mut self, grid: &Grid, corners: [DVec3; 3]) {
         if !corners.iter().all(|p| p.is_finite()) {
             return;
         }
@@ -214,6 +191,15 @@ impl Columns {
         if is_off {
             return;
         }
+        if grid.has(&corners) {
+            self.mark(corners);
+        } else {
+            grid.part_of(corners).into_iter().for_each(|t| self.mark(t));
+        }
+    }
+
+    /// Marks what a triangle over the grid touches, by samples.
+    fn mark(&mut self, corners: [DVec3; 3]) {
         let (apart, stretch) = self.sampling();
         // 1. Rows along the longest side.
         let length = |i: usize| (stretch * (corners[(i + 1) % 3] - corners[i])).length();

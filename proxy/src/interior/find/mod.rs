@@ -12,6 +12,7 @@ mod columns;
 mod complete;
 mod corridors;
 mod distance;
+mod grid;
 mod level;
 mod openings;
 mod outline;
@@ -39,7 +40,8 @@ pub struct FindOptions {
     pub up: Option<DVec3>,
     /// A metre in world units.
     pub meter: f64,
-    /// Side of the floor grid's squares, in metres; coarser where the floor is vast.
+    /// Side of the floor grid's squares, in metres; coarser, and told, where what stands at eye
+    /// height spreads over hectares.
     pub cell_size: f64,
     /// A passage parts two rooms if it is narrower than this share of the narrower one.
     pub bottleneck: f64,
@@ -190,7 +192,13 @@ pub fn find_interior(
     }
     // 4. Cells and portals.
     let interior = interior(evidence, &columns, &grown, openings, model, options)?;
-    let warnings = interior.check()?;
+    let mut warnings = interior.check()?;
+    if columns.step_m > options.cell_size * (1.0 + 1e-9) {
+        warnings.push(InteriorWarning::Coarse {
+            found: columns.step_m,
+            asked: options.cell_size,
+        });
+    }
     let place = |i: usize| match grown.labels[i] {
         _ if columns.is_wall(i) => Place::Wall,
         _ if columns.is_lintel(i) => Place::Lintel,
