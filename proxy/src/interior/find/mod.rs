@@ -14,6 +14,7 @@ mod corridors;
 mod distance;
 mod grid;
 mod level;
+mod merge;
 mod openings;
 mod outline;
 mod picture;
@@ -169,24 +170,8 @@ pub fn find_interior(
     let level = level::estimate(evidence, options)?;
     // 2. What is free over it.
     let columns = Columns::new(evidence, &level, options)?;
-    // 3. Rooms, and the holes between them; those with hardly a wall between them are one.
-    let mut labels = regions::regions(&columns, options);
-    let (grown, openings) = loop {
-        let grown = regions::grown(&columns, &labels);
-        let found = openings::openings(&columns, &grown);
-        match openings::open_pair(&columns, &found) {
-            Some((a, b)) => regions::join(&mut labels, a, b),
-            None => {
-                let small = regions::drop_small(&columns, &mut labels, &grown, options);
-                if !small {
-                    let all = found.into_iter().flat_map(|side| side.openings);
-                    let mut all: Vec<Opening> = all.collect();
-                    openings::meet(&columns, &mut all);
-                    break (grown, all);
-                }
-            }
-        }
-    };
+    // 3. Rooms, and the holes between them.
+    let (grown, openings) = merge::rooms(&columns, regions::regions(&columns, options), options);
     if grown.count == 0 {
         return Err(FindError::NoRooms(options.min_area, options.meter));
     }

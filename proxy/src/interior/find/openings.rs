@@ -204,14 +204,22 @@ pub(super) fn meet(columns: &Columns, openings: &mut [Opening]) {
     }
 }
 
-/// Two rooms that nothing but a beam parts, or nothing at all.
-pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)> {
-    let mut pairs: BTreeMap<(u32, u32), [usize; 4]> = BTreeMap::new();
+/// What parts two rooms, the lesser label first: how much there is of it, and how much is open, has a
+/// lintel, and is wall.
+type Parts = BTreeMap<(u32, u32), [usize; 4]>;
+
+fn add(parts: &mut Parts, [a, b]: [u32; 2], more: [usize; 4]) {
+    let sums = parts.entry((a.min(b), a.max(b))).or_default();
+    sums.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
+}
+
+/// Pairs of rooms that nothing but a beam parts, or nothing at all; no more than so many. From one pair on
+/// its second room goes by the name of its first, and what parts the two from a third is one.
+pub(super) fn open_pairs(columns: &Columns, sides: &[Side], at_once: usize) -> Vec<(u32, u32)> {
+    let mut parts = Parts::new();
     for side in sides {
-        let [a, b] = side.rooms;
-        let sums = pairs.entry((a.min(b), a.max(b))).or_default();
-        let of = [side.length, side.open, side.lintel, side.walled];
-        sums.iter_mut().zip(of).for_each(|(sum, n)| *sum += n);
+        let sums = [side.length, side.open, side.lintel, side.walled];
+        add(&mut parts, side.rooms, sums);
     }
     let widest = columns.squares(UNMARKED);
     let is_open = |[length, open, lintel, walled]: [usize; 4]| {
@@ -223,8 +231,19 @@ pub(super) fn open_pair(columns: &Columns, sides: &[Side]) -> Option<(u32, u32)>
         let is_gap = !below_beam && length as f64 > widest && 4 * walled < length;
         is_beam || is_gap
     };
-    let found = pairs.into_iter().find(|(_, sums)| is_open(*sums));
-    found.map(|(pair, _)| pair)
+    let mut pairs = Vec::new();
+    while pairs.len() < at_once {
+        let open = parts.iter().find(|(_, sums)| is_open(**sums));
+        let Some((&(a, b), _)) = open else { break };
+        pairs.push((a, b));
+        for ((c, d), sums) in std::mem::take(&mut parts) {
+            let rooms = [c, d].map(|label| if label == b { a } else { label });
+            if rooms[0] != rooms[1] {
+                add(&mut parts, rooms, sums);
+            }
+        }
+    }
+    pairs
 }
 
 fn side(

@@ -154,21 +154,13 @@ fn drop_outside(columns: &Columns, found: &mut Labels) {
 }
 
 /// Numbers regions in the order of their first squares.
-fn renumber(found: &mut Labels) {
+pub(super) fn renumber(found: &mut Labels) {
     let mut names: BTreeMap<u32, u32> = BTreeMap::new();
     for label in found.labels.iter_mut().filter(|l| **l != 0) {
         let next = names.len() as u32 + 1;
         *label = *names.entry(*label).or_insert(next);
     }
     found.count = names.len() as u32;
-}
-
-/// Makes two regions one.
-pub(super) fn join(found: &mut Labels, a: u32, b: u32) {
-    for label in found.labels.iter_mut().filter(|l| **l == b) {
-        *label = a;
-    }
-    renumber(found);
 }
 
 /// Rooms with what stands in them and half of their walls.
@@ -205,40 +197,4 @@ pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
         labels: (0..columns.count()).map(label).collect(),
         count: found.count,
     }
-}
-
-/// Joins regions that are too small for rooms to the one they touch most, or drops them;
-/// whether there was one.
-pub(super) fn drop_small(
-    columns: &Columns,
-    found: &mut Labels,
-    grown: &Grown,
-    options: &FindOptions,
-) -> bool {
-    let mut areas = vec![0.0; found.count as usize + 1];
-    for label in &grown.labels {
-        areas[*label as usize] += columns.step_m * columns.step_m;
-    }
-    let small = (1..=found.count).find(|l| areas[*l as usize] < options.min_area);
-    let Some(small) = small else {
-        return false;
-    };
-    let mut touched: BTreeMap<u32, usize> = BTreeMap::new();
-    for i in (0..columns.count()).filter(|i| found.labels[*i] == small) {
-        for j in columns.beside(i) {
-            let other = found.labels[j];
-            if other != 0 && other != small {
-                *touched.entry(other).or_default() += 1;
-            }
-        }
-    }
-    let into = touched
-        .iter()
-        .max_by_key(|(label, n)| (**n, u32::MAX - **label));
-    let into = into.map_or(0, |(label, _)| *label);
-    for label in found.labels.iter_mut().filter(|l| **l == small) {
-        *label = into;
-    }
-    renumber(found);
-    true
 }
