@@ -42,7 +42,7 @@ pub(super) struct Args {
     /// Leave out that photo, as if it were held out
     #[arg(long, conflicts_with = "path")]
     without_view: bool,
-    /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
+    /// A path derived from where the photos were taken (orbit, dolly or sweep, as for `render`), or a path
     /// file
     #[arg(long, value_name = "KIND|FILE")]
     path: Option<String>,

@@ -16,8 +16,9 @@ pub(super) struct ViewArgs {
     /// The views of a COLMAP model, of a path file, or of a screenshot of `view`
     #[arg(long, value_name = "MODEL|FILE")]
     pub(super) views: Option<PathBuf>,
-    /// A path derived from where the photos were taken (orbit, dolly or sweep), or a path
-    /// file, nerfstudio's too
+    /// A path derived from where the photos were taken, or a path file, nerfstudio's too. orbit goes around,
+    /// dolly towards the scene, back and beyond, sweep along the photos and back; all end where they
+    /// begin, and two frames of dolly or sweep are its ends
     #[arg(long, value_name = "KIND|FILE")]
     pub(super) path: Option<String>,
 }

@@ -24,6 +24,18 @@ fn keyframes() -> Value {
 }
 
 #[test]
+fn two_frames_of_a_derived_path_show_two_places() {
+    let folder = with_wall();
+    for kind in ["orbit", "dolly", "sweep"] {
+        let line =
+            format!("render wall --proxy plane --path {kind} --frames 2 --size 48x36 -o {kind}");
+        lumigraph(folder.path(), &line).ok();
+        let frames: Vec<Vec<u8>> = files(&folder.path().join(kind)).into_values().collect();
+        assert!(frames.len() == 2 && frames[0] != frames[1], "{kind}");
+    }
+}
+
+#[test]
 fn paths_go_to_nerfstudio_and_back() {
     let folder = with_wall();
     let here = folder.path();

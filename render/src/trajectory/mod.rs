@@ -20,8 +20,8 @@ pub enum Trajectory {
     /// Around the object, where the cameras surround one; otherwise a small ellipse in the
     /// plane of the cameras, looking at the same place all the while.
     Orbit,
-    /// From the middle of the capture towards the scene, back and beyond; where the
-    /// cameras were walked forwards, along the walk.
+    /// From the middle of the capture towards the scene, back and beyond, and to the middle again;
+    /// where the cameras were walked forwards, along the walk.
     Dolly,
     /// Along the longest direction of the camera positions and back.
     Sweep,
@@ -52,7 +52,8 @@ const SWEEP_KNOTS: usize = 64;
 const ORBIT_POINTS: usize = 720;
 
 /// A path of `frames` frames that repeats without a jump: after the last frame comes the
-/// first.
+/// first. Where it goes back the way it came, frames of the way back lie between those of the way
+/// there, and both ends have one: two frames are the ends.
 ///
 /// `points_in_world` are the sparse points, or nothing. All frames have one camera: a
 /// pinhole with the median focal length of the source views, their most common image
@@ -78,11 +79,10 @@ pub fn derive(
     }
 
     let capture = Capture::new(sources, points_in_world, proxy);
-    let phases = (0..frames).map(|i| i as f64 / frames as f64);
     let poses: Vec<Rigid3> = match kind {
-        Trajectory::Orbit => orbit(&capture, phases),
-        Trajectory::Dolly => dolly(&capture, phases),
-        Trajectory::Sweep => sweep(&capture, phases),
+        Trajectory::Orbit => orbit(&capture, frames),
+        Trajectory::Dolly => dolly(&capture, frames),
+        Trajectory::Sweep => sweep(&capture, frames),
     };
 
     let camera = typical_camera(sources);
@@ -107,24 +107,42 @@ pub fn derive(
     Ok(CameraPath::new(fps, frames.collect::<Result<_, _>>()?)?)
 }
 
-/// 0 → 1 → 0 over one period, standing still for a moment at both ends.
-fn there_and_back(phase: f64) -> f64 {
-    0.5 - 0.5 * (TAU * phase).cos()
+/// Where frames are on a way that ends where it began, in even shares of it.
+fn all_around(frames: usize) -> impl Iterator<Item = f64> {
+    (0..frames).map(move |i| i as f64 / frames as f64)
 }
 
-fn sweep(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
-    let Some((curve, length, _)) = along_the_cameras(capture) else {
-        return phases.map(|_| capture.reference_pose()).collect();
+/// Where frames are that go along a way, from 0 to 1, and back, from rest to rest: no two of them at one
+/// place, as those of the way back lie between the others, and one at each end. One alone is halfway.
+fn there_and_back(frames: usize) -> Vec<f64> {
+    if frames == 1 {
+        return vec![0.5];
+    }
+    let there = (0..frames).step_by(2);
+    let back = (0..frames).rev().filter(|place| place % 2 == 1);
+    let eased = |place: usize| {
+        let share = place as f64 / (frames - 1) as f64;
+        0.5 - 0.5 * (PI * share).cos()
     };
-    phases
-        .map(|t| curve.at(length * there_and_back(t)))
-        .collect()
+    there.chain(back).map(eased).collect()
 }
 
-fn dolly(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
+fn sweep(capture: &Capture, frames: usize) -> Vec<Rigid3> {
+    let Some((curve, length, _)) = along_the_cameras(capture) else {
+        return vec![capture.reference_pose(); frames];
+    };
+    let shares = there_and_back(frames).into_iter();
+    shares.map(|share| curve.at(length * share)).collect()
+}
+
+fn dolly(capture: &Capture, frames: usize) -> Vec<Rigid3> {
     let reach = (REACH * capture.half_extents[0]).min(REACH_TO_SCENE * capture.nearest_scene);
     let pose = capture.reference_pose();
     let forward = pose.rotation.conjugate() * DVec3::Z;
+    // From −1 to 1 and back, begun about halfway there.
+    let mut shares = there_and_back(frames);
+    shares.rotate_left(frames / 4);
+    let along = shares.into_iter().map(|share| 2.0 * share - 1.0);
 
     // A walk forwards: mostly one direction, and that of the gaze.
     let long = capture.half_extents[0] > 3.0 * capture.half_extents[1];
@@ -133,13 +151,11 @@ fn dolly(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
         && let Some((curve, length, middle)) = along_the_cameras(capture)
     {
         let reach = reach.min(middle).min(length - middle);
-        return phases
-            .map(|t| curve.at(middle + reach * (TAU * t).sin()))
-            .collect();
+        return along.map(|t| curve.at(middle + reach * t)).collect();
     }
-    phases
+    along
         .map(|t| {
-            let center = forward * (reach * (TAU * t).sin());
+            let center = forward * (reach * t);
             Rigid3::new(pose.rotation, -(pose.rotation * center))
         })
         .collect()
@@ -211,18 +227,18 @@ fn along_the_cameras(capture: &Capture) -> Option<(Curve, f64, f64)> {
     Some((Curve::new(knots, Interpolation::Spline), length, middle))
 }
 
-fn orbit(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
+fn orbit(capture: &Capture, frames: usize) -> Vec<Rigid3> {
     match capture.ring() {
-        Some(ring) => orbit_around(&ring, phases),
-        None => small_orbit(capture, phases),
+        Some(ring) => orbit_around(&ring, frames),
+        None => small_orbit(capture, frames),
     }
 }
 
 /// An ellipse about the reference camera, in the plane of the two longest directions of
 /// the camera positions.
-fn small_orbit(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
+fn small_orbit(capture: &Capture, frames: usize) -> Vec<Rigid3> {
     if !capture.has_extent() {
-        return phases.map(|_| capture.reference_pose()).collect();
+        return vec![capture.reference_pose(); frames];
     }
     let limit = REACH_TO_SCENE * capture.nearest_scene;
     let mut radii = [0, 1].map(|i| (REACH * capture.half_extents[i]).min(limit));
@@ -240,14 +256,14 @@ fn small_orbit(capture: &Capture, phases: impl Iterator<Item = f64>) -> Vec<Rigi
         radii = radii.map(|r| 0.8 * r);
     }
     let up = capture.reference_up();
-    phases
+    all_around(frames)
         .map(|t| Rigid3::looking_at(at(radii, t), capture.focus, up))
         .collect()
 }
 
 /// Around the object at even speed, as far from it and as high as the cameras thereabouts;
 /// to and fro where they leave a gap.
-fn orbit_around(ring: &Ring, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
+fn orbit_around(ring: &Ring, frames: usize) -> Vec<Rigid3> {
     let (from, to, closed) = ring.arc();
     let azimuth = |i: usize| from + (to - from) * i as f64 / ORBIT_POINTS as f64;
     let centers: Vec<DVec3> = (0..=ORBIT_POINTS).map(|i| ring.at(azimuth(i))).collect();
@@ -256,9 +272,13 @@ fn orbit_around(ring: &Ring, phases: impl Iterator<Item = f64>) -> Vec<Rigid3> {
         lengths.push(lengths[lengths.len() - 1] + pair[0].distance(pair[1]));
     }
     let length = lengths[ORBIT_POINTS];
-    phases
-        .map(|t| {
-            let share = if closed { t } else { there_and_back(t) };
+    let shares: Vec<f64> = match closed {
+        true => all_around(frames).collect(),
+        false => there_and_back(frames),
+    };
+    shares
+        .into_iter()
+        .map(|share| {
             let wanted = share * length;
             let after = lengths
                 .partition_point(|&l| l <= wanted)

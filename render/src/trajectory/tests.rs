@@ -109,6 +109,32 @@ fn steps_are_even_and_paths_closed() {
 }
 
 #[test]
+fn no_two_frames_show_the_same_and_two_are_the_ends() {
+    for s in [grid(), ring(360), ring(200), walk()] {
+        for kind in ALL {
+            for count in [2, 3, 4, 7, 30] {
+                let path = derive(kind, &s.sources, &s.points, &s.proxy, count, 30.0).unwrap();
+                let places = centers(&path);
+                for (i, place) in places.iter().enumerate() {
+                    let apart = places[..i].iter().map(|other| other.distance(*place));
+                    let nearest = apart.fold(f64::INFINITY, f64::min);
+                    assert!(nearest > 1e-3, "{kind:?}, {count}: {nearest} at {i}");
+                }
+            }
+        }
+    }
+    let s = grid();
+    for kind in [Trajectory::Dolly, Trajectory::Sweep] {
+        let two = derive(kind, &s.sources, &s.points, &s.proxy, 2, 30.0).unwrap();
+        let [from, to] = [0, 1].map(|i| centers(&two)[i]);
+        let all = centers(&path(kind, &s));
+        let far = |a: &DVec3| all.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
+        let widest = all.iter().map(far).fold(0.0, f64::max);
+        assert!(from.distance(to) > 0.99 * widest, "{kind:?}: {from} {to}");
+    }
+}
+
+#[test]
 fn paths_stay_near_the_cameras() {
     for (name, s, spacing) in [
         ("grid", grid(), 1.0),
