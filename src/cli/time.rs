@@ -7,6 +7,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use render::{Lumigraph, Moment};
 use serde_json::{Value, json};
+use std::sync::Once;
 
 /// For scenes that move. With either option photos count by their times, too.
 #[derive(Args, Clone)]
@@ -55,6 +56,38 @@ pub(super) struct Clock {
     time_s: Option<f64>,
     period_s: Option<f64>,
     window_s: Option<f64>,
+    photos: Span,
+}
+
+/// When photos were taken, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    first_s: f64,
+    last_s: f64,
+    /// From one to the next, on average.
+    apart_s: f64,
+}
+
+impl Span {
+    /// Of photos of these times; `None` without any.
+    fn of(times_s: &[f64]) -> Option<Self> {
+        let first_s = times_s.iter().copied().min_by(f64::total_cmp)?;
+        let last_s = times_s.iter().copied().max_by(f64::total_cmp)?;
+        let steps = times_s.len().max(2) - 1;
+        Some(Self {
+            first_s,
+            last_s,
+            apart_s: (last_s - first_s) / steps as f64,
+        })
+    }
+
+    /// The moment nearest to a given one that photos tell something of: as far beyond all of them as they lie
+    /// apart, or as the window reaches. From farther away all photos are as good as at one moment, and a
+    /// window that holds the nearest would hold them all.
+    fn nearest_s(&self, time_s: f64, window_s: Option<f64>) -> f64 {
+        let beyond_s = window_s.unwrap_or(0.0).max(self.apart_s);
+        time_s.clamp(self.first_s - beyond_s, self.last_s + beyond_s)
+    }
 }
 
 impl Clock {
@@ -68,12 +101,13 @@ impl Clock {
         if args.period.is_none() && args.time_window.is_none() && time_s.is_none() {
             return Ok(None);
         }
-        if lumigraph.sources.iter().all(|s| s.time_s.is_none()) {
+        let times_s: Vec<f64> = lumigraph.sources.iter().filter_map(|s| s.time_s).collect();
+        let Some(photos) = Span::of(&times_s) else {
             bail!(
                 "no photo has a time; import the photos with --times FILE.csv (name,seconds) \
                  or --frame-rate F"
             );
-        }
+        };
         let period_s = match args.period {
             None => None,
             Some(PeriodChoice::Seconds(seconds)) => Some(seconds),
@@ -83,14 +117,33 @@ impl Clock {
             time_s,
             period_s,
             window_s: args.time_window,
+            photos,
         }))
     }
 
-    /// The moment of a view that has a time of its own, or has none.
+    /// The moment of a view that has a time of its own, or has none. One far beyond all photos is the nearest
+    /// that they tell something of, which is said once a run.
     pub(super) fn moment(&self, name: &str, own: Option<f64>) -> anyhow::Result<Moment> {
-        let time_s = self.time_s.or(own);
-        let time_s =
-            time_s.ok_or_else(|| anyhow!("{name} has no time; give one, or --time for all"))?;
+        static SAID: Once = Once::new();
+        let asked_s = self.time_s.or(own);
+        let asked_s =
+            asked_s.ok_or_else(|| anyhow!("{name} has no time; give one, or --time for all"))?;
+        let mut time_s = asked_s;
+        if self.period_s.is_none() {
+            time_s = self.photos.nearest_s(asked_s, self.window_s);
+        }
+        if time_s != asked_s {
+            let Span {
+                first_s, last_s, ..
+            } = self.photos;
+            SAID.call_once(|| {
+                say!(
+                    "warning: {name} is to be as of {asked_s:.3} s, but photos were taken from \
+                     {first_s:.3} to {last_s:.3} s: those nearest in time show it; give --period if \
+                     everything repeats"
+                );
+            });
+        }
         Ok(Moment {
             time_s,
             period_s: self.period_s,
@@ -145,5 +198,39 @@ impl InWindow {
                 format!(", {fewest} to {most} photos in the time window")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_far_beyond_all_photos_are_the_nearest_that_they_tell_of() {
+        let photos = Span::of(&[0.2, 3.2, 0.0, 1.0]).unwrap();
+        assert_eq!((photos.first_s, photos.last_s), (0.0, 3.2));
+        let clock = |period_s, window_s| Clock {
+            time_s: None,
+            period_s,
+            window_s,
+            photos,
+        };
+        let shown = |clock: Clock, time_s| clock.moment("a", Some(time_s)).unwrap().time_s;
+        let plain = clock(None, Some(0.05));
+        let last_s = 3.2 + photos.apart_s;
+        for (asked_s, expected) in [(60.0, last_s), (-9.0, -photos.apart_s)] {
+            assert_eq!(shown(plain, asked_s), expected);
+        }
+        // Between them, or hardly beyond, all is as it is asked.
+        for asked_s in [0.0, 1.7, 3.2, 4.0, -1.0] {
+            assert_eq!(shown(plain, asked_s), asked_s);
+        }
+        // A wide window says how far photos count, and with a period there is no beyond.
+        assert_eq!(shown(clock(None, Some(100.0)), 60.0), 60.0);
+        assert_eq!(shown(clock(Some(1.5), None), 60.0), 60.0);
+        // All at one moment.
+        let photos = Span::of(&[7.0]).unwrap();
+        assert_eq!(photos.nearest_s(9.0, None), 7.0);
+        assert_eq!(Span::of(&[]), None);
     }
 }

@@ -84,6 +84,32 @@ fn frames_show_their_moment() {
 }
 
 #[test]
+fn a_moment_beyond_all_photos_is_told_and_shown_by_the_nearest() {
+    let folder = with_helicopter();
+    let render = |options: &str, out: &str| {
+        let line = format!(
+            "render helicopter --proxy plane --path orbit --frames 2 --size 48x36 -o {out} --json \
+             {options}"
+        );
+        let ran = lumigraph(folder.path(), &line).ok();
+        let counts = ran.json()["report"]["time"]["photos_in_window"].clone();
+        let most = counts[1].as_u64().unwrap();
+        (ran.stderr, most, files(&folder.path().join(out)))
+    };
+    // Of sixty photos in 11.8 s.
+    let told = "is to be as of 900.000 s, but photos were taken from 0.000 to 11.800 s";
+    let (said, most, late) = render("--time 900 --time-window 0.05", "late");
+    assert_eq!(said.matches(told).count(), 1, "{said}");
+    assert!(most < 10, "{most}");
+    let (_, _, later) = render("--time 90000", "later");
+    assert!(late == later);
+    let (said, ..) = render("--time 11.8", "end");
+    assert!(!said.contains("is to be as of"), "{said}");
+    let (said, most, _) = render("--time 900 --period 1.37", "turning");
+    assert!(!said.contains("is to be as of") && most < 30, "{said}");
+}
+
+#[test]
 fn times_are_imported_from_lists_names_and_frame_rates() {
     let folder = with_helicopter();
     let times = |scene: &str| -> Vec<Option<f64>> {
