@@ -5,7 +5,7 @@ use super::exposure::ExposureArgs;
 use super::frames::{Asked, NamedView};
 use super::inputs::files_behind_scene;
 use super::npz::{Weights, npz};
-use super::options::{FieldArgs, HoldOutArgs, SceneArgs, resized, size};
+use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
@@ -63,7 +63,7 @@ pub(super) struct Args {
     time: TimeArgs,
     #[command(flatten)]
     at: AtArgs,
-    /// Size of the picture in pixels [default: the photo's]
+    /// Size of the picture in pixels [default: the photo's]; of another shape it shows the middle of the view
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
     /// Also write the weights, for numpy: camera_names, ids, weights, points
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             frame_of(views, &args.view)?
         }
     };
-    let view = resized(view, args.size);
+    let view = cut(view, args.size);
     let clock = Clock::of(&args.time, args.at.time, &lumigraph)?;
     let moment = clock.map(|clock| clock.moment(&args.view, time_s));
     let part = Part {

@@ -30,6 +30,7 @@ mod references;
 mod render;
 mod report;
 mod session;
+mod shape;
 mod stamp;
 mod surface;
 mod targets;

@@ -2,6 +2,7 @@
 
 use super::interior::check_no_interior;
 use super::output::say;
+pub(super) use super::shape::{cut, resized};
 use calibrate::View;
 use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
@@ -279,7 +280,8 @@ pub(super) struct DrawArgs {
     /// What draws; without a graphics processor, auto is cpu
     #[arg(long, value_enum, default_value = "auto")]
     device: DeviceName,
-    /// Size of the pictures in pixels [default: each view's own]
+    /// Size of the pictures in pixels [default: each view's own]. Of another shape they show the middle of
+    /// the view, cut and not stretched; those that are compared with photos keep the photos' shape
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<(u32, u32)>,
     /// Leave nothing out, or nothing of what is named, though no picture needs it: decode every photo,
@@ -365,7 +367,7 @@ impl DrawArgs {
     /// # Errors
     /// It has more pixels on a side than are drawn.
     pub(super) fn resized(&self, name: &str, view: View) -> anyhow::Result<View> {
-        let view = resized(view, self.size);
+        let view = cut(view, self.size);
         let (width, height) = (view.width, view.height);
         if width.max(height) > MAX_SIDE {
             anyhow::bail!(
@@ -374,15 +376,6 @@ impl DrawArgs {
             );
         }
         Ok(view)
-    }
-}
-
-pub(super) fn resized(view: View, size: Option<(u32, u32)>) -> View {
-    match size {
-        Some((width, height)) if (width, height) != (view.width, view.height) => {
-            view.resized(width, height)
-        }
-        _ => view,
     }
 }
 

@@ -8,7 +8,7 @@ use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
 use super::made::{self, Made};
-use super::options::{resized, size};
+use super::options::{cut, resized, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
 use super::plot::{Line, plot};
@@ -409,7 +409,7 @@ fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
     let named = |(index, frame): (usize, path::PathFrame)| Named {
         index,
         name: frame.name,
-        view: resized(frame.view, args.size),
+        view: cut(frame.view, args.size),
         truth: None,
     };
     let frames = args

@@ -26,6 +26,7 @@ mod repeat;
 mod report;
 mod run;
 mod scene;
+mod shape;
 mod surface;
 mod time;
 mod turntable;
