@@ -1,4 +1,4 @@
-//! The plane where a reconstruction has no sparse points: through what the cameras look at.
+//! The plane where a reconstruction has no observations of sparse points: through what the cameras look at.
 
 use crate::Plane;
 use crate::condition::thinnest;

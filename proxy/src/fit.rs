@@ -56,12 +56,12 @@ impl fmt::Display for FitBasis {
             ),
             Self::Axes { cameras } => write!(
                 f,
-                "where the optical axes of {cameras} photos come closest, as there are no sparse \
+                "where the optical axes of {cameras} photos come closest, as they observe no sparse \
                  points"
             ),
             Self::DepthBounds { cameras } => write!(
                 f,
-                "the nearest and farthest depths of {cameras} photos, as there are no sparse \
+                "the nearest and farthest depths of {cameras} photos, as they observe no sparse \
                  points"
             ),
         }
@@ -73,7 +73,7 @@ impl fmt::Display for FitBasis {
 pub enum FitError {
     /// There is nothing to fit to.
     #[error(
-        "the reconstruction has no sparse points in front of its cameras to fit a plane to, and \
+        "the reconstruction's cameras observe no sparse points in front of them to fit a plane to, and \
          their optical axes do not meet there; give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
     )]
     NoPoints,
@@ -329,7 +329,7 @@ mod tests {
         r.points.clear();
         assert_eq!(
             fit_plane(&r).unwrap_err().to_string(),
-            "the reconstruction has no sparse points in front of its cameras to fit a plane to, \
+            "the reconstruction's cameras observe no sparse points in front of them to fit a plane to, \
              and their optical axes do not meet there; give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
         );
     }

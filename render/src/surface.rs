@@ -66,7 +66,12 @@ impl Surface {
         match &lumigraph.proxy {
             Proxy::Plane(plane) => of_plane(*plane),
             Proxy::ViewPlane => {
-                let plane = fit_plane_for_view(desired, &views(), &lumigraph.points);
+                let (views, sparse) = (views(), &lumigraph.points);
+                let plane = match sparse.is_empty() {
+                    // Nobody observes any: what the photos look at.
+                    true => points::plane_without_facets(desired, &views, sparse),
+                    false => fit_plane_for_view(desired, &views, sparse),
+                };
                 plane.map_or(Self::Nothing, of_plane)
             }
             proxy @ (Proxy::Points { .. } | Proxy::Dense(_)) => {

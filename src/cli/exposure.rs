@@ -100,7 +100,7 @@ impl ExposureUsed {
                 self.seconds
             ),
             (How::Matched(Verdict::NoLinks), _) => {
-                "as it is (no sparse points to match photos by)".to_owned()
+                "as it is (photos share no sparse points to match them by)".to_owned()
             }
         }
     }

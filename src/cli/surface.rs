@@ -44,6 +44,9 @@ pub(super) fn fit(
     };
     busy.finish_and_clear();
     let fitted = fitted.context("no such proxy can be fitted to this scene")?;
+    if let Some(note) = scene.note_of_unobserved(kind) {
+        say!("note: {note}");
+    }
     if let Some(note) = &fitted.note {
         say!("note: {note}; see `lumigraph proxy`");
     }

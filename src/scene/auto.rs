@@ -111,9 +111,8 @@ impl Scene {
     fn may_have(&self, kind: Kind) -> bool {
         match kind {
             Kind::Plane => true,
-            Kind::DominantPlane | Kind::ViewPlane | Kind::Tunnel | Kind::Points | Kind::Carved => {
-                self.reconstruction.points.len() >= FEWEST_POINTS
-            }
+            Kind::DominantPlane | Kind::Tunnel => self.reconstruction.points.len() >= FEWEST_POINTS,
+            Kind::ViewPlane | Kind::Points | Kind::Carved => self.observed_count() >= FEWEST_POINTS,
             // Photos are compared whatever there is of points.
             Kind::Dense | Kind::CarvedDense => true,
             Kind::Hull => self.has_silhouettes(),

@@ -120,7 +120,6 @@ impl Scene {
     /// # Errors
     /// The scene does not have what it takes; the message says what that is.
     pub fn fit(&self, kind: Kind, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
-        let sparse = || self.sparse(without);
         match kind {
             Kind::Plane => {
                 let fit = self.fit_plane(without)?;
@@ -133,7 +132,7 @@ impl Scene {
                 Ok(fitted.with_condition(fit.condition))
             }
             Kind::DominantPlane => {
-                let (_, points) = sparse()?;
+                let (_, points) = self.sparse(without)?;
                 let positions: Vec<DVec3> = points.iter().map(|p| p.position).collect();
                 let found = proxy::dominant_plane(&positions).map_err(unfit)?;
                 let how = format!("{} of {} points lie on it", found.inliers, found.points);
@@ -141,16 +140,17 @@ impl Scene {
                 Ok(fitted.with_condition(found.condition))
             }
             Kind::ViewPlane => {
-                self.needs_points(kind)?;
+                self.needs_observed(kind)?;
                 Ok(Fitted::new(Proxy::ViewPlane, "made for every view"))
             }
             Kind::Points => {
-                self.needs_points(kind)?;
+                self.needs_observed(kind)?;
                 Ok(Fitted::points(self.bound(without)?))
             }
             Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
             Kind::Carved => {
-                let (views, points) = sparse()?;
+                self.needs_observed(kind)?;
+                let (views, points) = self.observed(without)?;
                 let surface = carve::surface(&views, &points, &carve::Options::default());
                 let how = format!("carved out of {} points", points.len());
                 let mesh = surface.map_err(unfit)?.mesh;
@@ -183,17 +183,7 @@ impl Scene {
         tunnel::fit(&views, &positions).map_err(unfit)
     }
 
-    fn needs_points(&self, kind: Kind) -> Result<(), SceneError> {
-        if self.reconstruction.points.is_empty() {
-            return Err(unfit(format!(
-                "the scene has no sparse points, which the {} proxy is made of; try dense, carved-dense or plane",
-                kind.name()
-            )));
-        }
-        Ok(())
-    }
-
-    /// The views but those of the given names, and the sparse points they see.
+    /// The views but those of the given names, and the sparse points: each with those that see it, if any do.
     pub(super) fn sparse(
         &self,
         without: &BTreeSet<String>,
@@ -258,7 +248,7 @@ impl Scene {
     }
 
     /// The plane that fits the sparse points when the photos of the given names were never
-    /// taken; without points, that through what the cameras look at.
+    /// taken; where no photo observes any, that through what the cameras look at.
     ///
     /// # Errors
     /// Nothing to fit to.
@@ -277,9 +267,9 @@ impl Scene {
         bounds.collect()
     }
 
-    /// Without sparse points, the inverse depths (1/z) between which to compare each photo but those of the given
-    /// names: as the calibration has them, else around how far that lies which all look at; where they look
-    /// every way, around how far they are from one another.
+    /// Where no photo observes sparse points, the inverse depths (1/z) between which to compare each photo but
+    /// those of the given names: as the calibration has them, else around how far that lies which all look at;
+    /// where they look every way, around how far they are from one another.
     fn supposed_ranges(&self, without: &BTreeSet<String>) -> Result<Vec<[f64; 2]>, SceneError> {
         let sources = self.sources(without)?;
         let bounds = self.depth_bounds();
@@ -293,8 +283,8 @@ impl Scene {
         };
         if !(distance > 0.0 && distance.is_finite()) {
             return Err(unfit(
-                "the scene has no sparse points, and all photos were taken from one place, which tells \
-                 no depths",
+                "no photo observes sparse points, and all were taken from one place, which tells no \
+                 depths; give a plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)",
             ));
         }
         let range = |photo: &Photo| match bounds.get(&photo.name) {
@@ -317,7 +307,7 @@ impl Scene {
     }
 
     fn dense_surface(&self, without: &BTreeSet<String>) -> Result<CarvedPoints, SceneError> {
-        let (views, sparse) = self.sparse(without)?;
+        let (views, sparse) = self.observed(without)?;
         let (matching, note) = self.matching(without)?;
         let points = matching.points(&sparse, None);
         Ok(CarvedPoints::of_all(&views, points, sparse.len())?.with_note(note))
@@ -330,7 +320,7 @@ impl Scene {
         without: &BTreeSet<String>,
     ) -> Result<(Matching, Option<String>), SceneError> {
         let sources = self.sources(without)?;
-        let (views, sparse) = self.sparse(without)?;
+        let (views, sparse) = self.observed(without)?;
         let photo = |i: usize| usable(sources[i].0, &views[i]);
         let maps = self.depth_maps(without)?;
         let noise = maps.noise(|i| views[i].clone());

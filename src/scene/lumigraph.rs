@@ -113,10 +113,10 @@ impl Scene {
         });
         let points = match &proxy {
             Proxy::Plane(_) | Proxy::Mesh(_) => Vec::new(),
-            Proxy::ViewPlane => self.sparse_points(without, &names_of(&sources)),
+            Proxy::ViewPlane => self.observed_points(without, &names_of(&sources)),
             Proxy::Points { .. } => {
                 let views: Vec<View> = sources.iter().map(|s| s.view.clone()).collect();
-                on_surface(&views, self.sparse_points(without, &names_of(&sources)))
+                on_surface(&views, self.observed_points(without, &names_of(&sources)))
             }
             Proxy::Dense(dense) => renamed(dense, &names_of(&sources)),
         };
@@ -164,7 +164,7 @@ impl Scene {
     }
 
     /// The sparse points that do not rest on photos left out, each with those of the named
-    /// photos that observe it.
+    /// photos that observe it: of some models none.
     pub(super) fn sparse_points(
         &self,
         without: &BTreeSet<String>,

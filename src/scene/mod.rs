@@ -19,6 +19,7 @@ mod fit;
 mod import;
 mod lumigraph;
 mod names;
+mod observed;
 mod relative;
 mod rooms;
 mod silhouettes;

@@ -182,7 +182,7 @@ impl<'a> Trials<'a> {
     }
 
     fn dense_of_all(&mut self) -> Result<CarvedPoints, SceneError> {
-        let sparse = self.scene.sparse_points(self.without, &self.names);
+        let sparse = self.scene.observed_points(self.without, &self.names);
         let taken = self.take_matching()?;
         let (matching, note) = self.matching.insert(taken);
         let (points, note) = (matching.points(&sparse, None), note.clone());
@@ -198,7 +198,7 @@ impl<'a> Trials<'a> {
             let find = |judge: &Judge| {
                 let (gone, mut fewer) = (judge.source_idx, self.without.clone());
                 fewer.insert(judge.name.clone());
-                let sparse = self.scene.sparse_points(&fewer, &self.names);
+                let sparse = self.scene.observed_points(&fewer, &self.names);
                 let points = matching.points(&sparse, Some(gone));
                 CarvedPoints::new(&self.views(Some(gone)), points, sparse.len())
             };
@@ -271,7 +271,7 @@ impl<'a> Trials<'a> {
             Kind::Points | Kind::Dense | Kind::CarvedDense => self.bound(judges[0])?,
             _ => None,
         };
-        let sparse = || self.scene.sparse_points(&fewer, &self.names);
+        let sparse = || self.scene.observed_points(&fewer, &self.names);
         let (proxy, points) = match kind {
             Kind::Points => {
                 let gone = self.judges[judges[0]].source_idx;

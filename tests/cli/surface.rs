@@ -1,7 +1,8 @@
 //! Kinds of surface, and the choice between them.
 
-use crate::run::{files, lumigraph};
+use crate::run::{files, lumigraph, with_wall};
 use serde_json::Value;
+use std::path::Path;
 
 /// A folder with a small capture of the given scene.
 fn with(name: &str) -> tempfile::TempDir {
@@ -102,6 +103,62 @@ fn photos_without_sparse_points_are_compared() {
         error.contains("no sparse points") && error.contains("try dense"),
         "{error}"
     );
+}
+
+/// Writes a capture's model as programs do that tell points but not who observes them; or without points, too.
+/// How many points there were.
+fn forget_tracks(capture: &Path, and_points: bool) -> usize {
+    let sparse = capture.join("sparse");
+    let mut model = calibrate::colmap::read_model(&sparse.join("0")).unwrap();
+    let count = model.points.len();
+    for image in model.images.values_mut() {
+        image.keypoints.clear();
+    }
+    for point in model.points.values_mut() {
+        point.track.clear();
+    }
+    if and_points {
+        model.points.clear();
+    }
+    std::fs::remove_dir_all(&sparse).unwrap();
+    calibrate::colmap::write_text(&model, &sparse.join("0")).unwrap();
+    count
+}
+
+#[test]
+fn points_that_no_photo_observes_count_for_where_they_are_alone() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "proxy wall view-plane -o views.json").ok();
+    let count = forget_tracks(&here.join("wall"), false);
+    // 1. What is made of who observes which cannot be, and that is why.
+    for kind in ["points", "view-plane", "carved"] {
+        let error = lumigraph(here, &format!("evaluate wall --proxy {kind}")).error(1);
+        let told = format!("no photo observes any of the {count} sparse points");
+        assert!(
+            error.contains(&told) && error.contains("try dense"),
+            "{error}"
+        );
+    }
+    // 2. What is made of where they are can.
+    let ran = lumigraph(here, "proxy wall dominant-plane -o plane.json").ok();
+    assert!(!ran.stderr.contains("no photo observes"), "{}", ran.stderr);
+    // 3. A plane for every view, as it was made before, is that of all photos.
+    let evaluate = |proxy: &str| {
+        let ran = lumigraph(here, &format!("evaluate wall --proxy {proxy} --json")).ok();
+        let mean = ran.json()["mean"].clone();
+        let number = |name: &str| mean[name].as_f64().unwrap();
+        (number("psnr"), number("coverage"), ran.stderr)
+    };
+    assert!(evaluate("views.json").1 > 0.8);
+    // 4. Photos are compared as if there were no points.
+    let (with, _, said) = evaluate("dense");
+    let note = format!("note: no photo observes {count} of {count} sparse points");
+    assert_eq!(said.matches(&note).count(), 1, "{said}");
+    forget_tracks(&here.join("wall"), true);
+    let (without, _, said) = evaluate("dense");
+    assert!(with == without && with > 30.0, "{with} {without}");
+    assert!(!said.contains("no photo observes"), "{said}");
 }
 
 #[test]

@@ -97,6 +97,15 @@ pub enum CarveError {
         /// How many there are.
         photos: usize,
     },
+    /// Nobody sees any point.
+    #[error(
+        "no photo sees any of the {given} sparse points, so there are no lines of sight to carve with; try \
+         another proxy, such as a plane"
+    )]
+    Unseen {
+        /// How many there were.
+        given: usize,
+    },
     /// Nothing to carve around.
     #[error(
         "of {given} sparse points none is finite and in front of a photo that sees it; try \
@@ -194,8 +203,10 @@ impl Scene {
         let mut used: Vec<(DVec3, Vec<u32>, usize)> =
             points.iter().enumerate().filter_map(usable).collect();
         if used.is_empty() {
-            return Err(CarveError::NoPoints {
-                given: points.len(),
+            let (given, mut all) = (points.len(), points.iter());
+            return Err(match given > 0 && all.all(|p| p.seen_by.is_empty()) {
+                true => CarveError::Unseen { given },
+                false => CarveError::NoPoints { given },
             });
         }
 

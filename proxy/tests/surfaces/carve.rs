@@ -308,6 +308,14 @@ fn what_cannot_be_carved_is_an_error_that_says_why() {
          proxy, such as a plane"
     );
     assert_eq!(
+        text(
+            &room.views,
+            &[DVec3::ZERO, DVec3::ONE].map(|at| point(at, vec![]))
+        ),
+        "no photo sees any of the 2 sparse points, so there are no lines of sight to carve with; try \
+         another proxy, such as a plane"
+    );
+    assert_eq!(
         text(&room.views, &[point(DVec3::ONE, vec![1, 2])]),
         "point 0 is seen by photo 2 (both counting from 0), but there are 2 photos"
     );
