@@ -21,6 +21,8 @@ pub const DEPTH_UNITS_PER_STEP: f64 = 0.001;
 
 /// Alpha and mask agree where both are on the same side of half in this share of pixels.
 const AGREES: f64 = 0.99;
+/// An ignore mask's value below which depth is not used: masks have soft borders, and some are JPEG.
+const USED: u8 = 128;
 /// So many masks, spread over the photos, decide whether all are silhouettes.
 const MASKS_JUDGED: usize = 5;
 
@@ -38,6 +40,20 @@ impl Photo {
         Ok(pixels)
     }
 
+    /// Its pixels as [`Self::decode`] has them, transparent also where its ignore mask ignores them.
+    ///
+    /// # Errors
+    /// As for [`Self::decode`] and [`Self::decode_ignore_mask`].
+    pub fn decode_usable(&self, size: (u32, u32)) -> Result<RgbaImage, CaptureError> {
+        let mut pixels = self.decode(size)?;
+        if let Some(mask) = self.decode_ignore_mask(size)? {
+            for (pixel, used) in pixels.pixels_mut().zip(mask.pixels()) {
+                pixel.0[3] = pixel.0[3].min(used.0[0]);
+            }
+        }
+        Ok(pixels)
+    }
+
     /// Its ignore mask, if it has one: 0 = ignore, 255 = use.
     ///
     /// # Errors
@@ -48,14 +64,26 @@ impl Photo {
         self.ignore_mask.as_ref().map(decode).transpose()
     }
 
-    /// Its depth map, if it has one.
+    /// Its depth map, if it has one. Where its ignore mask ignores the photo the depth is unknown:
+    /// what is not to be seen is no surface, either.
     ///
     /// # Errors
-    /// It cannot be decoded, is not 16-bit grey or has another size than `size`, the photo's.
+    /// It cannot be decoded, is not 16-bit grey or has another size than `size`, the photo's; as for
+    /// [`Self::decode_ignore_mask`].
     pub fn decode_depth(&self, size: (u32, u32)) -> Result<Option<DepthMap>, CaptureError> {
         let scale = self.depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
-        let decode = |path: &PathBuf| capture::decode_depth(path, &self.name, size, scale);
-        self.depth_map.as_ref().map(decode).transpose()
+        let Some(path) = &self.depth_map else {
+            return Ok(None);
+        };
+        let mut map = capture::decode_depth(path, &self.name, size, scale)?;
+        if let Some(mask) = self.decode_ignore_mask(size)? {
+            for (depth, used) in map.depths.iter_mut().zip(mask.pixels()) {
+                if used.0[0] < USED {
+                    *depth = 0.0;
+                }
+            }
+        }
+        Ok(Some(map))
     }
 
     /// What lies beside it, with its kind.

@@ -5,7 +5,6 @@ use super::carved_points::CarvedPoints;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
 use glam::DVec3;
-use image::RgbaImage;
 use proxy::dense::{DenseOptions, Matching};
 use proxy::depth;
 use proxy::hull::{self, Silhouette};
@@ -321,7 +320,11 @@ impl Scene {
     ) -> Result<(Matching, Option<String>), SceneError> {
         let sources = self.sources(without)?;
         let (views, sparse) = self.observed(without)?;
-        let photo = |i: usize| usable(sources[i].0, &views[i]);
+        // One that cannot be decoded is left out; drawing will report it.
+        let photo = |i: usize| {
+            let size = (views[i].width, views[i].height);
+            sources[i].0.decode_usable(size).ok()
+        };
         let maps = self.depth_maps(without)?;
         let noise = maps.noise(|i| views[i].clone());
         let unusable = Mutex::new(BTreeMap::new());
@@ -452,17 +455,4 @@ pub(super) fn fuse_depth(
 /// Why a kind of proxy does not suit a scene.
 pub(super) fn unfit(reason: impl ToString) -> SceneError {
     SceneError::Unfit(reason.to_string())
-}
-
-/// A photo, transparent where its mask ignores it; `None` where it cannot be decoded, which
-/// drawing will report.
-fn usable(photo: &Photo, view: &View) -> Option<RgbaImage> {
-    let size = (view.width, view.height);
-    let mut pixels = photo.decode(size).ok()?;
-    if let Some(mask) = photo.decode_ignore_mask(size).ok()? {
-        for (pixel, used) in pixels.pixels_mut().zip(mask.pixels()) {
-            pixel.0[3] = pixel.0[3].min(used.0[0]);
-        }
-    }
-    Some(pixels)
 }

@@ -72,7 +72,7 @@ impl Scene {
             let pixels = f64::from(map.width) * f64::from(map.height);
             let every = (pixels / SIGHTS).sqrt().round().max(1.0);
             lines.extend(sights(view, &map, every as u32));
-            painting.add(view, &photo.decode(size)?, &map);
+            painting.add(view, &photo.decode_usable(size)?, &map);
         }
         let colors = painting.colors();
         let cameras = sources.iter().map(|(_, v)| (v.center(), v.up())).collect();

@@ -17,6 +17,7 @@ mod interior;
 mod interior_folder;
 mod kinds;
 mod ldis;
+mod masked_depth;
 mod masks;
 mod memory;
 mod opencv;
