@@ -60,7 +60,9 @@ impl Scene {
             }
         };
         // Its colours, and what cameras saw past.
-        let mut painting = Painting::new(&mesh, tolerance);
+        // Fused depth maps wind as cameras saw them.
+        let front_only = own.is_none_or(|solid| solid.kind().has_front_sides_only());
+        let mut painting = Painting::new(&mesh, tolerance, front_only);
         let mut lines = Vec::new();
         for (photo, view) in &sources {
             let size = (view.width, view.height);
