@@ -4,7 +4,8 @@ use calibrate::{Pixel, View};
 use capture::DepthMap;
 use glam::DVec3;
 
-/// From a camera to what a depth map shows, at every so-manieth column and row with a depth.
+/// From a camera to what a depth map shows, at every so-manieth column and row with a depth; what is
+/// behind the camera has depths below 0.
 pub fn sights(view: &View, depth: &DepthMap, every: u32) -> Vec<[DVec3; 2]> {
     let world_from_camera = view.camera_from_world.inverse();
     let center = view.center();
@@ -14,11 +15,11 @@ pub fn sights(view: &View, depth: &DepthMap, every: u32) -> Vec<[DVec3; 2]> {
         for column in (every / 2..depth.width).step_by(every as usize) {
             let index = row as usize * depth.width as usize + column as usize;
             let known = depth.depths.get(index).map(|d| f64::from(*d));
-            let Some(z) = known.filter(|z| *z > 0.0 && z.is_finite()) else {
+            let Some(z) = known.filter(|z| *z != 0.0 && z.is_finite()) else {
                 continue;
             };
             let ray = view.lens.unproject(Pixel::center_of(column, row));
-            let Some(ray) = ray.filter(|ray| ray.z > 0.05) else {
+            let Some(ray) = ray.filter(|ray| ray.z.abs() > 0.05 && ray.z * z > 0.0) else {
                 continue;
             };
             let point = world_from_camera * (ray * (z / ray.z));
