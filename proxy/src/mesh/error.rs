@@ -66,11 +66,17 @@ pub enum ExportError {
     /// A camera's pose or focal length is not finite.
     #[error("the camera {0} has no finite pose and focal length; leave it out")]
     Camera(String),
-    /// More than a GLB holds.
+    /// More than a GLB holds: at least so many bytes.
     #[error(
-        "a GLB holds less than 4 GiB, and this mesh takes {0} bytes; simplify it, or write .ply"
+        "a GLB holds less than 4 GiB, and this mesh takes at least {0} bytes; simplify it, or write .ply"
     )]
     TooLarge(usize),
+    /// The same of a model, which no other file holds.
+    #[error(
+        "a GLB holds less than 4 GiB, and this model takes at least {0} bytes; it must be of fewer triangles: \
+         simplify the mesh that it is made of, in Blender or MeshLab, or ask for fewer"
+    )]
+    ModelTooLarge(usize),
     /// The extras are no JSON.
     #[error("the extras of a GLB must be JSON: {0}")]
     Extras(serde_json::Error),

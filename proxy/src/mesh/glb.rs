@@ -1,6 +1,6 @@
 //! glTF 2.0 binary, written by way of the `gltf` crate's types.
 
-use super::model_glb::container;
+use super::model_glb::{container, file_size};
 use super::{ExportError, Mesh};
 use calibrate::View;
 use glam::{DQuat, DVec3, Vec3};
@@ -38,8 +38,10 @@ pub fn to_glb(
     if let Some(i) = corners.iter().position(is_bad) {
         return Err(ExportError::Position(i, mesh.positions[i]));
     }
-    // 1. The bytes.
-    let mut data = Vec::with_capacity(12 * (corners.len() + mesh.triangles.len()));
+    // 1. The bytes, twelve a corner and twelve a triangle.
+    let bytes = 12 * (corners.len() + mesh.triangles.len());
+    file_size(0, bytes, ExportError::TooLarge)?;
+    let mut data = Vec::with_capacity(bytes);
     data.extend(
         corners
             .iter()
@@ -49,9 +51,6 @@ pub fn to_glb(
     let positions_length = data.len();
     let indices = mesh.triangles.as_flattened().iter();
     data.extend(indices.flat_map(|i| i.to_le_bytes()));
-    if data.len() >= u32::MAX as usize / 2 {
-        return Err(ExportError::TooLarge(data.len()));
-    }
     // 2. What they are.
     let mut root = json::Root::default();
     root.asset.generator = Some("lumigraph".to_owned());
@@ -150,7 +149,7 @@ pub fn to_glb(
     root.scene = Some(scene);
     // 4. The file.
     let text = json::serialize::to_string(&root).map_err(ExportError::Extras)?;
-    container(text.into_bytes(), data)
+    container(text.into_bytes(), data, ExportError::TooLarge)
 }
 
 /// A camera's node, relative to `origin`.

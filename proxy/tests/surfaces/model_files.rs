@@ -100,6 +100,62 @@ fn a_model_comes_back_from_its_file() {
     assert_eq!(mesh, back.mesh);
 }
 
+/// The small model, stretched and moved.
+fn small_at(size: DVec3, place: DVec3) -> Model {
+    let mut model = small();
+    for position in &mut model.mesh.positions {
+        *position = *position * size + place;
+    }
+    model
+}
+
+#[test]
+fn a_model_far_from_the_origin_keeps_its_digits() {
+    // In UTM metres f32 tells heights apart by 0.03, and northings by half a metre.
+    let place = DVec3::new(500_000.1, 5_400_000.3, 300.7);
+    let model = small_at(DVec3::new(1.5, 1.1, 1.0), place);
+    let bytes = mesh::model_to_glb(&model).unwrap();
+    let (back, warnings) = read(&bytes).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!((&back.nodes, &back.parts), (&model.nodes, &model.parts));
+    let corners = |model: &Model| -> Vec<DVec3> {
+        let corners = model.mesh.triangles.as_flattened().iter();
+        corners.map(|i| model.mesh.positions[*i as usize]).collect()
+    };
+    for (a, b) in corners(&back).iter().zip(corners(&model)) {
+        assert!((*a - b).length() < 1e-7, "{a} for {b}");
+    }
+    // It stands on the node that has no parent, and does so if it is written again.
+    let text = String::from_utf8_lossy(&bytes);
+    assert_eq!(text.matches("\"translation\"").count(), 1);
+    let again = mesh::model_to_glb(&back).unwrap();
+    assert_eq!(corners(&read(&again).unwrap().0), corners(&back));
+}
+
+#[test]
+fn a_model_stays_in_the_worlds_frame_where_f32_holds_it() {
+    for (size, place) in [
+        // Sixteenths of a metre, however far away.
+        (1.25, DVec3::new(4096.0625, -70_000.5, 12.0)),
+        // What is around the origin is rounded there.
+        (1.3, DVec3::new(-0.7, 0.1, 0.3)),
+    ] {
+        let model = small_at(DVec3::splat(size), place);
+        let bytes = mesh::model_to_glb(&model).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(!text.contains("\"translation\""));
+        let (back, _) = read(&bytes).unwrap();
+        let rounded = |p: &DVec3| p.as_vec3().as_dvec3();
+        let position = |model: &Model, i: usize| {
+            let corners = model.mesh.triangles.as_flattened();
+            model.mesh.positions[corners[i] as usize]
+        };
+        for i in 0..6 {
+            assert_eq!(position(&back, i), rounded(&position(&model, i)));
+        }
+    }
+}
+
 #[test]
 fn colours_are_products_of_what_colours_a_place() {
     let model = small();
