@@ -122,7 +122,9 @@ fn of_photo(
         let (at, depth) = other.project(position)?;
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
         let off = (inverse - 1.0 / depth).abs();
-        (off <= (AGREE * inverse).max(AGREE_STEPS * map.step)).then_some(())
+        let near = (AGREE * inverse).max(AGREE_STEPS * map.step);
+        // Unknown is 0, which lies within a step of what is far.
+        (inverse > 0.0 && off <= near).then_some(())
     };
     // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
     let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
@@ -188,4 +190,39 @@ fn of_photo(
         agreed().or_else(measured)
     };
     (0..columns * rows).filter_map(of_cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::{Lens, Rigid3, View};
+    use glam::DVec2;
+    use image::{Rgba, RgbaImage};
+
+    /// Depths so far that one step more or less is infinity.
+    #[test]
+    fn nothing_agrees_with_pixels_of_unknown_depth() {
+        let view = View {
+            lens: Lens::pinhole(DVec2::splat(30.0), DVec2::new(16.0, 12.0)),
+            width: 32,
+            height: 24,
+            camera_from_world: Rigid3::IDENTITY,
+        };
+        let gray = RgbaImage::from_pixel(32, 24, Rgba([100, 100, 100, 255]));
+        let photo = SmallPhoto::new(&view, &gray, 32).unwrap();
+        let map = |inverse: f32| DepthMap {
+            inverse_depths: vec![inverse; photo.width * photo.height],
+            step: 0.02,
+        };
+        let (far, unknown) = (map(0.01), map(0.0));
+        let photos = vec![Some(photo.clone()); 3];
+        let neighbours = [vec![1, 2], vec![0, 2], vec![0, 1]];
+        let count = |maps: [&DepthMap; 3]| {
+            let maps = maps.map(Some);
+            points(&photos, &maps, &[None; 3], &neighbours, 4).len()
+        };
+        assert_eq!(count([&far, &unknown, &unknown]), 0);
+        assert_eq!(count([&far, &far, &unknown]), 0);
+        assert_eq!(count([&far, &far, &far]), 8 * 6);
+    }
 }
