@@ -9,7 +9,8 @@ use glam::{DMat3, DVec3};
 
 /// Fewer points than this tell no six walls.
 const LEAST_POINTS: usize = 12;
-/// Points farther from the cameras than this many times the median are left out.
+/// Points farther from the cameras' middle than this many times the median are left out; cameras where
+/// they are that much farther than both points and cameras are.
 const FAR: f64 = 100.0;
 /// So many points, spread over the list, decide about guesses.
 const SAMPLE: usize = 1200;
@@ -37,11 +38,16 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
     }
     let middle = |axis: usize| median(posed.iter().map(|v| v.center()[axis]).collect());
     let origin = DVec3::new(middle(0), middle(1), middle(2));
-    let points = near(points_in_world, origin);
-    let centers = near(
-        &posed.iter().map(|v| v.center()).collect::<Vec<_>>(),
-        origin,
-    );
+    let mut points = offsets(points_in_world.iter().copied(), origin);
+    let mut centers = offsets(posed.iter().map(|v| v.center()), origin);
+    let limit = reach(&points);
+    // A walk may lead far from where most photos were taken, if that is one place.
+    let limit_of_centers = limit.max(reach(&centers));
+    points.retain(|p| p.length() <= limit);
+    centers.retain(|c| c.length() <= limit_of_centers);
+    if centers.is_empty() {
+        return Err(TunnelError::NoViews);
+    }
     if points.len() < LEAST_POINTS {
         return Err(TunnelError::TooFewPoints {
             found: points.len(),
@@ -90,15 +96,18 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
     Ok(best.into_tunnel(origin))
 }
 
-/// The finite points relative to `origin`, those very far from it left out.
-fn near(points_in_world: &[DVec3], origin: DVec3) -> Vec<DVec3> {
-    let finite = points_in_world.iter().map(|p| *p - origin);
-    let mut offsets: Vec<DVec3> = finite.filter(|p| p.length().is_finite()).collect();
-    if !offsets.is_empty() {
-        let limit = FAR * median(offsets.iter().map(|p| p.length()).collect());
-        offsets.retain(|p| p.length() <= limit);
+/// The finite points relative to `origin`.
+fn offsets(points_in_world: impl Iterator<Item = DVec3>, origin: DVec3) -> Vec<DVec3> {
+    let offsets = points_in_world.map(|p| p - origin);
+    offsets.filter(|p| p.length().is_finite()).collect()
+}
+
+/// How far from the origin something still counts.
+fn reach(offsets: &[DVec3]) -> f64 {
+    match offsets {
+        [] => 0.0,
+        _ => FAR * median(offsets.iter().map(|p| p.length()).collect()),
     }
-    offsets
 }
 
 /// Twice the median distance of the points from the cameras' middle, across the way.

@@ -130,6 +130,28 @@ fn noise_and_mismatches_hardly_move_it() {
     assert!(tunnel.is_hallway(), "{tunnel:?}");
 }
 
+/// Most photos are a panorama of a tripod's, where the walk begins.
+#[test]
+fn a_panorama_does_not_cut_off_the_walk() {
+    let (mut views, points) = hallway();
+    let walk = fit(&views, &points).unwrap();
+    let tripod = vec![views[0].clone(); views.len() + 1];
+    views.extend(tripod);
+    let tunnel = fit(&views, &points).unwrap();
+    assert!(tunnel.is_hallway(), "{tunnel:?}");
+    assert!(views.iter().all(|v| tunnel.contains(v.center())));
+    let walked = tunnel.walked / walk.walked;
+    assert!((walked - 1.0).abs() < 0.02, "{walked}");
+    let errors = errors(&tunnel, Rigid3::IDENTITY, 1.0);
+    assert!(errors.iter().all(|e| *e < 0.02), "{errors:?}");
+    // One that is lost is not what the box is laid around.
+    let mut lost = views[0].clone();
+    lost.camera_from_world.translation.z += 1e9;
+    views.push(lost);
+    let found = fit(&views, &points).unwrap();
+    assert!(found.length() < 2.0 * tunnel.length(), "{found:?}");
+}
+
 #[test]
 fn every_ray_from_inside_meets_a_triangle_that_faces_it() {
     let (views, points) = hallway();
