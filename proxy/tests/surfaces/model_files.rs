@@ -310,6 +310,55 @@ fn specular_glossiness_is_read_as_base_colour() {
 }
 
 #[test]
+fn what_shines_is_shown_where_it_was_black_and_told_elsewhere() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    // A screen, and a lamp that is brighter than white.
+    let lamps = with_materials(&bytes, |materials| {
+        let black = json!({"baseColorFactor": [0, 0, 0, 1]});
+        let texture = materials[0]["pbrMetallicRoughness"]["baseColorTexture"].take();
+        materials[0]["pbrMetallicRoughness"] = black.clone();
+        materials[0]["emissiveTexture"] = texture;
+        materials[0]["emissiveFactor"] = json!([1, 1, 1]);
+        materials[1]["pbrMetallicRoughness"] = black;
+        materials[1]["emissiveFactor"] = json!([0.5, 0.25, 0]);
+        materials[1]["extensions"] =
+            json!({"KHR_materials_emissive_strength": {"emissiveStrength": 8}});
+    });
+    let (model, warnings) = read(&lamps).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!(model.materials[0], plain.materials[0]);
+    assert_eq!(model.textures, plain.textures);
+    let [r, g, b] = model.materials[1].base_color;
+    assert!(r == 1.0 && (g - 0.7354).abs() < 1e-3 && b == 0.0, "{g}");
+    // Corners' colours are none of it.
+    assert!(model.colors.iter().all(|color| *color == [255; 4]));
+    assert!(!plain.colors.iter().all(|color| *color == [255; 4]));
+    // What has a colour keeps it.
+    let shining = |more: Value| {
+        let changed = with_materials(&bytes, |materials| {
+            for material in materials.as_array_mut().unwrap() {
+                material["emissiveFactor"] = json!([0, 0, 1]);
+                material["extensions"] = more.clone();
+            }
+            materials[1]["name"] = "neon".into();
+        });
+        read(&changed).unwrap()
+    };
+    let (model, warnings) = shining(json!({}));
+    assert_eq!(
+        warnings,
+        ["what shines by itself is drawn as if it did not (2 materials: number 0, `neon`)"]
+    );
+    assert_eq!(
+        (&model.materials, &model.colors),
+        (&plain.materials, &plain.colors)
+    );
+    let (_, warnings) = shining(json!({"KHR_materials_unlit": {}}));
+    assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
 fn what_alpha_makes_invisible_is_left_out_and_told() {
     let bytes = mesh::model_to_glb(&small()).unwrap();
     let (plain, _) = read(&bytes).unwrap();

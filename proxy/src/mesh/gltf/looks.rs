@@ -205,9 +205,15 @@ impl Visitor for Looks {
         }
         if let Some(accessor) = colors {
             let code = |x: f64| (255.0 * srgb_from_linear(x)).round() as u8;
+            // Corners' colours are for what reflects.
+            let shines = number.and_then(|n| self.entry(n));
+            let shines = shines.is_some_and(MaterialEntry::shows_emission);
             let color = |[r, g, b, alpha]: [f64; 4]| {
                 least_alpha = least_alpha.min(alpha);
-                [code(r), code(g), code(b), 255]
+                match shines {
+                    true => [255; 4],
+                    false => [code(r), code(g), code(b), 255],
+                }
             };
             let colors = accessors.vectors(accessor)?;
             self.model.colors.extend(colors.map(color));
@@ -263,6 +269,8 @@ impl Looks {
     /// What of the materials is not shown as the file says.
     fn not_shown(&self, decoded: &[Decoded]) -> Vec<String> {
         let of_texture = |number: &usize| {
+            // Alpha of what shines is not the material's.
+            self.entry(*number).filter(|m| !m.shows_emission())?;
             let idx = self.material_idxs.get(&Some(*number))?;
             let material = self.model.materials.get(*idx as usize)?;
             let picture = decoded.get(material.texture_idx? as usize)?;

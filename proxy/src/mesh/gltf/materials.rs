@@ -1,5 +1,6 @@
 //! What a glTF file says of its materials, and what of that is not shown.
 
+use crate::mesh::model::srgb_from_linear;
 use crate::mesh::obj::shown;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -16,6 +17,9 @@ pub(super) struct MaterialEntry {
     #[serde(default)]
     alpha_mode: AlphaMode,
     alpha_cutoff: Option<f64>,
+    #[serde(default)]
+    emissive_factor: [f64; 3],
+    emissive_texture: Option<TextureUse>,
     #[serde(default)]
     extensions: BTreeMap<String, Extension>,
 }
@@ -37,12 +41,13 @@ enum AlphaMode {
     Opaque,
 }
 
-/// An extension of a material: what [`GLOSSINESS`] has for looks, all else passed over.
+/// An extension of a material: what [`GLOSSINESS`] and [`STRENGTH`] have for looks, all else passed over.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Extension {
     diffuse_factor: Option<[f64; 4]>,
     diffuse_texture: Option<TextureUse>,
+    emissive_strength: Option<f64>,
 }
 
 /// A texture that a material uses.
@@ -59,18 +64,24 @@ pub(super) struct TextureUse {
 /// The extension whose diffuse colour stands in place of the base colour.
 const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
+/// The extension that multiplies what shines.
+const STRENGTH: &str = "KHR_materials_emissive_strength";
+
+/// The extension of what has its base colour in any light, and shines with nothing else.
+const UNLIT: &str = "KHR_materials_unlit";
+
 /// Extensions that leave colour and opacity without light as they are, and what is read.
 const NO_LOSS: [&str; 12] = [
     GLOSSINESS,
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
+    STRENGTH,
     "KHR_materials_ior",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_specular",
-    "KHR_materials_unlit",
+    UNLIT,
     // What another lets through.
     "KHR_materials_volume",
     "KHR_xmp_json_ld",
@@ -84,17 +95,49 @@ impl MaterialEntry {
         self.extensions.get(GLOSSINESS)
     }
 
-    /// Base colour and alpha, linear, where they are not 1.
-    pub(super) fn factor(&self) -> Option<[f64; 4]> {
+    fn base_factor(&self) -> Option<[f64; 4]> {
         match self.glossiness() {
             Some(glossiness) => glossiness.diffuse_factor,
             None => self.pbr_metallic_roughness.base_color_factor,
         }
     }
 
-    /// The texture of the base colour.
+    /// What it shines with by itself, linear; no part is more than 1, but the hue is the file's.
+    fn emission(&self) -> [f64; 3] {
+        let strength = self.extensions.get(STRENGTH);
+        let strength = strength.and_then(|s| s.emissive_strength).unwrap_or(1.0);
+        let light = self
+            .emissive_factor
+            .map(|x| (strength * x).clamp(0.0, f64::MAX));
+        let brightest = light.into_iter().fold(1.0, f64::max);
+        light.map(|x| x / brightest)
+    }
+
+    fn shines(&self) -> bool {
+        !is_black(self.emission()) && !self.extensions.contains_key(UNLIT)
+    }
+
+    /// Whether what it shines with stands in place of its base colour, which is black.
+    pub(super) fn shows_emission(&self) -> bool {
+        let base = self.base_factor();
+        self.shines() && base.is_some_and(|[r, g, b, _]| is_black([r, g, b]))
+    }
+
+    /// Colour and alpha, linear, where they are not 1.
+    pub(super) fn factor(&self) -> Option<[f64; 4]> {
+        match self.shows_emission() {
+            true => {
+                let [r, g, b] = self.emission();
+                Some([r, g, b, self.alpha()])
+            }
+            false => self.base_factor(),
+        }
+    }
+
+    /// The texture of the colour.
     pub(super) fn texture(&self) -> Option<&TextureUse> {
         match self.glossiness() {
+            _ if self.shows_emission() => self.emissive_texture.as_ref(),
             Some(glossiness) => glossiness.diffuse_texture.as_ref(),
             None => self.pbr_metallic_roughness.base_color_texture.as_ref(),
         }
@@ -102,7 +145,7 @@ impl MaterialEntry {
 
     /// Its own, which textures and corners multiply.
     fn alpha(&self) -> f64 {
-        self.factor().map_or(1.0, |[.., alpha]| alpha)
+        self.base_factor().map_or(1.0, |[.., alpha]| alpha)
     }
 
     fn cutoff(&self) -> f64 {
@@ -130,6 +173,11 @@ impl MaterialEntry {
     }
 }
 
+/// Whether no picture of eight bits shows any of it.
+fn is_black(linear: [f64; 3]) -> bool {
+    linear.iter().all(|x| srgb_from_linear(*x) < LEAST_ALPHA)
+}
+
 /// What is not shown of a file's materials as it says, each kind once. `hidden` are triangles left
 /// out, by material; `drawn` is the least alpha of what is drawn, that of textures and corners,
 /// by material.
@@ -152,6 +200,7 @@ pub(super) fn not_shown(
     }
     // 2. What hides what is behind it.
     let mut seen_through = Vec::new();
+    let mut shining = Vec::new();
     let mut extended: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (number, least_alpha) in drawn {
         let Some(material) = materials.get(*number) else {
@@ -159,6 +208,9 @@ pub(super) fn not_shown(
         };
         if material.is_seen_through(*least_alpha) {
             seen_through.push(*number);
+        }
+        if material.shines() && !material.shows_emission() {
+            shining.push(*number);
         }
         let names = material.extensions.keys().map(String::as_str);
         for name in names.filter(|name| !NO_LOSS.contains(name)) {
@@ -172,6 +224,12 @@ pub(super) fn not_shown(
         ));
     }
     // 3. What may look otherwise.
+    if !shining.is_empty() {
+        let of = listed(materials, &shining);
+        warnings.push(format!(
+            "what shines by itself is drawn as if it did not ({of})"
+        ));
+    }
     for (name, numbers) in extended {
         let of = listed(materials, &numbers);
         warnings.push(format!("{} is not applied ({of})", shown(name)));
