@@ -2,14 +2,14 @@
 
 use super::obj::shown;
 use super::ply_header::{self, Element, Format, Scalar};
-use super::polygon::{Fan, Fans};
+use super::polygon::{Fan, Fans, Strip};
 use super::{Mesh, MeshFileError};
 use glam::DVec3;
 use std::path::Path;
 
-/// Reads corners and faces; other elements and properties are skipped.
+/// Reads corners, faces and strips of triangles; other elements and properties are skipped.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
-    let mesh = parse_named(path, bytes, ["vertex", "face"])?;
+    let mesh = parse_named(path, bytes, ["vertex", "face"], Some("tristrips"))?;
     mesh.ok_or_else(|| {
         let problem = "it has no element `vertex`";
         MeshFileError::File(path.to_owned(), problem.to_owned())
@@ -24,14 +24,15 @@ const OF_HULL: [&str; 2] = ["hull_vertex", "hull_face"];
 /// # Errors
 /// The file, the record and what is wrong with it.
 pub fn ply_hull(path: &Path, bytes: &[u8]) -> Result<Option<Mesh>, MeshFileError> {
-    parse_named(path, bytes, OF_HULL)
+    parse_named(path, bytes, OF_HULL, None)
 }
 
-/// Reads the corners and faces that go by these names; none if there are no corners.
+/// Reads the corners, faces and strips that go by these names; none if there are no corners.
 fn parse_named(
     path: &Path,
     bytes: &[u8],
     [corners, faces]: [&str; 2],
+    strips: Option<&str>,
 ) -> Result<Option<Mesh>, MeshFileError> {
     let header = ply_header::parse(bytes).map_err(|(line, problem)| MeshFileError::Line {
         path: path.to_owned(),
@@ -44,11 +45,11 @@ fn parse_named(
         line: header.lines + 1,
     };
     let mut mesh = Mesh::default();
-    // The greatest index and the face and line that have it: faces may come first.
-    let mut greatest = (0, 0, 0);
+    // The greatest index and the element, record and line that have it: faces may come first.
+    let mut greatest = (0, 0, 0, 0);
     let mut fans = Fans::default();
     let mut has_corners = false;
-    for element in &header.elements {
+    for (number, element) in header.elements.iter().enumerate() {
         if element.properties.is_empty() {
             continue;
         }
@@ -69,7 +70,11 @@ fn parse_named(
                     let first = mesh.triangles.len();
                     let read = face(&mut numbers, element, &columns, &mut mesh.triangles);
                     fans.note(first..mesh.triangles.len());
-                    read.map(|index| greatest = greatest.max((index, record, line)))
+                    read.map(|index| greatest = greatest.max((index, number, record, line)))
+                }
+                name if strips == Some(name) => {
+                    let read = strip(&mut numbers, element, &columns, &mut mesh.triangles);
+                    read.map(|index| greatest = greatest.max((index, number, record, line)))
                 }
                 _ => skip(&mut numbers, element),
             };
@@ -79,17 +84,14 @@ fn parse_named(
     if !has_corners {
         return Ok(None);
     }
-    let (index, record, line) = greatest;
+    let (index, number, record, line) = greatest;
     if !mesh.triangles.is_empty() && index as usize >= mesh.positions.len() {
         let problem = format!(
             "it uses corner {index}, but there are {} (the first is 0); is the file cut off?",
             mesh.positions.len()
         );
-        let face = header.elements.iter().find(|e| e.name == faces);
-        return Err(match face {
-            Some(face) => bad(path, header.format, face, record, line, problem),
-            None => MeshFileError::File(path.to_owned(), problem),
-        });
+        let element = &header.elements[number];
+        return Err(bad(path, header.format, element, record, line, problem));
     }
     fans.mend(&mut mesh);
     Ok(Some(mesh))
@@ -181,23 +183,62 @@ fn face(
     triangles: &mut Vec<[u32; 3]>,
 ) -> Result<u32, String> {
     let mut greatest = 0;
+    let mut polygon = Fan::default();
+    indices(numbers, element, columns, |index| {
+        let index = corner_of(index)?;
+        greatest = greatest.max(index);
+        polygon.corner(index, triangles);
+        Ok(())
+    })?;
+    Ok(greatest)
+}
+
+/// Reads strips of triangles, one after the other, as those of scans from Stanford; their greatest index.
+fn strip(
+    numbers: &mut Numbers,
+    element: &Element,
+    columns: &Columns,
+    triangles: &mut Vec<[u32; 3]>,
+) -> Result<u32, String> {
+    let mut greatest = 0;
+    let mut strip = Strip::default();
+    indices(numbers, element, columns, |index| {
+        // -1 begins another, whatever type it is written as.
+        if index == -1 || index == i64::from(u32::MAX) {
+            strip = Strip::default();
+            return Ok(());
+        }
+        let index = corner_of(index)?;
+        greatest = greatest.max(index);
+        strip.corner(index, triangles);
+        Ok(())
+    })?;
+    Ok(greatest)
+}
+
+fn corner_of(index: i64) -> Result<u32, String> {
+    u32::try_from(index).map_err(|_| format!("it uses corner {index}; corners count from 0"))
+}
+
+/// Hands on the numbers of a record's list of indices.
+fn indices(
+    numbers: &mut Numbers,
+    element: &Element,
+    columns: &Columns,
+    mut take: impl FnMut(i64) -> Result<(), String>,
+) -> Result<(), String> {
     for (i, property) in element.properties.iter().enumerate() {
         match property.length {
             Some(length) if columns.indices == Some(i) => {
-                let mut polygon = Fan::default();
                 for _ in 0..numbers.length(length)? {
-                    let index = numbers.whole(property.scalar)?;
-                    let index = u32::try_from(index)
-                        .map_err(|_| format!("it uses corner {index}; corners count from 0"))?;
-                    greatest = greatest.max(index);
-                    polygon.corner(index, triangles);
+                    take(numbers.whole(property.scalar)?)?;
                 }
             }
             Some(length) => skip_list(numbers, length, property.scalar)?,
             None => numbers.skip(property.scalar, 1)?,
         }
     }
-    Ok(greatest)
+    Ok(())
 }
 
 fn skip(numbers: &mut Numbers, element: &Element) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! Polygons of mesh files, cut into triangles.
+//! Polygons and strips of mesh files, cut into triangles.
 
 use super::Mesh;
 use glam::{DVec2, DVec3};
@@ -33,6 +33,29 @@ impl Fan {
             }
             (Some(_), None) => self.last = Some(index),
         }
+    }
+}
+
+/// Triangles that share two corners with the one before, and another with the next.
+#[derive(Default)]
+pub(super) struct Strip {
+    /// How many corners there were, and the last two.
+    count: usize,
+    last: [u32; 2],
+}
+
+impl Strip {
+    /// Takes in the next corner.
+    pub(super) fn corner(&mut self, index: u32, triangles: &mut Vec<[u32; 3]>) {
+        let [a, b] = self.last;
+        // Every other triangle is turned.
+        match (self.count < 2, self.count % 2) {
+            (true, _) => (),
+            (false, 0) => triangles.push([a, b, index]),
+            (false, _) => triangles.push([b, a, index]),
+        }
+        self.last = [b, index];
+        self.count += 1;
     }
 }
 

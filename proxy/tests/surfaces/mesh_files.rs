@@ -271,6 +271,54 @@ fn ply_is_read_from_text_and_both_binary_orders() {
 }
 
 #[test]
+fn ply_strips_of_triangles_are_read() {
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+             property float z\nelement tristrips 1\nproperty list int int vertex_indices\n\
+             end_header\n"
+        )
+    };
+    // A square, and one of its triangles again.
+    let indices: [i32; 8] = [0, 1, 2, 3, -1, 3, 2, 1];
+    let expected = Mesh {
+        positions: SQUARE.map(|p| DVec3::from_array(p.map(f64::from))).to_vec(),
+        triangles: vec![[0, 1, 2], [2, 1, 3], [3, 2, 1]],
+    };
+    let corners: String = SQUARE.map(|[x, y, z]| format!("{x} {y} {z}\n")).concat();
+    let text = |strips: &str| header("ascii") + &corners + strips;
+    let read = parse("a.ply", text("8 0 1 2 3 -1 3 2 1\n"));
+    assert_eq!(read.unwrap(), expected);
+    for (name, is_big) in [("binary_little_endian", false), ("binary_big_endian", true)] {
+        let mut bytes = header(name).into_bytes();
+        let mut put = |mut word: [u8; 4]| {
+            if is_big {
+                word.reverse();
+            }
+            bytes.extend(word);
+        };
+        for x in SQUARE.as_flattened() {
+            put(x.to_le_bytes());
+        }
+        put(8_i32.to_le_bytes());
+        for i in indices {
+            put(i.to_le_bytes());
+        }
+        assert_eq!(parse("a.ply", &bytes).unwrap(), expected, "{name}");
+    }
+    assert_eq!(
+        message("a.ply", text("3 0 1 4\n")),
+        "a.ply, line 14: it uses corner 4, but there are 4 (the first is 0); is the file cut off?"
+    );
+    assert_eq!(
+        message("a.ply", text("4 0 1 -2 3\n")),
+        "a.ply, line 14: it uses corner -2; corners count from 0"
+    );
+    let short = message("a.ply", text("5 0 1 -1 2 3\n"));
+    assert!(short.contains("4 corners but no triangle"), "{short}");
+}
+
+#[test]
 fn bad_ply_files_say_where() {
     let with = |rest: &str| {
         message(
