@@ -160,8 +160,9 @@ pub enum HullError {
     },
     /// Nothing is left.
     #[error(
-        "the silhouettes of {photos} photos have no point in common; allow more pixels of \
-         tolerance or more misses, or check that masks and cameras belong together"
+        "the silhouettes of {photos} photos have no point in common; check that masks and \
+         cameras belong together, leave out photos where they do not (`--hold-out`), or try the \
+         proxy `points` or `carved`, which need no masks"
     )]
     Contradiction {
         /// How many photos.

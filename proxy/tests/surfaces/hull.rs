@@ -554,6 +554,13 @@ fn what_bounds_no_object_is_refused() {
     let mut lost = views.clone();
     lost[1].camera_from_world.translation.x = f64::NAN;
     assert_eq!(carve_with(&lost, masks), Err(HullError::Pose { photo: 1 }));
+    // What can be done where nothing is left.
+    assert_eq!(
+        HullError::Contradiction { photos: 8 }.to_string(),
+        "the silhouettes of 8 photos have no point in common; check that masks and cameras belong \
+         together, leave out photos where they do not (`--hold-out`), or try the proxy `points` \
+         or `carved`, which need no masks"
+    );
     // Masks of other photos.
     let turned: Vec<Silhouette> = (0..8).map(|i| masks[(i * 3 + 1) % 8].clone()).collect();
     if let Ok(measures) = carve_with(views, &turned) {
