@@ -2,7 +2,7 @@
 
 use super::Silhouette;
 use crate::Mesh;
-use calibrate::{Distortion, Pixel, View};
+use calibrate::{Distortion, Lens, Pixel, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -88,7 +88,7 @@ pub(super) fn cover(
         let sign = volume.signum();
         for row in low[1]..high[1] {
             for column in low[0]..high[0] {
-                let Some(ray) = rays.at(column, row, width) else {
+                let Some(ray) = rays.at(column, row) else {
                     continue;
                 };
                 if normals.iter().all(|n| sign * n.dot(ray) >= 0.0) {
@@ -147,29 +147,147 @@ pub(super) enum Rays {
         origin: DVec2,
         step: DVec2,
     },
-    Lens(Vec<Option<DVec3>>),
+    Lens(Box<LensRays>),
 }
 
 impl Rays {
     pub(super) fn of(view: &View) -> Self {
-        if view.lens.distortion() == Distortion::None {
-            return Self::Pinhole {
+        match view.lens.distortion() {
+            Distortion::None => Self::Pinhole {
                 origin: (0.5 - view.lens.principal) / view.lens.focal,
                 step: 1.0 / view.lens.focal,
-            };
+            },
+            _ => Self::Lens(Box::new(LensRays::of(view))),
         }
-        let pixels = (0..view.height).flat_map(|row| (0..view.width).map(move |c| (c, row)));
-        let ray = |(column, row): (u32, u32)| view.lens.unproject(Pixel::center_of(column, row));
-        Self::Lens(pixels.map(ray).collect())
     }
 
-    fn at(&self, column: usize, row: usize, width: usize) -> Option<DVec3> {
+    fn at(&self, column: usize, row: usize) -> Option<DVec3> {
         match self {
             Self::Pinhole { origin, step } => {
                 let at = DVec2::new(column as f64, row as f64);
                 Some((*origin + at * *step).extend(1.0))
             }
-            Self::Lens(rays) => rays[row * width + column],
+            Self::Lens(rays) => rays.at(column, row),
         }
+    }
+}
+
+/// Of a lens' rays so many pixels apart are kept, across and down: all of them would take many times the
+/// memory of the photo, and most of the time that measuring takes.
+const BLOCK: usize = 8;
+/// Between them they are interpolated where that is off by no more than this in the middle of a side, in
+/// pixels.
+const OFF_PX: f64 = 0.02;
+
+/// The rays of a lens with distortion, some of which may lead backwards.
+pub(super) struct LensRays {
+    lens: Lens,
+    /// How many blocks there are side by side.
+    across: usize,
+    /// Those through the first pixels of all blocks and of those that would come next, of unit length; NaN
+    /// where there is none.
+    nodes: Vec<DVec3>,
+    /// Which blocks' rays may be interpolated.
+    is_smooth: Vec<bool>,
+}
+
+impl LensRays {
+    fn of(view: &View) -> Self {
+        let lens = view.lens;
+        let [across, down] = [view.width, view.height].map(|side| (side as usize).div_ceil(BLOCK));
+        // In halves of a block.
+        let ray = |x: usize, y: usize| {
+            let [x, y] = [x, y].map(|i| (i * BLOCK / 2) as f64 + 0.5);
+            lens.unproject(Pixel::new(x, y)).unwrap_or(DVec3::NAN)
+        };
+        let all = (0..=down).flat_map(|j| (0..=across).map(move |i| (i, j)));
+        let nodes: Vec<DVec3> = all.map(|(i, j)| ray(2 * i, 2 * j)).collect();
+        let is_smooth = |(i, j): (usize, usize)| {
+            let node = j * (across + 1) + i;
+            let [from, right, below] = [node, node + 1, node + across + 1].map(|k| nodes[k]);
+            let off = |to: DVec3, middle: DVec3| {
+                let half_way = (0.5 * (from + to)).normalize();
+                half_way.distance(middle) * BLOCK as f64 / from.distance(to)
+            };
+            // A NaN is no ray.
+            off(right, ray(2 * i + 1, 2 * j)) <= OFF_PX
+                && off(below, ray(2 * i, 2 * j + 1)) <= OFF_PX
+                && nodes[node + across + 2].is_finite()
+        };
+        let blocks = (0..down).flat_map(|j| (0..across).map(move |i| (i, j)));
+        let is_smooth = blocks.map(is_smooth).collect();
+        Self {
+            lens,
+            across,
+            nodes,
+            is_smooth,
+        }
+    }
+
+    fn at(&self, column: usize, row: usize) -> Option<DVec3> {
+        let (i, j) = (column / BLOCK, row / BLOCK);
+        if !self.is_smooth[j * self.across + i] {
+            let pixel = Pixel::center_of(column as u32, row as u32);
+            return self.lens.unproject(pixel);
+        }
+        let [x, y] = [column, row].map(|k| (k % BLOCK) as f64 / BLOCK as f64);
+        let above = j * (self.across + 1) + i;
+        let below = above + self.across + 1;
+        let between = |node: usize| self.nodes[node].lerp(self.nodes[node + 1], x);
+        Some(between(above).lerp(between(below), y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::Rigid3;
+
+    /// The share of blocks in which rays are interpolated; none of them may be off.
+    fn checked(focal: f64, size: [u32; 2], distortion: Distortion) -> f64 {
+        let [width, height] = size;
+        let middle = 0.5 * DVec2::new(f64::from(width), f64::from(height)) + 1.3;
+        let view = View {
+            lens: Lens::new(DVec2::splat(focal), middle, distortion),
+            width,
+            height,
+            camera_from_world: Rigid3::IDENTITY,
+        };
+        let rays = LensRays::of(&view);
+        for row in (0..height).step_by(3) {
+            for column in 0..width {
+                let pixel = Pixel::center_of(column, row);
+                let expected = view.lens.unproject(pixel);
+                let found = rays.at(column as usize, row as usize);
+                assert_eq!(found.is_some(), expected.is_some(), "{column}, {row}");
+                let (Some(found), Some(expected)) = (found, expected) else {
+                    continue;
+                };
+                let off = found.normalize().distance(expected) * focal;
+                assert!(off < 0.5, "{column}, {row}: {off}");
+                if let Some(seen) = view.lens.project(found) {
+                    let off = (seen.x - pixel.x).hypot(seen.y - pixel.y);
+                    assert!(off < 0.08, "{column}, {row}: {off}");
+                }
+            }
+        }
+        let smooth = rays.is_smooth.iter().filter(|smooth| **smooth).count();
+        smooth as f64 / rays.is_smooth.len() as f64
+    }
+
+    #[test]
+    fn rays_between_those_kept_are_the_lens_own() {
+        let barrel = |k: f64| Distortion::Rational {
+            k: [k, 0.0, 0.0, 0.0, 0.0, 0.0],
+            p: [0.002, -0.001],
+        };
+        let fisheye = Distortion::Fisheye {
+            k: [0.02, 0.0, 0.0, 0.0],
+        };
+        assert!(checked(900.0, [1001, 750], barrel(-0.15)) > 0.95);
+        assert!(checked(300.0, [321, 240], barrel(0.2)) > 0.5);
+        // One that sees what is behind it, and one that sees nothing beyond its limit.
+        assert!(checked(300.0, [1203, 600], fisheye) > 0.3);
+        checked(90.0, [321, 240], barrel(-0.3));
     }
 }
