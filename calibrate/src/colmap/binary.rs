@@ -16,7 +16,7 @@ const NO_POINT: u64 = u64::MAX;
 /// Bytes of a camera without its parameters: id, model, width, height.
 const CAMERA_BYTES: usize = 24;
 /// Bytes of an image without keypoints: id, pose, camera, a name of its end alone, count.
-const IMAGE_BYTES: usize = 73;
+pub(super) const IMAGE_BYTES: usize = 73;
 /// Bytes of a point that no image sees: id, position, colour, error, count.
 const POINT_BYTES: usize = 51;
 /// Bytes of a keypoint: x, y and a point's id.

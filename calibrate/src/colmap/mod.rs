@@ -25,7 +25,7 @@ mod text;
 mod write;
 
 pub use error::{ColmapError, Incomplete, Place};
-pub use find::find_model;
+pub use find::{SubModel, find_model, side_by_side};
 pub use write::{write_binary, write_text};
 
 use crate::{Camera, CameraId, Reconstruction};

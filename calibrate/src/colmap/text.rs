@@ -77,6 +77,18 @@ pub(super) fn read_images(
     Ok(images)
 }
 
+/// How many images `images.txt` lists, whether or not they can be read; `None` where it is no
+/// text.
+pub(super) fn count_images(path: &Path, bytes: &[u8]) -> Option<u64> {
+    let mut lines = Lines::new(path, bytes).ok()?;
+    let mut count = 0;
+    while lines.next_record().is_some() {
+        lines.next_line();
+        count += 1;
+    }
+    Some(count)
+}
+
 /// Reads an image's second line: x, y and a point's id (−1 for none), again and again.
 fn read_keypoints(line: &Line<'_>) -> Result<Vec<Keypoint>, ColmapError> {
     let words = line.text.split_whitespace().count();

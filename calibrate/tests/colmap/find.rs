@@ -1,6 +1,8 @@
 use crate::synthetic::small;
-use calibrate::colmap::{find_model, write_binary, write_text};
+use calibrate::colmap::{find_model, side_by_side, write_binary, write_text};
+use std::collections::BTreeSet;
 use std::fs;
+use std::path::PathBuf;
 
 #[test]
 fn the_usual_places_are_tried_in_order() {
@@ -39,4 +41,42 @@ fn a_missing_folder_is_said_to_be_missing() {
             root.display()
         )
     );
+}
+
+#[test]
+fn of_several_models_the_one_with_the_most_images_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let at = |number: u32| root.join("sparse").join(number.to_string());
+    let whole = small();
+    let part = whole.without_images(&BTreeSet::from(["a.jpg".to_owned()]));
+    assert_eq!((whole.images.len(), part.images.len()), (2, 1));
+
+    // One alone, whatever its number.
+    write_text(&part, &at(3)).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(3));
+    // Of equals the first, and numbers count as numbers.
+    write_binary(&part, &at(20)).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(3));
+    write_text(&whole, &at(100)).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(100));
+    write_binary(&whole, &at(4)).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(4));
+    assert_eq!(find_model(&root.join("sparse")).unwrap(), at(4));
+    let counts = || -> Vec<(PathBuf, Option<u64>)> {
+        let models = side_by_side(&at(4)).into_iter();
+        models.map(|m| (m.folder, m.images)).collect()
+    };
+    let counted = [(3, 1), (4, 2), (20, 1), (100, 2)];
+    assert_eq!(counts(), counted.map(|(n, images)| (at(n), Some(images))));
+
+    // A damaged one is not the largest, whatever it says of itself.
+    fs::write(at(4).join("images.bin"), [0xff; 64]).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(100));
+    assert_eq!(counts()[1], (at(4), None));
+    // Others are none: incomplete, or not called by a number.
+    fs::remove_file(at(100).join("cameras.txt")).unwrap();
+    write_text(&whole, &root.join("sparse/best")).unwrap();
+    assert_eq!(find_model(root).unwrap(), at(3));
+    assert!(side_by_side(&root.join("sparse/best")).is_empty());
 }
