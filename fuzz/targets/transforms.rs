@@ -1,11 +1,11 @@
 #![no_main]
-use calibrate::formats::parse_transforms;
+use calibrate::formats::{parse_files_beside, parse_transforms};
 use libfuzzer_sys::fuzz_target;
-use lumigraph_fuzz::{reconstruction, size_of};
+use lumigraph_fuzz::{reconstruction, size_of, within_memory};
 use std::path::Path;
 
 fuzz_target!(|data: &[u8]| {
-    reconstruction(data.len(), || {
-        parse_transforms(Path::new("file"), data, &size_of)
-    });
+    let path = Path::new("file");
+    reconstruction(data.len(), || parse_transforms(path, data, &size_of));
+    let _ = within_memory(data.len(), || parse_files_beside(path, data), |_| 0);
 });

@@ -88,3 +88,58 @@ pub fn detect_content(mut file: impl BufRead + Seek) -> Option<Format> {
     let frame = keys.frames.as_ref()?.first()?;
     (frame.file_path.is_some() && frame.transform_matrix.is_some()).then_some(Format::Transforms)
 }
+
+/// Which format a file is called after, whatever is in it: `transforms.json` and its like
+/// (`transforms_train.json`), `bundle.out`, `*.nvm`, `poses_bounds.npy`, `*.sfm`,
+/// `sfm_data.json`. One that [`detect`] does not know is damaged, or something else.
+pub fn by_name(path: &Path) -> Option<Format> {
+    let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+    let is = |start: &str, end: &str| name.starts_with(start) && name.ends_with(end);
+    // Copies to other systems may leave `._model.nvm` beside `model.nvm`.
+    if name.starts_with('.') {
+        None
+    } else if name == "transforms.json" || is("transforms_", ".json") {
+        Some(Format::Transforms)
+    } else if is("", "bundle.out") || is("bundle_", ".out") {
+        Some(Format::Bundler)
+    } else if is("", ".nvm") {
+        Some(Format::Nvm)
+    } else if name == "poses_bounds.npy" {
+        Some(Format::Llff)
+    } else if is("", ".sfm") {
+        Some(Format::Meshroom)
+    } else if is("sfm_data", ".json") {
+        Some(Format::OpenMvg)
+    } else {
+        None
+    }
+}
+
+/// Which format a file was meant to be that [`detect`] does not know: by its name, or by keys
+/// that its beginning has where that is JSON's.
+pub fn meant(path: &Path) -> Option<Format> {
+    // As far as the first frame, view or pose.
+    const BEGINNING: u64 = 1 << 16;
+    by_name(path).or_else(|| {
+        let mut start = Vec::new();
+        let file = File::open(path).ok()?;
+        file.take(BEGINNING).read_to_end(&mut start).ok()?;
+        let start = String::from_utf8_lossy(&start);
+        let has = |key: &str| start.contains(&format!("\"{key}\""));
+        let is_json = start
+            .trim_start_matches('\u{feff}')
+            .trim_start()
+            .starts_with('{');
+        if !is_json {
+            None
+        } else if has("transform_matrix") {
+            Some(Format::Transforms)
+        } else if has("sfm_data_version") {
+            Some(Format::OpenMvg)
+        } else if has("views") && has("intrinsicId") {
+            Some(Format::Meshroom)
+        } else {
+            None
+        }
+    })
+}

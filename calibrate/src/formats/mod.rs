@@ -9,6 +9,7 @@
 //! and no two images share a name. Matrices that are rotations to within 1e-4 become the
 //! nearest rotation.
 
+mod beside;
 mod build;
 mod bundler;
 mod detect;
@@ -21,9 +22,10 @@ mod openmvg;
 mod transforms;
 mod words;
 
+pub use beside::{FilesBeside, parse_files_beside, read_files_beside};
 pub use build::SizeOf;
 pub use bundler::{parse_bundler, read_bundler};
-pub use detect::{Format, detect, detect_content};
+pub use detect::{Format, by_name, detect, detect_content, meant};
 pub use error::FormatError;
 pub use llff::{parse_llff, read_llff, read_llff_bounds};
 pub use meshroom::{parse_meshroom, read_meshroom};

@@ -1,6 +1,7 @@
 use crate::captures::capture;
 use crate::openmvg::SFM_DATA;
-use calibrate::formats::{Format, detect};
+use calibrate::formats::{Format, by_name, detect, meant};
+use std::path::Path;
 
 fn detected(content: &[u8]) -> Option<Format> {
     let folder = tempfile::tempdir().unwrap();
@@ -61,4 +62,50 @@ fn other_files_are_none_of_them() {
     }
     assert_eq!(detect(std::path::Path::new("nowhere/at/all")), None);
     assert_eq!(detect(std::path::Path::new(".")), None, "a folder");
+}
+
+#[test]
+fn damaged_files_are_known_by_their_names() {
+    for (name, format) in [
+        ("transforms.json", Some(Format::Transforms)),
+        ("a/Transforms_Train.JSON", Some(Format::Transforms)),
+        ("bundle.out", Some(Format::Bundler)),
+        ("bundle_001.out", Some(Format::Bundler)),
+        ("reconstruction.bundle.out", Some(Format::Bundler)),
+        ("sparse.nvm", Some(Format::Nvm)),
+        ("poses_bounds.npy", Some(Format::Llff)),
+        ("cameras.sfm", Some(Format::Meshroom)),
+        ("sfm_data.json", Some(Format::OpenMvg)),
+        ("dataparser_transforms.json", None),
+        ("._model.nvm", None),
+        ("bundle.txt", None),
+        ("depth.npy", None),
+        ("..", None),
+    ] {
+        assert_eq!(by_name(Path::new(name)), format, "{name}");
+    }
+}
+
+#[test]
+fn damaged_files_of_other_names_are_known_by_their_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.json");
+    assert_eq!(meant(&path), None, "nothing is there");
+    for (content, format) in [
+        (
+            "\u{feff} {\"frames\": [{\"transform_matrix\": [",
+            Some(Format::Transforms),
+        ),
+        (&SFM_DATA[..SFM_DATA.len() / 2], Some(Format::OpenMvg)),
+        (
+            "{\"views\": [{\"intrinsicId\": \"1\",",
+            Some(Format::Meshroom),
+        ),
+        ("{\"camera_matrix\": {", None),
+        ("transform_matrix: \"transform_matrix\"", None),
+        ("", None),
+    ] {
+        std::fs::write(&path, content).unwrap();
+        assert_eq!(meant(&path), format, "{content}");
+    }
 }

@@ -1,10 +1,11 @@
 use crate::broken::damage;
 use crate::captures::{angle_between, capture};
 use calibrate::colmap::{find_model, read_model};
-use calibrate::formats::{FormatError, read_transforms};
+use calibrate::formats::{FormatError, parse_files_beside, read_transforms};
 use calibrate::{Camera, ModelKind, Reconstruction};
 use glam::DVec3;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 fn no_photo(_: &str) -> Option<(u32, u32)> {
     None
@@ -239,6 +240,47 @@ fn small_deviations_become_the_nearest_rotation() {
         .camera_from_world
         .rotation;
     assert!((rotation.length() - 1.0).abs() < 1e-15);
+}
+
+#[test]
+fn masks_depth_maps_and_points_are_named_from_the_file_s_folder() {
+    let named = |text: &str| parse_files_beside(Path::new("a/transforms.json"), text.as_bytes());
+    let beside = named(
+        r#"{"ply_file_path": "sparse_pc.ply", "applied_scale": 0.5, "frames": [
+            {"file_path": "./images\\1.jpg", "mask_path": ".\\masks\\1.png"},
+            {"file_path": "images/2.jpg", "mask_path": null, "depth_file_path": "/d/2.png"},
+            {"file_path": "images/3.jpg", "mask_path": "", "depth_file_path": "../d/3.png"}]}"#,
+    )
+    .unwrap();
+    let list = |files: &BTreeMap<String, PathBuf>| -> Vec<String> {
+        let files = files.iter();
+        let text = |(image, file): (&String, &PathBuf)| format!("{image}: {}", file.display());
+        files.map(text).collect()
+    };
+    assert_eq!(list(&beside.masks), ["images/1.jpg: a/masks/1.png"]);
+    assert_eq!(
+        list(&beside.depth_maps),
+        ["images/2.jpg: /d/2.png", "images/3.jpg: a/../d/3.png"]
+    );
+    assert_eq!(beside.points, Some(PathBuf::from("a/sparse_pc.ply")));
+    assert_eq!(beside.applied_scale, 0.5);
+
+    let bare = named(&format!("{{\"frames\": [{FRAME}]}}")).unwrap();
+    assert!(bare.masks.is_empty() && bare.depth_maps.is_empty());
+    assert_eq!((bare.points, bare.applied_scale), (None, 1.0));
+    for (text, expected) in [
+        (
+            r#"{"frames": [{"file_path": "a", "mask_path": 7}]}"#,
+            "a/transforms.json, frames[0].mask_path: found 7, expected a string",
+        ),
+        (
+            r#"{"applied_scale": 0, "frames": []}"#,
+            "a/transforms.json, applied_scale: found 0, expected more than 0",
+        ),
+    ] {
+        let error = named(text).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
 }
 
 #[test]

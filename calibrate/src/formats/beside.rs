@@ -1,0 +1,77 @@
+//! What a `transforms.json` names beside the photos.
+//!
+//! - nerfstudio's `mask_path` is an ignore mask as ours are: 0 = ignore.
+//! - Its `depth_file_path` is depth along z, in steps of which nerfstudio takes 1000 to a unit.
+//!   `applied_scale` scaled the poses that are in the file and not the depths.
+//! - `ply_file_path` are the sparse points.
+//! - Paths count from the folder that the file lies in.
+
+use super::build;
+use super::error::{FormatError, Problem};
+use super::json::{self, Json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Files that a `transforms.json` names beside the photos; they need not exist.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilesBeside {
+    /// Ignore masks, by the images' names as [`read_transforms`](super::read_transforms) has
+    /// them.
+    pub masks: BTreeMap<String, PathBuf>,
+    /// Depth maps, likewise.
+    pub depth_maps: BTreeMap<String, PathBuf>,
+    /// The sparse points.
+    pub points: Option<PathBuf>,
+    /// What depths are to be multiplied by to be in the poses' units.
+    pub applied_scale: f64,
+}
+
+/// Reads which files a `transforms.json` names beside the photos.
+///
+/// # Errors
+/// An unreadable file; paths that are no texts, a scale that is no positive number.
+pub fn read_files_beside(path: &Path) -> Result<FilesBeside, FormatError> {
+    parse_files_beside(path, &build::read(path)?)
+}
+
+/// Reads the content of a file at `path`.
+///
+/// # Errors
+/// As for [`read_files_beside`].
+pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, FormatError> {
+    let value = json::parse(path, bytes)?;
+    let root = Json::root(path, &value);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let file = |json: &Json<'_>, key: &str| -> Result<Option<PathBuf>, FormatError> {
+        let Some(stored) = json.optional(key) else {
+            return Ok(None);
+        };
+        // An empty text is none.
+        let name = build::name(stored.text()?).ok();
+        Ok(name.map(|name| folder.join(name)))
+    };
+    let mut beside = FilesBeside {
+        masks: BTreeMap::new(),
+        depth_maps: BTreeMap::new(),
+        points: file(&root, "ply_file_path")?,
+        applied_scale: 1.0,
+    };
+    if let Some(scale) = root.optional("applied_scale") {
+        beside.applied_scale = scale.number()?;
+        if beside.applied_scale <= 0.0 {
+            let problem = format!("found {}, expected more than 0", beside.applied_scale);
+            return Err(scale.error(Problem::broken(problem)));
+        }
+    }
+    for frame in root.field("frames")?.items()? {
+        let file_path = frame.field("file_path")?;
+        let name = build::name(file_path.text()?).map_err(|p| file_path.error(p))?;
+        if let Some(mask) = file(&frame, "mask_path")? {
+            beside.masks.insert(name.clone(), mask);
+        }
+        if let Some(depth) = file(&frame, "depth_file_path")? {
+            beside.depth_maps.insert(name, depth);
+        }
+    }
+    Ok(beside)
+}
