@@ -3,14 +3,14 @@
 use super::import::check_photos;
 use super::info_of_file;
 use super::interior::check_no_interior;
-use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, tie_text};
+use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, print_warnings, tie_text};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use super::surface::{proxy_json, proxy_text};
 use calibrate::{TRUSTED_TIE, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
-use lumigraph::scene::{Photo, Scene, SceneError};
+use lumigraph::scene::{ImportOptions, Photo, Scene, SceneError, other_models};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -44,9 +44,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return info_of_file::run(&args.scene.scene, &args.keys.keys(), args.json);
     }
     if let Some(model) = bare_model(&args.scene.scene) {
+        if model != args.scene.scene
+            && let Some(note) = other_models(&model)
+        {
+            say!("note: {note}");
+        }
         return info_of_file::of_model(&model, args.json);
     }
-    let scene = args.scene.open_whole()?;
+    let scene = open(args)?;
     if args.scene.strict {
         check_photos(&scene)?;
     }
@@ -64,12 +69,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The COLMAP model that a folder itself is, if it holds neither photos nor a scene.
+/// The COLMAP model that a folder itself is, or one of those in its numbered folders, if it holds
+/// neither photos nor a scene.
 fn bare_model(folder: &Path) -> Option<PathBuf> {
     let model = colmap::find_model(folder).ok()?;
     let has_photos = find_photos_folder(folder).is_some() || Scene::is_scene(folder);
-    let is_it = model == folder || model == folder.join("0");
+    let is_within = model.parent() == Some(folder) && !colmap::side_by_side(&model).is_empty();
+    let is_it = model == folder || is_within;
     (is_it && !has_photos).then_some(model)
+}
+
+/// Opens the scene, or the capture with those matrices of its calibration that were asked for.
+fn open(args: &Args) -> anyhow::Result<Scene> {
+    let folder = &args.scene.scene;
+    if Scene::is_scene(folder) {
+        return args.scene.open_whole();
+    }
+    let options = ImportOptions {
+        keys: args.keys.keys(),
+        strict: args.scene.strict,
+        ..ImportOptions::default()
+    };
+    let (scene, warnings) = Scene::import(folder, &options)?;
+    print_warnings(&warnings);
+    Ok(scene)
 }
 
 fn gather(scene: &Scene) -> anyhow::Result<Value> {

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()> {
-    let info = match formats::detect(path) {
+    let info = match formats::detect(path).or_else(|| formats::meant(path)) {
         Some(format) => {
             let (whole, sizes) = scene::read_bare(format, path)?;
             if sizes == Sizes::Unknown {

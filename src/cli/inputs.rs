@@ -1,6 +1,7 @@
 //! The files that pictures and calibrations follow from.
 
-use calibrate::{colmap, formats, opencv};
+use calibrate::opencv::{self, Keys};
+use calibrate::{colmap, formats};
 use capture::{PhotoSet, find_photos_folder};
 use lumigraph::scene::file::SceneFile;
 use lumigraph::scene::{Photo, Scene};
@@ -108,11 +109,15 @@ pub(super) fn calibration_in(path: &Path) -> Option<PathBuf> {
     if let Ok(model) = colmap::find_model(path) {
         return Some(model);
     }
-    let of_opencv = opencv::find_calibrations(path).into_iter().next();
-    of_opencv.or_else(|| {
+    let of_opencv = opencv::find_calibrations(path, &Keys::default());
+    let mut usable = of_opencv.usable.into_iter();
+    let of_others = || {
         let mut files = files_in(path).into_iter();
         files.find(|file| formats::detect(file).is_some())
-    })
+    };
+    // One whose matrices were chosen by name.
+    let by_keys = || Some(of_opencv.unusable.first()?.path().to_owned());
+    usable.next().or_else(of_others).or_else(by_keys)
 }
 
 /// The files of a calibration: its own, or those of a COLMAP model in a folder.

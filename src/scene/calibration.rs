@@ -1,152 +1,45 @@
-//! Finding a capture's calibration and reading it, whichever program made it.
+//! Reading a capture's calibration, whichever program made it.
+
+pub(super) use super::source::{Source, find};
 
 use super::{ImportOptions, SceneError, Warning};
+use calibrate::Reconstruction;
 use calibrate::formats::{self, Format};
-use calibrate::opencv::{self, Keys, OpenCvCalibration};
-use calibrate::{Reconstruction, colmap, colmap::ColmapError};
+use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
 use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Where a calibration is, and whose.
-#[derive(Debug)]
-pub(super) enum Source {
-    /// The folder of a COLMAP model.
-    Colmap(PathBuf),
-    /// A file by OpenCV.
-    OpenCv(PathBuf),
-    /// A file of another program.
-    Other(Format, PathBuf),
-}
-
-impl Source {
-    /// For messages.
-    pub(super) fn text(&self) -> String {
-        match self {
-            Self::Colmap(model) => format!("the COLMAP model in {}", model.display()),
-            Self::OpenCv(file) | Self::Other(_, file) => file.display().to_string(),
-        }
-    }
-}
-
-/// The calibration of a capture: the file or folder given, else what the capture's folder
-/// holds. A COLMAP model comes before an OpenCV file; what is passed over is noted.
-pub(super) fn find(
-    capture: &Path,
-    options: &ImportOptions,
-    warnings: &mut Vec<Warning>,
-) -> Result<Source, SceneError> {
-    let source = search(capture, options, warnings)?;
-    warnings.extend(unused_keys(&options.keys, &source));
-    Ok(source)
-}
-
-/// What to say of options for OpenCV's files that were given with another calibration, if any.
-fn unused_keys(keys: &Keys, source: &Source) -> Option<Warning> {
-    if matches!(source, Source::OpenCv(_)) {
-        return None;
-    }
-    let options = [
-        ("--camera-matrix", keys.camera_matrix.is_some()),
-        ("--distortion", keys.distortion.is_some()),
-        ("--fisheye", keys.fisheye),
-    ];
-    let given = options.into_iter().filter(|(_, is_given)| *is_given);
-    let given: Vec<&str> = given.map(|(name, _)| name).collect();
-    let change = match given.len() {
-        0 => return None,
-        1 => "changes",
-        _ => "change",
-    };
-    Some(Warning::Note(format!(
-        "{} {change} nothing: the calibration is {}, none of OpenCV's",
-        given.join(" and "),
-        source.text()
-    )))
-}
-
-/// As [`find`], whatever other options there are.
-fn search(
-    capture: &Path,
-    options: &ImportOptions,
-    warnings: &mut Vec<Warning>,
-) -> Result<Source, SceneError> {
-    let given = options.calibration.as_deref();
-    if let Some(file) = given.filter(|path| path.is_file()) {
-        // One of a COLMAP model's files stands for all.
-        let folder = file.parent().unwrap_or(Path::new(""));
-        let is_colmap = ["bin", "txt"]
-            .iter()
-            .any(|e| file.extension() == Some(e.as_ref()))
-            && colmap::find_model(folder).is_ok_and(|model| model == folder);
-        return Ok(match formats::detect(file) {
-            _ if is_colmap => Source::Colmap(folder.to_owned()),
-            Some(format) => Source::Other(format, file.to_owned()),
-            None => Source::OpenCv(file.to_owned()),
-        });
-    }
-    let folder = given.unwrap_or(capture);
-    let model = colmap::find_model(folder);
-    let model_found = model.as_ref().ok().cloned().map(Source::Colmap);
-    let opencv_found = opencv::find_calibrations(folder)
-        .into_iter()
-        .map(Source::OpenCv);
-    let mut found = model_found
-        .into_iter()
-        .chain(opencv_found)
-        .chain(others(folder));
-    let source = match (found.next(), model) {
-        (Some(source), _) => source,
-        (None, Err(source)) if given.is_none() && is_nothing_there(&source) => {
-            return Err(SceneError::Uncalibrated {
-                folder: folder.to_owned(),
-                source,
-            });
-        }
-        (None, Err(error)) => return Err(error.into()),
-        (None, Ok(model)) => Source::Colmap(model),
-    };
-    if let Some(Source::OpenCv(other) | Source::Other(_, other)) = found.next() {
-        warnings.push(Warning::Note(format!(
-            "the calibration is {}; for that in {} say --calibration {1}",
-            source.text(),
-            other.display()
-        )));
-    }
-    Ok(source)
-}
-
-/// Whether not even a part of a model was found.
-fn is_nothing_there(error: &ColmapError) -> bool {
-    matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
-}
-
-/// The other programs' calibrations in a folder, by name.
-fn others(folder: &Path) -> impl Iterator<Item = Source> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
-    files.sort();
-    files
-        .into_iter()
-        .filter_map(|file| Some(Source::Other(formats::detect(&file)?, file)))
-}
-
 /// Reads another program's calibration. Its photos are found by the ends of their paths.
+///
+/// Where the calibration leaves their sizes to the photos, one that is missing or corrupt is
+/// taken to be as large as the others: it is not left out here, but once it is known why.
 pub(super) fn read_other(
     format: Format,
     path: &Path,
     photos: &PhotoSet,
 ) -> Result<Reconstruction, SceneError> {
+    let some_size = OnceCell::new();
+    let any_size = || {
+        let mut sizes = photos.photos.iter().map(|photo| photo_size(&photo.path));
+        *some_size.get_or_init(|| sizes.find_map(Result::ok).unwrap_or((1, 1)))
+    };
     let size_of = |listed: &str| {
-        let photo = photos.find(&photo_of(listed, photos))?;
-        photo_size(&photo.path).ok()
+        let photo = photos.find(&photo_of(listed, photos));
+        let own = photo.and_then(|photo| photo_size(&photo.path).ok());
+        Some(own.unwrap_or_else(any_size))
     };
     let names: Vec<String> = photos.photos.iter().map(|p| p.name.clone()).collect();
     let mut whole = formats::read(format, path, &size_of, &names)?;
     let mut named = BTreeSet::new();
     for image in whole.images.values_mut() {
-        image.name = photo_of(&image.name, photos);
+        let mut name = photo_of(&image.name, photos);
+        // The paths of photos that are missing may end alike.
+        if photos.find(&name).is_none() && named.contains(&name) {
+            name = image.name.trim_start_matches('/').to_owned();
+        }
+        image.name = name;
         if !named.insert(image.name.clone()) {
             return Err(SceneError::Poses {
                 path: path.to_owned(),
@@ -222,11 +115,8 @@ pub(super) fn read_opencv(
     // 1. One pose a photo.
     let count = calibration.photo_poses().len();
     if count == 0 {
-        return Err(refuse(
-            "cameras, but no poses; expected extrinsic_parameters, rvecs and tvecs, or the R and \
-             T of two cameras; have OpenCV write the extrinsic parameters, or give a COLMAP model"
-                .to_owned(),
-        ));
+        let path = path.to_owned();
+        return Err(OpenCvError::NoPoses { path }.into());
     }
     if calibration.cameras.len() > 1 && !calibration.poses.is_empty() {
         let names: Vec<&str> = calibration
@@ -256,14 +146,16 @@ pub(super) fn read_opencv(
     }
 
     // 3. Where the file does not say, the image size is the photos'.
-    let known = names.iter().find_map(|name| photos.find(name));
-    let size = match known {
-        Some(photo) if calibration.cameras.iter().any(|c| c.size.is_none()) => {
-            photo_size(&photo.path)?
-        }
-        _ => (1, 1),
+    let is_open = calibration.cameras.iter().any(|c| c.size.is_none());
+    let known = names.iter().filter_map(|name| photos.find(name));
+    let mut sizes = known.map(|photo| photo_size(&photo.path));
+    let size = if is_open {
+        // What is wrong with photos is told when they are left out.
+        sizes.find_map(Result::ok)
+    } else {
+        None
     };
-    let whole = calibration.reconstruction(&names, size);
+    let whole = calibration.reconstruction(&names, size.unwrap_or((1, 1)));
     for (id, camera) in &whole.cameras {
         camera.lens().map_err(|source| SceneError::Camera {
             name: format!("{}, camera {}", path.display(), id.0),
@@ -310,7 +202,7 @@ fn photo_names(
 /// The photo that a list calls by a path of whoever calibrated: the one whose name, with
 /// or without its extension, is the longest end of that path. Where there is none, the
 /// path's own end.
-fn photo_of(listed: &str, photos: &PhotoSet) -> String {
+pub(super) fn photo_of(listed: &str, photos: &PhotoSet) -> String {
     let listed = listed.replace('\\', "/");
     let mut rest = listed.as_str();
     loop {

@@ -1,8 +1,10 @@
 //! Calibrations of other programs, from file to picture.
 
 use crate::run::{lumigraph, with_wall};
-use calibrate::colmap;
+use calibrate::{ImageId, Reconstruction, colmap};
 use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
@@ -65,4 +67,137 @@ fn bad_records_are_named() {
     let error = lumigraph(folder.path(), "info wall").error(1);
     let record = "wall/transforms.json, frames[3] (images/0003.png).transform_matrix: ";
     assert!(error.starts_with(record), "{error}");
+}
+
+/// The places of a model's images in files that count them.
+fn places(model: &Reconstruction) -> BTreeMap<ImageId, usize> {
+    model.images.keys().copied().zip(0..).collect()
+}
+
+/// The pixels that observe a model's points, relative to the middle of their photos, as NVM
+/// counts them; with `up` −1, as Bundler does.
+fn points(model: &Reconstruction, up: f64, separator: &str) -> String {
+    let places = places(model);
+    let mut text = String::new();
+    for point in model.points.values() {
+        let [x, y, z] = point.position.to_array();
+        let [r, g, b] = point.color;
+        let seen = point.track.len();
+        let words = [
+            format!("{x} {y} {z}"),
+            format!("{r} {g} {b}"),
+            seen.to_string(),
+        ];
+        text += &words.join(separator);
+        for (id, index) in &point.track {
+            let image = &model.images[id];
+            let camera = &model.cameras[&image.camera_id];
+            let keypoint = &image.keypoints[*index as usize];
+            let x = keypoint.x - f64::from(camera.width) / 2.0;
+            let y = up * (keypoint.y - f64::from(camera.height) / 2.0);
+            let _ = write!(text, " {} {index} {x} {y}", places[id]);
+        }
+        text += "\n";
+    }
+    text
+}
+
+/// The model as a bundle.out; its list of photos is that of the names.
+fn bundle(model: &Reconstruction) -> String {
+    let (images, points_text) = (&model.images, points(model, -1.0, "\n"));
+    let mut text = format!(
+        "# Bundle file v0.3\n{} {}\n",
+        images.len(),
+        model.points.len()
+    );
+    for image in images.values() {
+        let focal = model.cameras[&image.camera_id].params[0];
+        let (r, t) = (
+            image.camera_from_world.matrix(),
+            image.camera_from_world.translation,
+        );
+        let _ = writeln!(text, "{focal} 0 0");
+        for (i, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
+            let row = r.row(i) * sign;
+            let _ = writeln!(text, "{} {} {}", row.x, row.y, row.z);
+        }
+        let _ = writeln!(text, "{} {} {}", t.x, -t.y, -t.z);
+    }
+    text + &points_text
+}
+
+/// The model as VisualSFM's file.
+fn nvm(model: &Reconstruction) -> String {
+    let mut text = format!("NVM_V3\n\n{}\n", model.images.len());
+    for image in model.images.values() {
+        let focal = model.cameras[&image.camera_id].params[0];
+        let [x, y, z, w] = image.camera_from_world.rotation.to_array();
+        let c = image.camera_from_world.center();
+        let name = &image.name;
+        let _ = writeln!(
+            text,
+            "{name} {focal} {w} {x} {y} {z} {} {} {} 0 0",
+            c.x, c.y, c.z
+        );
+    }
+    let points_text = points(model, 1.0, " ");
+    format!("{text}\n{}\n{points_text}", model.points.len())
+}
+
+/// Of formats that leave sizes to the photos.
+#[test]
+fn photos_that_are_missing_or_corrupt_are_left_out_whatever_the_format() {
+    let folder = with_wall();
+    let here = folder.path();
+    let at = |path: &str| here.join(path);
+    let model = colmap::read_model(&at("wall/sparse/0")).unwrap();
+    let mut sizeless = transforms(&at("wall/sparse/0"));
+    for key in ["w", "h"] {
+        assert!(sizeless.as_object_mut().unwrap().remove(key).is_some());
+    }
+    lumigraph(here, "export wall --format opencv -o cal.yml").ok();
+    let opencv = fs::read_to_string(at("cal.yml")).unwrap();
+    let is_size = |line: &&str| line.starts_with("image_width") || line.starts_with("image_height");
+    let opencv: Vec<&str> = opencv.lines().filter(|line| !is_size(line)).collect();
+    let list: Vec<&str> = model.images.values().map(|i| i.name.as_str()).collect();
+    fs::write(at("wall/list.txt"), list.join("\n")).unwrap();
+    fs::remove_dir_all(at("wall/sparse")).unwrap();
+    fs::write(at("wall/images/0000.png"), "not a picture").unwrap();
+    fs::remove_file(at("wall/images/0003.png")).unwrap();
+    let gone = ["0000.png", "0003.png"].map(str::to_owned);
+    let rest = model.without_images(&BTreeSet::from(gone));
+    let seen = |model: &Reconstruction| -> usize {
+        let tracks = model.points.values().map(|point| point.track.len());
+        tracks.sum()
+    };
+    for (name, text, has_points) in [
+        ("cal.yml", opencv.join("\n"), false),
+        ("transforms.json", sizeless.to_string(), false),
+        ("bundle.out", bundle(&model), true),
+        ("model.nvm", nvm(&model), true),
+    ] {
+        let file = at("wall").join(name);
+        fs::write(&file, text).unwrap();
+        let ran = lumigraph(here, "import wall -o scene --force").ok();
+        assert!(ran.stdout.starts_with("scene: 7 photos"), "{}", ran.stdout);
+        for warning in [
+            "warning: photo 0000.png is left out: wall/images/0000.png: found no picture format",
+            "warning: photo 0003.png is left out: wall/images/0003.png: cannot read the picture",
+        ] {
+            assert!(ran.stderr.contains(warning), "{name}: {}", ran.stderr);
+        }
+        // Points keep what the other photos see of them.
+        let kept = colmap::read_model(&at("scene/model")).unwrap();
+        assert_eq!(kept.images.len(), 7);
+        if has_points {
+            assert_eq!(kept.points.len(), rest.points.len(), "{name}");
+            assert_eq!(seen(&kept), seen(&rest), "{name}");
+        }
+        for camera in kept.cameras.values() {
+            assert_eq!((camera.width, camera.height), (96, 72), "{name}");
+        }
+        let error = lumigraph(here, "info wall --strict").error(1);
+        assert!(error.starts_with("photo 0000.png: "), "{name}: {error}");
+        fs::remove_file(file).unwrap();
+    }
 }

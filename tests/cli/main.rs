@@ -10,6 +10,7 @@ mod exposure;
 mod faults;
 mod field;
 mod formats;
+mod found;
 mod gpu;
 mod help;
 mod hull;

@@ -169,7 +169,7 @@ fn names_beside(path: &Path, count: usize, notes: &mut Vec<String>) -> Vec<Strin
 }
 
 /// The files in a folder, sorted by name.
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
     files.sort();
@@ -177,24 +177,10 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Whether a name ends like a storage file's.
-fn is_storage_name(file: &Path) -> bool {
+pub(super) fn is_storage_name(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default().to_string_lossy();
     let known = ["yml", "yaml", "xml", "json", "gz"];
     known.contains(&extension.to_ascii_lowercase().as_str())
-}
-
-/// The files in a folder (not those within) that hold a calibration with poses, by name.
-pub fn find_calibrations(folder: &Path) -> Vec<PathBuf> {
-    // Larger ones are something else.
-    const LARGEST: u64 = 64 << 20;
-    let holds_poses = |file: &PathBuf| {
-        let small = std::fs::metadata(file).is_ok_and(|m| m.len() <= LARGEST);
-        small
-            && is_storage_name(file)
-            && read_calibration(file, &Keys::default())
-                .is_ok_and(|c| !c.poses.is_empty() || c.right_from_left.is_some())
-    };
-    files(folder).into_iter().filter(holds_poses).collect()
 }
 
 impl OpenCvCalibration {

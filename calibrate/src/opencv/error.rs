@@ -1,5 +1,5 @@
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why an OpenCV calibration could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +62,18 @@ pub enum OpenCvError {
         /// The matrices it holds: name and shape.
         found: Vec<String>,
     },
+    /// Cameras alone.
+    #[error(
+        "{}: the file holds cameras, but no poses; expected extrinsic_parameters, rvecs and tvecs, \
+         or the R and T of two cameras; have OpenCV write the extrinsic parameters, or give a \
+         COLMAP model; without this file beside the photos `import` has COLMAP find cameras and \
+         poses",
+        path.display()
+    )]
+    NoPoses {
+        /// The file.
+        path: PathBuf,
+    },
     /// A name was asked for that the file does not have.
     #[error(
         "{}: no matrix is called {key}; the file holds {}", path.display(), list(found)
@@ -86,6 +98,22 @@ pub enum OpenCvError {
         /// What the file calls it.
         model: String,
     },
+}
+
+impl OpenCvError {
+    /// The file that it is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Read { path, .. }
+            | Self::NotStorage { path, .. }
+            | Self::Malformed { path, .. }
+            | Self::Value { path, .. }
+            | Self::NoCamera { path, .. }
+            | Self::NoPoses { path }
+            | Self::NoSuchKey { path, .. }
+            | Self::Model { path, .. } => path,
+        }
+    }
 }
 
 fn list(found: &[String]) -> String {

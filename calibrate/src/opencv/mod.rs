@@ -17,6 +17,7 @@ mod calibration;
 mod cameras;
 mod coefficients;
 mod error;
+mod find;
 mod flat;
 mod json;
 mod matrix;
@@ -27,7 +28,8 @@ mod xml;
 mod yaml;
 
 pub use board::Board;
-pub use calibration::{OpenCvCalibration, calibration, find_calibrations, read_calibration};
+pub use calibration::{OpenCvCalibration, calibration, read_calibration};
 pub use cameras::{Keys, OpenCvCamera};
 pub use error::OpenCvError;
+pub use find::{FoundCalibrations, find_calibrations};
 pub use storage::{DataType, Entries, FileStorage, Matrix, Node, Value};

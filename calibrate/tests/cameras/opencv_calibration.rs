@@ -158,7 +158,9 @@ fn the_chessboard_is_what_colmap_says() {
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     assert!((mean - 0.175).abs() < 0.01, "{mean}");
     assert!(found.points.values().all(|p| p.position.z == 0.0));
-    assert_eq!(find_calibrations(&capture), [file]);
+    let in_folder = find_calibrations(&capture, &Keys::default());
+    assert_eq!(in_folder.usable, [file]);
+    assert!(in_folder.unusable.is_empty(), "{in_folder:?}");
 }
 
 /// Found by fuzzing: most corners in place, one of them no number.

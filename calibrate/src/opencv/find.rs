@@ -1,0 +1,78 @@
+//! Which files of a folder are OpenCV's calibrations, and which look like one.
+
+use super::calibration::{files, is_storage_name, read_calibration};
+use super::storage::FileStorage;
+use super::values::Values;
+use super::{Keys, OpenCvError, poses};
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Larger files are something else.
+const LARGEST: u64 = 64 << 20;
+
+/// The calibrations in a folder.
+#[derive(Debug, Default)]
+pub struct FoundCalibrations {
+    /// Files with cameras and poses, by name.
+    pub usable: Vec<PathBuf>,
+    /// What is wrong with those that look like a calibration and cannot be used, by name; last
+    /// those that lack nothing but a name known here.
+    pub unusable: Vec<OpenCvError>,
+}
+
+/// Looks for files with cameras, as `keys` choose them, and poses in a folder, not in those
+/// within.
+///
+/// What looks like a calibration, too, is a file with cameras alone, one with poses alone, and
+/// one that holds matrices the way OpenCV writes them, whole or damaged.
+pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
+    let mut found = FoundCalibrations::default();
+    let is_small = |file: &Path| fs::metadata(file).is_ok_and(|m| m.len() <= LARGEST);
+    for file in files(folder) {
+        if !(is_storage_name(&file) && is_small(&file)) {
+            continue;
+        }
+        match read_calibration(&file, keys) {
+            Ok(calibration) if calibration.photo_poses().is_empty() => {
+                found.unusable.push(OpenCvError::NoPoses { path: file });
+            }
+            Ok(_) => found.usable.push(file),
+            Err(error) if holds_matrices(&file) || holds_poses(&file) => found.unusable.push(error),
+            Err(_) => {}
+        }
+    }
+    let lacks_a_name = |error: &OpenCvError| {
+        matches!(
+            error,
+            OpenCvError::NoCamera { .. } | OpenCvError::NoSuchKey { .. }
+        )
+    };
+    found.unusable.sort_by_key(lacks_a_name);
+    found
+}
+
+/// Whether a file has the mark of OpenCV's matrices, as far as it can be unpacked.
+fn holds_matrices(file: &Path) -> bool {
+    const MARK: &[u8] = b"opencv-matrix";
+    let Ok(packed) = fs::read(file) else {
+        return false;
+    };
+    let mut unpacked = Vec::new();
+    if packed.starts_with(&[0x1f, 0x8b]) {
+        // What is read before an error stays, and a whole file was refused for what it holds.
+        let reader = flate2::read::MultiGzDecoder::new(packed.as_slice());
+        let _ = reader.take(LARGEST).read_to_end(&mut unpacked);
+    } else {
+        unpacked = packed;
+    }
+    unpacked.windows(MARK.len()).any(|bytes| bytes == MARK)
+}
+
+/// Whether a file has the poses of views under a name known here.
+fn holds_poses(file: &Path) -> bool {
+    FileStorage::read(file).is_ok_and(|storage| {
+        let poses = poses::of_views(&Values::of(file, &storage));
+        poses.is_ok_and(|poses| !poses.is_empty())
+    })
+}

@@ -1,0 +1,195 @@
+//! Where a capture's calibration is, whichever program made it.
+
+use super::{ImportOptions, SceneError, Warning};
+use calibrate::colmap::{self, ColmapError, SubModel};
+use calibrate::formats::{self, Format, FormatError};
+use calibrate::opencv::{self, Keys};
+use std::path::{Path, PathBuf};
+
+/// Where a calibration is, and whose.
+#[derive(Debug)]
+pub(super) enum Source {
+    /// The folder of a COLMAP model.
+    Colmap(PathBuf),
+    /// A file by OpenCV.
+    OpenCv(PathBuf),
+    /// A file of another program.
+    Other(Format, PathBuf),
+}
+
+impl Source {
+    /// For messages.
+    pub(super) fn text(&self) -> String {
+        match self {
+            Self::Colmap(model) => format!("the COLMAP model in {}", model.display()),
+            Self::OpenCv(file) | Self::Other(_, file) => file.display().to_string(),
+        }
+    }
+}
+
+/// The calibration of a capture: the file or folder given, else what the capture's folder
+/// holds. A COLMAP model comes before an OpenCV file; what is passed over is noted, and where
+/// nothing else is there, a calibration that cannot be used is the error.
+pub(super) fn find(
+    capture: &Path,
+    options: &ImportOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Source, SceneError> {
+    let source = search(capture, options, warnings)?;
+    warnings.extend(unused_keys(&options.keys, &source));
+    Ok(source)
+}
+
+/// What to say of options for OpenCV's files that were given with another calibration, if any.
+fn unused_keys(keys: &Keys, source: &Source) -> Option<Warning> {
+    if matches!(source, Source::OpenCv(_)) {
+        return None;
+    }
+    let options = [
+        ("--camera-matrix", keys.camera_matrix.is_some()),
+        ("--distortion", keys.distortion.is_some()),
+        ("--fisheye", keys.fisheye),
+    ];
+    let given = options.into_iter().filter(|(_, is_given)| *is_given);
+    let given: Vec<&str> = given.map(|(name, _)| name).collect();
+    let change = match given.len() {
+        0 => return None,
+        1 => "changes",
+        _ => "change",
+    };
+    Some(Warning::Note(format!(
+        "{} {change} nothing: the calibration is {}, none of OpenCV's",
+        given.join(" and "),
+        source.text()
+    )))
+}
+
+/// As [`find`], whatever other options there are.
+fn search(
+    capture: &Path,
+    options: &ImportOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Source, SceneError> {
+    let given = options.calibration.as_deref();
+    if let Some(file) = given.filter(|path| path.is_file()) {
+        // One of a COLMAP model's files stands for all.
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let is_colmap = ["bin", "txt"]
+            .iter()
+            .any(|e| file.extension() == Some(e.as_ref()))
+            && colmap::find_model(folder).is_ok_and(|model| model == folder);
+        let format = formats::detect(file).or_else(|| formats::meant(file));
+        return Ok(match format {
+            _ if is_colmap => Source::Colmap(folder.to_owned()),
+            Some(format) => Source::Other(format, file.to_owned()),
+            None => Source::OpenCv(file.to_owned()),
+        });
+    }
+
+    // 1. What is there.
+    let folder = given.unwrap_or(capture);
+    let model = colmap::find_model(folder);
+    let of_opencv = opencv::find_calibrations(folder, &options.keys);
+    let (others, damaged) = others(folder);
+    let model_found = model.as_ref().ok().cloned().map(Source::Colmap);
+    let opencv_found = of_opencv.usable.into_iter().map(Source::OpenCv);
+    let mut found = model_found.into_iter().chain(opencv_found).chain(others);
+    let damaged = damaged.into_iter().map(SceneError::Format);
+    let unusable = of_opencv.unusable.into_iter().map(SceneError::OpenCv);
+    let mut unusable = damaged.chain(unusable);
+
+    // 2. The first of it.
+    let source = match (found.next(), model) {
+        (Some(source), _) => source,
+        (None, Ok(model)) => Source::Colmap(model),
+        (None, Err(error)) => {
+            let is_nothing = is_nothing_there(&error);
+            return Err(match unusable.next() {
+                Some(reason) if is_nothing => reason,
+                _ if is_nothing && given.is_none() => SceneError::Uncalibrated {
+                    folder: folder.to_owned(),
+                    source: error,
+                },
+                _ => error.into(),
+            });
+        }
+    };
+
+    // 3. The rest.
+    if let Source::Colmap(model) = &source
+        && model != folder
+    {
+        warnings.extend(other_models(model).map(Warning::Note));
+    }
+    if let Some(Source::OpenCv(other) | Source::Other(_, other)) = found.next() {
+        warnings.push(Warning::Note(format!(
+            "the calibration is {}; for that in {} say --calibration {1}",
+            source.text(),
+            other.display()
+        )));
+    }
+    // OpenCV's calibrations may be in several files, of which one alone can be read.
+    let is_part = |error: &SceneError| {
+        matches!(source, Source::OpenCv(_)) && matches!(error, SceneError::OpenCv(_))
+    };
+    for reason in unusable.filter(|error| !is_part(error)) {
+        warnings.push(Warning::Note(format!(
+            "the calibration is {}; not used: {reason}",
+            source.text()
+        )));
+    }
+    Ok(source)
+}
+
+/// What to say of the models beside one of several that COLMAP could not join, if there are
+/// others.
+pub fn other_models(model: &Path) -> Option<String> {
+    // More are only counted.
+    const SHOWN: usize = 3;
+    let text = |one: &SubModel| {
+        let photos = match one.images {
+            Some(photos) => format!("{photos} photos"),
+            None => "damaged".to_owned(),
+        };
+        format!("{} ({photos})", one.folder.display())
+    };
+    let all = colmap::side_by_side(model);
+    let taken = text(all.iter().find(|one| one.folder == model)?);
+    let others = all.iter().filter(|one| one.folder != model);
+    let mut listed: Vec<String> = others.map(text).collect();
+    if listed.is_empty() {
+        return None;
+    }
+    if listed.len() > SHOWN {
+        let more = listed.len() - SHOWN;
+        listed.truncate(SHOWN);
+        listed.push(format!("{more} more"));
+    }
+    Some(format!(
+        "the calibration is the COLMAP model in {taken}; --calibration takes another: {}",
+        listed.join(", ")
+    ))
+}
+
+/// Whether not even a part of a model was found.
+fn is_nothing_there(error: &ColmapError) -> bool {
+    matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
+}
+
+/// The other programs' calibrations in a folder, by name, and what is wrong with files that are
+/// called like one.
+fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
+    files.sort();
+    let (mut found, mut damaged) = (Vec::new(), Vec::new());
+    for file in files {
+        if let Some(format) = formats::detect(&file) {
+            found.push(Source::Other(format, file));
+        } else if let Some(format) = formats::by_name(&file) {
+            let read = formats::read(format, &file, &|_| Some((1, 1)), &[]);
+            damaged.extend(read.err());
+        }
+    }
+    (found, damaged)
+}
