@@ -2,8 +2,8 @@
 
 use super::Usage;
 use super::inputs::{calibration_of, files_behind_scene, model_files};
-use super::options::SceneArgs;
-use super::output::{print, write_file};
+use super::options::{SceneArgs, beside_counts};
+use super::output::{print, say, write_file};
 use super::targets::check_apart;
 use anyhow::bail;
 use calibrate::export::{
@@ -11,14 +11,15 @@ use calibrate::export::{
 };
 use calibrate::{Image, colmap};
 use clap::ValueEnum;
-use lumigraph::scene::{Photo, Scene, SceneError, relative};
+use lumigraph::scene::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, relative};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Write a scene's cameras, poses and points for other programs
 ///
 /// A COLMAP model is a folder; transforms.json (nerfstudio) and OpenCV's calibration are a
-/// file, which names the photos by their paths from where it lies. Photos are not copied.
+/// file, which names the photos by their paths from where it lies, transforms.json their ignore
+/// masks and depth maps, too. Photos are not copied.
 /// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
 /// all of them can. Tilted sensors and skewed fisheyes are OpenCV's alone.
 ///
@@ -94,6 +95,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             write_file(output, text.as_bytes())?;
         }
     }
+    say_beside(&scene, args.format);
     print(&format!(
         "{}: {} photos, {}\n",
         output.display(),
@@ -144,11 +146,14 @@ fn files<'a>(scene: &'a Scene, file: &Path) -> Result<BTreeMap<&'a str, FrameFil
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    let has_depth = depth_scale(scene).is_some();
     let of_photo = |photo: &'a Photo| {
-        let mask = photo.ignore_mask.as_deref();
+        let beside = |file: Option<&Path>| file.map(|file| relative(folder, file)).transpose();
+        let depth = photo.depth_map.as_deref().filter(|_| has_depth);
         let files = FrameFiles {
             photo: relative(folder, &photo.path)?,
-            mask: mask.map(|mask| relative(folder, mask)).transpose()?,
+            mask: beside(photo.ignore_mask.as_deref())?,
+            depth: beside(depth)?,
         };
         Ok((photo.name.as_str(), files))
     };
@@ -161,5 +166,56 @@ fn of(files: &BTreeMap<&str, FrameFiles>, image: &Image) -> FrameFiles {
     known.unwrap_or_else(|| FrameFiles {
         photo: image.name.clone(),
         mask: None,
+        depth: None,
     })
+}
+
+/// World units a step of the scene's depth maps, where a `transforms.json` can name them: if all
+/// photos have one, in the same steps.
+fn depth_scale(scene: &Scene) -> Option<f64> {
+    let of = |photo: &Photo| {
+        let scale = photo.depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
+        photo.depth_map.as_ref().map(|_| scale)
+    };
+    let mut scales = scene.photos.iter().map(of);
+    let first = scales.next()??;
+    scales.all(|scale| scale == Some(first)).then_some(first)
+}
+
+/// Says what beside the photos is not in the file or model, or in a way that its readers must know of.
+fn say_beside(scene: &Scene, format: Format) {
+    let total = scene.photos.len();
+    let counts = beside_counts(scene);
+    let [masks, .., depth_maps] = counts.map(|(_, n)| n);
+    let is_transforms = matches!(format, Format::Transforms);
+    if is_transforms && masks > 0 && masks < total {
+        say!(
+            "note: {masks} of {total} photos have an ignore mask; nerfstudio wants one for each or \
+             for none"
+        );
+    }
+    let scale = depth_scale(scene).filter(|_| is_transforms);
+    if let Some(scale) = scale.filter(|scale| *scale != DEPTH_UNITS_PER_STEP) {
+        say!(
+            "note: the depth maps are in steps of {scale} world units, which the file cannot say: \
+             give nerfstudio-data --depth-unit-scale-factor {scale}, or --depth-scale {scale} to \
+             `import`"
+        );
+    }
+    if is_transforms && depth_maps > 0 && scale.is_none() {
+        say!(
+            "note: left out: {depth_maps} depth maps; nerfstudio wants one for each of the {total} \
+             photos, all in the same steps"
+        );
+    }
+    // Of nerfstudio's, masks and depth maps are dealt with.
+    let has_place = |what: &str| is_transforms && ["ignore masks", "depth maps"].contains(&what);
+    let others = counts
+        .into_iter()
+        .filter(|(what, n)| *n > 0 && !has_place(what));
+    let others: Vec<String> = others.map(|(what, n)| format!("{n} {what}")).collect();
+    if !others.is_empty() {
+        let others = others.join(", ");
+        say!("note: left out: {others}; the format has no place for them");
+    }
 }

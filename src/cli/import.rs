@@ -22,13 +22,15 @@ use std::path::{Path, PathBuf};
 ///
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
 /// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
-/// alone, with --calibration. Photos are not copied, except with --undistort.
+/// alone, with --calibration. Of `sparse/0`, `sparse/1` and so on, the model with the most photos
+/// is taken. Photos are not copied, except with --undistort.
 ///
 /// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
 /// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in
 /// the order of a list within or beside it (images.yml), else in the order of their names.
 ///
-/// Masks and depth maps in PHOTOS/masks and PHOTOS/depth are found by the photos' names.
+/// Masks and depth maps in PHOTOS/masks and PHOTOS/depth are found by the photos' names, others
+/// where a transforms.json names them.
 ///
 /// Without a calibration, COLMAP is run if it is installed. A video may be given instead of
 /// photos: ffmpeg takes its sharpest frames, into the scene's folder. Interrupted, the same

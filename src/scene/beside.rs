@@ -223,10 +223,12 @@ impl Scene {
                  matte already; {remedy}"
             )
         } else if !asked && self.masks_keep_little() {
+            let folder = self.masks_folder();
+            let folder = folder.display();
             format!(
-                "the masks in {MASKS_FOLDER} keep less than half of each photo, as an object's \
-                 silhouettes do, and serve the hull only; --mattes {MASKS_FOLDER} cuts the photos \
-                 out along them, --masks {MASKS_FOLDER} ignores all else"
+                "the masks in {folder} keep less than half of each photo, as an object's \
+                 silhouettes do, and serve the hull only; --mattes {folder} cuts the photos \
+                 out along them, --masks {folder} ignores all else"
             )
         } else {
             return;
@@ -236,6 +238,23 @@ impl Scene {
             for photo in &mut self.photos {
                 photo.silhouette = photo.ignore_mask.take();
             }
+        }
+    }
+
+    /// Where the first ignore mask lies, as options may name it: from the capture's folder, if it
+    /// is in there.
+    fn masks_folder(&self) -> PathBuf {
+        let mut masks = self.photos.iter().filter_map(|p| p.ignore_mask.as_deref());
+        let folder = masks.next().and_then(Path::parent);
+        let capture = self.capture.as_deref().unwrap_or(Path::new(""));
+        let within = folder.map(|folder| match folder.strip_prefix(capture) {
+            Ok(within) if within != Path::new("") => within,
+            _ => folder,
+        });
+        match within {
+            // Or in folders of the same names as the photos'.
+            Some(folder) if !folder.starts_with(MASKS_FOLDER) => folder.to_owned(),
+            _ => PathBuf::from(MASKS_FOLDER),
         }
     }
 

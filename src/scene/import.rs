@@ -119,6 +119,7 @@ impl Scene {
 
         // 4. What lies beside them.
         scene.find_beside(capture, options, &mut warnings)?;
+        scene.find_named(&source, &found, options, &mut warnings)?;
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);
         scene.judge_depth(&mut warnings);

@@ -18,6 +18,7 @@ pub mod file;
 mod fit;
 mod import;
 mod lumigraph;
+mod named;
 mod names;
 mod observed;
 mod relative;

@@ -21,6 +21,7 @@ mod ldis;
 mod masked_depth;
 mod masks;
 mod memory;
+mod nerfstudio;
 mod opencv;
 mod path;
 mod render;

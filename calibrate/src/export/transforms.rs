@@ -22,10 +22,14 @@ pub struct FrameFiles {
     pub photo: String,
     /// What to ignore in it: black, as in COLMAP.
     pub mask: Option<String>,
+    /// Depth along z, 16-bit grey. nerfstudio takes 1000 steps for a unit, if it is not told
+    /// otherwise.
+    pub depth: Option<String>,
 }
 
 /// The text of a `transforms.json`: a frame for each image, in the order of their ids.
-/// Sparse points have no place in it.
+/// Sparse points have no place in it. nerfstudio wants masks for all photos or for none, and
+/// so depth maps.
 ///
 /// # Errors
 /// No image; a camera without a lens, or one whose lens is none of OpenCV's or has a
@@ -76,11 +80,14 @@ pub fn transforms_json(
 
     // 3. The frames.
     let frame = |image: &Image| {
-        let FrameFiles { photo, mask } = files_of(image);
+        let FrameFiles { photo, mask, depth } = files_of(image);
         let mut frame = Map::new();
         frame.insert("file_path".to_owned(), json!(photo));
         if let Some(mask) = mask {
             frame.insert("mask_path".to_owned(), json!(mask));
+        }
+        if let Some(depth) = depth {
+            frame.insert("depth_file_path".to_owned(), json!(depth));
         }
         if !shared {
             frame.extend(intrinsics[&image.camera_id].clone());

@@ -91,6 +91,7 @@ fn through_transforms(whole: &Reconstruction) -> Reconstruction {
     let files = |image: &Image| FrameFiles {
         photo: image.name.clone(),
         mask: None,
+        depth: None,
     };
     fs::write(&path, transforms_json(whole, &files).unwrap()).unwrap();
     read_transforms(&path, &|name| panic!("{name}: the size is in the file")).unwrap()
@@ -249,6 +250,7 @@ fn the_keys_are_those_that_nerfstudio_reads() {
     let files = |image: &Image| FrameFiles {
         photo: image.name.clone(),
         mask: (image.name.contains('1')).then(|| "m.png".to_owned()),
+        depth: (image.name.contains('1')).then(|| "d.png".to_owned()),
     };
     let json = |cameras: &[Camera]| -> serde_json::Value {
         let whole = reconstruction(cameras, &[Rigid3::IDENTITY; 2]);
@@ -273,6 +275,8 @@ fn the_keys_are_those_that_nerfstudio_reads() {
     assert_eq!(shared["frames"][0]["transform_matrix"][2][2], -1.0);
     assert!(shared["frames"][0].get("mask_path").is_none());
     assert_eq!(shared["frames"][1]["mask_path"], "m.png");
+    assert!(shared["frames"][0].get("depth_file_path").is_none());
+    assert_eq!(shared["frames"][1]["depth_file_path"], "d.png");
 
     let own = json(&expressible()[1..3]);
     assert_eq!(own["camera_model"], "OPENCV");
@@ -289,6 +293,7 @@ fn what_cannot_be_expressed_is_named() {
         let files = |image: &Image| FrameFiles {
             photo: image.name.clone(),
             mask: None,
+            depth: None,
         };
         transforms_json(&one(cameras), &files)
             .unwrap_err()

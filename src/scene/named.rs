@@ -1,0 +1,118 @@
+//! Masks and depth maps that the calibration names.
+
+use super::calibration::{Source, photo_of};
+use super::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, Warning};
+use calibrate::formats::{self, FilesBeside, Format};
+use capture::{Beside, CaptureError, PhotoSet, check_beside};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+impl Scene {
+    /// Gives photos the ignore masks and depth maps that a `transforms.json` names for them,
+    /// where folders gave them none and none were asked for, and says what of it is not used.
+    pub(super) fn find_named(
+        &mut self,
+        source: &Source,
+        found: &PhotoSet,
+        options: &ImportOptions,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), SceneError> {
+        let Source::Other(Format::Transforms, file) = source else {
+            return Ok(());
+        };
+        let FilesBeside {
+            masks,
+            depth_maps,
+            points,
+            applied_scale,
+        } = formats::read_files_beside(file)?;
+        let by_photo = |named: BTreeMap<String, PathBuf>| -> BTreeMap<String, PathBuf> {
+            let named = named.into_iter();
+            named.map(|(n, path)| (photo_of(&n, found), path)).collect()
+        };
+        let mut note = |text: String| {
+            let file = file.display();
+            warnings.push(Warning::Note(format!("{file} names {text}")));
+        };
+        if options.masks.is_none() && !options.no_masks {
+            let missing = self.add_masks(&by_photo(masks));
+            if let Some(example) = missing.first() {
+                note(format!(
+                    "{} ignore masks that are not there ({}, for one); nothing is ignored in \
+                     their photos",
+                    missing.len(),
+                    example.display()
+                ));
+            }
+        }
+        if options.depth.is_none() {
+            // A scale that was asked for is that of the scene's units.
+            let is_asked = options.depth_scale != DEPTH_UNITS_PER_STEP;
+            let scale = options.depth_scale * if is_asked { 1.0 } else { applied_scale };
+            let unused = self.add_depth_maps(&by_photo(depth_maps), scale);
+            if let Some(reason) = unused.first() {
+                note(format!(
+                    "{} depth maps that are not used, for one: {reason}",
+                    unused.len()
+                ));
+            }
+        }
+        if let Some(points) = points.filter(|points| points.is_file()) {
+            note(format!(
+                "the sparse points in {}, which are not read: the scene has none",
+                points.display()
+            ));
+        }
+        Ok(())
+    }
+
+    /// Gives photos without an ignore mask theirs; those that are not there.
+    fn add_masks(&mut self, named: &BTreeMap<String, PathBuf>) -> Vec<PathBuf> {
+        let real = |path: &Path| path.canonicalize().ok();
+        let mut missing = Vec::new();
+        for photo in self.photos.iter_mut().filter(|p| p.ignore_mask.is_none()) {
+            let Some(mask) = named.get(&photo.name) else {
+                continue;
+            };
+            if !mask.is_file() {
+                missing.push(mask.clone());
+                continue;
+            }
+            // One file does not serve as both.
+            let matte = photo.object_matte.as_deref();
+            let is_matte = matte.is_some_and(|matte| real(matte) == real(mask));
+            if !is_matte {
+                photo.ignore_mask = Some(mask.clone());
+            }
+        }
+        missing
+    }
+
+    /// Gives photos without a depth map theirs; what is wrong with those that cannot be used.
+    /// Other programs make depth maps of any size and kind fit.
+    fn add_depth_maps(
+        &mut self,
+        named: &BTreeMap<String, PathBuf>,
+        scale: f64,
+    ) -> Vec<CaptureError> {
+        let images = self.reconstruction.images.values();
+        let camera_ids: BTreeMap<&str, _> =
+            images.map(|i| (i.name.as_str(), i.camera_id)).collect();
+        let mut unused = Vec::new();
+        for photo in self.photos.iter_mut().filter(|p| p.depth_map.is_none()) {
+            let Some(map) = named.get(&photo.name) else {
+                continue;
+            };
+            let camera = &self.reconstruction.cameras[&camera_ids[photo.name.as_str()]];
+            let size = (camera.width, camera.height);
+            match check_beside(Beside::DepthMap, map, &photo.name, size) {
+                Ok(()) => {
+                    photo.depth_scale = Some(scale);
+                    photo.depth_map = Some(map.clone());
+                }
+                Err(reason) => unused.push(reason),
+            }
+        }
+        unused
+    }
+}
