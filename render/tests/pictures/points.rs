@@ -229,6 +229,44 @@ fn slivers_beyond_all_photos_are_painted_by_the_triangulated_field_too() {
     assert!(moved > 5, "{moved}");
 }
 
+/// What is moved ends near some photo's border, where rounding must not take it out again.
+#[test]
+fn what_is_moved_into_a_photo_is_painted_by_every_engine() {
+    let shot = Shot::of("shelf", 4, None);
+    let lumigraph = lumigraph(&shot);
+    let middle = shot.views[0].between(&shot.views[3], 0.45);
+    let distance = lumigraph.points[0].position.distance(middle.center());
+    let (mut count, mut holes) = (0, Vec::new());
+    for step in 0..16 {
+        // From farther back than all photos more is seen of what surrounds the shelf.
+        let angle = 0.4 * f64::from(step);
+        let back = 0.4 + 0.01 * f64::from(step);
+        let place = DVec3::new(0.1 * angle.cos(), 0.1 * angle.sin(), back) * distance;
+        let turned = DQuat::from_rotation_z(0.03 * f64::from(step));
+        let desired = View {
+            camera_from_world: calibrate::Rigid3::new(turned, place) * middle.camera_from_world,
+            ..middle.clone()
+        };
+        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        let Surface::Facets(map) = &frame.surface else {
+            panic!("{step}");
+        };
+        let moved: Vec<bool> = map.moved().collect();
+        count += moved.iter().filter(|moved| **moved).count();
+        let truth = reference::render_exact(&frame).unwrap();
+        for (engine, picture) in pictures(&frame, Method::Exact) {
+            let both = picture.pixels().zip(truth.pixels());
+            for (i, (painted, expected)) in both.enumerate().filter(|(i, _)| moved[*i]) {
+                if painted.0[3] == 0 && expected.0[3] > 0 {
+                    holes.push((engine, step, i));
+                }
+            }
+        }
+    }
+    assert!(count > 3_000, "{count}");
+    assert!(holes.is_empty(), "{holes:?}");
+}
+
 #[test]
 fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
     let shot = Shot::of("shelf", 9, None);
