@@ -6,6 +6,7 @@
 //! (0.5, 0.5), and reducing a photo keeps its corners where they are, so intrinsics
 //! follow by the ratio of the sizes alone.
 
+mod alike;
 mod beside;
 mod decode;
 mod error;
@@ -21,6 +22,7 @@ pub mod video;
 mod warp;
 mod write;
 
+pub use alike::{name_key, stem_key};
 pub use beside::{
     Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_depth_steps,
     decode_mask, match_by_name,
@@ -28,7 +30,7 @@ pub use beside::{
 pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use exif::{Exif, read_exif};
-pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder};
+pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder, find_photos_within};
 pub use resize::{reduced_size, resize, resize_mask};
 pub use sequence::is_sequence;
 pub use times::{

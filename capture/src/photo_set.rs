@@ -70,6 +70,50 @@ pub fn find_photos_folder(capture: &Path) -> Option<PathBuf> {
     holds_photo.then(|| capture.to_owned())
 }
 
+/// The same; else the capture itself if folders within hold some, as where each camera of a rig has
+/// its own. Not asked are hidden ones, those directly in the capture that are called as one of
+/// `others`, and captures of their own, which have `images` in them.
+pub fn find_photos_within(capture: &Path, others: &[&str]) -> Option<PathBuf> {
+    find_photos_folder(capture).or_else(|| {
+        let is_other = |path: &Path| {
+            let name = path.file_name().and_then(|name| name.to_str());
+            name.is_some_and(|name| others.contains(&name))
+        };
+        let mut folders = folders_in(capture).into_iter();
+        let holds_some =
+            folders.any(|path| !is_other(&path) && holds_photos(&path, &mut Vec::new()));
+        holds_some.then(|| capture.to_owned())
+    })
+}
+
+/// Whether a folder, or one within, holds a photo, and is no capture of its own.
+fn holds_photos(folder: &Path, around: &mut Vec<PathBuf>) -> bool {
+    // As in `collect`, of links.
+    let Ok(real) = fs::canonicalize(folder) else {
+        return false;
+    };
+    if around.contains(&real) || folder.join("images").is_dir() {
+        return false;
+    }
+    around.push(real);
+    let photos = find_photos_folder(folder);
+    let found = photos.is_some()
+        || folders_in(folder)
+            .iter()
+            .any(|path| holds_photos(path, around));
+    around.pop();
+    found
+}
+
+/// The visible folders in one; none where it cannot be listed.
+fn folders_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    paths
+        .filter(|path| !is_hidden(path) && path.is_dir())
+        .collect()
+}
+
 /// Appends the photos in `folder`, whose own name within the set is `prefix`.
 fn collect(
     folder: &Path,

@@ -1,8 +1,8 @@
 //! Listing, decoding, reducing and writing photos.
 
 use capture::{
-    CaptureError, PhotoSet, decode, decode_reduced, find_photos_folder, photo_size, reduced_size,
-    resize, write_png,
+    CaptureError, PhotoSet, decode, decode_reduced, find_photos_folder, find_photos_within,
+    photo_size, reduced_size, resize, write_png,
 };
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgba, RgbaImage};
@@ -130,6 +130,37 @@ fn the_photos_of_a_capture_are_in_images_or_beside() {
         find_photos_folder(folder.path()),
         Some(folder.path().join("images"))
     );
+}
+
+#[test]
+fn photos_may_lie_in_folders_within_a_capture_alone() {
+    let folder = folder();
+    let within = || find_photos_within(folder.path(), &["masks", "depth"]);
+    for name in [
+        "masks/a.jpg",
+        "depth/cam0/a.png",
+        ".thumbnails/a.jpg",
+        "other-capture/images/a.jpg",
+        "cam0/notes.txt",
+    ] {
+        put(&folder, name, b"anything");
+        assert_eq!(within(), None, "{name}");
+    }
+    put(&folder, "cam0/day 1/a.jpg", b"anything");
+    assert_eq!(within().as_deref(), Some(folder.path()));
+    assert_eq!(find_photos_folder(folder.path()), None);
+    put(&folder, "images/a.jpg", b"anything");
+    assert_eq!(within(), Some(folder.path().join("images")));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_lead_in_no_circle_where_photos_are_looked_for() {
+    let folder = folder();
+    put(&folder, "cam0/notes.txt", b"anything");
+    let link = folder.path().join("cam0/round");
+    std::os::unix::fs::symlink(folder.path().join("cam0"), link).unwrap();
+    assert_eq!(find_photos_within(folder.path(), &[]), None);
 }
 
 #[test]

@@ -5,10 +5,9 @@ use super::output::say;
 use super::session::{progress, spinner};
 use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
 use capture::video::{self, FrameCount, VideoFrame, VideoProgress};
-use capture::{PhotoSet, find_photos_folder};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
-use lumigraph::scene::SceneError;
+use lumigraph::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// How photos without a calibration are had.
@@ -94,9 +93,7 @@ impl UncalibratedArgs {
         is_video: bool,
         work: &Path,
     ) -> anyhow::Result<PathBuf> {
-        let folder =
-            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
-        let photos = PhotoSet::open(&folder)?;
+        let photos = Scene::photos_of(capture)?;
         let mut options = Options::for_photos(&photos, is_video)?;
         match self.matching {
             Some(MatchingName::Sequential) => options.matching = Matching::Sequential,

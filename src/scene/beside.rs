@@ -1,5 +1,6 @@
 //! What lies beside the photos: masks, mattes and depth maps, found by name and checked.
 
+use super::undistort::{MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, Warning};
 use capture::{Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside, match_by_name};
 use image::{GrayImage, RgbaImage};
@@ -9,11 +10,18 @@ use std::path::{Path, PathBuf};
 /// in a scene that was undistorted.
 pub(super) const MASKS_FOLDER: &str = "masks";
 pub(super) const DEPTH_FOLDER: &str = "depth";
+/// Folders in a capture that hold none of its photos.
+pub(super) const FOLDERS: [&str; 4] = [
+    MASKS_FOLDER,
+    DEPTH_FOLDER,
+    MATTES_FOLDER,
+    SILHOUETTES_FOLDER,
+];
 
-/// Whether a file of a capture is a mask or a depth map by its place.
+/// Whether a file of a capture is no photo, but a mask, a matte or a depth map by its place.
 pub(super) fn is_beside(name: &str) -> bool {
     let folder = name.split_once('/').map(|(folder, _)| folder);
-    folder.is_some_and(|folder| [MASKS_FOLDER, DEPTH_FOLDER].contains(&folder))
+    folder.is_some_and(|folder| FOLDERS.contains(&folder))
 }
 
 /// World units a step of depth maps, if nobody says: millimetres where units are metres.

@@ -95,8 +95,8 @@ pub enum SceneError {
     NoFolder(PathBuf),
     /// The capture holds no photos.
     #[error(
-        "{}: no photos here, neither in it nor in `images`; give the folder that holds the \
-         photos, and their calibration with --calibration", .0.display()
+        "{}: no photos here, neither in it nor in `images` or other folders within; give the folder \
+         that holds the photos, and their calibration with --calibration", .0.display()
     )]
     NoPhotos(PathBuf),
     /// A folder of masks, mattes or depth maps has none for any photo.
@@ -123,7 +123,7 @@ pub enum SceneError {
     /// Too many photos are missing or corrupt.
     #[error(
         "{left_out} of {total} calibrated photos cannot be used, and too few remain (at least 2 \
-         are needed): {name}: {reason}; check that the calibration belongs to these photos"
+         are needed): {name}: {reason}; {remedy}"
     )]
     TooFew {
         /// How many are missing or corrupt.
@@ -134,6 +134,8 @@ pub enum SceneError {
         name: String,
         /// What is wrong with it.
         reason: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A file or folder cannot be read or written.
     #[error("{}: cannot {doing}: {source}", path.display())]

@@ -3,14 +3,16 @@
 use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
+use super::meant::Meant;
 use super::times::{TimeSource, set_times};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
 use calibrate::{Reconstruction, colmap};
-use capture::{CaptureError, PhotoSet, find_photos_folder, photo_size};
+use capture::{CaptureError, PhotoSet, find_photos_within, photo_size};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// How photos are imported.
@@ -59,13 +61,18 @@ impl Default for ImportOptions {
 
 /// Photos that must remain for others to be left out.
 const ENOUGH: usize = 2;
+/// What to do where too few of a calibration's photos are there, or of a scene's.
+const OTHERS: &str = "check that the calibration belongs to these photos";
+const MOVED: &str = "photos stay where they are, and a scene says how to get there from its own folder: move \
+                     them or the scene back, or import them again";
 
 impl Scene {
     /// Imports a capture, a folder of photos with a calibration in it or beside it.
     ///
     /// Every photo's size is compared with its camera's, and those of masks, mattes and depth
     /// maps with their photos', from the files' headers. Photos get times where some are to be
-    /// had (see [`TimeSource`]). A calibrated photo that is missing, or whose header cannot be read, is
+    /// had (see [`TimeSource`]). A photo that the calibration calls otherwise in letters' case, in how marks are
+    /// written or in what it ends in alone is found, with a note. A calibrated photo that is missing, or whose header cannot be read, is
     /// left out with a warning as long as two others remain.
     ///
     /// # Errors
@@ -86,7 +93,7 @@ impl Scene {
 
         // 2. The photos, matched by name.
         let found = Self::photos_of(capture)?;
-        let reconstruction = match &source {
+        let mut reconstruction = match &source {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
             Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
@@ -96,8 +103,17 @@ impl Scene {
             Source::Other(Format::Llff, file) => calibration::depth_bounds(file, &found)?,
             _ => BTreeMap::new(),
         };
+        let meant = Meant::of(&mut reconstruction, &found);
         let mut scene = Self::of(reconstruction, capture, &found, &bounds, options);
-        let names: BTreeSet<&str> = scene.photos.iter().map(|p| p.name.as_str()).collect();
+        for photo in &mut scene.photos {
+            if let Some(file) = meant.photos.get(&photo.name) {
+                photo.path.clone_from(&file.path);
+            }
+        }
+        warnings.extend(meant.note(scene.photos.len()));
+        let names = scene.photos.iter().map(|photo| photo.name.as_str());
+        let files = meant.photos.values().map(|file| file.name.as_str());
+        let names: BTreeSet<&str> = names.chain(files).collect();
         let unused = |photo: &&capture::PhotoFile| !names.contains(photo.name.as_str());
         if let Some(example) = found.photos.iter().find(unused) {
             warnings.push(Warning::Uncalibrated {
@@ -115,7 +131,7 @@ impl Scene {
         )?;
 
         // 3. Are they what was calibrated?
-        warnings.extend(scene.leave_out_unusable(options.strict)?);
+        warnings.extend(scene.leave_out_unusable(options.strict, &meant.near)?);
 
         // 4. What lies beside them.
         scene.find_beside(capture, options, &mut warnings)?;
@@ -126,13 +142,17 @@ impl Scene {
         Ok((scene, warnings))
     }
 
-    /// The photos of a capture.
-    pub(super) fn photos_of(capture: &Path) -> Result<PhotoSet, SceneError> {
+    /// The photos of a capture: those in its folder `images`, or else in itself and the folders within, but for
+    /// those where masks, mattes, silhouettes and depth maps are.
+    ///
+    /// # Errors
+    /// There are none; a folder that cannot be listed; a name that is not UTF-8.
+    pub fn photos_of(capture: &Path) -> Result<PhotoSet, SceneError> {
         if !capture.is_dir() {
             return Err(SceneError::NoFolder(capture.to_owned()));
         }
-        let folder =
-            find_photos_folder(capture).ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
+        let folder = find_photos_within(capture, &beside::FOLDERS)
+            .ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
         let mut found = PhotoSet::open(&folder)?;
         if folder == capture {
             // Photos that lie in the capture itself have their masks within.
@@ -186,10 +206,15 @@ impl Scene {
         }
     }
 
-    /// Compares every photo's size with its camera's, and leaves out what cannot be used.
-    pub(super) fn leave_out_unusable(&mut self, strict: bool) -> Result<Vec<Warning>, SceneError> {
+    /// Compares every photo's size with its camera's, and leaves out what cannot be used. `near` says of
+    /// names what is called nearly so.
+    pub(super) fn leave_out_unusable(
+        &mut self,
+        strict: bool,
+        near: &BTreeMap<String, String>,
+    ) -> Result<Vec<Warning>, SceneError> {
         let images = self.images_by_name();
-        let mut unusable: Vec<(String, CaptureError)> = Vec::new();
+        let mut unusable: Vec<(String, String)> = Vec::new();
         for photo in &self.photos {
             let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
             let expected = (camera.width, camera.height);
@@ -202,7 +227,11 @@ impl Scene {
                         expected,
                     }));
                 }
-                Err(error) => unusable.push((photo.name.clone(), error)),
+                Err(error) => {
+                    let near = near.get(&photo.name);
+                    let near = near.map_or_else(String::new, |near| format!("; {near}"));
+                    unusable.push((photo.name.clone(), format!("{error}{near}")));
+                }
             }
         }
         self.leave_out(unusable, strict)
@@ -229,7 +258,7 @@ impl Scene {
     /// Leaves out photos for what is wrong with them, as long as enough others remain.
     pub(super) fn leave_out(
         &mut self,
-        unusable: Vec<(String, CaptureError)>,
+        unusable: Vec<(String, impl Display)>,
         strict: bool,
     ) -> Result<Vec<Warning>, SceneError> {
         let Some((name, reason)) = unusable.first() else {
@@ -240,19 +269,23 @@ impl Scene {
             return Err(SceneError::Strict { name, reason });
         }
         if self.photos.len() - unusable.len() < ENOUGH {
+            let is_gone = |photo: &Photo| photo.name == name && !photo.path.exists();
+            let was_moved = self.folder.is_some() && self.photos.iter().any(is_gone);
             return Err(SceneError::TooFew {
                 left_out: unusable.len(),
                 total: self.photos.len(),
+                remedy: if was_moved { MOVED } else { OTHERS },
                 name,
                 reason,
             });
         }
         let names: BTreeSet<String> = unusable.iter().map(|(name, _)| name.clone()).collect();
         self.take_out(&names);
-        let warning = |(name, error): (String, CaptureError)| Warning::LeftOut {
+        let unusable = unusable.into_iter();
+        let warnings = unusable.map(|(name, reason)| Warning::LeftOut {
             name,
-            reason: error.to_string(),
-        };
-        Ok(unusable.into_iter().map(warning).collect())
+            reason: reason.to_string(),
+        });
+        Ok(warnings.collect())
     }
 }

@@ -19,6 +19,7 @@ mod fit;
 mod import;
 mod lumigraph;
 mod named;
+mod meant;
 mod names;
 mod observed;
 mod relative;

@@ -8,7 +8,7 @@ use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
 use proxy::Proxy;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The file that makes a folder a scene.
@@ -61,7 +61,7 @@ impl Scene {
         let bytes = std::fs::read(&path).map_err(|e| io(&path, "read the scene", e))?;
         let file = SceneFile::parse(&path, &bytes)?;
         let mut scene = Self::from_file(file, folder, &path)?;
-        let warnings = scene.leave_out_unusable(strict)?;
+        let warnings = scene.leave_out_unusable(strict, &BTreeMap::new())?;
         scene.check_beside()?;
         Ok((scene, warnings))
     }

@@ -54,7 +54,7 @@ impl Scene {
             &found,
             &mut warnings,
         )?;
-        warnings.extend(scene.leave_out_unusable(options.strict)?);
+        warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);
         scene.find_beside(capture, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);
         scene.check_beside()?;

@@ -22,6 +22,7 @@ mod masked_depth;
 mod masks;
 mod memory;
 mod nerfstudio;
+mod names;
 mod opencv;
 mod path;
 mod render;

@@ -1,0 +1,143 @@
+//! Which photos a calibration means by names that no photo has to the letter.
+
+use super::Warning;
+use calibrate::Reconstruction;
+use capture::{PhotoFile, PhotoSet, name_key, photo_size, stem_key};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What lies there for such names.
+#[derive(Debug, Default)]
+pub(super) struct Meant {
+    /// By the calibration's name: the photo that it surely means.
+    pub(super) photos: BTreeMap<String, PhotoFile>,
+    /// By the calibration's name: what is called nearly so and why it is not used, for messages.
+    pub(super) near: BTreeMap<String, String>,
+}
+
+impl Meant {
+    /// Looks for the photos of all names that none of those `found` has. Names that lead to one past other
+    /// folders, as `../images/a.jpg`, become the photo's own.
+    ///
+    /// A photo is meant where its name and the calibration's are the only ones that differ in letters'
+    /// case or in how their marks are written alone, or else in what they end in, too, and it is as large
+    /// as was calibrated.
+    pub(super) fn of(whole: &mut Reconstruction, found: &PhotoSet) -> Self {
+        name_directly(whole, found);
+        // 1. Names without a photo, and photos without a name.
+        let sizes = whole.images.values().map(|image| {
+            let camera = &whole.cameras[&image.camera_id];
+            (image.name.as_str(), (camera.width, camera.height))
+        });
+        let sizes: BTreeMap<&str, (u32, u32)> = sizes.collect();
+        let names = sizes.keys().copied();
+        let missing: Vec<&str> = names.filter(|name| found.find(name).is_none()).collect();
+        let mut meant = Self::default();
+        if missing.is_empty() {
+            return meant;
+        }
+        let is_free = |photo: &&PhotoFile| !sizes.contains_key(photo.name.as_str());
+        let free: Vec<&PhotoFile> = found.photos.iter().filter(is_free).collect();
+
+        // 2. Which of them belong together, the most alike first.
+        let mut taken: BTreeSet<&str> = BTreeSet::new();
+        let keys: [fn(&str) -> String; 3] = [name_key, stem_key, last_key];
+        for (i, key) in keys.into_iter().enumerate() {
+            let open = missing.iter().copied();
+            let open = open.filter(|name| !meant.photos.contains_key(*name));
+            let open = by_key(open, |name| key(name));
+            let files = free.iter().copied();
+            let files = files.filter(|photo| !taken.contains(photo.name.as_str()));
+            let files = by_key(files, |photo| key(&photo.name));
+            for (key, names) in open {
+                let Some(files) = files.get(&key) else {
+                    continue;
+                };
+                let why_not = match (&names[..], &files[..]) {
+                    _ if keys.len() == i + 1 => IN_ANOTHER_FOLDER.to_owned(),
+                    ([name], [file]) => match photo_size(&file.path) {
+                        Ok(size) if size == sizes[name] => {
+                            meant.photos.insert((*name).to_owned(), (*file).clone());
+                            taken.insert(&file.name);
+                            continue;
+                        }
+                        Ok((width, height)) => {
+                            let (w, h) = sizes[name];
+                            format!(
+                                "called nearly so, but has {width} × {height} pixels where {w} × {h} \
+                                 were calibrated"
+                            )
+                        }
+                        Err(_) => "called nearly so, but cannot be read".to_owned(),
+                    },
+                    _ => NOT_ALONE.to_owned(),
+                };
+                let example = files[0].name.as_str();
+                for name in names {
+                    let near = || format!("{example} is {why_not}");
+                    meant.near.entry(name.to_owned()).or_insert_with(near);
+                }
+            }
+        }
+        let Self { photos, near } = &mut meant;
+        near.retain(|name, _| !photos.contains_key(name));
+        meant
+    }
+
+    /// What to say of photos that are used under another name, if there are any.
+    pub(super) fn note(&self, total: usize) -> Option<Warning> {
+        let (name, photo) = self.photos.first_key_value()?;
+        Some(Warning::Note(format!(
+            "{} of {total} photos are used though their files' names differ from the calibration's in \
+             letters' case, in how marks are written, or in what they end in ({} for {name}, for one)",
+            self.photos.len(),
+            photo.name
+        )))
+    }
+}
+
+/// Why a photo is not used that is called nearly as one is that is missing.
+const NOT_ALONE: &str =
+    "called nearly so, but others are, too: give the one that is meant that very name";
+const IN_ANOTHER_FOLDER: &str =
+    "called so in another folder: names in a calibration begin in the folder of all photos";
+
+/// Of what a name ends in after its last `/`.
+fn last_key(name: &str) -> String {
+    name_key(name.rsplit('/').next().unwrap_or(name))
+}
+
+fn by_key<T>(
+    items: impl Iterator<Item = T>,
+    key: impl Fn(&T) -> String,
+) -> BTreeMap<String, Vec<T>> {
+    let mut all: BTreeMap<String, Vec<T>> = BTreeMap::new();
+    for item in items {
+        all.entry(key(&item)).or_default().push(item);
+    }
+    all
+}
+
+/// Gives images whose names lead to a photo past other folders that photo's own name, unless another has it.
+fn name_directly(whole: &mut Reconstruction, found: &PhotoSet) {
+    let is_detour = |name: &str| name.split('/').any(|part| matches!(part, "" | "." | ".."));
+    if !whole.images.values().any(|image| is_detour(&image.name)) {
+        return;
+    }
+    let names = whole.images.values().map(|image| image.name.clone());
+    let mut names: BTreeSet<String> = names.collect();
+    let real = |path: &Path| path.canonicalize().ok();
+    let files = found.photos.iter();
+    let files = files.filter_map(|photo| Some((real(&photo.path)?, photo.name.as_str())));
+    let files: BTreeMap<PathBuf, &str> = files.collect();
+    for image in whole.images.values_mut() {
+        if !is_detour(&image.name) {
+            continue;
+        }
+        let file = real(&found.root.join(&image.name));
+        let own = file.and_then(|file| files.get(&file).copied());
+        if let Some(own) = own.filter(|own| names.insert((*own).to_owned())) {
+            image.name = own.to_owned();
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Photos that a calibration calls otherwise than their files, or that lie where it does not say.
+
+use crate::run::{lumigraph, with_wall};
+use calibrate::colmap;
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+fn at(folder: &TempDir, path: &str) -> PathBuf {
+    folder.path().join(path)
+}
+
+/// The wall, whose model calls photos otherwise.
+fn called(name: impl Fn(&str) -> String) -> TempDir {
+    let folder = with_wall();
+    let model = at(&folder, "wall/sparse/0");
+    let mut whole = colmap::read_model(&model).unwrap();
+    for image in whole.images.values_mut() {
+        image.name = name(&image.name);
+    }
+    fs::remove_dir_all(&model).unwrap();
+    colmap::write_text(&whole, &model).unwrap();
+    folder
+}
+
+/// Of its photos, the number `i`.
+fn photo(folder: &TempDir, i: usize) -> PathBuf {
+    at(folder, &format!("wall/images/000{i}.png"))
+}
+
+#[test]
+fn each_camera_of_a_rig_may_have_a_folder() {
+    let camera = |name: &str| format!("cam{}", name.as_bytes()[3] % 2);
+    let folder = called(|name| format!("{}/{name}", camera(name)));
+    for i in 0..9 {
+        let name = format!("000{i}.png");
+        let place = at(&folder, "wall").join(camera(&name));
+        fs::create_dir_all(&place).unwrap();
+        fs::rename(photo(&folder, i), place.join(name)).unwrap();
+    }
+    fs::remove_dir(at(&folder, "wall/images")).unwrap();
+    // What lies beside photos is none.
+    let mattes = at(&folder, "wall/mattes/cam0");
+    fs::create_dir_all(&mattes).unwrap();
+    image::GrayImage::new(96, 72)
+        .save(mattes.join("0000.png"))
+        .unwrap();
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(ran.stdout.contains("9 photos"), "{}", ran.stdout);
+    assert!(
+        !ran.stderr.contains("not in the calibration"),
+        "{}",
+        ran.stderr
+    );
+    let line = "render wall --proxy plane --path sweep --frames 2 --size 32x24 -o frames";
+    lumigraph(folder.path(), line).ok();
+
+    fs::remove_dir_all(at(&folder, "wall/cam0")).unwrap();
+    fs::remove_dir_all(at(&folder, "wall/cam1")).unwrap();
+    let error = lumigraph(folder.path(), "info wall").error(1);
+    assert!(
+        error.contains("or other folders within; give the"),
+        "{error}"
+    );
+}
+
+#[test]
+fn names_may_differ_in_case_in_marks_and_in_what_they_end_in() {
+    let folder = called(|name| name.replace("0004", "S\u{FC}d-4"));
+    let images = |name: &str| at(&folder, "wall/images").join(name);
+    let shrunk = |i: usize, to: &str, size: (u32, u32)| {
+        let picture = image::open(photo(&folder, i)).unwrap();
+        let filter = image::imageops::FilterType::Nearest;
+        let picture = picture.resize_exact(size.0, size.1, filter).into_rgb8();
+        picture.save(images(to)).unwrap();
+        fs::remove_file(photo(&folder, i)).unwrap();
+    };
+    // Those that are used.
+    fs::rename(photo(&folder, 3), images("0003.PNG")).unwrap();
+    fs::rename(photo(&folder, 4), images("Su\u{308}d-4.png")).unwrap();
+    shrunk(5, "0005.jpg", (96, 72));
+    // One of which two may be meant, one of another size, one elsewhere.
+    fs::copy(photo(&folder, 6), images("0006.JPEG")).unwrap();
+    fs::rename(photo(&folder, 6), images("0006.jpg")).unwrap();
+    shrunk(7, "0007.jpg", (95, 72));
+    fs::create_dir(images("late")).unwrap();
+    fs::rename(photo(&folder, 8), images("late/0008.png")).unwrap();
+
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    for said in [
+        "note: 3 of 9 photos are used though their files' names differ from the calibration's in \
+         letters' case, in how marks are written, or in what they end in (0003.PNG for 0003.png, \
+         for one)\n",
+        "note: 4 of 10 photos are not in the calibration and stay unused (0006.JPEG, for one)\n",
+        "0006.JPEG is called nearly so, but others are, too: give the one that is meant that very",
+        "0007.jpg is called nearly so, but has 95 × 72 pixels where 96 × 72 were calibrated",
+        "late/0008.png is called so in another folder: ",
+    ] {
+        assert!(ran.stderr.contains(said), "{said}: {}", ran.stderr);
+    }
+    let scene = fs::read(at(&folder, "scene/scene.json")).unwrap();
+    let scene: Value = serde_json::from_slice(&scene).unwrap();
+    let photos = scene["photos"].as_array().unwrap().iter();
+    let files: Vec<&str> = photos.map(|p| p["path"].as_str().unwrap()).collect();
+    let used = [
+        "0000.png",
+        "0001.png",
+        "0002.png",
+        "0003.PNG",
+        "0005.jpg",
+        "Su\u{308}d-4.png",
+    ];
+    assert_eq!(files, used.map(|name| format!("../wall/images/{name}")));
+    let error = lumigraph(folder.path(), "info wall --strict").error(1);
+    assert!(
+        error.contains("photo 0006.png: ") && error.contains("0006.JPEG is called nearly so"),
+        "{error}"
+    );
+}
+
+#[test]
+fn names_may_lead_past_other_folders() {
+    let folder = called(|name| format!("../images/{name}"));
+    let ran = lumigraph(folder.path(), "evaluate wall --proxy plane --json").ok();
+    assert!(
+        !ran.stderr.contains("not in the calibration"),
+        "{}",
+        ran.stderr
+    );
+    // As the split calls them.
+    assert_eq!(ran.json()["photos"][0]["name"], "0000.png");
+}
+
+#[test]
+fn a_scene_that_was_moved_says_so() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    fs::create_dir(at(&folder, "deep")).unwrap();
+    fs::rename(at(&folder, "scene"), at(&folder, "deep/scene")).unwrap();
+    let error = lumigraph(folder.path(), "info deep/scene").error(1);
+    assert!(error.starts_with("9 of 9 calibrated photos"), "{error}");
+    assert!(
+        error.ends_with("move them or the scene back, or import them again"),
+        "{error}"
+    );
+}
