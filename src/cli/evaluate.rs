@@ -5,11 +5,12 @@ use super::inputs::files_behind_scene;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
 use super::output::say;
 use super::output::{print, print_json};
-use super::report::{Report, Start};
+use super::report::Report;
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
 use super::targets::{check_folder, check_inputs};
 use super::time::TimeArgs;
+use super::took::Start;
 use anyhow::bail;
 use clap::builder::RangedU64ValueParser;
 use lumigraph::scene::{Scene, TruthScore, picture_files};
@@ -94,13 +95,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     let size = args.draw.size;
     let lines = score_photos(&mut session, &held_out, size, output, &kept)?;
-    let result = json(&session, &lines);
+    let report = Report::new(&session, &start);
     if args.json {
-        return print_json(&result);
+        return print_json(&json(&session, &lines, &report));
     }
     say!("proxy: {}", session.proxy.text());
     say!("exposure: {}", session.exposure.text());
-    say!("{}", Report::new(&session, &start).text());
+    say!("{}", report.text());
     print(&table(&lines))
 }
 
@@ -180,7 +181,7 @@ fn mean_line(lines: &[Line]) -> Option<Line> {
     })
 }
 
-fn json(session: &Session, lines: &[Line]) -> Value {
+fn json(session: &Session, lines: &[Line], report: &Report) -> Value {
     let mut mean = json!(mean_line(lines));
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
@@ -190,6 +191,7 @@ fn json(session: &Session, lines: &[Line]) -> Value {
         "mean": mean,
         "proxy": session.proxy.json(),
         "exposure": session.exposure.json(),
+        "report": report,
     });
     if let Some(time) = session.time_json() {
         result["time"] = time;

@@ -35,6 +35,7 @@ mod stamp;
 mod surface;
 mod targets;
 mod time;
+mod took;
 mod uncalibrated;
 #[cfg(feature = "window")]
 mod view;

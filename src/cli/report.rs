@@ -2,30 +2,16 @@
 
 use super::session::Session;
 use super::time::InWindow;
+pub(super) use super::took::megabytes;
+use super::took::{Memory, Start, Took};
 use calibrate::Distortion;
-use cpu_time::ProcessTime;
 use image::RgbaImage;
 use render::gpu::Gpu;
-use render::{Bounded, Engine, Frame, Ready, Residency, SourceView, photo_bytes};
-use serde::{Serialize, Serializer};
+use render::{Bounded, Engine, Frame, Ready, SourceView, photo_bytes};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
-
-/// When a command began.
-pub(super) struct Start {
-    wall: Instant,
-    cpu: ProcessTime,
-}
-
-impl Start {
-    pub(super) fn now() -> Self {
-        Self {
-            wall: Instant::now(),
-            cpu: ProcessTime::now(),
-        }
-    }
-}
+use std::time::Duration;
 
 /// The run report, printed at the end and part of `--json`.
 #[derive(Serialize)]
@@ -38,7 +24,8 @@ pub(super) struct Report {
     /// Where a graphics processor draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     gpu_memory: Option<Memory>,
-    /// What the graphics device did not do, and what became of it; and what is odd about the frames.
+    /// What draws in place of what was asked for, what the graphics device did not do, and what became of it; and
+    /// what is odd about the frames.
     notes: Vec<String>,
     /// Those that show nothing at all.
     frames_empty: usize,
@@ -62,10 +49,8 @@ pub(super) struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     max_error: Option<MaxError>,
     skipped: Skipped,
-    seconds: f64,
-    cpu_seconds: f64,
-    /// `None` where the system does not say.
-    peak_memory_bytes: Option<u64>,
+    #[serde(flatten)]
+    took: Took,
     /// Where time plays a part.
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<Value>,
@@ -80,11 +65,10 @@ impl Report {
         let costs = &session.costs;
         let stages = session.ledger.total();
         let drawn = !costs.frames.is_empty();
-        let notes = engine.map(Engine::notes).unwrap_or_default().iter();
         Self {
-            notes: notes.cloned().chain(session.note_of_empty()).collect(),
-            frames_empty: costs.empty(),
-            frames_by_cpu: costs.frames.iter().filter(|frame| frame.by_cpu).count(),
+            notes: session.notes(),
+            frames_empty: costs.empty() + costs.alone_empty,
+            frames_by_cpu: costs.by_cpu() + costs.alone_by_cpu,
             frames_instead: engine.map_or(0, Engine::frames_by_cpu),
             stages: drawn.then(|| stages.json()),
             stages_text: stages.text(),
@@ -99,9 +83,7 @@ impl Report {
             photos_bytes: photos.bytes(),
             cpu_memory: Memory(photos.residency()),
             gpu_memory: session.gpu_residency().map(Memory),
-            seconds: start.wall.elapsed().as_secs_f64(),
-            cpu_seconds: start.cpu.elapsed().as_secs_f64(),
-            peak_memory_bytes: peak_memory_bytes(),
+            took: start.took(),
             time: session.time_json(),
             in_window: session.in_window,
         }
@@ -109,21 +91,15 @@ impl Report {
 
     /// A few lines for people.
     pub(super) fn text(&self) -> String {
-        let peak = self.peak_memory_bytes.map_or_else(String::new, |bytes| {
-            format!(", peak memory {}", megabytes(bytes))
-        });
         let mut memory = self.cpu_memory.text();
         if let Some(gpu) = self.gpu_memory {
             memory += &format!("; on the device {}", gpu.text());
         }
         let mut text = format!(
-            "{} of {} photos decoded ({}), {:.1} s ({:.1} CPU s) on {}{peak}{}",
+            "{} of {} photos decoded ({memory}), {}{}",
             self.photos_decoded,
             self.photos_total,
-            memory,
-            self.seconds,
-            self.cpu_seconds,
-            self.device,
+            self.took.text(&self.device),
             self.in_window.text(),
         );
         if self.stages.is_some() {
@@ -153,6 +129,9 @@ impl Report {
 #[derive(Default)]
 pub(super) struct Costs {
     frames: Vec<FrameCost>,
+    /// Of views that were drawn each by itself: how many the CPU drew, and how many show nothing.
+    alone_by_cpu: usize,
+    alone_empty: usize,
     /// By source view, whether any frame scored it; begun anew where photos were left out.
     ever_scored: Vec<bool>,
 }
@@ -219,9 +198,20 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
-            // Of most pictures the first pixels tell.
-            is_empty: picture.pixels().all(|pixel| pixel.0[3] == 0),
+            is_empty: is_empty(picture),
         });
+    }
+
+    /// Notes a view that was drawn by itself, however often.
+    pub(super) fn note_alone(&mut self, engine: &Engine, picture: &RgbaImage) {
+        let by_cpu = engine.gpu().is_none() || engine.last_by_cpu();
+        self.alone_by_cpu += usize::from(by_cpu);
+        self.alone_empty += usize::from(is_empty(picture));
+    }
+
+    /// How many frames the CPU drew.
+    fn by_cpu(&self) -> usize {
+        self.frames.iter().filter(|frame| frame.by_cpu).count()
     }
 
     /// How many frames show nothing at all.
@@ -257,6 +247,12 @@ impl Costs {
             "scorings_omitted": cost.scorings_omitted,
         })
     }
+}
+
+/// Whether no pixel is covered, not even in part.
+fn is_empty(picture: &RgbaImage) -> bool {
+    // Of most pictures the first pixels tell.
+    picture.pixels().all(|pixel| pixel.0[3] == 0)
 }
 
 /// How long the graphics device drew.
@@ -451,55 +447,4 @@ impl Skipped {
         }
         text
     }
-}
-
-/// What photos took of a memory.
-#[derive(Clone, Copy)]
-struct Memory(Residency);
-
-impl Memory {
-    /// `12 MB at most`, and what the budget had to do with it.
-    fn text(self) -> String {
-        let took = self.0;
-        let mut text = format!("{} at most", megabytes(took.peak));
-        if let Some(budget) = took.budget {
-            text += &format!(" of {}", megabytes(budget));
-        }
-        if took.evictions > 0 {
-            text += &format!(", {} let go", took.evictions);
-        }
-        if took.level_cap > 0 {
-            let (frames, level) = (took.capped_frames, took.level_cap);
-            text += &format!(", too little for {frames} drawings: mip levels from {level} on");
-        }
-        text
-    }
-}
-
-impl Serialize for Memory {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let took = self.0;
-        json!({
-            "budget_bytes": took.budget,
-            "held_bytes": took.held,
-            "peak_bytes": took.peak,
-            "loads": took.loads,
-            "evictions": took.evictions,
-            "level_cap": took.level_cap,
-            "capped_drawings": took.capped_frames,
-        })
-        .serialize(serializer)
-    }
-}
-
-pub(super) fn megabytes(bytes: u64) -> String {
-    format!("{:.0} MB", bytes as f64 / 1e6)
-}
-
-/// The most memory that the process ever held, as Linux counts it.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
 }

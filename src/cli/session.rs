@@ -41,6 +41,8 @@ pub(super) struct Session {
     /// Of the frames that were drawn one after the other.
     pub(super) ledger: Ledger,
     pub(super) costs: Costs,
+    /// What was said of what draws, before anything was drawn.
+    notes: Vec<String>,
     /// How much of what the engine has to say was said.
     notes_said: usize,
     /// Held-out photos, and those found corrupt.
@@ -97,6 +99,7 @@ impl Session {
             in_window: InWindow::default(),
             ledger: Ledger::new(),
             costs: Costs::default(),
+            notes: Vec::new(),
             notes_said: 0,
             proxy,
             exposure,
@@ -170,11 +173,14 @@ impl Session {
             gpu.set_budget(self.gpu_memory);
         }
         if self.device == DeviceChoice::Auto && engine.gpu().is_none() {
-            say!("note: no graphics processor answers; drawing on the CPU");
+            let note = "no graphics processor answers; drawing on the CPU";
+            self.notes.push(note.to_owned());
         }
         if self.gpu_memory.is_some() && engine.gpu().is_none() {
-            say!("note: --gpu-memory changes nothing: no graphics processor draws");
+            let note = "--gpu-memory changes nothing: no graphics processor draws";
+            self.notes.push(note.to_owned());
         }
+        self.notes.iter().for_each(|note| say!("note: {note}"));
         self.engine = Some(engine);
         let mut source_idx = 0;
         while self.decodes_all && source_idx < self.lumigraph.photos.len() {
@@ -256,6 +262,13 @@ impl Session {
             say!("note: {note}");
         }
         Ok(())
+    }
+
+    /// All that was said of what draws and of the frames of [`Self::draw_all`].
+    pub(super) fn notes(&self) -> Vec<String> {
+        let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();
+        let own = self.notes.iter().chain(engine).cloned();
+        own.chain(self.note_of_empty()).collect()
     }
 
     /// What to say of frames of [`Self::draw_all`] that show nothing, if there are any.
@@ -375,6 +388,9 @@ impl Session {
             picture = self.draw(desired, moment)?;
         }
         let cpu = start.elapsed();
+        if let Some(engine) = &self.engine {
+            self.costs.note_alone(engine, &picture);
+        }
         Ok(Timed { picture, cpu })
     }
 

@@ -15,6 +15,7 @@ use super::plot::{Line, plot};
 use super::references::ReferenceArgs;
 use super::session::progress;
 use super::targets::check_folder;
+use super::took::Start;
 use anyhow::{Context, bail};
 use calibrate::View;
 use clap::ValueEnum;
@@ -22,7 +23,7 @@ use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
 use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
-use report::{Drawn, Scored, Walked, ms};
+use report::{Drawn, Report, Scored, Walked, ms};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -119,6 +120,7 @@ enum NoSkip {
 const FPS: f64 = 15.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let start = Start::now();
     // 1. What to do.
     let fills = fills(&args.portals)?;
     args.references.check()?;
@@ -183,8 +185,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         say!("exposure: {}", photos.exposure.text());
     }
     let painter = opened.painter(references.device(), references.cpu_memory)?;
+    let mut notes = Vec::new();
     let ldis = match fills.contains(&PortalFill::Ldi) && !args.no_ldi_files {
-        true => ldi_files(&opened, &options, &painter)?,
+        true => ldi_files(&opened, &options, &painter, &mut notes)?,
         false => None,
     };
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
@@ -200,22 +203,29 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
         for note in walk.painter().notes() {
             say!("note: {note}");
+            notes.push(note.to_owned());
         }
-        report(args, &opened, &walk, &walks, &way.frames)
+        let whole = Report::new(&walk, notes, &start);
+        report(args, &opened, &walk, &walks, &way.frames, &whole)
     })
 }
 
-/// The folder of LDIs that `lumigraph ldis` made as this walk would, if it did.
+/// The folder of LDIs that `lumigraph ldis` made as this walk would, if it did. What is said of others is
+/// noted.
 fn ldi_files(
     opened: &Opened,
     options: &WalkOptions,
     painter: &Painter,
+    notes: &mut Vec<String>,
 ) -> anyhow::Result<Option<PathBuf>> {
     let made = || {
         let (files, photos) = (opened.files(), opened.photos.as_ref());
         Made::new(&opened.file, &files, &options.library, painter, photos)
     };
-    made::usable(&opened.file, made, |text| say!("note: {text}"))
+    made::usable(&opened.file, made, |text| {
+        say!("note: {text}");
+        notes.push(text);
+    })
 }
 
 /// Draws all frames, by each kind of portals.
@@ -258,6 +268,7 @@ fn report(
     walk: &Walk<'_>,
     walks: &[Walked],
     frames: &[Named],
+    whole: &Report,
 ) -> anyhow::Result<()> {
     let (interior, model) = (&opened.interior, &opened.model);
     let device = walk.painter().description();
@@ -293,8 +304,10 @@ fn report(
             "photos_decoded": decoded.map(|d| d.loads),
             "video": args.film.video(),
             "walks": walks,
+            "report": whole,
         }));
     }
+    say!("{}", whole.text());
     let mut text = format!(
         "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7} {:>5}",
         "portals",

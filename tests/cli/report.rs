@@ -189,3 +189,31 @@ fn a_bound_on_the_error_chooses_frame_by_frame() {
         );
     }
 }
+
+#[test]
+fn whatever_draws_ends_with_a_report_and_all_notes_on_what_draws() {
+    let folder = with_wall();
+    for line in [
+        "render wall --path sweep --frames 2 -o out",
+        "evaluate wall --every 5",
+    ] {
+        let line = format!("{line} --proxy plane --size 48x36 --json --device auto");
+        let ran = lumigraph(folder.path(), &format!("{line} --gpu-memory 1GB")).ok();
+        let report = &ran.json()["report"];
+        assert!(report["seconds"].as_f64() > Some(0.0), "{line}: {report}");
+        assert!(report["photos_decoded"].as_u64() > Some(0), "{line}");
+        assert_eq!(report["frames_empty"], 0, "{line}");
+        let notes = report["notes"].as_array().unwrap().iter();
+        let notes: Vec<&str> = notes.map(|note| note.as_str().unwrap()).collect();
+        for said in [
+            "no graphics processor answers; drawing on the CPU",
+            "--gpu-memory changes nothing: no graphics processor draws",
+        ] {
+            let is_said = ran.stderr.contains(&format!("note: {said}\n"));
+            assert_eq!(notes.contains(&said), is_said, "{line}: {}", ran.stderr);
+            // Without a device both are, and with one neither.
+            let by_cpu = report["frames_by_cpu"].as_u64() > Some(0);
+            assert_eq!(by_cpu, is_said, "{line}: {report}");
+        }
+    }
+}

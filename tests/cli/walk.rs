@@ -128,6 +128,25 @@ fn a_house_is_walked_through() {
 }
 
 #[test]
+fn a_walk_ends_with_a_report() {
+    let folder = with_house();
+    let line = "walk house --frames 2 --size 16x12 --reference-size 8x8 --portals texture -o out";
+    let ran = lumigraph(folder.path(), &format!("{line} --json")).ok();
+    let report = &ran.json()["report"];
+    assert_eq!(report["device"], "CPU");
+    assert_eq!(report["notes"], Value::Array(Vec::new()));
+    assert!(report["seconds"].as_f64() > Some(0.0), "{report}");
+    assert!(report["references_memory"]["loads"].is_u64(), "{report}");
+    // No photos colour a model.
+    assert!(report.get("photos_total").is_none(), "{report}");
+    let said = lumigraph(folder.path(), line).ok().stderr;
+    assert!(
+        said.contains(" at most, ") && said.contains(" CPU s) on CPU"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_walk_becomes_a_film() {
     let folder = with_house();
     let here = folder.path();

@@ -1,9 +1,10 @@
-//! What a walk says of itself: a line for people, and JSON.
+//! What a walk says of itself: lines for people, and JSON.
 
 use super::super::stamp::in_unicode;
+use super::super::took::{Memory, Start, Took};
 use lumigraph::scene::TruthScore;
 use proxy::interior::Interior;
-use render::interior::{FrameCost, PortalFill};
+use render::interior::{FrameCost, PortalFill, Walk};
 use render::score::mean_of;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -84,6 +85,57 @@ struct ScoreReport {
     #[serde(flatten)]
     score: TruthScore,
     cpu_ms: f64,
+}
+
+/// What the whole run took, under the names that other commands' reports have for it.
+#[derive(Serialize)]
+pub(super) struct Report {
+    device: String,
+    /// Where photos colour what is drawn.
+    #[serde(flatten)]
+    photos: Option<PhotosReport>,
+    /// Of images that were made to fill portals.
+    references_memory: Memory,
+    notes: Vec<String>,
+    #[serde(flatten)]
+    took: Took,
+}
+
+#[derive(Serialize)]
+struct PhotosReport {
+    photos_decoded: usize,
+    photos_total: usize,
+    cpu_memory: Memory,
+}
+
+impl Report {
+    /// Of a walk that is over; `notes` is all that was said of it.
+    pub(super) fn new(walk: &Walk<'_>, notes: Vec<String>, start: &Start) -> Self {
+        let captured = walk.painter().captured();
+        let photos = captured.map(|captured| &captured.lumigraph().photos);
+        Self {
+            device: walk.painter().description(),
+            photos: photos.map(|photos| PhotosReport {
+                photos_decoded: photos.decoded(),
+                photos_total: photos.len(),
+                cpu_memory: Memory(photos.residency()),
+            }),
+            references_memory: Memory(walk.library().residency()),
+            notes,
+            took: start.took(),
+        }
+    }
+
+    /// A line for people.
+    pub(super) fn text(&self) -> String {
+        let photos = self.photos.as_ref().map_or_else(String::new, |photos| {
+            let (decoded, total) = (photos.photos_decoded, photos.photos_total);
+            let memory = photos.cpu_memory.text();
+            format!("{decoded} of {total} photos decoded ({memory}), ")
+        });
+        let (images, took) = (self.references_memory.text(), self.took.text(&self.device));
+        format!("{photos}images in portals {images}, {took}")
+    }
 }
 
 pub(super) fn ms(time: std::time::Duration) -> f64 {
