@@ -12,7 +12,6 @@ use super::targets::{check_folder, check_inputs};
 use super::time::TimeArgs;
 use super::took::Start;
 use anyhow::bail;
-use clap::builder::RangedU64ValueParser;
 use lumigraph::scene::{Scene, TruthScore, picture_files};
 use render::score::{PSNR_CAP_DB, mean_of};
 use serde::Serialize;
@@ -43,8 +42,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "SPLIT.json")]
     hold_out: Option<PathBuf>,
     /// Hold out every N-th photo by name
-    #[arg(long, value_name = "N", conflicts_with = "hold_out",
-        value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
+    #[arg(long, value_name = "N", conflicts_with = "hold_out", value_parser = every)]
     every: Option<usize>,
     #[command(flatten)]
     proxy: ProxyArgs,
@@ -103,6 +101,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     say!("exposure: {}", session.exposure.text());
     say!("{}", report.text());
     print(&table(&lines))
+}
+
+/// Of how many photos one is held out: not of each.
+fn every(text: &str) -> Result<usize, String> {
+    let count = text.parse::<usize>().ok().filter(|&count| count > 1);
+    count.ok_or_else(|| "expected a whole number above one, as in 8".to_owned())
 }
 
 fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {

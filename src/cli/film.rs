@@ -213,11 +213,21 @@ impl Plan {
 }
 
 impl FilmArgs {
-    /// Fails early where a film cannot be made: by making a short one.
-    pub(super) fn check(&self) -> anyhow::Result<()> {
+    /// Fails early where a film cannot be made of the frames in a folder: by making a short one.
+    pub(super) fn check(&self, frames: &Path) -> anyhow::Result<()> {
         let Some(video) = &self.video else {
             return Ok(());
         };
+        let named = format!("--video {}", video.display());
+        let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if video.is_dir() || whole(frames).starts_with(whole(video)) {
+            let text = format!(
+                "{named}: a folder has that name, or would have it for the frames (-o {}); give the film \
+                 another",
+                frames.display()
+            );
+            return Err(Usage(text).into());
+        }
         capture::video::ffmpeg().text(&["-version"])?;
         let folder = tempfile::tempdir()?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());
@@ -225,7 +235,6 @@ impl FilmArgs {
         // Of one frame alone ffmpeg makes a picture, too (.png).
         let frames = [(); 2].map(|()| Ok(vec![0; 3 * 16 * 16])).into_iter();
         let made = capture::video::encode(&trial, size, fps, frames);
-        let named = format!("--video {}", video.display());
         match made {
             Err(_) if !is_film(video) => Err(Usage(format!(
                 "{named}: ffmpeg makes no film of that name; films end in {}, …",

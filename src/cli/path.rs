@@ -1,9 +1,11 @@
 //! `lumigraph path`
 
-use super::output::{make_parent, print};
+use super::output::{make_parent, print, say};
 use super::targets::check_apart;
 use clap::ValueEnum;
-use render::path::{self, NerfstudioFrame, read_in, read_keyframes, write_nerfstudio};
+use render::path::{
+    self, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
+};
 use std::path::PathBuf;
 
 /// Turn a camera path into nerfstudio's format, or into this program's
@@ -60,6 +62,14 @@ impl NerfstudioArgs {
             .transpose()?
             .unwrap_or_default())
     }
+
+    /// Says so where the file changes nothing, as what was read, if anything, is no path of nerfstudio's.
+    pub(super) fn say_unused(&self, read: Option<&PathBuf>) {
+        let is_used = || read.is_some_and(|path| is_nerfstudio(path));
+        if self.dataparser_transforms.is_some() && !is_used() {
+            say!("note: --dataparser-transforms changes nothing: there is no path of nerfstudio's");
+        }
+    }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
@@ -74,7 +84,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let keyframes = read_keyframes(&args.path, &frame)?;
             write_nerfstudio(&args.output, &read, keyframes.as_ref(), &frame)?;
         }
-        Format::Lumigraph => path::write(&args.output, &read)?,
+        Format::Lumigraph => {
+            args.nerfstudio.say_unused(Some(&args.path));
+            path::write(&args.output, &read)?;
+        }
     }
     print(&format!(
         "{}: {} frames, {} a second\n",

@@ -76,8 +76,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Of a path that is not there nobody can say how many frames it has.
     let asked = Asked::new(&args.views, &args.nerfstudio.frame()?)?;
     chosen.check(asked.is_derived())?;
+    let file = args.views.path.as_ref().map(PathBuf::from);
+    let file = file.filter(|_| !asked.is_derived());
+    args.nerfstudio
+        .say_unused(args.views.views.as_ref().or(file.as_ref()));
     check_folder(&args.output)?;
-    args.film.check()?;
+    args.film.check(&args.output)?;
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,

@@ -153,7 +153,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         ..defaults
     };
     check_folder(&args.output)?;
-    args.film.check()?;
+    args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");
     let references = &args.references;
@@ -177,6 +177,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let named = args.path.iter().chain(args.nerfstudio.file()).cloned();
     inputs.extend(files_behind(named, &scenes));
+    args.nerfstudio.say_unused(args.path.as_ref());
     // 3. The walks: one walker, so that images are made once for all kinds.
     if references.no_photos {
         opened.photos = None;

@@ -28,6 +28,14 @@ fn usage_errors_exit_with_2() {
         ("evaluate wall --beta -1", "zero or more"),
         ("evaluate wall --proxy sphere", "plane, dominant-plane"),
         ("evaluate wall --every 1", "--every"),
+        (
+            "evaluate wall --every 1",
+            "a whole number above one, as in 8",
+        ),
+        (
+            "evaluate wall --every -3",
+            "a whole number above one, as in 8",
+        ),
         ("proxy wall plane", "-o"),
         ("proxy wall plane --point 1,2,3", "--normal"),
         (

@@ -108,3 +108,52 @@ fn a_path_is_not_written_over_what_it_is_made_of() {
         assert!(files(here) == before, "{line}");
     }
 }
+
+#[test]
+fn transforms_that_no_path_needs_are_told() {
+    let folder = with_wall();
+    let here = folder.path();
+    std::fs::write(here.join("own.json"), keyframes().to_string()).unwrap();
+    let transform = json!({"transform": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], "scale": 1});
+    std::fs::write(here.join("dp.json"), transform.to_string()).unwrap();
+    let there = "--dataparser-transforms dp.json";
+    lumigraph(here, "path own.json --format nerfstudio -o theirs.json").ok();
+    let render = "render wall --proxy plane --size 32x24 -o out";
+    for (line, is_idle) in [
+        (
+            "path own.json --format lumigraph -o a.json".to_owned(),
+            true,
+        ),
+        (
+            "path own.json --format nerfstudio -o b.json".to_owned(),
+            false,
+        ),
+        (
+            "path theirs.json --format lumigraph -o c.json".to_owned(),
+            false,
+        ),
+        (format!("{render} --path sweep --frames 2"), true),
+        (format!("{render} --path own.json"), true),
+        (format!("{render} --views wall/sparse/0"), true),
+        (format!("{render} --path theirs.json"), false),
+    ] {
+        let said = lumigraph(here, &format!("{line} {there}")).ok().stderr;
+        let note =
+            "note: --dataparser-transforms changes nothing: there is no path of nerfstudio's\n";
+        assert_eq!(said.contains(note), is_idle, "{line}: {said}");
+    }
+}
+
+#[test]
+fn what_is_no_path_is_told_what_one_is() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("cameras.txt"),
+        "1 PINHOLE 96 72 60 60 48 36\n",
+    )
+    .unwrap();
+    let line = "path cameras.txt --format nerfstudio -o x.json";
+    let error = lumigraph(folder.path(), line).error(1);
+    let expected = "expected an object with version, fps, and frames or keyframes";
+    assert!(error.contains(expected), "{error}");
+}

@@ -447,3 +447,20 @@ fn frames_of_an_earlier_run_are_told_of() {
     let expected = "note: frame_0002.png in out is not of this run";
     assert!(said.contains(expected), "{said}");
 }
+
+#[test]
+fn a_film_is_no_folder() {
+    let folder = with_wall();
+    let before = files(folder.path());
+    for (video, output) in [
+        ("x.mp4", "x.mp4"),
+        ("./x.mp4", "x.mp4/frames"),
+        ("wall", "out"),
+    ] {
+        let line = format!("render wall --path orbit --video {video} -o {output}");
+        let error = lumigraph(folder.path(), &line).error(2);
+        let said = format!("--video {video}: a folder has that name, or would have it");
+        assert!(error.starts_with(&said), "{line}: {error}");
+        assert!(files(folder.path()) == before, "{line}");
+    }
+}

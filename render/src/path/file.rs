@@ -94,6 +94,11 @@ pub fn read_in(path: &Path, frame: &NerfstudioFrame) -> Result<CameraPath, PathF
     parse_in(path, &bytes_of(path)?, frame)
 }
 
+/// Whether a file is a path of nerfstudio's, by its content; what cannot be read is none.
+pub fn is_nerfstudio(path: &Path) -> bool {
+    bytes_of(path).is_ok_and(|bytes| nerfstudio::is_nerfstudio(&bytes))
+}
+
 fn bytes_of(path: &Path) -> Result<Vec<u8>, PathFileError> {
     std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))
 }
@@ -125,6 +130,7 @@ fn parse_own(
     let json = |e| PathFileError::Json(path.to_owned(), e);
     // The version first: a later one may have other keys.
     #[derive(Deserialize)]
+    #[serde(expecting = "an object with version, fps, and frames or keyframes")]
     struct Version {
         version: u64,
     }
