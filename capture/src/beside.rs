@@ -3,12 +3,13 @@
 use crate::decode::{format_of, read_failed};
 use crate::{CaptureError, PhotoSet, decode};
 use image::{
-    ColorType, DynamicImage, GrayImage, ImageBuffer, ImageDecoder, ImageReader, Luma, RgbaImage,
+    ColorType, DynamicImage, GrayImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Luma,
+    Rgb, RgbaImage,
 };
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// What a picture beside a photo says about it.
@@ -37,7 +38,7 @@ impl fmt::Display for Beside {
 pub struct Matched {
     /// By the photo's name.
     pub by_photo: BTreeMap<String, PathBuf>,
-    /// PNG files that belong to no photo, by their name in the folder.
+    /// Files of the kind asked for that belong to no photo, by their name in the folder.
     pub unmatched: Vec<String>,
 }
 
@@ -48,9 +49,27 @@ pub struct Matched {
 /// # Errors
 /// A folder that cannot be listed or holds no pictures; a file that two photos could claim.
 pub fn match_by_name(folder: &Path, photos: &[&str]) -> Result<Matched, CaptureError> {
+    match_kind(folder, photos, |kind| kind == "png")
+}
+
+/// The same of JPEG files: masks and mattes may be such, but photos lie in folders as well (see
+/// [`is_black_and_white`]).
+///
+/// # Errors
+/// As for [`match_by_name`].
+pub fn match_jpegs_by_name(folder: &Path, photos: &[&str]) -> Result<Matched, CaptureError> {
+    match_kind(folder, photos, |kind| kind != "png")
+}
+
+fn match_kind(
+    folder: &Path,
+    photos: &[&str],
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<Matched, CaptureError> {
     let mut files: BTreeMap<String, (String, PathBuf)> = BTreeMap::new();
     for file in PhotoSet::open(folder)?.photos {
-        if let (name, Some("png")) = split_extension(&file.name) {
+        let (name, kind) = split_extension(&file.name);
+        if kind.is_some_and(&is_wanted) {
             let called = with_lower_extension(name);
             files.entry(called).or_insert((file.name, file.path));
         }
@@ -134,8 +153,50 @@ pub fn check_beside(
     Ok(())
 }
 
+/// From black and from white, what compression makes of them in JPEG files, at the most.
+const JPEG_NOISE: u8 = 32;
+const WHITE: u8 = 255 - JPEG_NOISE;
+
+/// Whether a picture is black and white, as masks are, but for what compression makes of that: 95 % of it,
+/// and at least 1 % white.
+///
+/// # Errors
+/// As for [`crate::decode()`].
+pub fn is_black_and_white(path: &Path) -> Result<bool, CaptureError> {
+    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let picture = decode::decode_any(path, &bytes, |_| Ok(()))?.into_rgb8();
+    let count = |is_it: fn(u8) -> bool| {
+        let is_it = |pixel: &&Rgb<u8>| pixel.0.iter().all(|value| is_it(*value));
+        picture.pixels().filter(is_it).count()
+    };
+    let black = count(|value| value <= JPEG_NOISE);
+    let white = count(|value| value >= WHITE);
+    let all = picture.pixels().len();
+    Ok(20 * (black + white) >= 19 * all && 100 * white >= all)
+}
+
+/// Whether a mask or a matte says nothing but in its alpha channel, which is not read: its colour is one all
+/// over, and its alpha is not.
+///
+/// # Errors
+/// As for [`crate::decode()`].
+pub fn is_in_alpha(path: &Path) -> Result<bool, CaptureError> {
+    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let reader = ImageReader::with_format(Cursor::new(&bytes), format_of(path, &bytes)?);
+    let has_alpha = reader.into_decoder().map(|d| d.color_type().has_alpha());
+    // What is wrong with the file decoding says.
+    if has_alpha.is_ok_and(|has_alpha| !has_alpha) {
+        return Ok(false);
+    }
+    let picture = decode::decode_any(path, &bytes, |_| Ok(()))?.into_rgba8();
+    let first = picture.get_pixel(0, 0).0;
+    let is_one_color = picture.pixels().all(|pixel| pixel.0[..3] == first[..3]);
+    Ok(is_one_color && picture.pixels().any(|pixel| pixel.0[3] != first[3]))
+}
+
 /// Decodes an ignore mask or an object matte, 0…255; colours by their brightness. A
-/// picture of nothing but zeros and ones means 0 and 255.
+/// picture of nothing but zeros and ones means 0 and 255; in a JPEG file what is nearly black or
+/// white is.
 ///
 /// # Errors
 /// As for [`crate::decode()`], and another size than its photo's.
@@ -145,8 +206,15 @@ pub fn decode_mask(
     photo: &str,
     photo_size: (u32, u32),
 ) -> Result<GrayImage, CaptureError> {
-    let mut mask = decode_beside(kind, path, photo, photo_size)?.into_luma8();
-    if mask.iter().all(|&value| value <= 1) {
+    let (picture, format) = decode_beside(kind, path, photo, photo_size)?;
+    let mut mask = picture.into_luma8();
+    if format == ImageFormat::Jpeg {
+        mask.iter_mut().for_each(|value| match *value {
+            ..=JPEG_NOISE => *value = 0,
+            WHITE.. => *value = 255,
+            _ => {}
+        });
+    } else if mask.iter().all(|&value| value <= 1) {
         mask.iter_mut().for_each(|value| *value *= 255);
     }
     Ok(mask)
@@ -219,7 +287,7 @@ pub fn decode_depth_steps(
     photo: &str,
     photo_size: (u32, u32),
 ) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, CaptureError> {
-    let picture = decode_beside(Beside::DepthMap, path, photo, photo_size)?;
+    let (picture, _) = decode_beside(Beside::DepthMap, path, photo, photo_size)?;
     check_depth_format(path, picture.color())?;
     Ok(picture.into_luma16())
 }
@@ -229,10 +297,11 @@ fn decode_beside(
     path: &Path,
     photo: &str,
     photo_size: (u32, u32),
-) -> Result<DynamicImage, CaptureError> {
+) -> Result<(DynamicImage, ImageFormat), CaptureError> {
     let check = |found| check_size(kind, path, found, photo, photo_size);
-    let bytes = std::fs::read(path).map_err(decode::read_failed(path))?;
-    decode::decode_any(path, &bytes, check)
+    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let picture = decode::decode_any(path, &bytes, check)?;
+    Ok((picture, format_of(path, &bytes)?))
 }
 
 fn check_size(

@@ -1,6 +1,9 @@
 //! Masks, mattes and depth maps: matched to photos by name, decoded, checked.
 
-use capture::{Beside, apply_matte, check_beside, decode_depth, decode_mask, match_by_name};
+use capture::{
+    Beside, apply_matte, check_beside, decode_depth, decode_mask, is_black_and_white, is_in_alpha,
+    match_by_name, match_jpegs_by_name,
+};
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, Rgba, RgbaImage};
 use std::fs;
 use std::path::PathBuf;
@@ -96,6 +99,66 @@ fn masks_are_grey_whatever_they_are_stored_as() {
     for path in paths {
         let mask = decode_mask(Beside::IgnoreMask, &path, "a.jpg", (4, 3)).unwrap();
         assert_eq!(mask, expected, "{}", path.display());
+    }
+}
+
+#[test]
+fn black_and_white_jpegs_are_masks() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = GrayImage::from_fn(16, 16, |x, _| Luma([if x < 8 { 0 } else { 255 }]));
+    let jpeg = |name: &str, picture: DynamicImage| {
+        let path = folder.path().join(name);
+        let format = image::ImageFormat::Jpeg;
+        picture.save_with_format(&path, format).unwrap();
+        path
+    };
+    let whole = jpeg("a.jpg.jpg", expected.clone().into());
+    let stem = jpeg("b.JPEG", expected.clone().into());
+    let gray = ImageBuffer::from_fn(16, 16, |x, y| Rgb([(8 * (x + y)) as u8, 90, 90]));
+    let photo = jpeg("c.jpg", gray.into());
+    let matched = match_jpegs_by_name(folder.path(), &["a.jpg", "b.png", "d.jpg"]).unwrap();
+    let files: Vec<PathBuf> = matched.by_photo.into_values().collect();
+    assert_eq!(files, [whole.clone(), stem]);
+    assert_eq!(matched.unmatched, ["c.jpg"]);
+    assert!(
+        match_by_name(folder.path(), &["a.jpg"])
+            .unwrap()
+            .by_photo
+            .is_empty()
+    );
+
+    assert!(is_black_and_white(&whole).unwrap() && !is_black_and_white(&photo).unwrap());
+    let black = jpeg("night.jpg", GrayImage::new(16, 16).into());
+    assert!(!is_black_and_white(&black).unwrap());
+    let mask = decode_mask(Beside::IgnoreMask, &whole, "a.jpg", (16, 16)).unwrap();
+    assert_eq!(mask, expected);
+}
+
+#[test]
+fn masks_that_are_only_in_an_alpha_channel_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let masks = |color: u8, alpha: u8| {
+        RgbaImage::from_fn(4, 3, |x, _| match x {
+            0 => Rgba([color, color, color, alpha]),
+            _ => Rgba([255; 4]),
+        })
+    };
+    for (i, (mask, expected)) in [
+        (DynamicImage::from(masks(255, 0)), true),
+        (
+            DynamicImage::from(masks(255, 0)).into_luma_alpha8().into(),
+            true,
+        ),
+        (DynamicImage::from(masks(0, 0)), false),
+        (DynamicImage::from(masks(0, 255)), false),
+        (DynamicImage::from(masks(255, 255)), false),
+        (DynamicImage::from(GrayImage::new(4, 3)), false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = save(&folder, "m.png", mask);
+        assert_eq!(is_in_alpha(&path).unwrap(), expected, "{i}");
     }
 }
 

@@ -2,8 +2,12 @@
 
 use super::undistort::{MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, Warning};
-use capture::{Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside, match_by_name};
+use capture::{
+    Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside, is_black_and_white,
+    is_in_alpha, match_by_name, match_jpegs_by_name,
+};
 use image::{GrayImage, RgbaImage};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where masks and depth maps are looked for in a capture, if nobody says, and where they are
@@ -159,14 +163,21 @@ impl Scene {
         let names = photos.chain(&self.left_out);
         let names: Vec<&str> = names.map(String::as_str).collect();
         let total = self.photos.len();
-        let Matched {
-            mut by_photo,
-            unmatched,
-        } = match match_by_name(folder, &names) {
+        let mut matched = match match_by_name(folder, &names) {
             // An empty folder that nobody mentioned is none.
             Err(CaptureError::NoPhotos { .. }) if !asked => return Ok(()),
             matched => matched?,
         };
+        if matched.by_photo.is_empty() {
+            matched = jpegs(kind, folder, &names, warnings).unwrap_or(matched);
+        }
+        let Matched {
+            mut by_photo,
+            unmatched,
+        } = matched;
+        if kind != Beside::DepthMap {
+            warnings.extend(note_of_alpha(kind, &by_photo));
+        }
         let is_found = |p: &&Photo| by_photo.contains_key(&p.name);
         let found = self.photos.iter().filter(is_found).count();
         if let (0, true, Some(example)) = (found, asked, names.first()) {
@@ -303,6 +314,48 @@ impl Scene {
         };
         !masked.is_empty() && masked.iter().step_by(step).all(keeps_little)
     }
+}
+
+/// The JPEG files in a folder without PNG files for any photo, where they are black and white; of others a
+/// note says why they are not used.
+fn jpegs(
+    kind: Beside,
+    folder: &Path,
+    names: &[&str],
+    warnings: &mut Vec<Warning>,
+) -> Option<Matched> {
+    // What two photos could claim is none's.
+    let matched = match_jpegs_by_name(folder, names).ok()?;
+    let (example, _) = matched.by_photo.first_key_value()?;
+    let is_mask = |file: &PathBuf| is_black_and_white(file).unwrap_or(false);
+    let why = match kind {
+        Beside::DepthMap => "depth does not fit into JPEG files: write 16-bit grey PNG",
+        _ if some_of(&matched.by_photo).all(is_mask) => return Some(matched),
+        _ => "the JPEG files are not black and white: write PNG",
+    };
+    warnings.push(Warning::Note(format!(
+        "{}: {} of {} photos have a file of their name here that is no {kind} ({example}, for one): {why}",
+        folder.display(),
+        matched.by_photo.len(),
+        names.len()
+    )));
+    None
+}
+
+/// What to say of masks that have their shape in their alpha channel, if some that are asked do.
+fn note_of_alpha(kind: Beside, by_photo: &BTreeMap<String, PathBuf>) -> Option<Warning> {
+    let file = some_of(by_photo).find(|file| is_in_alpha(file).unwrap_or(false))?;
+    Some(Warning::Note(format!(
+        "{}: an {kind} of one colour all over, whose alpha channel is not read: write in grey what is \
+         transparent there",
+        file.display()
+    )))
+}
+
+/// A few of the files, spread over all.
+fn some_of(by_photo: &BTreeMap<String, PathBuf>) -> impl Iterator<Item = &PathBuf> {
+    let step = by_photo.len().div_ceil(MASKS_JUDGED).max(1);
+    by_photo.values().step_by(step)
 }
 
 /// A folder as given, or else the capture's own of that name.

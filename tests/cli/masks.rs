@@ -184,6 +184,47 @@ fn masks_go_by_several_names_and_may_be_missing() {
 }
 
 #[test]
+fn masks_may_be_jpegs_and_are_not_looked_for_in_alpha() {
+    let folder = with_wall();
+    for i in 0..9 {
+        save(at(&folder, &format!("wall/masks/{i:04}.jpg")), &mask_of(i));
+    }
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(ran.stdout.contains(", 9 ignore masks"), "{}", ran.stdout);
+
+    // Pictures in colour are none, nor is depth.
+    for i in 0..9 {
+        let photo = image::open(at(&folder, &format!("wall/images/{i:04}.png"))).unwrap();
+        fs::remove_file(at(&folder, &format!("wall/depth/{i:04}.png"))).unwrap();
+        for to in ["masks", "depth"] {
+            let file = at(&folder, &format!("wall/{to}/{i:04}.jpg"));
+            photo.to_rgb8().save(file).unwrap();
+        }
+    }
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    for said in [
+        "note: wall/masks: 9 of 9 photos have a file of their name here that is no ignore mask \
+         (0000.png, for one): the JPEG files are not black and white: write PNG\n",
+        "that is no depth map (0000.png, for one): depth does not fit into JPEG files: write 16-bit",
+    ] {
+        assert!(ran.stderr.contains(said), "{said}: {}", ran.stderr);
+    }
+
+    for i in 0..9 {
+        let mask = mask_of(i);
+        let mask = RgbaImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+            Rgba([255, 255, 255, mask.get_pixel(x, y).0[0]])
+        });
+        let file = at(&folder, &format!("people/{i:04}.png"));
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        mask.save(file).unwrap();
+    }
+    let ran = lumigraph(folder.path(), "import wall --masks people -o again").ok();
+    let said = "note: people/0000.png: an ignore mask of one colour all over, whose alpha channel";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+}
+
+#[test]
 fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
     let folder = with_wall();
     let mask = at(&folder, "wall/masks/0003.png.png");
