@@ -23,7 +23,8 @@ use std::path::{Path, PathBuf};
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
 /// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
 /// alone, with --calibration. Of `sparse/0`, `sparse/1` and so on, the model with the most photos
-/// is taken. Photos are not copied, except with --undistort.
+/// is taken. Photos may lie in folders within, as one for each camera of a rig. They are not
+/// copied, except with --undistort.
 ///
 /// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
 /// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in

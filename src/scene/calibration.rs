@@ -9,7 +9,7 @@ use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
 use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
 use std::cell::{Cell, OnceCell};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Reads another program's calibration. Its photos are found by the ends of their paths.
 ///

@@ -72,8 +72,8 @@ impl Scene {
     /// Every photo's size is compared with its camera's, and those of masks, mattes and depth
     /// maps with their photos', from the files' headers. Photos get times where some are to be
     /// had (see [`TimeSource`]). A photo that the calibration calls otherwise in letters' case, in how marks are
-    /// written or in what it ends in alone is found, with a note. A calibrated photo that is missing, or whose header cannot be read, is
-    /// left out with a warning as long as two others remain.
+    /// written or in what it ends in alone is found, with a note. A calibrated photo that is missing, or whose
+    /// header cannot be read, is left out with a warning as long as two others remain.
     ///
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of

@@ -74,7 +74,7 @@ fn free_places(interior: &Interior, contents: &Contents, solid: &Solid) -> Vec<(
         let step = SPACING * interior.eye_height;
         let steps = ((high - low) / step).floor();
         let id = CellId(i as u32);
-        let floor = contents.floor_height(interior, id).unwrap_or(low.z);
+        let floor = contents.floor_of(interior, id).unwrap_or(low.z);
         let eye = floor + interior.eye_height;
         for a in 1..steps.x as usize {
             for b in 1..steps.y as usize {

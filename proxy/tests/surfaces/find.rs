@@ -164,7 +164,7 @@ fn the_floor_of_found_rooms_is_where_one_stands() {
         assert_eq!(found.interior.cells.len(), 2);
         for i in 0..2 {
             let id = CellId(i as u32);
-            let floor = contents.floor_height(&found.interior, id).unwrap();
+            let floor = contents.floor_of(&found.interior, id).unwrap();
             assert!((floor - far.y).abs() < 1e-6, "{floor}");
             assert!(bounds(&found, i).min.y < far.y - 0.05);
             let door = &found.interior.portals[0];

@@ -89,6 +89,12 @@ impl App {
         }
     }
 
+    fn on_escape(&mut self, event_loop: &ActiveEventLoop) {
+        if self.escape() {
+            self.close(event_loop);
+        }
+    }
+
     fn width(&self) -> f64 {
         let size = self.window.as_ref().map(|window| window.inner_size());
         size.map_or(1.0, |size| f64::from(size.width.max(1)))
@@ -175,9 +181,7 @@ impl App {
                     Some(Key::Close) if is_down && !consumed => self.close(event_loop),
                     // Held, it would close the help and then the window.
                     Some(Key::Escape) if is_down && !consumed && !event.repeat => {
-                        if self.escape() {
-                            self.close(event_loop);
-                        }
+                        self.on_escape(event_loop);
                     }
                     Some(key) if !consumed || !is_down => {
                         self.do_key(key, is_down, event.repeat);
