@@ -206,22 +206,11 @@ impl Polygon {
     fn bends(&self, flat: &[DVec2]) -> Vec<usize> {
         let straight = -STRAIGHT_INSIDE * self.size..=STRAIGHT_OUTSIDE * self.size;
         let mut left: Vec<usize> = (0..flat.len()).collect();
-        let (mut at, mut kept) = (0, 0);
-        while left.len() > 3 && kept < left.len() {
-            let n = left.len();
-            let i = at % n;
-            let [a, b, c] = [(i + n - 1) % n, i, (i + 1) % n].map(|k| flat[left[k]]);
+        thin(&mut left, |corners| {
+            let [a, b, c] = corners.map(|k| flat[k]);
             // How far it is outside the line between its neighbours; NaN where these are one.
-            let outside = cross(a, b, c) / a.distance(c);
-            if straight.contains(&outside) {
-                left.remove(i);
-                kept = 0;
-                at = i.saturating_sub(1);
-            } else {
-                kept += 1;
-                at = i + 1;
-            }
-        }
+            straight.contains(&(cross(a, b, c) / a.distance(c)))
+        });
         left
     }
 
@@ -310,6 +299,24 @@ fn crossing(corners: &[DVec3]) -> Option<PolygonError> {
         .collect();
     let (a, b) = crossing_sides(&flat)?;
     Some(PolygonError::Crossing(a, b))
+}
+
+/// Leaves out corners of an outline, given with the one before and the one after, that are needless, as
+/// long as more than three are left.
+pub(super) fn thin<T: Copy>(outline: &mut Vec<T>, is_needless: impl Fn([T; 3]) -> bool) {
+    let (mut at, mut kept) = (0, 0);
+    while outline.len() > 3 && kept < outline.len() {
+        let n = outline.len();
+        let i = at % n;
+        if is_needless([(i + n - 1) % n, i, (i + 1) % n].map(|k| outline[k])) {
+            outline.remove(i);
+            kept = 0;
+            at = i.saturating_sub(1);
+        } else {
+            kept += 1;
+            at = i + 1;
+        }
+    }
 }
 
 #[cfg(test)]

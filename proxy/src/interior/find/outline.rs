@@ -2,6 +2,7 @@
 
 use super::columns::Columns;
 use super::openings::Opening;
+use crate::interior::polygon::thin;
 use glam::DVec2;
 
 /// A room that fills this much of a rectangle is one.
@@ -194,22 +195,8 @@ pub(super) fn snap(outlines: &mut [Vec<DVec2>], openings: &mut [Opening], within
 
 /// Removes corners that are the same or on a line.
 fn tidy(outline: &mut Vec<DVec2>) {
-    let mut at = 0;
-    let mut kept = 0;
-    while outline.len() > 3 && kept < outline.len() {
-        let n = outline.len();
-        let i = at % n;
-        let (a, b, c) = (outline[(i + n - 1) % n], outline[i], outline[(i + 1) % n]);
-        let is_needless = (b - a).perp_dot(c - b).abs()
-            < 1e-9 * (c - a).length_squared().max(1e-18)
-            || a.distance(b) < 1e-9;
-        if is_needless {
-            outline.remove(i);
-            kept = 0;
-            at = i.saturating_sub(1);
-        } else {
-            kept += 1;
-            at = i + 1;
-        }
-    }
+    thin(outline, |[a, b, c]| {
+        (b - a).perp_dot(c - b).abs() < 1e-9 * (c - a).length_squared().max(1e-18)
+            || a.distance(b) < 1e-9
+    });
 }
