@@ -15,8 +15,8 @@ use image::ImageFormat;
 use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
-    interior_from_nodes, read_interior, surface_of, write_interior,
+    Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare, fit_to_sight,
+    interior_from_nodes, read_interior, strays, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
 use std::ffi::OsString;
@@ -79,6 +79,8 @@ pub(super) struct Args {
 
 /// Portals that are nearer than this to one another are the same; metres.
 const SAME_PORTAL: f64 = 0.3;
+/// Rooms and portals reach farther by this at most to have what is seen; metres.
+const WALL: f64 = 0.35;
 /// What a capture's model is called.
 const MODEL: &str = "model.glb";
 
@@ -217,7 +219,15 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
         },
     };
     let rooms = match given {
-        Some((interior, warnings)) => Rooms::given(interior, warnings),
+        Some((interior, mut warnings)) => {
+            // They are as they were given, and what they hide is said.
+            warnings.extend(
+                strays(&interior, &model)
+                    .with_context(named)?
+                    .warning(&interior),
+            );
+            Rooms::given(interior, warnings)
+        }
         None => {
             let busy = spinner("finding rooms");
             // Doors that the model marks are open.
@@ -228,11 +238,23 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
                 sights: &[],
             };
             let found = find_interior(&evidence, &file, options);
+            let fitted = found.map(|found| fitted(found, &model, options.meter));
             busy.finish_and_clear();
-            Rooms::found(found.with_context(named)?)?
+            Rooms::found(fitted.with_context(named)?.with_context(named)?)?
         }
     };
     finish(args, &file, &bytes, &model, rooms, told.known)
+}
+
+/// What was found with all of the model in sight that is.
+fn fitted(
+    mut found: FoundInterior,
+    model: &Model,
+    meter: f64,
+) -> Result<FoundInterior, InteriorError> {
+    let left = fit_to_sight(&mut found.interior, model, WALL * meter)?;
+    found.warnings.extend(left.warning(&found.interior));
+    Ok(found)
 }
 
 /// Files beside the model.

@@ -2,7 +2,8 @@
 
 use crate::run::{files, lumigraph};
 use glam::{DQuat, DVec3};
-use proxy::interior::read_interior;
+use proxy::interior::find::{Evidence, FindOptions, find_interior};
+use proxy::interior::{read_interior, surface_of, write_interior};
 use proxy::mesh::{Mesh, model_to_glb, read_model};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -317,15 +318,24 @@ fn corners(folder: &Path) -> [Vec<Vec<DVec3>>; 2] {
 /// Makes an interior of a model, and one of photos with depth taken all around in its rooms, and
 /// looks for each cell and portal of either in the other.
 fn same_from_model_and_photos(here: &Path, model: &Path, survey: &str) {
-    let line = format!("interior {} --find -o model", model.display());
-    lumigraph(here, &line).ok();
+    // As found: what is walked through reaches as far as lines of sight in the model do.
+    let (read, _) = read_model(&here.join(model)).unwrap();
+    let evidence = Evidence {
+        mesh: &surface_of(&read),
+        cameras: &[],
+        sights: &[],
+    };
+    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
+    std::fs::create_dir(here.join("found")).unwrap();
+    std::fs::copy(here.join(model), here.join("found/model.glb")).unwrap();
+    write_interior(&here.join("found/interior.json"), &found.interior).unwrap();
     lumigraph(
         here,
-        &format!("generate survey --of model {survey} -o survey"),
+        &format!("generate survey --of found {survey} -o survey"),
     )
     .ok();
-    let ran = lumigraph(here, "interior survey --compare model -o photos").ok();
-    let (model, photos) = (corners(&here.join("model")), corners(&here.join("photos")));
+    let ran = lumigraph(here, "interior survey --compare found -o photos").ok();
+    let (model, photos) = (corners(&here.join("found")), corners(&here.join("photos")));
     let [rooms, openings] = [&model[0], &model[1]].map(Vec::len);
     let said = format!("{rooms} of {rooms} rooms, {openings} of {openings} portals found");
     assert!(ran.stdout.contains(&said), "{}", ran.stdout);
@@ -346,6 +356,52 @@ fn photos_of_a_house_give_the_cells_and_portals_of_its_model() {
     let folder = with_house();
     let (model, survey) = ("house/house.glb", "--photos 48 --size 128x96");
     same_from_model_and_photos(folder.path(), Path::new(model), survey);
+}
+
+#[test]
+fn found_rooms_are_drawn_as_the_whole_model_is_and_what_given_ones_hide_is_told() {
+    let folder = with_house();
+    let here = folder.path();
+    let ran = lumigraph(here, "interior house/house.glb --find -o found").ok();
+    assert!(!ran.stderr.contains("lines of sight"), "{}", ran.stderr);
+    let walk =
+        "walk found --frames 24 --size 96x72 --portals geometry,whole --device cpu -o walked";
+    lumigraph(here, walk).ok();
+    let [culled, whole] = ["geometry", "whole"].map(|mode| files(&here.join("walked").join(mode)));
+    let pictures = |files: BTreeMap<_, _>| -> BTreeMap<_, _> {
+        let is_png = |path: &std::path::PathBuf| path.extension().is_some_and(|e| e == "png");
+        files.into_iter().filter(|(path, _)| is_png(path)).collect()
+    };
+    let (culled, whole) = (pictures(culled), pictures(whole));
+    assert_eq!(culled.len(), 24);
+    assert!(culled == whole);
+
+    // Two halves of the house with an opening of a hand's breadth between them.
+    let (interior, _) = read_interior(&here.join("house/interior.json")).unwrap();
+    let portal = interior
+        .portals
+        .iter()
+        .find(|p| p.cells.iter().all(Option::is_some));
+    let center = portal.unwrap().polygon.center();
+    let across = interior.up.cross(portal.unwrap().polygon.normal());
+    let corner = |u: f64, v: f64| (center + 0.05 * (u * across + v * interior.up)).to_array();
+    let rooms = interior.cells.iter().map(|cell| {
+        let room = cell.content.room().unwrap();
+        serde_json::json!({"name": cell.name, "min": room.min.to_array(), "max": room.max.to_array()})
+    });
+    let between: Vec<&str> = interior
+        .cells
+        .iter()
+        .map(|cell| cell.name.as_str())
+        .collect();
+    let rooms = serde_json::json!({"version": 1, "up": interior.up.to_array(),
+        "eye_height": interior.eye_height, "rooms": rooms.collect::<Vec<_>>(),
+        "openings": [{"name": "slit", "between": between,
+            "polygon": [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]}]});
+    std::fs::write(here.join("rooms.json"), rooms.to_string()).unwrap();
+    let ran = lumigraph(here, "interior house/house.glb --rooms rooms.json -o slit").ok();
+    let said = "lines of sight through and past portals meet what portals hide";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
 }
 
 #[test]

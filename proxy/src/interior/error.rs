@@ -1,4 +1,5 @@
 use super::PolygonError;
+use glam::DVec3;
 use std::path::PathBuf;
 
 /// What makes an interior contradict itself.
@@ -125,6 +126,24 @@ pub enum InteriorWarning {
         found: f64,
         /// What it was to be.
         asked: f64,
+    },
+    /// Portals hide what is seen.
+    #[error(
+        "{hidden} of {tried} lines of sight through and past portals meet what portals hide, such as the one from \
+         {eye} in cell `{cell}` to {seen}: frames may lack it there; let the portal that it passes, or the \
+         cell's box, reach farther"
+    )]
+    Hidden {
+        /// Lines of sight.
+        hidden: usize,
+        /// All that were tried.
+        tried: usize,
+        /// Where the first begins.
+        cell: String,
+        /// Its eye, in the world.
+        eye: DVec3,
+        /// What it sees.
+        seen: DVec3,
     },
     /// Triangles that no cell has.
     #[error("{0} triangles are in no cell; they are drawn whatever is visible")]

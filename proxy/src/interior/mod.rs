@@ -18,6 +18,7 @@ mod polygon;
 mod rooms;
 mod seen;
 mod semicircle;
+mod strays;
 mod turned;
 mod visibility;
 
@@ -29,6 +30,7 @@ pub use overlap::triangle_touches_box;
 pub use polygon::{Polygon, PolygonError};
 pub use rooms::{interior_from_nodes, interior_from_rooms, parse_rooms, read_rooms};
 pub use semicircle::{SemicircleOptions, SemicircleView, angle_before, semicircles};
+pub use strays::{Stray, Strays, fit_to_sight, strays};
 pub use visibility::{Pass, Region, Visibility, VisibleCell, clip, visible, visible_through};
 
 use glam::{BVec3, DVec3};

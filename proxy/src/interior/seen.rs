@@ -24,33 +24,34 @@ impl Seen {
     /// Of a model's triangles those of its cells, in their order, and others that are of none, but hide
     /// what is behind them.
     pub(super) fn new(model: &Model, by_cell: &[Vec<u32>], others: &[u32]) -> Self {
-        let is_in_reach = |i: u32| {
-            let corners = model.mesh.corners(i as usize);
-            corners.iter().all(|p| p.abs().max_element() < FARTHEST)
-        };
-        let ids = (0..).map(|i| Some(CellId(i)));
-        let of_cells = ids.zip(by_cell);
-        let of_cells = of_cells.flat_map(|(id, list)| list.iter().map(move |i| (*i, id)));
-        let of_none = others.iter().map(|i| (*i, None));
-        let all = of_cells.chain(of_none).filter(|(i, _)| is_in_reach(*i));
-        let mut all: Vec<(u32, Option<CellId>)> = all.collect();
-        all.sort_unstable();
-        let mut triangles = Vec::new();
-        let (mut begins, mut cells) = (vec![0], Vec::new());
-        for same in all.chunk_by(|a, b| a.0 == b.0) {
-            triangles.push(model.mesh.triangles[same[0].0 as usize]);
-            cells.extend(same.iter().filter_map(|(_, id)| *id));
-            begins.push(cells.len() as u32);
-        }
+        let all = in_reach(model, by_cell, others);
+        let triangles = all.chunk_by(|a, b| a.0 == b.0);
+        let triangles = triangles.map(|same| model.mesh.triangles[same[0].0 as usize]);
         let mut mesh = Mesh {
             positions: model.mesh.positions.clone(),
-            triangles,
+            triangles: triangles.collect(),
         };
         mesh.drop_unused();
-        Self {
+        let mut seen = Self {
             solid: Solid::new(MeshKind::Mesh, mesh),
-            begins,
-            cells,
+            begins: Vec::new(),
+            cells: Vec::new(),
+        };
+        seen.share_out(&all);
+        seen
+    }
+
+    /// The same triangles with other cells: all of `others` that have one now, and the other way round.
+    pub(super) fn regroup(&mut self, model: &Model, by_cell: &[Vec<u32>], others: &[u32]) {
+        self.share_out(&in_reach(model, by_cell, others));
+    }
+
+    fn share_out(&mut self, all: &[(u32, Option<CellId>)]) {
+        self.begins = vec![0];
+        self.cells.clear();
+        for same in all.chunk_by(|a, b| a.0 == b.0) {
+            self.cells.extend(same.iter().filter_map(|(_, id)| *id));
+            self.begins.push(self.cells.len() as u32);
         }
     }
 
@@ -64,4 +65,20 @@ impl Seen {
         let [begin, end] = [i, i + 1].map(|k| self.begins[k] as usize);
         Some((hit.along, &self.cells[begin..end]))
     }
+}
+
+/// Triangles that rays may meet, in order, with each cell that has them.
+fn in_reach(model: &Model, by_cell: &[Vec<u32>], others: &[u32]) -> Vec<(u32, Option<CellId>)> {
+    let is_in_reach = |i: u32| {
+        let corners = model.mesh.corners(i as usize);
+        corners.iter().all(|p| p.abs().max_element() < FARTHEST)
+    };
+    let ids = (0..).map(|i| Some(CellId(i)));
+    let of_cells = ids.zip(by_cell);
+    let of_cells = of_cells.flat_map(|(id, list)| list.iter().map(move |i| (*i, id)));
+    let of_none = others.iter().map(|i| (*i, None));
+    let all = of_cells.chain(of_none).filter(|(i, _)| is_in_reach(*i));
+    let mut all: Vec<(u32, Option<CellId>)> = all.collect();
+    all.sort_unstable();
+    all
 }

@@ -227,6 +227,15 @@ pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibi
     }
 }
 
+/// The cells that an eye in one sees all around.
+pub(super) fn all_around(interior: &Interior, cell: CellId, eye: DVec3) -> Visibility {
+    let mut search = Search::new(interior, eye);
+    match search.visit(cell, &Region::ALL, None, 0) {
+        Ok(()) => search.found,
+        Err(TooMany) => everything(interior, Some(cell), &Region::ALL),
+    }
+}
+
 /// What an eye sees through a portal: the cells beyond it, the nearest first, and where. `region` is
 /// where it sees through it, as a [`Pass`] says; what the portal's outline leaves of it is up to
 /// the caller. The eye is on the other side of the portal; where it is, and behind what, is no matter.

@@ -12,7 +12,7 @@ use proxy::interior::find::{
 use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
 use proxy::mesh::Model;
 
-fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
+pub(crate) fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
     let evidence = Evidence {
         mesh,
         cameras: &[],

@@ -14,3 +14,4 @@ mod mesh_files;
 mod model_files;
 mod portals;
 mod room;
+mod strays;

@@ -1,0 +1,348 @@
+//! Lines of sight that leave a cell beside all of its portals.
+//!
+//! Culling by portals draws what the whole model would if there are none. Where rooms are found, cells are boxes
+//! and portals rectangles on a grid, and a leaf that stands open beside a doorway is in one room, but seen
+//! from the other past the doorway's outline: [`fit_to_sight`] lets boxes and outlines reach as far as is seen.
+
+use super::seen::Seen;
+use super::visibility::all_around;
+use super::{
+    CellId, Content, Contents, Interior, InteriorError, InteriorWarning, Polygon, Portal,
+    Visibility,
+};
+use crate::mesh::Model;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+/// A line of sight from a cell to a triangle that its portals hide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stray {
+    /// Where the eye is.
+    pub from: CellId,
+    /// In the world.
+    pub eye: DVec3,
+    /// What it sees, in the world.
+    pub seen: DVec3,
+    /// The cells that portals show in that direction; none of them has what is seen.
+    pub shown: Vec<CellId>,
+}
+
+/// Lines of sight that were tried, and those that portals hide.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Strays {
+    /// How many met a triangle.
+    pub tried: usize,
+    /// In the order of portals, and of their sides.
+    pub found: Vec<Stray>,
+}
+
+impl Strays {
+    /// What is to be said of them, if there are any.
+    pub fn warning(&self, interior: &Interior) -> Option<InteriorWarning> {
+        let first = self.found.first()?;
+        Some(InteriorWarning::Hidden {
+            hidden: self.found.len(),
+            tried: self.tried,
+            cell: interior.cell(first.from).name.clone(),
+            eye: first.eye,
+            seen: first.seen,
+        })
+    }
+}
+
+/// Eyes before each side of a portal, and lines of sight from each.
+const EYES: u32 = 64;
+const LINES: u32 = 128;
+/// Places that are tried for each eye.
+const TRIES: u32 = 16;
+/// Eyes stand between these heights over the floor, and look past the portal by so much, in eyes' heights.
+const HEIGHTS: [f64; 2] = [0.1, 1.6];
+const BESIDE: f64 = 1.0;
+/// A hit so little nearer than what is aimed at, in shares of the distance, is that.
+const THERE: f64 = 1e-6;
+/// From one place to the next in two and in three dimensions, so that they are spread evenly: powers of
+/// the inverse of the number whose third, or fourth, power is one more than itself (Roberts 2018).
+const NEXT_2: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+const NEXT_3: [f64; 3] = [
+    0.819_172_513_396_164_5,
+    0.671_043_606_703_788_8,
+    0.549_700_477_901_970_2,
+];
+
+/// Looks through and past every portal from many places before it, and finds what portals hide though it is seen.
+///
+/// The same for any number of threads.
+///
+/// # Errors
+/// A cell shows a node that the model does not have.
+pub fn strays(interior: &Interior, model: &Model) -> Result<Strays, InteriorError> {
+    let (contents, _) = Contents::new(interior, model)?;
+    let seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
+    Ok(look(interior, &contents, &seen))
+}
+
+/// What needs so much of the reach is fitted first; then what needs twice as much, and so on.
+const LEAST_SHARE: f64 = 1.0 / 16.0;
+/// A box rather reaches so many times as far as a portal would have to.
+const BOXES_FIRST: f64 = 4.0;
+/// Beyond what was seen, in shares of the reach.
+const MARGIN: f64 = 0.05;
+/// How often it is looked from everywhere anew.
+const LOOKS: usize = 8;
+
+/// Lets cells' boxes, and portals that are upright rectangles, reach as far as lines of sight show that they
+/// must: what needs the least first, by at most about `reach` beyond what they reached before, in world
+/// units, again and again. What portals hide all the same is left over.
+///
+/// # Errors
+/// A cell shows a node that the model does not have.
+pub fn fit_to_sight(
+    interior: &mut Interior,
+    model: &Model,
+    reach: f64,
+) -> Result<Strays, InteriorError> {
+    let (mut contents, _) = Contents::new(interior, model)?;
+    let mut seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
+    let mut strays = look(interior, &contents, &seen);
+    for _ in 1..LOOKS {
+        let mut left = strays.found.clone();
+        let mut share = LEAST_SHARE;
+        let mut is_fitted = false;
+        while !left.is_empty() && share <= 1.0 {
+            let fitted = |stray: &Stray| fit(interior, stray, share * reach, MARGIN * reach);
+            let fitted: Vec<Option<Fitted>> = left.iter().map(fitted).collect();
+            if fitted.contains(&Some(Fitted::Box)) {
+                contents = Contents::new(interior, model)?.0;
+                seen.regroup(model, &contents.triangles, &contents.elsewhere);
+            }
+            if fitted.iter().all(Option::is_none) {
+                share *= 2.0;
+                continue;
+            }
+            is_fitted = true;
+            left = look_again(interior, &seen, &left);
+        }
+        if !is_fitted {
+            break;
+        }
+        strays = look(interior, &contents, &seen);
+    }
+    Ok(strays)
+}
+
+/// What reaches farther than before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fitted {
+    Box,
+    Portal,
+}
+
+/// Fits what a stray is nearest to, if that is no farther than said, with a margin.
+fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Option<Fitted> {
+    // 1. Of what leads on from where it is shown, the outline that it passes nearest to.
+    let ray = stray.seen - stray.eye;
+    let leads_on = |portal: &Portal| {
+        let [front, back] = portal
+            .cells
+            .map(|id| id.map(|id| stray.shown.contains(&id)));
+        front.zip(back).is_some_and(|(front, back)| front != back)
+    };
+    let portals = interior.portals.iter().enumerate();
+    let portals = portals.filter(|(_, portal)| leads_on(portal));
+    let passed = portals.filter_map(|(i, portal)| {
+        let along = -portal.polygon.height(stray.eye) / ray.dot(portal.polygon.normal());
+        let at = stray.eye + along * ray;
+        (along > 0.0 && along <= 1.0).then(|| (portal.polygon.distance(at), i, at))
+    });
+    let passed = passed.min_by(|a, b| a.0.total_cmp(&b.0));
+    // 2. The box that it ends nearest to.
+    let boxes = stray.shown.iter().filter_map(|id| {
+        let room = interior.cell(*id).content.room()?;
+        Some((room.distance(stray.seen) / BOXES_FIRST, *id))
+    });
+    let ended = boxes.min_by(|a, b| a.0.total_cmp(&b.0));
+    // 3. Whichever is nearer.
+    let least = passed.map_or(f64::INFINITY, |(distance, ..)| distance);
+    if let Some((distance, id)) = ended
+        && distance <= least.min(reach)
+    {
+        if let Content::Box(room)
+        | Content::Scene {
+            room: Some(room), ..
+        } = &mut interior.cells[id.0 as usize].content
+        {
+            room.min = room.min.min(stray.seen - margin);
+            room.max = room.max.max(stray.seen + margin);
+        }
+        return Some(Fitted::Box);
+    }
+    let (_, i, at) = passed.filter(|_| least <= reach)?;
+    let polygon = &mut interior.portals[i].polygon;
+    let frame = Frame::of(polygon, interior.up);
+    let [low, high] = frame.span(polygon);
+    let place = frame.place(at);
+    let (low, high) = (low.min(place - margin), high.max(place + margin));
+    let corners = [
+        low,
+        DVec2::new(high.x, low.y),
+        high,
+        DVec2::new(low.x, high.y),
+    ];
+    *polygon = Polygon::new(corners.map(|corner| frame.at(corner)).to_vec()).ok()?;
+    Some(Fitted::Portal)
+}
+
+fn look(interior: &Interior, contents: &Contents, seen: &Seen) -> Strays {
+    let sides = interior.portals.iter().flat_map(|portal| {
+        let from = portal.cells.into_iter().flatten();
+        from.map(move |from| (portal, from))
+    });
+    let sides: Vec<(&Portal, CellId)> = sides.collect();
+    let before = |(portal, from): (&Portal, CellId)| before(interior, contents, seen, portal, from);
+    let found: Vec<Strays> = sides.into_par_iter().map(before).collect();
+    found.into_iter().fold(Strays::default(), |mut all, some| {
+        all.tried += some.tried;
+        all.found.extend(some.found);
+        all
+    })
+}
+
+/// Those of some lines of sight that are still hidden.
+fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> Vec<Stray> {
+    let of_eyes: Vec<&[Stray]> = strays
+        .chunk_by(|a, b| a.eye == b.eye && a.from == b.from)
+        .collect();
+    let left = of_eyes.into_par_iter().flat_map_iter(|of_eye| {
+        let visibility = all_around(interior, of_eye[0].from, of_eye[0].eye);
+        let again = move |old: &Stray| {
+            let hit = seen.first(old.eye, old.seen - old.eye)?;
+            hidden(&visibility, old.from, old.eye, old.seen - old.eye, hit)
+        };
+        of_eye.iter().filter_map(again)
+    });
+    left.collect()
+}
+
+/// What is seen from the places on one side of a portal from which one sees through it.
+fn before(
+    interior: &Interior,
+    contents: &Contents,
+    seen: &Seen,
+    portal: &Portal,
+    from: CellId,
+) -> Strays {
+    let mut strays = Strays::default();
+    let Some(bounds) = contents.bounds.get(from.0 as usize).copied().flatten() else {
+        return strays;
+    };
+    let frame = Frame::of(&portal.polygon, interior.up);
+    let span = frame.span(&portal.polygon);
+    let outer = DVec2::splat(BESIDE * interior.eye_height);
+    let aim =
+        |[low, high]: [DVec2; 2], [x, y]: [f64; 2]| frame.at(low + DVec2::new(x, y) * (high - low));
+    let mut eyes = 0;
+    for i in 1..=EYES * TRIES {
+        // 1. A place in the cell from which a place in the portal is seen.
+        let share = NEXT_3.map(|step| (step * f64::from(i)).fract());
+        let point = bounds.min + DVec3::from_array(share) * (bounds.max - bounds.min);
+        let Some(eye) = stand(interior, contents, from, point) else {
+            continue;
+        };
+        let ray = aim(span, [share[1], share[2]]) - eye;
+        let is_open = portal.polygon.covers(eye + ray, 0.0)
+            && seen.first(eye, ray).is_none_or(|hit| hit.0 > 1.0 - THERE);
+        if !is_open {
+            continue;
+        }
+        // 2. Past it.
+        let visibility = all_around(interior, from, eye);
+        for k in 0..LINES {
+            let number = f64::from(eyes * LINES + k);
+            let place = NEXT_2.map(|step| (step * number).fract());
+            let ray = aim([span[0] - outer, span[1] + outer], place) - eye;
+            if let Some(hit) = seen.first(eye, ray) {
+                strays.tried += 1;
+                let stray = hidden(&visibility, from, eye, ray, hit);
+                strays.found.extend(stray);
+            }
+        }
+        eyes += 1;
+        if eyes == EYES {
+            break;
+        }
+    }
+    strays
+}
+
+/// A line of sight, if portals hide what it meets: so many of its lengths away, of some cells. What is of no
+/// cell is never hidden.
+fn hidden(
+    visibility: &Visibility,
+    from: CellId,
+    eye: DVec3,
+    ray: DVec3,
+    (along, cells): (f64, &[CellId]),
+) -> Option<Stray> {
+    let visible = visibility.cells.iter();
+    let shown = visible.filter(|visible| visible.regions.iter().any(|r| r.contains(ray)));
+    let shown: Vec<CellId> = shown.map(|visible| visible.cell).collect();
+    let is_hidden = !cells.is_empty() && !cells.iter().any(|id| shown.contains(id));
+    is_hidden.then(|| Stray {
+        from,
+        eye,
+        seen: eye + along * ray,
+        shown,
+    })
+}
+
+/// A point of a cell's bounds, if it is in the cell: over the cell's floor, if it has one, at an eye's height.
+fn stand(interior: &Interior, contents: &Contents, from: CellId, point: DVec3) -> Option<DVec3> {
+    let mut eye = point;
+    if let Some(floor) = &interior.cell(from).floor {
+        let height = floor.height(point) * floor.normal().dot(interior.up).signum();
+        let [low, high] = HEIGHTS;
+        let share = low + (height / interior.eye_height).rem_euclid(high - low);
+        eye += (share * interior.eye_height - height) * interior.up;
+    }
+    (contents.locate(interior, eye) == Some(from)).then_some(eye)
+}
+
+/// Axes in a polygon's plane.
+struct Frame {
+    origin: DVec3,
+    across: DVec3,
+    along: DVec3,
+}
+
+impl Frame {
+    /// The second goes as far up as the plane does.
+    fn of(polygon: &Polygon, up: DVec3) -> Self {
+        let normal = polygon.normal();
+        let across = match up.cross(normal) {
+            across if across.length() > 1e-3 => across.normalize(),
+            _ => normal.any_orthonormal_vector(),
+        };
+        Self {
+            origin: polygon.center(),
+            across,
+            along: normal.cross(across),
+        }
+    }
+
+    fn at(&self, place: DVec2) -> DVec3 {
+        self.origin + place.x * self.across + place.y * self.along
+    }
+
+    fn place(&self, point: DVec3) -> DVec2 {
+        let from = point - self.origin;
+        DVec2::new(from.dot(self.across), from.dot(self.along))
+    }
+
+    /// The least and the greatest of the places of a polygon's corners.
+    fn span(&self, polygon: &Polygon) -> [DVec2; 2] {
+        let places = polygon.corners().iter().map(|p| self.place(*p));
+        places.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[l, h], p| {
+            [l.min(p), h.max(p)]
+        })
+    }
+}
