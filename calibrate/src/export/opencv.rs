@@ -133,7 +133,8 @@ impl Yaml {
     ) {
         let dt = match channels {
             1 => "d".to_owned(),
-            channels => format!("{channels}d"),
+            // In quotes, as OpenCV writes it: else it reads a number and stops at the letter.
+            channels => format!("\"{channels}d\""),
         };
         let _ = write!(
             self.0,

@@ -6,7 +6,8 @@ use calibrate::export::{
 use calibrate::formats::read_transforms;
 use calibrate::opencv::{Keys, read_calibration};
 use calibrate::{
-    Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Reconstruction, Rigid3, colmap,
+    Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Reconstruction,
+    Rigid3, colmap,
 };
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
@@ -185,6 +186,33 @@ fn opencvs_own_lenses_read_back_from_its_files() {
             "{text}"
         );
     }
+}
+
+/// OpenCV reads `3d` without quotes as a number, and refuses the file.
+#[test]
+fn element_types_of_several_channels_are_in_quotes() {
+    let mut whole = reconstruction(&expressible()[1..2], &[Rigid3::IDENTITY; 2]);
+    for image in whole.images.values_mut() {
+        image.keypoints = vec![Keypoint {
+            x: 10.5,
+            y: 20.0,
+            point: Some(Point3DId(1)),
+        }];
+    }
+    let point = Point3D {
+        position: DVec3::new(0.25, 0.5, 2.0),
+        color: [128; 3],
+        error_px: -1.0,
+        track: whole.images.keys().map(|id| (*id, 0)).collect(),
+    };
+    whole.points.insert(Point3DId(1), point);
+    let text = opencv_yaml(&whole, &|image| image.name.clone()).unwrap();
+    let board = "grid_points: !!opencv-matrix\n   rows: 1\n   cols: 1\n   dt: \"3d\"\n   \
+                 data: [ 0.25, 0.5, 2.0 ]\n\
+                 image_points: !!opencv-matrix\n   rows: 2\n   cols: 1\n   dt: \"2d\"\n   \
+                 data: [ 10.0, 19.5, 10.0, 19.5 ]\n";
+    assert!(text.ends_with(board), "{text}");
+    assert!(text.contains("rows: 3\n   cols: 3\n   dt: d\n"), "{text}");
 }
 
 #[test]
