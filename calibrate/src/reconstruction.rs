@@ -1,6 +1,9 @@
-use crate::{Camera, CameraError, CameraId, Pixel, Rigid3};
-use glam::DVec3;
+use crate::{Camera, CameraError, CameraId, Lens, Pixel, Rigid3};
+use glam::{DVec2, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// So many observations, spread over all images, tell how well a model fits its photos.
+const JUDGED: usize = 500;
 
 /// The id of an image in a reconstruction: sparse, chosen by whoever made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -110,16 +113,51 @@ impl Reconstruction {
         let lens = camera.lens()?;
         let mut errors = Vec::new();
         for image in self.images.values().filter(|i| i.camera_id == camera_id) {
-            for keypoint in &image.keypoints {
-                let Some(point) = keypoint.point.and_then(|id| self.points.get(&id)) else {
-                    continue;
-                };
-                let projected = lens.project(image.camera_from_world * point.position);
-                let observed = Pixel::new(keypoint.x, keypoint.y);
-                errors.push(projected.map_or(f64::INFINITY, |pixel| pixel.distance(observed)));
-            }
+            let error = |keypoint| self.error_px(image, &lens, keypoint, DVec2::ZERO);
+            errors.extend(image.keypoints.iter().filter_map(error));
         }
         Ok(errors)
+    }
+
+    /// The median of the distances in pixels between the keypoints of all images and the projections of
+    /// the sparse points that they observe, judged by some hundreds of them spread evenly; infinite where
+    /// most points lie behind the cameras, `None` where no keypoint observes any. Images of cameras
+    /// without a lens have no say.
+    pub fn median_error_px(&self) -> Option<f64> {
+        self.median_error_px_from(|_| DVec2::ZERO)
+    }
+
+    /// The same where keypoints count from a pixel of their camera.
+    pub(crate) fn median_error_px_from(&self, origin_of: impl Fn(&Camera) -> DVec2) -> Option<f64> {
+        let observations = || {
+            self.images.values().flat_map(|image| {
+                let observing = image.keypoints.iter().filter(|k| k.point.is_some());
+                observing.map(move |keypoint| (image, keypoint))
+            })
+        };
+        let error = |(image, keypoint): (&Image, &Keypoint)| {
+            let camera = self.cameras.get(&image.camera_id)?;
+            self.error_px(image, &camera.lens().ok()?, keypoint, origin_of(camera))
+        };
+        let step = observations().count().div_ceil(JUDGED).max(1);
+        let mut errors: Vec<f64> = observations().step_by(step).filter_map(error).collect();
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied()
+    }
+
+    /// How far a keypoint, counted from `origin`, is from the projection of the sparse point that it
+    /// observes, in pixels; infinite where that lies behind the camera, `None` where there is none.
+    fn error_px(
+        &self,
+        image: &Image,
+        lens: &Lens,
+        keypoint: &Keypoint,
+        origin: DVec2,
+    ) -> Option<f64> {
+        let point = self.points.get(&keypoint.point?)?;
+        let projected = lens.project(image.camera_from_world * point.position);
+        let observed = Pixel::new(keypoint.x + origin.x, keypoint.y + origin.y);
+        Some(projected.map_or(f64::INFINITY, |pixel| pixel.distance(observed)))
     }
 }
 
@@ -215,5 +253,32 @@ mod tests {
         assert!((errors[6] - 0.5).abs() < 1e-12);
         let none = three_images().reprojection_errors_px(CameraId(8)).unwrap();
         assert!(none.is_empty());
+    }
+
+    #[test]
+    fn the_median_error_is_that_of_all_images() {
+        let mut whole = three_images();
+        assert!(whole.median_error_px().unwrap() < 1e-12);
+        let moved = whole.median_error_px_from(|camera| DVec2::new(0.0, -camera.params[0]));
+        assert!((moved.unwrap() - 100.0).abs() < 1e-12, "{moved:?}");
+        for point in whole.points.values_mut() {
+            point.position.z = -1.0;
+        }
+        assert_eq!(whole.median_error_px(), Some(f64::INFINITY));
+        whole.points.clear();
+        assert_eq!(whole.median_error_px(), None);
+    }
+
+    /// Where there are many, those that are judged are of all images.
+    #[test]
+    fn the_median_error_is_judged_by_observations_everywhere() {
+        let mut whole = three_images();
+        for (image, slip) in whole.images.values_mut().zip([0.0, 3.0, 7.0]) {
+            let mut keypoint = image.keypoints[0];
+            keypoint.y = 50.0 + slip;
+            image.keypoints = vec![keypoint; 10 * JUDGED];
+        }
+        let median = whole.median_error_px().unwrap();
+        assert!((median - 3.0).abs() < 1e-12, "{median}");
     }
 }

@@ -5,5 +5,8 @@ use lumigraph_fuzz::{reconstruction, size_of};
 use std::path::Path;
 
 fuzz_target!(|data: &[u8]| {
-    reconstruction(data.len(), || parse_nvm(Path::new("file"), data, &size_of));
+    let path = Path::new("file");
+    reconstruction(data.len(), || {
+        parse_nvm(path, data, &size_of, &mut Vec::new())
+    });
 });

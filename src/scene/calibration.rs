@@ -19,6 +19,7 @@ pub(super) fn read_other(
     format: Format,
     path: &Path,
     photos: &PhotoSet,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Reconstruction, SceneError> {
     let some_size = OnceCell::new();
     let any_size = || {
@@ -31,7 +32,9 @@ pub(super) fn read_other(
         Some(own.unwrap_or_else(any_size))
     };
     let names: Vec<String> = photos.photos.iter().map(|p| p.name.clone()).collect();
-    let mut whole = formats::read(format, path, &size_of, &names)?;
+    let mut notes = Vec::new();
+    let mut whole = formats::read(format, path, &size_of, &names, &mut notes)?;
+    warnings.extend(notes.into_iter().map(Warning::Note));
     let mut named = BTreeSet::new();
     for image in whole.images.values_mut() {
         let mut name = photo_of(&image.name, photos);
@@ -83,7 +86,7 @@ pub fn read_bare(format: Format, path: &Path) -> Result<(Reconstruction, Sizes),
         }
         size
     };
-    let whole = formats::read(format, path, &size_of, &[])?;
+    let whole = formats::read(format, path, &size_of, &[], &mut Vec::new())?;
     Ok((whole, sizes.get()))
 }
 

@@ -4,6 +4,7 @@ use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
 use super::meant::Meant;
+use super::misfit;
 use super::times::{TimeSource, set_times};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::formats::Format;
@@ -97,7 +98,9 @@ impl Scene {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
             Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
-            Source::Other(format, file) => calibration::read_other(*format, file, &found)?,
+            Source::Other(format, file) => {
+                calibration::read_other(*format, file, &found, &mut warnings)?
+            }
         };
         let bounds = match &source {
             Source::Other(Format::Llff, file) => calibration::depth_bounds(file, &found)?,
@@ -131,6 +134,7 @@ impl Scene {
         )?;
 
         // 3. Are they what was calibrated?
+        warnings.extend(misfit::of(&scene.reconstruction));
         warnings.extend(scene.leave_out_unusable(options.strict, &meant.near)?);
 
         // 4. What lies beside them.

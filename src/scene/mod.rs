@@ -19,6 +19,7 @@ mod fit;
 mod import;
 mod lumigraph;
 mod meant;
+mod misfit;
 mod named;
 mod names;
 mod observed;

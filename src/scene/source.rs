@@ -187,7 +187,7 @@ fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
         if let Some(format) = formats::detect(&file) {
             found.push(Source::Other(format, file));
         } else if let Some(format) = formats::by_name(&file) {
-            let read = formats::read(format, &file, &|_| Some((1, 1)), &[]);
+            let read = formats::read(format, &file, &|_| Some((1, 1)), &[], &mut Vec::new());
             damaged.extend(read.err());
         }
     }

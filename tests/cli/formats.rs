@@ -144,6 +144,40 @@ fn nvm(model: &Reconstruction) -> String {
     format!("{text}\n{}\n{points_text}", model.points.len())
 }
 
+#[test]
+fn pixels_that_count_from_elsewhere_are_told() {
+    let folder = with_wall();
+    let at = |path: &str| folder.path().join(path);
+    let model = colmap::read_model(&at("wall/sparse/0")).unwrap();
+    fs::remove_dir_all(at("wall/sparse")).unwrap();
+    let info = |[x, y]: [f64; 2]| {
+        let mut moved = model.clone();
+        let images = moved.images.values_mut();
+        for keypoint in images.flat_map(|image| &mut image.keypoints) {
+            keypoint.x += x;
+            keypoint.y += y;
+        }
+        fs::write(at("wall/model.nvm"), nvm(&moved)).unwrap();
+        lumigraph(folder.path(), "info wall").ok().stderr
+    };
+    let corner = "from the photos' corners, as COLMAP";
+    let misfit = "see the sparse points";
+    let usual = info([0.0, 0.0]);
+    assert!(
+        !usual.contains(corner) && !usual.contains(misfit),
+        "{usual}"
+    );
+    // From the corner of a photo of 96 × 72 they are read as they are meant.
+    let colmaps = info([48.0, 36.0]);
+    assert!(
+        colmaps.contains(corner) && !colmaps.contains(misfit),
+        "{colmaps}"
+    );
+    let wrong = info([-30.0, 30.0]);
+    let note = "note: photos see the sparse points 42 pixels (the median) from where";
+    assert!(wrong.contains(note) && !wrong.contains(corner), "{wrong}");
+}
+
 /// Of formats that leave sizes to the photos.
 #[test]
 fn photos_that_are_missing_or_corrupt_are_left_out_whatever_the_format() {

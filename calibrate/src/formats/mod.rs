@@ -38,7 +38,8 @@ use std::path::Path;
 
 /// Reads a calibration of a known format. `size_of` gives the size in pixels of the photo
 /// that a name in the file stands for, where the format leaves it to the photos;
-/// `photo_names` are the photos in their order, for a format that names none.
+/// `photo_names` are the photos in their order, for a format that names none. What had to be
+/// guessed is added to `notes`, for people.
 ///
 /// # Errors
 /// As the format's own reader.
@@ -47,11 +48,12 @@ pub fn read(
     path: &Path,
     size_of: SizeOf<'_>,
     photo_names: &[String],
+    notes: &mut Vec<String>,
 ) -> Result<Reconstruction, FormatError> {
     match format {
         Format::Transforms => read_transforms(path, size_of),
         Format::Bundler => read_bundler(path, size_of),
-        Format::Nvm => read_nvm(path, size_of),
+        Format::Nvm => read_nvm(path, size_of, notes),
         Format::Llff => read_llff(path, photo_names, size_of),
         Format::Meshroom => read_meshroom(path),
         Format::OpenMvg => read_openmvg(path),

@@ -3,7 +3,9 @@
 //! - A camera has x right, y down, z forward; its line is NAME f q_w q_x q_y q_z c_x c_y
 //!   c_z r 0, with q the rotation camera from world and c the centre in the world.
 //! - Pixels are relative to the image's centre, y down; SiftGPU, which measures them, puts
-//!   the first pixel's centre at (0.5, 0.5) as we do. Sizes are not stored.
+//!   the first pixel's centre at (0.5, 0.5) as we do. Sizes are not stored. COLMAP's
+//!   `model_converter` (3.8 does) writes them relative to the image's corner: the way that
+//!   fits the model is taken.
 //! - Distortion acts on the *measurement* (Wu, "Critical configurations for radial
 //!   distortion self-calibration", and PBA's `SetNormalizedMeasurementDistortion`): with d
 //!   the measured position over f, the undistorted one is u = d·(1 + r·|d|²):
@@ -25,16 +27,21 @@ const QUATERNION_TOLERANCE: f64 = 1e-3;
 
 /// Reads the first model of an `.nvm` file. Images and points are numbered from 0, as in
 /// the file; keypoints are in the order of the points that they observe. `size_of` is
-/// asked for every image.
+/// asked for every image. Where measurements do not count from the images' centres, `notes`
+/// say so.
 ///
 /// # Errors
 /// An unreadable file, another version, a quaternion that is no rotation, a camera
 /// without a lens, a photo of unknown size, two photos of one name.
-pub fn read_nvm(path: &Path, size_of: SizeOf<'_>) -> Result<Reconstruction, FormatError> {
-    parse_nvm(path, &build::read(path)?, size_of)
+pub fn read_nvm(
+    path: &Path,
+    size_of: SizeOf<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Reconstruction, FormatError> {
+    parse_nvm(path, &build::read(path)?, size_of, notes)
 }
 
-/// Reads the content of a file; `path` is only named in errors.
+/// Reads the content of a file; `path` is only named in errors and notes.
 ///
 /// # Errors
 /// As for [`read_nvm`].
@@ -42,6 +49,7 @@ pub fn parse_nvm(
     path: &Path,
     bytes: &[u8],
     size_of: SizeOf<'_>,
+    notes: &mut Vec<String>,
 ) -> Result<Reconstruction, FormatError> {
     let mut words = Words::new(path, build::text(path, bytes)?);
     let header = words.line().unwrap_or_default();
@@ -56,7 +64,40 @@ pub fn parse_nvm(
     for id in 0..point_count {
         read_point(&mut words, &mut builder, id, image_count)?;
     }
-    builder.finish("images")
+    let mut whole = builder.finish("images")?;
+    notes.extend(place_keypoints(path, &mut whole));
+    Ok(whole)
+}
+
+/// Moves measurements to where they count from, and says so where that is not as VisualSFM
+/// has it: from the images' corners if so they are less than half as far from what their
+/// points project to. The two ways are half an image apart.
+fn place_keypoints(path: &Path, whole: &mut Reconstruction) -> Option<String> {
+    let from_corner = whole.median_error_px();
+    let from_center = whole.median_error_px_from(principal);
+    if let (Some(corner_px), Some(center_px)) = (from_corner, from_center)
+        && corner_px < center_px / 2.0
+    {
+        return Some(format!(
+            "{}: measurements are taken to count from the photos' corners, as COLMAP writes \
+             them: they are {corner_px:.1} pixels from their points (the median), counted from \
+             the photos' centres {center_px:.1}",
+            path.display()
+        ));
+    }
+    for image in whole.images.values_mut() {
+        let origin = principal(&whole.cameras[&image.camera_id]);
+        for keypoint in &mut image.keypoints {
+            keypoint.x += origin.x;
+            keypoint.y += origin.y;
+        }
+    }
+    None
+}
+
+/// The principal point is the origin of measurements.
+fn principal(camera: &Camera) -> DVec2 {
+    DVec2::new(camera.params[2], camera.params[3])
 }
 
 /// The calibration that all cameras share, if the first line gives one: (fx, fy) and
@@ -181,9 +222,16 @@ fn read_point(
             let problem = format!("found image {image}, expected less than {image_count}");
             return Err(words.error(&of, Problem::broken(problem)));
         };
-        // The principal point is the origin of measurements.
-        let pixel = Pixel::new(camera.params[2] + x, camera.params[3] + y);
-        observations.push((ImageId(image), pixel));
+        // Finite measurements and principal points may still overflow together.
+        let pixel = principal(camera) + DVec2::new(x, y);
+        if !pixel.is_finite() {
+            let problem = format!(
+                "image {image} observes the point at ({}, {}), expected finite numbers",
+                pixel.x, pixel.y
+            );
+            return Err(words.error(&of, Problem::broken(problem)));
+        }
+        observations.push((ImageId(image), Pixel::new(x, y)));
     }
     let place = words.place(&of);
     builder.point(&place, Point3DId(id), position, color, &observations)

@@ -1,6 +1,6 @@
 use crate::broken::damage;
 use crate::captures::{capture, mean, reprojection_errors_px};
-use calibrate::formats::{FormatError, read_nvm};
+use calibrate::formats::{FormatError, parse_nvm, read_nvm};
 use calibrate::{ModelKind, Pixel, Reconstruction};
 use glam::DVec3;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn parse(model: &str) -> Result<Reconstruction, FormatError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.nvm");
     std::fs::write(&path, model).unwrap();
-    read_nvm(&path, &size_of)
+    read_nvm(&path, &size_of, &mut Vec::new())
 }
 
 fn error(from: &str, to: &str) -> String {
@@ -41,7 +41,9 @@ fn the_example_reprojects() {
         return;
     };
     let size_of = |_: &str| Some((2592, 1944));
-    let whole = read_nvm(&path, &size_of).unwrap();
+    let mut notes = Vec::new();
+    let whole = read_nvm(&path, &size_of, &mut notes).unwrap();
+    assert!(notes.is_empty(), "{notes:?}");
     assert_eq!((whole.images.len(), whole.points.len()), (22, 853));
     let mut errors = reprojection_errors_px(&whole);
     errors.sort_by(f64::total_cmp);
@@ -72,6 +74,34 @@ fn axes_names_and_pixels_are_visualsfm_s() {
         whole.cameras[&images[1].camera_id].model,
         ModelKind::Pinhole
     );
+}
+
+/// COLMAP 3.8 writes what VisualSFM counts from the photo's centre from its corner.
+#[test]
+fn measurements_from_the_corner_are_told_by_where_points_project_to() {
+    let read = |origin: [i32; 2]| {
+        let mut text = "NVM_V3\n\n1\na.jpg 100 1 0 0 0 0 0 0 0 0\n\n9\n".to_owned();
+        for i in -4..5 {
+            let (x, y) = (5 * i, 2 * i);
+            let [at_x, at_y] = [origin[0] + x, origin[1] + y];
+            text += &format!("{x} {y} 100 10 20 30 1 0 7 {at_x} {at_y}\n");
+        }
+        let mut notes = Vec::new();
+        let path = Path::new("a/model.nvm");
+        let whole = parse_nvm(path, text.as_bytes(), &size_of, &mut notes).unwrap();
+        (whole, notes)
+    };
+    let (from_center, notes) = read([0, 0]);
+    assert!(notes.is_empty(), "{notes:?}");
+    let (from_corner, notes) = read([30, 20]);
+    assert_eq!(from_corner, from_center);
+    let note = "a/model.nvm: measurements are taken to count from the photos' corners, as COLMAP \
+                writes them: they are 0.0 pixels from their points (the median), counted from \
+                the photos' centres 36.1";
+    assert_eq!(notes, [note]);
+    // Where neither fits, they count as VisualSFM has them.
+    let (_, notes) = read([300, 200]);
+    assert!(notes.is_empty(), "{notes:?}");
 }
 
 #[test]
@@ -125,6 +155,16 @@ fn a_centre_too_far_away_for_a_pose_is_told() {
         error.starts_with("line 4 (image 0, a b.jpg): the camera's centre is too far away"),
         "{error}"
     );
+}
+
+#[test]
+fn a_measurement_too_far_away_for_a_pixel_is_told() {
+    let text = MODEL
+        .replacen("NVM_V3", "NVM_V3 FixedK 90 1e308 91 22", 1)
+        .replacen("9.5 19", "1e308 19", 1);
+    let error = parse(&text).unwrap_err().to_string();
+    let expected = "line 8 (point 0): image 0 observes the point at (inf, 41), expected finite";
+    assert!(error.contains(expected), "{error}");
 }
 
 #[test]
@@ -184,6 +224,6 @@ fn errors_quote_only_the_beginning_of_long_lines() {
 fn damaged_files_are_refused() {
     let needed = MODEL.find("19\n0").unwrap() + 1;
     damage(MODEL.as_bytes(), needed, |path: &Path| {
-        read_nvm(path, &size_of)
+        read_nvm(path, &size_of, &mut Vec::new())
     });
 }

@@ -113,7 +113,7 @@ pub(crate) fn parse(sample: Sample, bytes: &[u8]) -> Result<Reconstruction, Stri
             files[sample as usize] = bytes;
             return colmap::parse_text(Path::new("model"), files).map_err(|e| e.to_string());
         }
-        Nvm | NvmFixed => formats::parse_nvm(path, bytes, &size_of),
+        Nvm | NvmFixed => formats::parse_nvm(path, bytes, &size_of, &mut Vec::new()),
         Bundler => {
             let list = (Path::new("list.txt"), bundle().0.as_bytes());
             formats::parse_bundler(path, bytes, list, &size_of)
