@@ -9,7 +9,9 @@
 //!   `camera_angle_x`, `camera_angle_y` in radians. What a frame says goes before what is
 //!   said for all. With only one of the two axes, pixels are square.
 //! - Distortion is OpenCV's; with `camera_model` OPENCV_FISHEYE or `is_fisheye` its
-//!   fisheye's. nerfstudio's r⁸ term of a lens that is no fisheye (`k4`) must be zero.
+//!   fisheye's. nerfstudio's r⁸ term of a lens that is no fisheye (`k4`) must be zero, and so
+//!   must `k5` and `k6` of all but FULL_OPENCV. `distortion_params`, a list of nerfstudio's in
+//!   the order k1 k2 k3 k4 p1 p2, goes before the single coefficients beside it.
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
@@ -157,11 +159,8 @@ impl<'a> Intrinsics<'a> {
 
     /// The model and the parameters that follow the focal lengths and the centre.
     fn lens(&self) -> Result<(ModelKind, Vec<f64>), FormatError> {
-        let mut c = [0.0; 8];
-        for (value, key) in c.iter_mut().zip(COEFFICIENTS) {
-            *value = self.number_or(key, 0.0)?;
-        }
-        let [k1, k2, p1, p2, k3, k4, ..] = c;
+        let c = self.coefficients()?;
+        let [k1, k2, p1, p2, k3, k4, k5, k6] = c;
         let nonzero = COEFFICIENTS.iter().zip(c).find(|(_, value)| *value != 0.0);
         let named = self.get("camera_model");
         let name = named.as_ref().map(|json| json.text()).transpose()?;
@@ -176,6 +175,12 @@ impl<'a> Intrinsics<'a> {
             None | Some("OPENCV" | "FULL_OPENCV" | "SIMPLE_RADIAL" | "RADIAL") => {
                 if name == Some("FULL_OPENCV") && c[5..] != [0.0; 3] {
                     return Ok((ModelKind::FullOpenCv, c.to_vec()));
+                }
+                if [k5, k6] != [0.0; 2] {
+                    return refuse(
+                        format!("k5 is {k5} and k6 is {k6}, which FULL_OPENCV alone has"),
+                        "set camera_model to FULL_OPENCV if it is one, or undistort the photos",
+                    );
                 }
                 if k4 != 0.0 {
                     return refuse(
@@ -222,7 +227,32 @@ impl<'a> Intrinsics<'a> {
                 undistort,
             );
         }
+        if [k5, k6] != [0.0; 2] {
+            return refuse(
+                format!("found a fisheye with k5 = {k5} and k6 = {k6}, expected none"),
+                undistort,
+            );
+        }
         Ok((ModelKind::OpenCvFisheye, vec![k1, k2, k3, k4]))
+    }
+
+    /// The coefficients, in the order of [`COEFFICIENTS`]; zero where nothing is said.
+    fn coefficients(&self) -> Result<[f64; 8], FormatError> {
+        for level in [self.frame, self.root] {
+            if let Some(list) = level.optional("distortion_params") {
+                let [k1, k2, k3, k4, p1, p2] = list.numbers()?;
+                return Ok([k1, k2, p1, p2, k3, k4, 0.0, 0.0]);
+            }
+            // A frame's own go before a list for all.
+            if COEFFICIENTS.iter().any(|key| level.optional(key).is_some()) {
+                break;
+            }
+        }
+        let mut c = [0.0; 8];
+        for (value, key) in c.iter_mut().zip(COEFFICIENTS) {
+            *value = self.number_or(key, 0.0)?;
+        }
+        Ok(c)
     }
 }
 

@@ -173,6 +173,62 @@ fn a_frame_s_own_intrinsics_go_first() {
     assert_eq!(used, [1, 2, 2], "equal cameras are one");
 }
 
+/// nerfstudio's order: k1 k2 k3 k4 p1 p2.
+#[test]
+fn distortion_comes_as_a_list_too() {
+    let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
+    let list = |numbers: &str| format!("{shared}, \"distortion_params\": {numbers}");
+    let plain = camera(&list("[0.1, 0.2, 0, 0, 0.01, 0.02]"));
+    assert_eq!(plain.model, ModelKind::OpenCv);
+    assert_eq!(plain.params[4..], [0.1, 0.2, 0.01, 0.02]);
+    let fisheye = list("[0.1, 0.2, 0.3, 0.4, 0, 0]") + r#", "camera_model": "OPENCV_FISHEYE""#;
+    assert_eq!(camera(&fisheye).params[4..], [0.1, 0.2, 0.3, 0.4]);
+    // Of one and the same level the list counts, as it does for nerfstudio.
+    let both = list("[0.1, 0.2, 0, 0, 0, 0]") + r#", "k1": 0.5, "k3": 0.5"#;
+    assert_eq!(camera(&both).params[4..], [0.1, 0.2, 0.0, 0.0]);
+
+    // What a frame says goes first, whichever way.
+    let own = |key: &str, name: &str| {
+        let frame = FRAME.replace("b c.jpg", name);
+        frame.replacen('{', &format!("{{{key},"), 1)
+    };
+    let with_list = own(r#""distortion_params": [0.3, 0, 0, 0, 0, 0]"#, "d.jpg");
+    let with_k1 = own(r#""k1": 0.4"#, "e.jpg");
+    let frames = format!("{FRAME}, {with_list}, {with_k1}");
+    let whole = parse(&list("[0.1, 0.2, 0, 0, 0, 0]"), &frames).unwrap();
+    let first: Vec<_> = whole.cameras.values().map(|c| &c.params[4..6]).collect();
+    assert_eq!(first, [[0.1, 0.2], [0.3, 0.0], [0.4, 0.0]]);
+
+    let short = error(&list("[0.1, 0.2, 0, 0]"), FRAME);
+    let expected = "distortion_params: found an array of 4, expected an array of 6";
+    assert!(short.starts_with(expected), "{short}");
+    let eighth = error(&list("[0.1, 0.2, 0, 0.4, 0, 0]"), FRAME);
+    assert!(eighth.contains("k4 is 0.4, an r⁸ term"), "{eighth}");
+}
+
+#[test]
+fn coefficients_that_a_model_lacks_are_refused() {
+    let with = |model: &str, terms: &str| {
+        format!(r#""w": 100, "h": 80, "fl_x": 90, "camera_model": "{model}", "k1": 0.1, {terms}"#)
+    };
+    let full = camera(&with("FULL_OPENCV", r#""k5": 0.5, "k6": 0.2"#));
+    assert_eq!(full.params[4..], [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.2]);
+    let zero = camera(&with("OPENCV", r#""k5": 0, "k6": 0.0"#));
+    assert_eq!(zero.model, ModelKind::OpenCv);
+    for model in ["OPENCV", "RADIAL", "SIMPLE_RADIAL"] {
+        assert_eq!(
+            error(&with(model, r#""k4": 0.3, "k5": 0.5"#), FRAME),
+            "camera_model: k5 is 0.5 and k6 is 0, which FULL_OPENCV alone has; set camera_model \
+             to FULL_OPENCV if it is one, or undistort the photos"
+        );
+    }
+    assert_eq!(
+        error(&with("OPENCV_FISHEYE", r#""k6": 0.2"#), FRAME),
+        "camera_model: found a fisheye with k5 = 0 and k6 = 0.2, expected none; undistort the \
+         photos and export them as PINHOLE"
+    );
+}
+
 #[test]
 fn errors_name_the_frame_and_a_remedy() {
     let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
