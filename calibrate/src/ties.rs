@@ -69,31 +69,36 @@ impl Reconstruction {
         }
 
         // 3. What each of the others shares with everyone else.
-        let weak = groups
-            .into_values()
-            .filter(|group| *group != largest)
-            .map(|group| {
-                let across = |point: &&crate::Point3D| {
-                    let inside = point
-                        .track
-                        .iter()
-                        .filter(|(id, _)| group.contains(id))
-                        .count();
-                    inside > 0 && inside < point.track.len()
-                };
-                let mut names: Vec<String> = group
-                    .iter()
-                    .map(|id| self.images[id].name.clone())
-                    .collect();
-                names.sort();
-                WeakGroup {
-                    names,
-                    shared_points: self.points.values().filter(across).count(),
-                }
-            });
-        let mut weak: Vec<WeakGroup> = weak.filter(|group| group.shared_points > 0).collect();
+        let across = self.points_across(&group_of);
+        let others = groups.into_iter().filter(|(_, group)| *group != largest);
+        let weak = others.filter_map(|(id, group)| {
+            let names = group.iter().map(|image| self.images[image].name.clone());
+            let mut names: Vec<String> = names.collect();
+            names.sort();
+            Some(WeakGroup {
+                names,
+                shared_points: *across.get(&id)?,
+            })
+        });
+        let mut weak: Vec<WeakGroup> = weak.collect();
         weak.sort_by(|a, b| a.names.cmp(&b.names));
         weak
+    }
+
+    /// How many points images of each group see that others see, too; groups without any are
+    /// left out. `group_of` has the group of each image.
+    fn points_across(&self, group_of: &BTreeMap<ImageId, ImageId>) -> BTreeMap<ImageId, usize> {
+        let mut across = BTreeMap::new();
+        for point in self.points.values() {
+            let seen_by = point.track.iter().map(|(image, _)| group_of.get(image));
+            let seen_by: BTreeSet<Option<&ImageId>> = seen_by.collect();
+            if seen_by.len() > 1 {
+                for group in seen_by.into_iter().flatten() {
+                    *across.entry(*group).or_default() += 1;
+                }
+            }
+        }
+        across
     }
 }
 
@@ -148,6 +153,26 @@ mod tests {
                 shared_points: 5
             }]
         );
+    }
+
+    /// A point counts once for each group that it ties to others, however many of the group see it.
+    #[test]
+    fn each_of_several_groups_has_its_own_points() {
+        let points: &[(&[u32], usize)] = &[
+            (&[0, 1, 2, 3, 4], 40),
+            (&[5, 6], 20),
+            (&[5, 6, 0, 1], 3),
+            (&[5, 7], 2),
+            (&[7, 4, 7], 4),
+            (&[7], 30),
+            (&[8], 30),
+        ];
+        let weak = reconstruction(9, points).weakly_tied(TRUSTED_TIE);
+        let found: Vec<(String, usize)> = weak
+            .iter()
+            .map(|group| (group.names.join(" "), group.shared_points))
+            .collect();
+        assert_eq!(found, [("f g".to_owned(), 5), ("h".to_owned(), 6)]);
     }
 
     #[test]

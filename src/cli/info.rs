@@ -7,7 +7,7 @@ use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, print_warni
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use super::surface::{proxy_json, proxy_text};
-use calibrate::{TRUSTED_TIE, colmap};
+use calibrate::{TRUSTED_TIE, WeakGroup, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
 use lumigraph::scene::{ImportOptions, Photo, Scene, SceneError, other_models};
@@ -55,15 +55,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.scene.strict {
         check_photos(&scene)?;
     }
-    let info = gather(&scene)?;
+    let weak = scene.reconstruction.weakly_tied(TRUSTED_TIE);
+    let info = gather(&scene, &weak)?;
     if args.json {
         return print_json(&info);
     }
     print(&text(&scene, &info))?;
-    for group in scene.reconstruction.weakly_tied(TRUSTED_TIE) {
+    for group in &weak {
         say!(
             "note: {}; what draws leaves them out, unless --keep-weak",
-            tie_text(&group)
+            tie_text(group)
         );
     }
     Ok(())
@@ -95,7 +96,7 @@ fn open(args: &Args) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-fn gather(scene: &Scene) -> anyhow::Result<Value> {
+fn gather(scene: &Scene, weak: &[WeakGroup]) -> anyhow::Result<Value> {
     let reconstruction = &scene.reconstruction;
     let mut cameras = Vec::new();
     let mut photo_bytes = 0.0;
@@ -151,7 +152,7 @@ fn gather(scene: &Scene) -> anyhow::Result<Value> {
             "range_s": [first, last],
         })),
         "left_out": scene.left_out,
-        "weakly_tied": reconstruction.weakly_tied(TRUSTED_TIE).iter().map(|group| json!({
+        "weakly_tied": weak.iter().map(|group| json!({
             "photos": group.names,
             "shared_points": group.shared_points,
         })).collect::<Vec<_>>(),
