@@ -146,6 +146,16 @@ pub enum ColmapError {
         /// Its model.
         model: ModelKind,
     },
+    /// A model was to be written beside the rigs or frames of another one.
+    #[error(
+        "{}: the file is of another model, and COLMAP 4 would read it with the one to be written \
+         and fail; choose another folder, or remove rigs and frames there first",
+        path.display()
+    )]
+    Rigs {
+        /// The file with them.
+        path: PathBuf,
+    },
     /// A text model was to be written where a binary one would be read in its stead.
     #[error(
         "{}: the folder already holds a binary model, which would be read instead of the text \

@@ -4,7 +4,8 @@
 //! `camera_from_world`, its quaternion scalar first; a keypoint's coordinates and the
 //! principal point put the first pixel's centre at (0.5, 0.5), as we do. Further files
 //! beside the three (`rigs`, `frames`, `project.ini`) are left alone: `images` carries
-//! every pose, in COLMAP's newest layout too.
+//! every pose, in COLMAP's newest layout too. Beside another model's rigs and frames none is
+//! written.
 //!
 //! ```no_run
 //! use calibrate::colmap;

@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// What [`read_model`](super::read_model) would refuse is refused here, before anything
 /// is written; so is a name with a line break or with white space at its ends, and a
-/// folder with a binary model, which would be read instead. Files that cannot be written.
+/// folder with a binary model, which would be read instead, or with `rigs.txt` or
+/// `frames.txt`. Files that cannot be written.
 pub fn write_text(reconstruction: &Reconstruction, folder: &Path) -> Result<(), ColmapError> {
     if find::format_in(folder) == Some(Format::Binary) {
         return Err(ColmapError::Hidden {
@@ -40,8 +41,8 @@ pub fn write_text(reconstruction: &Reconstruction, folder: &Path) -> Result<(), 
 ///
 /// # Errors
 /// What [`read_model`](super::read_model) would refuse is refused here, before anything
-/// is written; so is a name with a zero byte, and a camera of a model that COLMAP lacks.
-/// Files that cannot be written.
+/// is written; so is a name with a zero byte, a camera of a model that COLMAP lacks, and a
+/// folder with `rigs.bin` or `frames.bin`. Files that cannot be written.
 pub fn write_binary(reconstruction: &Reconstruction, folder: &Path) -> Result<(), ColmapError> {
     let mut cameras = reconstruction.cameras.iter();
     if let Some((id, camera)) = cameras.find(|(_, camera)| camera.model.colmap_id().is_none()) {
@@ -64,6 +65,9 @@ pub fn write_binary(reconstruction: &Reconstruction, folder: &Path) -> Result<()
     )
 }
 
+/// What COLMAP 4 writes beside the three files: they hold the ids of their own model's images and cameras.
+const FURTHER: [&str; 2] = ["rigs", "frames"];
+
 type WriteFile = fn(&Reconstruction, &mut dyn Write) -> io::Result<()>;
 
 fn write(
@@ -73,7 +77,7 @@ fn write(
     name_fits: impl Fn(&str) -> bool,
     write_files: [WriteFile; 3],
 ) -> Result<(), ColmapError> {
-    // 1. Refuse what could not be read again.
+    // 1. Refuse what could not be read again, here or by COLMAP.
     let files = format.files(folder);
     check::references(reconstruction, &files)?;
     for (id, image) in &reconstruction.images {
@@ -84,6 +88,11 @@ fn write(
                 name: image.name.clone(),
             });
         }
+    }
+
+    let further = FURTHER.map(|stem| folder.join(format!("{stem}.{}", format.extension())));
+    if let Some(path) = further.into_iter().find(|file| file.exists()) {
+        return Err(ColmapError::Rigs { path });
     }
 
     // 2. Write beside the final names.

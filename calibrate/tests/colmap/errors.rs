@@ -1,7 +1,7 @@
 //! What is refused, and in which words.
 
 use crate::synthetic::small;
-use calibrate::colmap::{parse_binary, read_model, write_binary, write_text};
+use calibrate::colmap::{ColmapError, parse_binary, read_model, write_binary, write_text};
 use calibrate::{CameraId, ImageId, Point3DId, Reconstruction};
 use proptest::prelude::*;
 use std::fs;
@@ -404,6 +404,30 @@ fn a_text_model_is_not_hidden_behind_a_binary_one() {
             folder.path().display()
         )
     );
+}
+
+/// COLMAP 4 cannot open three files of one model and rigs and frames of another.
+#[test]
+fn a_model_is_not_written_beside_the_rigs_of_another() {
+    type Write = fn(&Reconstruction, &Path) -> Result<(), ColmapError>;
+    let writes: [(&str, Write); 2] = [("bin", write_binary), ("txt", write_text)];
+    for (end, write) in writes {
+        for further in ["rigs", "frames"] {
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join(format!("{further}.{end}"));
+            fs::write(&file, "of another model").unwrap();
+            let error = write(&small(), folder.path()).unwrap_err().to_string();
+            let expected = format!(
+                "{}: the file is of another model, and COLMAP 4 would read it with the one to be \
+                 written and fail; choose another folder, or remove rigs and frames there first",
+                file.display()
+            );
+            assert_eq!(error, expected);
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+            fs::remove_file(&file).unwrap();
+            write(&small(), folder.path()).unwrap();
+        }
+    }
 }
 
 /// Older versions of COLMAP wrote records in any order.
