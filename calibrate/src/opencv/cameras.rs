@@ -3,7 +3,7 @@
 use super::OpenCvError;
 use super::coefficients::{coefficients_for, is_fisheye};
 use super::flat::{of_scalars, size};
-use super::storage::{Matrix, Value};
+use super::storage::{Matrix, Node, Value};
 use super::values::{Named, Role, Values, plain};
 use crate::{Camera, CameraError, Distortion, Lens};
 use glam::DVec2;
@@ -136,7 +136,7 @@ fn of_known_names(
         let Some((Role::CameraMatrix, side)) = &named.role else {
             continue;
         };
-        let Some(matrix) = named.node.matrix() else {
+        let Some(matrix) = folded(named.node) else {
             continue;
         };
         // Short names are often something else; a long one is meant.
@@ -225,6 +225,22 @@ fn of_matrix(
     })
 }
 
+/// A matrix. A plain list of nine numbers that is a camera matrix row by row, as in ROS's CameraInfo, is 3 × 3;
+/// what says of itself that it has another shape keeps that.
+fn folded(node: &Node) -> Option<Matrix> {
+    let matrix = node.matrix()?;
+    let is_list = matches!(node.value, Value::Sequence(_)) && matrix.rows == 1;
+    if is_list && matrix.cols == 9 && matrix.data[6..] == [0.0, 0.0, 1.0] {
+        let (rows, cols) = (3, 3);
+        return Some(Matrix {
+            rows,
+            cols,
+            ..matrix
+        });
+    }
+    Some(matrix)
+}
+
 /// What a camera matrix says, in OpenCV's pixels.
 struct Intrinsics {
     focal: DVec2,
@@ -234,7 +250,7 @@ struct Intrinsics {
 
 fn intrinsics(values: &Values<'_>, named: &Named<'_>) -> Result<Intrinsics, OpenCvError> {
     let refuse = |problem: String| Err(values.refuse(named, problem));
-    let Some(matrix) = named.node.matrix() else {
+    let Some(matrix) = folded(named.node) else {
         return refuse("no matrix, expected a 3 × 3 camera matrix".to_owned());
     };
     let m = &matrix.data;

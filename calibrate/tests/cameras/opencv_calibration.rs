@@ -264,6 +264,49 @@ fn a_fisheye_is_known_by_what_the_file_says() {
     );
 }
 
+/// As `rostopic echo` prints it, of ROS 1 and 2.
+#[test]
+fn camera_infos_of_ros_have_their_matrices_as_lists() {
+    let text = |k: &str, d: &str| {
+        format!(
+            "header:\n  seq: 1\n  frame_id: camera\nheight: 480\nwidth: 640\n\
+             distortion_model: \"plumb_bob\"\n{d}: [0.1, 0.02, 0.003, 0.004, 0.05]\n\
+             {k}: [{K}]\nR: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n\
+             P: [400, 0, 320, 0, 0, 400, 240, 0, 0, 0, 1, 0]\n\
+             roi:\n  x_offset: 0\n  height: 0\n  width: 0\n  do_rectify: False\n"
+        )
+    };
+    let asked = Keys {
+        camera_matrix: Some("K".to_owned()),
+        distortion: Some("D".to_owned()),
+        ..Keys::default()
+    };
+    let all = Keys::default();
+    for (text, keys) in [
+        (text("K", "D"), &all),
+        (text("k", "d"), &all),
+        (text("K", "D"), &asked),
+    ] {
+        let found = read_with(&text, keys).unwrap();
+        let [camera] = &found.cameras[..] else {
+            panic!("{:?}", found.cameras);
+        };
+        assert_eq!(camera.size, Some((640, 480)));
+        assert_eq!(camera.lens.focal, DVec2::new(500.0, 510.0));
+        assert_eq!(camera.lens.principal, DVec2::new(320.0, 240.0));
+        let five = Distortion::of_opencv(&[0.1, 0.02, 0.003, 0.004, 0.05]);
+        assert_eq!(Some(camera.lens.distortion()), five);
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+    }
+    // Nine numbers that are no camera matrix stay what they are.
+    let other = "camera_matrix: [1, 2, 3, 4, 5, 6, 7, 8, 9]\n";
+    let refused = error(other);
+    assert!(
+        refused.contains("the camera matrix is 1 × 9, expected 3 × 3"),
+        "{refused}"
+    );
+}
+
 #[test]
 fn a_fisheye_of_camodocals_has_its_terms_among_its_projection_parameters() {
     let text = "model_type: KANNALA_BRANDT\nprojection_parameters:\n   k2: 0.1\n   k3: 0.02\n   \
