@@ -92,10 +92,15 @@ pub(super) fn count_images(path: &Path, bytes: &[u8]) -> Option<u64> {
 /// Reads an image's second line: x, y and a point's id (−1 for none), again and again.
 fn read_keypoints(line: &Line<'_>) -> Result<Vec<Keypoint>, ColmapError> {
     let words = line.text.split_whitespace().count();
-    if !words.is_multiple_of(3) {
+    // A name of three words makes twelve.
+    if !words.is_multiple_of(3) || is_image(line) {
+        let found = match words % 3 {
+            0 => "an image".to_owned(),
+            _ => format!("{words} words"),
+        };
         return Err(line.malformed(format!(
-            "found {words} words, expected the keypoints of the image on the line before, three \
-             words each (an image without any has an empty second line)"
+            "found {found}, expected the keypoints of the image on the line before, three words \
+             each (an image without any has an empty second line)"
         )));
     }
     let mut fields = line.fields();
@@ -111,6 +116,14 @@ fn read_keypoints(line: &Line<'_>) -> Result<Vec<Keypoint>, ColmapError> {
         keypoints.push(line.accept(check::keypoint(index, x, y, point))?);
     }
     Ok(keypoints)
+}
+
+/// Whether a line is an image's first one: it begins with an id, and has the beginning of a name
+/// where the fourth keypoint would have a number.
+fn is_image(line: &Line<'_>) -> bool {
+    let mut words = line.text.split_whitespace();
+    let has_id = words.next().is_some_and(|id| id.parse::<u32>().is_ok());
+    has_id && words.nth(8).is_some_and(|x| x.parse::<f64>().is_err())
 }
 
 /// Reads `points3D.txt`.

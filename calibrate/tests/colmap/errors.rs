@@ -275,6 +275,28 @@ fn a_left_out_keypoint_line_is_explained() {
              before, three words each (an image without any has an empty second line){REMEDY}"
         )
     );
+    // A name of three words makes twelve, which four keypoints would have, too.
+    fs::write(
+        folder.path().join("images.txt"),
+        "3 1 0 0 0 0 0 0 1 a.jpg\n8 0.8 0.6 0 0 0 0 0 4 my second photo.jpg\n",
+    )
+    .unwrap();
+    assert_eq!(
+        error_of(folder.path()),
+        format!(
+            "images.txt, line 2: found an image, expected the keypoints of the image on the line \
+             before, three words each (an image without any has an empty second line){REMEDY}"
+        )
+    );
+    // Keypoints of which one is damaged are no image.
+    fs::write(
+        folder.path().join("images.txt"),
+        "3 1 0 0 0 0 0 0 1 a.jpg\n8 0.8 -1 0 0 -1 0 0 -1 1 2 x\n",
+    )
+    .unwrap();
+    let damaged = error_of(folder.path());
+    let expected = "images.txt, line 2: found \"x\", expected a point's id";
+    assert!(damaged.starts_with(expected), "{damaged}");
 }
 
 #[test]
