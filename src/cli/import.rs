@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// Make a scene of photos and their calibration, or of photos alone
 ///
 /// PHOTOS is a capture (a folder with `images/` and a COLMAP model in `sparse/0`, `sparse`,
-/// `dense/sparse` or itself, or else an OpenCV calibration with poses), or the photo folder
+/// `dense/sparse`, `colmap/sparse/0` or itself, or else an OpenCV calibration with poses), or the photo folder
 /// alone, with --calibration. Of `sparse/0`, `sparse/1` and so on, the model with the most photos
 /// is taken. Photos may lie in folders within, as one for each camera of a rig. They are not
 /// copied, except with --undistort.

@@ -1,4 +1,4 @@
-use super::{ColmapError, Format, Incomplete, binary, text};
+use super::{ColmapError, Format, Incomplete, binary, run, text};
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,10 @@ pub struct SubModel {
 }
 
 /// The folder that holds a capture's COLMAP model: the first of `sparse/0`, `sparse`,
-/// `dense/sparse`, `model`, `folder` itself and its `0` with all three files, binary or text.
+/// `dense/sparse`, `dense/0/sparse`, `model`, `folder` itself, its `0`, `colmap/sparse/0` and
+/// `colmap/sparse` with all three files, binary or text. Where `folder` is such a `dense`, its
+/// `0/sparse` comes after its `0`. A `colmap` that [`run`](super::run::run) works in is passed
+/// over: it may not be finished there.
 ///
 /// Where beside `0` there are further models (`1`, `2`, …), the one with the most images is
 /// taken, of equals the first; see [`side_by_side`].
@@ -26,40 +29,61 @@ pub fn find_model(folder: &Path) -> Result<PathBuf, ColmapError> {
             folder: folder.to_owned(),
         });
     }
-    let sparse = folder.join("sparse");
-    let places = [
-        sparse.clone(),
-        folder.join("dense").join("sparse"),
-        folder.join("model"),
-        folder.to_owned(),
-    ];
-    let found = largest(&sparse)
-        .or_else(|| {
-            let is_model = |place: &&PathBuf| format_in(place).is_some();
-            places.iter().find(is_model).cloned()
-        })
-        .or_else(|| largest(folder));
-    found.ok_or_else(|| {
-        let [first, last] = [sparse.as_path(), folder].map(|within| match numbered(within) {
-            models if models.is_empty() => vec![within.join("0")],
-            models => models,
-        });
-        no_model(folder, &[first, places.to_vec(), last].concat())
-    })
+    let places = places(folder);
+    let found = places.iter().find_map(|together| largest(together));
+    found.ok_or_else(|| no_model(folder, &places.concat()))
 }
 
-/// The models in the numbered folders of which `model` is one, by their numbers, itself among
-/// them; none where `model` is in no such folder.
-pub fn side_by_side(model: &Path) -> Vec<SubModel> {
-    let all = model.parent().map(complete).unwrap_or_default();
-    if !all.iter().any(|other| other == model) {
-        return Vec::new();
+/// Where a capture's model may be, in order; of several places together the largest is taken.
+fn places(folder: &Path) -> Vec<Vec<PathBuf>> {
+    let dense = folder.join("dense");
+    let colmap = folder.join("colmap");
+    let or_first = |models: Vec<PathBuf>, first: PathBuf| match models {
+        models if models.is_empty() => vec![first],
+        models => models,
+    };
+    let models = |within: &Path| or_first(numbered(within), within.join("0"));
+    let undistorted_models =
+        |within: &Path| or_first(undistorted(within), within.join("0").join("sparse"));
+    let mut places = vec![
+        models(&folder.join("sparse")),
+        vec![folder.join("sparse")],
+        vec![dense.join("sparse")],
+        undistorted_models(&dense),
+        vec![folder.join("model")],
+        vec![folder.to_owned()],
+        models(folder),
+    ];
+    // In any other folder numbered ones may be captures that have nothing to do with each other.
+    if std::path::absolute(folder).is_ok_and(|folder| folder.ends_with("dense")) {
+        places.push(undistorted_models(folder));
     }
+    if !run::is_work(&colmap) {
+        let sparse = colmap.join("sparse");
+        places.extend([models(&sparse), vec![sparse]]);
+    }
+    places
+}
+
+/// The models in the numbered folders of which `model` is in one, or is one, by their numbers,
+/// itself among them; none where `model` is in no such folder.
+pub fn side_by_side(model: &Path) -> Vec<SubModel> {
+    let above = model.parent();
+    let families = [
+        above.map(numbered),
+        above.and_then(Path::parent).map(undistorted),
+    ];
+    let complete = |mut models: Vec<PathBuf>| {
+        models.retain(|place| format_in(place).is_some());
+        models
+    };
+    let mut families = families.into_iter().flatten().map(complete);
+    let all = families.find(|all| all.iter().any(|other| other == model));
     let counted = |folder: PathBuf| SubModel {
         images: count_images(&folder),
         folder,
     };
-    all.into_iter().map(counted).collect()
+    all.into_iter().flatten().map(counted).collect()
 }
 
 /// The folders within one that are called by numbers, in the order of these.
@@ -77,25 +101,27 @@ fn numbered(folder: &Path) -> Vec<PathBuf> {
     found.into_iter().map(|(_, path)| path).collect()
 }
 
-/// Those that hold a complete model.
-fn complete(folder: &Path) -> Vec<PathBuf> {
-    let mut found = numbered(folder);
-    found.retain(|place| format_in(place).is_some());
-    found
+/// Where COLMAP's reconstructor leaves the models of photos that it undistorted, of each model's
+/// in a numbered folder.
+fn undistorted(folder: &Path) -> Vec<PathBuf> {
+    let numbered = numbered(folder).into_iter();
+    numbered.map(|folder| folder.join("sparse")).collect()
 }
 
-/// The one of them with the most images, of equals the first.
-fn largest(folder: &Path) -> Option<PathBuf> {
-    let found = complete(folder);
+/// Of these places that with the model of the most images, of equals the first.
+fn largest(together: &[PathBuf]) -> Option<PathBuf> {
+    let is_model = |place: &&PathBuf| format_in(place).is_some();
+    let found: Vec<&PathBuf> = together.iter().filter(is_model).collect();
     // One alone need not be read.
-    if let [only] = found.as_slice() {
+    if let [only] = found[..] {
         return Some(only.clone());
     }
     // The last of equals is taken.
-    found
+    let largest = found
         .into_iter()
         .rev()
-        .max_by_key(|model| count_images(model))
+        .max_by_key(|model| count_images(model));
+    largest.cloned()
 }
 
 /// How many images the model in a folder has, from as little of it as tells.

@@ -8,7 +8,17 @@ use std::path::PathBuf;
 fn the_usual_places_are_tried_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
-    for place in ["", "model", "dense/sparse", "sparse", "sparse/0"] {
+    for place in [
+        "colmap/sparse",
+        "colmap/sparse/0",
+        "0",
+        "",
+        "model",
+        "dense/0/sparse",
+        "dense/sparse",
+        "sparse",
+        "sparse/0",
+    ] {
         let place = root.join(place);
         write_text(&small(), &place).unwrap();
         let found = find_model(root).unwrap();
@@ -25,9 +35,44 @@ fn no_model_says_where_it_looked_and_what_is_missing() {
     let error = find_model(root).unwrap_err().to_string();
     let expected = "ROOT: no COLMAP model here; looked for cameras, images and points3D (all \
         three as .bin or all three as .txt) in ROOT/sparse/0, ROOT/sparse, ROOT/dense/sparse, \
-        ROOT/model, ROOT, ROOT/0; ROOT/sparse/0 lacks points3D.bin; give the folder that holds the three \
+        ROOT/dense/0/sparse, ROOT/model, ROOT, ROOT/0, ROOT/colmap/sparse/0, ROOT/colmap/sparse; \
+        ROOT/sparse/0 lacks points3D.bin; give the folder that holds the three \
         files, or make them with `colmap mapper` or `colmap model_converter`";
     assert_eq!(error.replace(&*root.to_string_lossy(), "ROOT"), expected);
+}
+
+/// As `colmap automatic_reconstructor` leaves them.
+#[test]
+fn undistorted_models_are_found_from_around_and_from_within() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let dense = root.join("dense");
+    let at = |number: u32| dense.join(number.to_string()).join("sparse");
+    let whole = small();
+    let part = whole.without_images(&BTreeSet::from(["a.jpg".to_owned()]));
+    write_binary(&part, &at(0)).unwrap();
+    write_binary(&whole, &at(1)).unwrap();
+    for given in ["", "dense", "dense/1"] {
+        let found = find_model(&root.join(given)).unwrap();
+        assert_eq!(found.components().as_path(), at(1));
+    }
+    let models = side_by_side(&at(1)).into_iter();
+    let counts: Vec<(PathBuf, Option<u64>)> = models.map(|m| (m.folder, m.images)).collect();
+    assert_eq!(counts, [(at(0), Some(1)), (at(1), Some(2))]);
+
+    // Elsewhere numbered folders are captures of their own.
+    fs::rename(&dense, root.join("houses")).unwrap();
+    assert!(find_model(&root.join("houses")).is_err());
+}
+
+#[test]
+fn what_a_run_of_ours_works_on_is_no_model_yet() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    write_binary(&small(), &root.join("colmap/sparse/0")).unwrap();
+    assert_eq!(find_model(root).unwrap(), root.join("colmap/sparse/0"));
+    fs::write(root.join("colmap/run.json"), "{}").unwrap();
+    assert!(find_model(root).is_err());
 }
 
 #[test]

@@ -126,3 +126,8 @@ pub fn run(
     }
     outcome::read(photos, work)
 }
+
+/// Whether a folder is one that [`run`] works in, finished or not.
+pub(super) fn is_work(folder: &Path) -> bool {
+    record::is_kept_in(folder)
+}

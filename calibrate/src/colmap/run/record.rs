@@ -47,6 +47,11 @@ struct File {
     finished: Vec<Step>,
 }
 
+/// Whether a folder is one that runs work in.
+pub(super) fn is_kept_in(folder: &Path) -> bool {
+    folder.join(FILE).is_file()
+}
+
 /// Whether all that a folder holds is called as what runs leave there.
 fn holds_only_a_runs(work: &Path) -> io::Result<bool> {
     let logs = Step::ALL.map(Step::log);
