@@ -30,7 +30,9 @@ pub use beside::{
 pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
 pub use exif::{Exif, read_exif};
-pub use photo_set::{PhotoFile, PhotoSet, find_photos_folder, find_photos_within};
+pub use photo_set::{
+    PhotoFile, PhotoSet, find_photos_folder, find_photos_within, has_photo_extension,
+};
 pub use resize::{reduced_size, resize, resize_mask};
 pub use sequence::is_sequence;
 pub use times::{

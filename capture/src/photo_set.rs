@@ -160,11 +160,16 @@ fn is_hidden(path: &Path) -> bool {
 
 /// Whether a name is a photo's: visible, with one of the extensions.
 fn is_photo(path: &Path) -> bool {
+    !is_hidden(path) && has_photo_extension(path)
+}
+
+/// Whether a name ends in what photos' names may end in: `.jpg`, `.jpeg` or `.png`, in any case.
+pub fn has_photo_extension(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str());
     let known = |extension: &str| {
         EXTENSIONS
             .iter()
             .any(|known| extension.eq_ignore_ascii_case(known))
     };
-    !is_hidden(path) && extension.is_some_and(known)
+    extension.is_some_and(known)
 }

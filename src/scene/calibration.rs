@@ -2,11 +2,12 @@
 
 pub(super) use super::source::{Source, find};
 
+use super::listed::Listed;
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::Reconstruction;
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
-use capture::{PhotoFile, PhotoSet, find_photos_folder, photo_size};
+use capture::{PhotoSet, find_photos_folder, photo_size};
 use std::cell::{Cell, OnceCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -26,8 +27,9 @@ pub(super) fn read_other(
         let mut sizes = photos.photos.iter().map(|photo| photo_size(&photo.path));
         *some_size.get_or_init(|| sizes.find_map(Result::ok).unwrap_or((1, 1)))
     };
-    let size_of = |listed: &str| {
-        let photo = photos.find(&photo_of(listed, photos));
+    let listed = Listed::of(photos);
+    let size_of = |path: &str| {
+        let photo = listed.photo(path);
         let own = photo.and_then(|photo| photo_size(&photo.path).ok());
         Some(own.unwrap_or_else(any_size))
     };
@@ -37,7 +39,7 @@ pub(super) fn read_other(
     warnings.extend(notes.into_iter().map(Warning::Note));
     let mut named = BTreeSet::new();
     for image in whole.images.values_mut() {
-        let mut name = photo_of(&image.name, photos);
+        let mut name = listed.name(&image.name);
         // The paths of photos that are missing may end alike.
         if photos.find(&name).is_none() && named.contains(&name) {
             name = image.name.trim_start_matches('/').to_owned();
@@ -73,12 +75,11 @@ pub enum Sizes {
 pub fn read_bare(format: Format, path: &Path) -> Result<(Reconstruction, Sizes), SceneError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let photos = find_photos_folder(folder).and_then(|photos| PhotoSet::open(&photos).ok());
+    let listed = photos.as_ref().map(Listed::of);
     let sizes = Cell::new(Sizes::Known);
-    let size_of = |listed: &str| {
-        let size = photos.as_ref().and_then(|photos| {
-            let photo = photos.find(&photo_of(listed, photos))?;
-            photo_size(&photo.path).ok()
-        });
+    let size_of = |path: &str| {
+        let photo = listed.as_ref().and_then(|listed| listed.photo(path));
+        let size = photo.and_then(|photo| photo_size(&photo.path).ok());
         // LLFF's file has a size of its own.
         if size.is_none() && format != Format::Llff {
             sizes.set(Sizes::Unknown);
@@ -136,13 +137,8 @@ pub(super) fn read_opencv(
 
     // 2. Their photos.
     let names = photo_names(&calibration, count, path, photos, warnings).map_err(refuse)?;
-    let named: BTreeSet<&String> = names.iter().collect();
-    if named.len() < names.len() {
-        let twice = names
-            .iter()
-            .enumerate()
-            .find(|(i, name)| names[..*i].contains(name));
-        let twice = twice.map_or("", |(_, name)| name);
+    let mut named = BTreeSet::new();
+    if let Some(twice) = names.iter().find(|name| !named.insert(*name)) {
         return Err(refuse(format!(
             "poses, but the list of photos names {twice} twice; expected a photo for each of {count} poses"
         )));
@@ -178,8 +174,9 @@ fn photo_names(
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<String>, String> {
     if calibration.image_names.len() == count {
+        let listed = Listed::of(photos);
         let names = calibration.image_names.iter();
-        return Ok(names.map(|listed| photo_of(listed, photos)).collect());
+        return Ok(names.map(|path| listed.name(path)).collect());
     }
     if photos.photos.len() != count {
         return Err(format!(
@@ -200,28 +197,4 @@ fn photo_names(
         .iter()
         .map(|photo| photo.name.clone())
         .collect())
-}
-
-/// The photo that a list calls by a path of whoever calibrated: the one whose name, with
-/// or without its extension, is the longest end of that path. Where there is none, the
-/// path's own end.
-pub(super) fn photo_of(listed: &str, photos: &PhotoSet) -> String {
-    let listed = listed.replace('\\', "/");
-    let mut rest = listed.as_str();
-    loop {
-        let stem_is = |photo: &&PhotoFile| {
-            let stem = photo.name.rsplit_once('.').map_or("", |(stem, _)| stem);
-            stem == rest
-        };
-        if let Some(photo) = photos
-            .find(rest)
-            .or_else(|| photos.photos.iter().find(stem_is))
-        {
-            return photo.name.clone();
-        }
-        match rest.split_once('/') {
-            Some((_, shorter)) => rest = shorter,
-            None => return rest.to_owned(),
-        }
-    }
 }

@@ -17,6 +17,7 @@ mod exposure;
 pub mod file;
 mod fit;
 mod import;
+mod listed;
 mod lumigraph;
 mod meant;
 mod misfit;

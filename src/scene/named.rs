@@ -1,6 +1,7 @@
 //! Masks and depth maps that the calibration names.
 
-use super::calibration::{Source, photo_of};
+use super::calibration::Source;
+use super::listed::Listed;
 use super::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, Warning};
 use calibrate::formats::{self, FilesBeside, Format};
 use capture::{Beside, CaptureError, PhotoSet, check_beside};
@@ -26,9 +27,10 @@ impl Scene {
             points,
             applied_scale,
         } = formats::read_files_beside(file)?;
+        let listed = Listed::of(found);
         let by_photo = |named: BTreeMap<String, PathBuf>| -> BTreeMap<String, PathBuf> {
             let named = named.into_iter();
-            named.map(|(n, path)| (photo_of(&n, found), path)).collect()
+            named.map(|(n, path)| (listed.name(&n), path)).collect()
         };
         let mut note = |text: String| {
             let file = file.display();
