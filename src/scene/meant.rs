@@ -17,13 +17,15 @@ pub(super) struct Meant {
 
 impl Meant {
     /// Looks for the photos of all names that none of those `found` has. Names that lead to one past other
-    /// folders, as `../images/a.jpg`, become the photo's own.
+    /// folders, as `../images/a.jpg`, become the photo's own, and so do those that all begin in a folder
+    /// around the photos', as `images/a.jpg` do.
     ///
     /// A photo is meant where its name and the calibration's are the only ones that differ in letters'
     /// case or in how their marks are written alone, or else in what they end in, too, and it is as large
     /// as was calibrated.
     pub(super) fn of(whole: &mut Reconstruction, found: &PhotoSet) -> Self {
         name_directly(whole, found);
+        name_from_within(whole, found);
         // 1. Names without a photo, and photos without a name.
         let sizes = whole.images.values().map(|image| {
             let camera = &whole.cameras[&image.camera_id];
@@ -140,4 +142,37 @@ fn name_directly(whole: &mut Reconstruction, found: &PhotoSet) {
             image.name = own.to_owned();
         }
     }
+}
+
+/// Shortens names that all begin in one of the folders around the photos, where COLMAP was given that: in the
+/// folder `images`, `images/a.jpg` is `a.jpg`.
+fn name_from_within(whole: &mut Reconstruction, found: &PhotoSet) {
+    let Some(start) = start_outside(whole, found) else {
+        return;
+    };
+    for image in whole.images.values_mut() {
+        image.name.drain(..start.len());
+    }
+}
+
+/// What all names begin with that leads to the photos' folder from one around it; `None` unless with it none is
+/// found, and without it some are.
+fn start_outside(whole: &Reconstruction, found: &PhotoSet) -> Option<String> {
+    let images = whole.images.values();
+    let names: Vec<&str> = images.map(|image| image.name.as_str()).collect();
+    let is_found = |name: &str| found.find(name).is_some();
+    if names.iter().any(|name| is_found(name)) {
+        return None;
+    }
+    let root = std::path::absolute(&found.root).ok()?;
+    let mut start = String::new();
+    for folder in root.iter().rev() {
+        start.insert_str(0, &format!("{}/", folder.to_str()?));
+        let rests = names.iter().map(|name| name.strip_prefix(start.as_str()));
+        let rests: Option<Vec<&str>> = rests.collect();
+        if rests.is_some_and(|rests| rests.into_iter().any(is_found)) {
+            return Some(start);
+        }
+    }
+    None
 }

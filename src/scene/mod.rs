@@ -30,6 +30,8 @@ mod silhouettes;
 mod source;
 mod split;
 mod store;
+#[cfg(test)]
+mod tests;
 mod times;
 mod trial;
 mod truth;
