@@ -114,14 +114,16 @@ impl Photo {
 
 impl Scene {
     /// Gives the photos the masks, mattes and depth maps asked for, and those that lie in
-    /// the capture's `masks` and `depth`.
+    /// the `masks` and `depth` of the folder that the photos are at home in. Folders are given as they are, or
+    /// as the capture's own.
     pub(super) fn find_beside(
         &mut self,
-        capture: &Path,
+        home: &Path,
         options: &ImportOptions,
         warnings: &mut Vec<Warning>,
     ) -> Result<(), SceneError> {
-        let within = |name: &str| Some(capture.join(name)).filter(|folder| folder.is_dir());
+        let within = |name: &str| Some(home.join(name)).filter(|folder| folder.is_dir());
+        let capture = self.capture.as_deref().unwrap_or(home);
         let given = |folder: &Option<PathBuf>| folder.as_ref().map(|f| folder_of(capture, f));
         let mattes = given(&options.mattes).transpose()?;
         let masks = match given(&options.masks).transpose()? {

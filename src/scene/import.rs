@@ -3,6 +3,7 @@
 use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
+use super::home::{home_of, note_of_home};
 use super::meant::Meant;
 use super::misfit;
 use super::times::{TimeSource, set_times};
@@ -68,7 +69,8 @@ const MOVED: &str = "photos stay where they are, and a scene says how to get the
                      them or the scene back, or import them again";
 
 impl Scene {
-    /// Imports a capture, a folder of photos with a calibration in it or beside it.
+    /// Imports a capture, a folder of photos with a calibration in it or beside it. Where COLMAP's model of
+    /// photos that it undistorted is taken, the photos are those, which lie beside it.
     ///
     /// Every photo's size is compared with its camera's, and those of masks, mattes and depth
     /// maps with their photos', from the files' headers. Photos get times where some are to be
@@ -93,7 +95,9 @@ impl Scene {
         let source = calibration::find(capture, options, &mut warnings)?;
 
         // 2. The photos, matched by name.
-        let found = Self::photos_of(capture)?;
+        let home = home_of(&source, capture);
+        warnings.extend(note_of_home(&source, capture, &home));
+        let found = Self::photos_of(&home)?;
         let mut reconstruction = match &source {
             Source::Colmap(model) => colmap::read_model(model)?,
             // OpenCV may leave it to the photos which is which.
@@ -138,7 +142,7 @@ impl Scene {
         warnings.extend(scene.leave_out_unusable(options.strict, &meant.near)?);
 
         // 4. What lies beside them.
-        scene.find_beside(capture, options, &mut warnings)?;
+        scene.find_beside(&home, options, &mut warnings)?;
         scene.find_named(&source, &found, options, &mut warnings)?;
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);

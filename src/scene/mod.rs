@@ -16,6 +16,7 @@ mod error;
 mod exposure;
 pub mod file;
 mod fit;
+mod home;
 mod import;
 mod listed;
 mod lumigraph;

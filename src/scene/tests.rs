@@ -4,7 +4,7 @@ use super::{ImportOptions, Scene, SceneError};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3, colmap};
 use image::RgbImage;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (8, 6);
@@ -95,4 +95,60 @@ fn names_may_begin_in_a_folder_around_the_photos() {
         error.contains("a.png is called so in another folder"),
         "{error}"
     );
+}
+
+#[test]
+fn photos_that_colmap_undistorted_are_those_of_the_model_beside_them() {
+    let captures = Captures::new();
+    let names = ["a.png", "b.png"];
+    // Its own size, so that others would be refused.
+    captures.photos("wall/dense/images", &names, SIZE);
+    captures.model("wall/dense/sparse", &names);
+    let folder_of = |scene: &Scene| {
+        let folder = scene.photos[0].path.parent().unwrap();
+        let folder = folder.strip_prefix(captures.at("wall")).unwrap();
+        folder.to_owned()
+    };
+    for capture in ["wall", "wall/dense"] {
+        let (scene, said) = captures.import(capture);
+        assert_eq!(folder_of(&scene), Path::new("dense/images"));
+        assert!(said.is_empty(), "{said:?}");
+    }
+
+    // What lies beside the originals is not theirs.
+    captures.photos("wall/images", &names, (9, 7));
+    captures.photos("wall/masks", &names, (9, 7));
+    let (scene, said) = captures.import("wall");
+    assert_eq!(folder_of(&scene), Path::new("dense/images"));
+    let note = "the photos are those in ROOT/wall/dense/images, beside their COLMAP model; not used: \
+                ROOT/wall/images, ROOT/wall/masks";
+    assert_eq!(said, [note]);
+
+    // Those that are given are used, aloud.
+    captures.photos("others", &names, SIZE);
+    let options = ImportOptions {
+        calibration: Some(captures.at("wall/dense")),
+        ..ImportOptions::default()
+    };
+    let (scene, warnings) = Scene::import(&captures.at("others"), &options).unwrap();
+    assert_eq!(scene.photos[0].path, captures.at("others/a.png"));
+    let said = warnings[0].to_string();
+    assert!(
+        said.contains("and may be of those: `lumigraph import "),
+        "{said}"
+    );
+
+    // Of each model's photos in a numbered folder.
+    captures.model("wall/dense/3/sparse", &names);
+    captures.photos("wall/dense/3/images", &names, SIZE);
+    fs::remove_dir_all(captures.at("wall/dense/sparse")).unwrap();
+    for capture in ["wall", "wall/dense", "wall/dense/3"] {
+        let (scene, _) = captures.import(capture);
+        assert_eq!(folder_of(&scene), Path::new("dense/3/images"));
+    }
+
+    // A model of the photos as they were goes first.
+    captures.model("wall/sparse/0", &names);
+    let error = captures.try_import("wall").unwrap_err().to_string();
+    assert!(error.contains("wall/images/a.png"), "{error}");
 }
