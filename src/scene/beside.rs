@@ -1,5 +1,6 @@
 //! What lies beside the photos: masks, mattes and depth maps, found by name and checked.
 
+use super::meant::Meant;
 use super::undistort::{MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, Warning};
 use capture::{
@@ -115,10 +116,11 @@ impl Photo {
 impl Scene {
     /// Gives the photos the masks, mattes and depth maps asked for, and those that lie in
     /// the `masks` and `depth` of the folder that the photos are at home in. Folders are given as they are, or
-    /// as the capture's own.
+    /// as the capture's own. What is called like the file that is `meant` by a photo's name is that photo's, too.
     pub(super) fn find_beside(
         &mut self,
         home: &Path,
+        meant: &Meant,
         options: &ImportOptions,
         warnings: &mut Vec<Warning>,
     ) -> Result<(), SceneError> {
@@ -145,7 +147,7 @@ impl Scene {
             (Beside::DepthMap, depth, options.depth.is_some()),
         ] {
             if let Some(folder) = folder {
-                self.attach(kind, &folder, asked, options, warnings)?;
+                self.attach(kind, &folder, asked, meant, options, warnings)?;
             }
         }
         Ok(())
@@ -157,6 +159,7 @@ impl Scene {
         kind: Beside,
         folder: &Path,
         asked: bool,
+        meant: &Meant,
         options: &ImportOptions,
         warnings: &mut Vec<Warning>,
     ) -> Result<(), SceneError> {
@@ -165,13 +168,14 @@ impl Scene {
         let names = photos.chain(&self.left_out);
         let names: Vec<&str> = names.map(String::as_str).collect();
         let total = self.photos.len();
-        let mut matched = match match_by_name(folder, &names) {
+        let by_name = meant.matched(&names, |names| match_by_name(folder, names));
+        let mut matched = match by_name {
             // An empty folder that nobody mentioned is none.
             Err(CaptureError::NoPhotos { .. }) if !asked => return Ok(()),
             matched => matched?,
         };
         if matched.by_photo.is_empty() {
-            matched = jpegs(kind, folder, &names, warnings).unwrap_or(matched);
+            matched = jpegs(kind, folder, &names, meant, warnings).unwrap_or(matched);
         }
         let Matched {
             mut by_photo,
@@ -324,10 +328,12 @@ fn jpegs(
     kind: Beside,
     folder: &Path,
     names: &[&str],
+    meant: &Meant,
     warnings: &mut Vec<Warning>,
 ) -> Option<Matched> {
     // What two photos could claim is none's.
-    let matched = match_jpegs_by_name(folder, names).ok()?;
+    let matched = meant.matched(names, |names| match_jpegs_by_name(folder, names));
+    let matched = matched.ok()?;
     let (example, _) = matched.by_photo.first_key_value()?;
     let is_mask = |file: &PathBuf| is_black_and_white(file).unwrap_or(false);
     let why = match kind {

@@ -6,7 +6,8 @@ use super::file::{Extra, Settings};
 use super::home::{home_of, note_of_home};
 use super::meant::Meant;
 use super::misfit;
-use super::times::{TimeSource, set_times};
+use super::named::Named;
+use super::times::{Clues, TimeSource, set_times};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
@@ -129,20 +130,19 @@ impl Scene {
                 example: example.name.clone(),
             });
         }
-        set_times(
-            &mut scene.photos,
+        let clues = Clues {
             capture,
-            &options.times,
-            &found,
-            &mut warnings,
-        )?;
+            found: &found,
+            meant: &meant,
+        };
+        set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
 
         // 3. Are they what was calibrated?
         warnings.extend(misfit::of(&scene.reconstruction));
         warnings.extend(scene.leave_out_unusable(options.strict, &meant.near)?);
 
         // 4. What lies beside them.
-        scene.find_beside(&home, options, &mut warnings)?;
+        scene.find_beside(&home, &meant, options, &mut warnings)?;
         scene.find_named(&source, &found, options, &mut warnings)?;
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);

@@ -2,7 +2,7 @@
 
 use super::Warning;
 use calibrate::Reconstruction;
-use capture::{PhotoFile, PhotoSet, name_key, photo_size, stem_key};
+use capture::{CaptureError, Matched, PhotoFile, PhotoSet, name_key, photo_size, stem_key};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -84,6 +84,40 @@ impl Meant {
         let Self { photos, near } = &mut meant;
         near.retain(|name, _| !photos.contains_key(name));
         meant
+    }
+
+    /// What belongs to photos, as `matching` finds it by names: by the calibration's, or else by that of the
+    /// file that is meant.
+    pub(super) fn matched(
+        &self,
+        names: &[&str],
+        matching: impl Fn(&[&str]) -> Result<Matched, CaptureError>,
+    ) -> Result<Matched, CaptureError> {
+        let mut matched = matching(names)?;
+        let mut open: BTreeMap<&str, &str> = BTreeMap::new();
+        for (name, file) in &self.photos {
+            if !matched.by_photo.contains_key(name) {
+                open.insert(&file.name, name);
+            }
+        }
+        if open.is_empty() {
+            return Ok(matched);
+        }
+        let files: Vec<&str> = open.keys().copied().collect();
+        let Matched {
+            by_photo,
+            unmatched,
+        } = matching(&files)?;
+        let taken: BTreeSet<PathBuf> = matched.by_photo.values().cloned().collect();
+        for (file, path) in by_photo {
+            if !taken.contains(&path) {
+                let name = open[file.as_str()].to_owned();
+                matched.by_photo.insert(name, path);
+            }
+        }
+        let unmatched: BTreeSet<String> = unmatched.into_iter().collect();
+        matched.unmatched.retain(|name| unmatched.contains(name));
+        Ok(matched)
     }
 
     /// What to say of photos that are used under another name, if there are any.

@@ -2,7 +2,7 @@
 
 use super::{ImportOptions, Scene, SceneError};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3, colmap};
-use image::RgbImage;
+use image::{GrayImage, Luma, RgbImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -151,4 +151,54 @@ fn photos_that_colmap_undistorted_are_those_of_the_model_beside_them() {
     captures.model("wall/sparse/0", &names);
     let error = captures.try_import("wall").unwrap_err().to_string();
     assert!(error.contains("wall/images/a.png"), "{error}");
+}
+
+#[test]
+fn photos_called_otherwise_keep_what_is_called_like_their_files() {
+    let captures = Captures::new();
+    captures.photos("wall/images", &["a.png", "b.png"], SIZE);
+    captures.model("wall/sparse/0", &["a.jpg", "b.jpg"]);
+    let times = |text: &str| fs::write(captures.at("wall/times.csv"), text).unwrap();
+    let masks_of = |scene: &Scene| -> Vec<PathBuf> {
+        let masks = scene.photos.iter().filter_map(|p| p.ignore_mask.as_ref());
+        let name = |mask: &PathBuf| PathBuf::from(mask.file_name().unwrap());
+        masks.map(name).collect()
+    };
+    let times_of =
+        |scene: &Scene| -> Vec<Option<f64>> { scene.photos.iter().map(|p| p.time_s).collect() };
+
+    // Like the files; one that is like the calibration's name goes first.
+    for name in ["a.png.png", "b.png.png", "b.jpg.png"] {
+        let path = captures.room_for(&format!("wall/masks/{name}"));
+        GrayImage::from_pixel(SIZE.0, SIZE.1, Luma([255]))
+            .save(path)
+            .unwrap();
+    }
+    times("a.png,3\nb.jpg,5\n");
+    let (scene, said) = captures.import("wall");
+    assert_eq!(
+        masks_of(&scene),
+        ["a.png.png", "b.jpg.png"].map(PathBuf::from)
+    );
+    assert_eq!(times_of(&scene), [Some(3.0), Some(5.0)]);
+    assert!(
+        said[0].contains("2 of 2 photos are used though"),
+        "{said:?}"
+    );
+    let astray = "ROOT/wall/masks: 1 files belong to no calibrated photo (b.png.png, for one)";
+    assert_eq!(said[1..], [astray]);
+
+    // Without the photo's own extension either name is the same.
+    fs::remove_dir_all(captures.at("wall/masks")).unwrap();
+    fs::remove_file(captures.at("wall/times.csv")).unwrap();
+    let path = captures.room_for("wall/masks/a.png");
+    GrayImage::from_pixel(SIZE.0, SIZE.1, Luma([255]))
+        .save(path)
+        .unwrap();
+    let (scene, said) = captures.import("wall");
+    assert_eq!(masks_of(&scene), [PathBuf::from("a.png")]);
+    assert_eq!(
+        said[1..],
+        ["ROOT/wall/masks: 1 of 2 photos have their ignore mask here"]
+    );
 }

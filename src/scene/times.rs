@@ -1,7 +1,9 @@
 //! When the photos were taken: from a list, a frame rate, the cameras or the names.
 
+use super::meant::Meant;
 use super::{Photo, SceneError, Warning};
 use capture::{PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Where photos' times come from.
@@ -20,19 +22,26 @@ pub enum TimeSource {
 /// The list that is looked for in a capture's folder.
 const TIMES_FILE: &str = "times.csv";
 
-/// Gives the photos their times. `found` are all there are, calibrated or not: a list may
-/// name those as well. Where a list lacks some, a note says so: at a moment they take no part.
+/// Where a capture's times may be.
+pub(super) struct Clues<'a> {
+    pub(super) capture: &'a Path,
+    /// All photos there are, calibrated or not: a list may name those as well.
+    pub(super) found: &'a PhotoSet,
+    /// Those that the calibration calls otherwise: a list may have either name.
+    pub(super) meant: &'a Meant,
+}
+
+/// Gives the photos their times. Where a list lacks some, a note says so: at a moment they take no part.
 pub(super) fn set_times(
     photos: &mut [Photo],
-    capture: &Path,
     source: &TimeSource,
-    found: &PhotoSet,
+    clues: &Clues<'_>,
     warnings: &mut Vec<Warning>,
 ) -> Result<(), SceneError> {
-    let own = capture.join(TIMES_FILE);
+    let own = clues.capture.join(TIMES_FILE);
     let times: Times = match source {
-        TimeSource::List(file) => from_list(photos, file, found, warnings)?,
-        TimeSource::Found if own.is_file() => from_list(photos, &own, found, warnings)?,
+        TimeSource::List(file) => from_list(photos, file, clues, warnings)?,
+        TimeSource::Found if own.is_file() => from_list(photos, &own, clues, warnings)?,
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
         TimeSource::Found => {
             let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
@@ -59,12 +68,18 @@ pub(super) fn set_times(
 fn from_list(
     photos: &[Photo],
     file: &Path,
-    found: &PhotoSet,
+    clues: &Clues<'_>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Times, SceneError> {
-    let is_photo = |name: &str| found.find(name).is_some() || photos.iter().any(|p| p.name == name);
+    let names: BTreeSet<&str> = photos.iter().map(|p| p.name.as_str()).collect();
+    let is_photo = |name: &str| clues.found.find(name).is_some() || names.contains(name);
     let listed = read_times(file, is_photo)?;
-    let lacks = |photo: &&Photo| !listed.contains_key(&photo.name);
+    let time_of = |photo: &Photo| {
+        let by_name = listed.get(&photo.name);
+        let by_file = || listed.get(&clues.meant.photos.get(&photo.name)?.name);
+        by_name.or_else(by_file).copied()
+    };
+    let lacks = |photo: &&Photo| time_of(photo).is_none();
     if let Some(example) = photos.iter().find(lacks) {
         warnings.push(Warning::Note(format!(
             "{}: no time for {} of {} photos ({}, for one): in views at a moment they take no part",
@@ -74,8 +89,7 @@ fn from_list(
             example.name
         )));
     }
-    let times = photos.iter().map(|p| listed.get(&p.name).copied());
-    Ok(times.collect())
+    Ok(photos.iter().map(time_of).collect())
 }
 
 /// Frames by the last number in their names, which must be all that differs between them.

@@ -1,7 +1,9 @@
 //! Photos of an object on a turntable, or from a circle around it: cameras from silhouettes
 //! alone.
 
-use super::{ImportOptions, Photo, Scene, SceneError, Warning, calibration, times};
+use super::meant::Meant;
+use super::times::{Clues, set_times};
+use super::{ImportOptions, Photo, Scene, SceneError, Warning, calibration};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3};
 use capture::{CaptureError, PhotoSet, photo_size};
 use proxy::hull::{Silhouette, turntable};
@@ -47,15 +49,15 @@ impl Scene {
         let unposed = reconstruction(&names, |_| Rigid3::IDENTITY, size, 1.0);
         let mut scene = Self::of(unposed, capture, &found, &BTreeMap::new(), options);
         scene.settings.turntable_degrees = Some(step_degrees);
-        times::set_times(
-            &mut scene.photos,
+        let meant = Meant::default();
+        let clues = Clues {
             capture,
-            &options.times,
-            &found,
-            &mut warnings,
-        )?;
+            found: &found,
+            meant: &meant,
+        };
+        set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);
-        scene.find_beside(capture, options, &mut warnings)?;
+        scene.find_beside(capture, &meant, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);
