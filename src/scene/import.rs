@@ -130,10 +130,12 @@ impl Scene {
                 example: example.name.clone(),
             });
         }
+        let named = Named::of(&source, &found)?;
         let clues = Clues {
             capture,
             found: &found,
             meant: &meant,
+            named: named.as_ref(),
         };
         set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
 
@@ -143,7 +145,9 @@ impl Scene {
 
         // 4. What lies beside them.
         scene.find_beside(&home, &meant, options, &mut warnings)?;
-        scene.find_named(&source, &found, options, &mut warnings)?;
+        if let Some(named) = named {
+            scene.add_named(named, options, &mut warnings);
+        }
         scene.check_beside()?;
         scene.judge_masks(options.masks.is_some(), &mut warnings);
         scene.judge_depth(&mut warnings);

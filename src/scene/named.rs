@@ -1,4 +1,4 @@
-//! Masks and depth maps that the calibration names.
+//! Masks, depth maps and times that the calibration names.
 
 use super::calibration::Source;
 use super::listed::Listed;
@@ -8,36 +8,56 @@ use capture::{Beside, CaptureError, PhotoSet, check_beside};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// What a `transforms.json` says beside cameras and poses, by the photos' names.
+pub(super) struct Named {
+    pub(super) file: PathBuf,
+    pub(super) beside: FilesBeside,
+}
+
+impl Named {
+    /// `None` of any other calibration.
+    pub(super) fn of(source: &Source, found: &PhotoSet) -> Result<Option<Self>, SceneError> {
+        let Source::Other(Format::Transforms, file) = source else {
+            return Ok(None);
+        };
+        let mut beside = formats::read_files_beside(file)?;
+        let listed = Listed::of(found);
+        beside.masks = by_photo(beside.masks, &listed);
+        beside.depth_maps = by_photo(beside.depth_maps, &listed);
+        beside.times = by_photo(beside.times, &listed);
+        let file = file.clone();
+        Ok(Some(Self { file, beside }))
+    }
+}
+
+fn by_photo<T>(named: BTreeMap<String, T>, listed: &Listed<'_>) -> BTreeMap<String, T> {
+    let named = named.into_iter();
+    named.map(|(path, it)| (listed.name(&path), it)).collect()
+}
+
 impl Scene {
-    /// Gives photos the ignore masks and depth maps that a `transforms.json` names for them,
+    /// Gives photos the ignore masks and depth maps that a calibration names for them,
     /// where folders gave them none and none were asked for, and says what of it is not used.
-    pub(super) fn find_named(
+    pub(super) fn add_named(
         &mut self,
-        source: &Source,
-        found: &PhotoSet,
+        named: Named,
         options: &ImportOptions,
         warnings: &mut Vec<Warning>,
-    ) -> Result<(), SceneError> {
-        let Source::Other(Format::Transforms, file) = source else {
-            return Ok(());
-        };
+    ) {
+        let Named { file, beside } = named;
         let FilesBeside {
             masks,
             depth_maps,
             points,
             applied_scale,
-        } = formats::read_files_beside(file)?;
-        let listed = Listed::of(found);
-        let by_photo = |named: BTreeMap<String, PathBuf>| -> BTreeMap<String, PathBuf> {
-            let named = named.into_iter();
-            named.map(|(n, path)| (listed.name(&n), path)).collect()
-        };
+            times: _,
+        } = beside;
         let mut note = |text: String| {
             let file = file.display();
             warnings.push(Warning::Note(format!("{file} names {text}")));
         };
         if options.masks.is_none() && !options.no_masks {
-            let missing = self.add_masks(&by_photo(masks));
+            let missing = self.add_masks(&masks);
             if let Some(example) = missing.first() {
                 note(format!(
                     "{} ignore masks that are not there ({}, for one); nothing is ignored in \
@@ -51,7 +71,7 @@ impl Scene {
             // A scale that was asked for is that of the scene's units.
             let is_asked = options.depth_scale != DEPTH_UNITS_PER_STEP;
             let scale = options.depth_scale * if is_asked { 1.0 } else { applied_scale };
-            let unused = self.add_depth_maps(&by_photo(depth_maps), scale);
+            let unused = self.add_depth_maps(&depth_maps, scale);
             if let Some(reason) = unused.first() {
                 note(format!(
                     "{} depth maps that are not used, for one: {reason}",
@@ -65,7 +85,6 @@ impl Scene {
                 points.display()
             ));
         }
-        Ok(())
     }
 
     /// Gives photos without an ignore mask theirs; those that are not there.

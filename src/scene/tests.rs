@@ -202,3 +202,68 @@ fn photos_called_otherwise_keep_what_is_called_like_their_files() {
         ["ROOT/wall/masks: 1 of 2 photos have their ignore mask here"]
     );
 }
+
+#[test]
+fn times_that_only_some_photos_have_are_told() {
+    let captures = Captures::new();
+    let names = ["20240131_154500.png", "20240131_154502.png", "c.png"];
+    captures.photos("wall", &names, SIZE);
+    captures.model("wall/sparse/0", &names);
+    let (scene, said) = captures.import("wall");
+    let times: Vec<Option<f64>> = scene.photos.iter().map(|p| p.time_s).collect();
+    assert_eq!(times, [Some(0.0), Some(2.0), None]);
+    let note = "the photos' names: no time for 1 of 3 photos (c.png, for one): in views at a moment \
+                they take no part";
+    assert_eq!(said, [note]);
+
+    // None at all is no news.
+    captures.photos("shelf", &["a.png", "b.png"], SIZE);
+    captures.model("shelf/sparse/0", &["a.png", "b.png"]);
+    let (_, said) = captures.import("shelf");
+    assert!(said.is_empty(), "{said:?}");
+}
+
+#[test]
+fn times_of_frames_are_read() {
+    let captures = Captures::new();
+    captures.photos("wall/train", &["a.png", "b.png", "c.png"], SIZE);
+    let frames = |times: [&str; 3]| {
+        let frame = |(name, time): (&str, &str)| {
+            format!(
+                "{{\"file_path\": \"./train/{name}\", \"time\": {time}, \"transform_matrix\": \
+                 [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}"
+            )
+        };
+        let frames = ["a", "b", "c"].into_iter().zip(times).map(frame);
+        let frames: Vec<String> = frames.collect();
+        let text = format!("{{\"fl_x\": 8, \"frames\": [{}]}}", frames.join(", "));
+        fs::write(captures.at("wall/transforms_train.json"), text).unwrap();
+    };
+    let times_of =
+        |scene: &Scene| -> Vec<Option<f64>> { scene.photos.iter().map(|p| p.time_s).collect() };
+
+    frames(["0", "0.5", "null"]);
+    let (scene, said) = captures.import("wall");
+    assert_eq!(times_of(&scene), [Some(0.0), Some(0.5), None]);
+    let file = "ROOT/wall/transforms_train.json";
+    assert_eq!(
+        said,
+        [
+            format!("{file} names times of the photos, from 0 to 0.5, which are taken as seconds"),
+            format!(
+                "{file}: no time for 1 of 3 photos (train/c.png, for one): in views at a moment they \
+                 take no part"
+            ),
+        ]
+    );
+
+    // A list says more, and one time for all says nothing.
+    fs::write(captures.at("wall/times.csv"), "train/c.png,7\n").unwrap();
+    let (scene, _) = captures.import("wall");
+    assert_eq!(times_of(&scene), [None, None, Some(7.0)]);
+    fs::remove_file(captures.at("wall/times.csv")).unwrap();
+    frames(["0", "0", "0"]);
+    let (scene, said) = captures.import("wall");
+    assert_eq!(times_of(&scene), [None; 3]);
+    assert!(said.is_empty(), "{said:?}");
+}

@@ -1,6 +1,7 @@
-//! When the photos were taken: from a list, a frame rate, the cameras or the names.
+//! When the photos were taken: from a list, a frame rate, the calibration, the cameras or the names.
 
 use super::meant::Meant;
+use super::named::Named;
 use super::{Photo, SceneError, Warning};
 use capture::{PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
 use std::collections::BTreeSet;
@@ -9,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// Where photos' times come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum TimeSource {
-    /// The capture's `times.csv`; without one what cameras wrote into the photos, or the
-    /// photos' names if these tell more times.
+    /// The capture's `times.csv`; without one what a `transforms.json` says of its frames, else
+    /// what cameras wrote into the photos, or the photos' names if these tell more times.
     #[default]
     Found,
     /// A list, `name,seconds` a line.
@@ -29,9 +30,11 @@ pub(super) struct Clues<'a> {
     pub(super) found: &'a PhotoSet,
     /// Those that the calibration calls otherwise: a list may have either name.
     pub(super) meant: &'a Meant,
+    /// What the calibration says.
+    pub(super) named: Option<&'a Named>,
 }
 
-/// Gives the photos their times. Where a list lacks some, a note says so: at a moment they take no part.
+/// Gives the photos their times. Where some have none, a note says so: at a moment they take no part.
 pub(super) fn set_times(
     photos: &mut [Photo],
     source: &TimeSource,
@@ -43,26 +46,60 @@ pub(super) fn set_times(
         TimeSource::List(file) => from_list(photos, file, clues, warnings)?,
         TimeSource::Found if own.is_file() => from_list(photos, &own, clues, warnings)?,
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
-        TimeSource::Found => {
-            let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
-            let by_name = capture::times_of_names(&names);
-            let by_camera = photos
-                .iter()
-                .map(|p| read_exif(&p.path).ok()?.taken_s)
-                .collect();
-            let by_camera = from_earliest(by_camera);
-            let count = |times: &Times| times.iter().flatten().count();
-            if count(&by_name) > count(&by_camera) {
-                by_name
-            } else {
-                by_camera
-            }
-        }
+        TimeSource::Found => match from_calibration(photos, clues, warnings) {
+            Some(times) => times,
+            None => from_photos(photos, warnings),
+        },
     };
     for (photo, time_s) in photos.iter_mut().zip(times) {
         photo.time_s = time_s;
     }
     Ok(())
+}
+
+/// Those that the calibration says, unless it has one time for all.
+fn from_calibration(
+    photos: &[Photo],
+    clues: &Clues<'_>,
+    warnings: &mut Vec<Warning>,
+) -> Option<Times> {
+    let Named { file, beside } = clues.named?;
+    let times: Times = photos
+        .iter()
+        .map(|p| beside.times.get(&p.name).copied())
+        .collect();
+    let known = || times.iter().flatten().copied();
+    let (first, last) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
+    if first == last {
+        return None;
+    }
+    let file = file.display().to_string();
+    warnings.push(Warning::Note(format!(
+        "{file} names times of the photos, from {first} to {last}, which are taken as seconds"
+    )));
+    warnings.extend(note_of_lack(photos, &times, &file));
+    Some(times)
+}
+
+/// Those that cameras wrote into the photos, or their names if these tell more.
+fn from_photos(photos: &[Photo], warnings: &mut Vec<Warning>) -> Times {
+    let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
+    let by_name = capture::times_of_names(&names);
+    let by_camera = photos
+        .iter()
+        .map(|p| read_exif(&p.path).ok()?.taken_s)
+        .collect();
+    let by_camera = from_earliest(by_camera);
+    let count = |times: &Times| times.iter().flatten().count();
+    let (times, told_by) = if count(&by_name) > count(&by_camera) {
+        (by_name, "the photos' names")
+    } else {
+        (by_camera, "what cameras wrote into the photos")
+    };
+    if count(&times) > 0 {
+        warnings.extend(note_of_lack(photos, &times, told_by));
+    }
+    times
 }
 
 fn from_list(
@@ -79,17 +116,21 @@ fn from_list(
         let by_file = || listed.get(&clues.meant.photos.get(&photo.name)?.name);
         by_name.or_else(by_file).copied()
     };
-    let lacks = |photo: &&Photo| time_of(photo).is_none();
-    if let Some(example) = photos.iter().find(lacks) {
-        warnings.push(Warning::Note(format!(
-            "{}: no time for {} of {} photos ({}, for one): in views at a moment they take no part",
-            file.display(),
-            photos.iter().filter(lacks).count(),
-            photos.len(),
-            example.name
-        )));
-    }
-    Ok(photos.iter().map(time_of).collect())
+    let times: Times = photos.iter().map(time_of).collect();
+    warnings.extend(note_of_lack(photos, &times, &file.display().to_string()));
+    Ok(times)
+}
+
+/// What to say of photos that have no time where others have, if there are any; `told_by` is what has the others'.
+fn note_of_lack(photos: &[Photo], times: &[Option<f64>], told_by: &str) -> Option<Warning> {
+    let lacking = photos.iter().zip(times).filter(|(_, time)| time.is_none());
+    let lacking: Vec<&str> = lacking.map(|(photo, _)| photo.name.as_str()).collect();
+    let example = lacking.first()?;
+    Some(Warning::Note(format!(
+        "{told_by}: no time for {} of {} photos ({example}, for one): in views at a moment they take no part",
+        lacking.len(),
+        photos.len()
+    )))
 }
 
 /// Frames by the last number in their names, which must be all that differs between them.

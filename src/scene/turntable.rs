@@ -54,6 +54,7 @@ impl Scene {
             capture,
             found: &found,
             meant: &meant,
+            named: None,
         };
         set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);

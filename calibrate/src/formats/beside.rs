@@ -1,9 +1,11 @@
-//! What a `transforms.json` names beside the photos.
+//! What a `transforms.json` says beside cameras and poses.
 //!
 //! - nerfstudio's `mask_path` is an ignore mask as ours are: 0 = ignore.
 //! - Its `depth_file_path` is depth along z, in steps of which nerfstudio takes 1000 to a unit.
 //!   `applied_scale` scaled the poses that are in the file and not the depths.
 //! - `ply_file_path` are the sparse points.
+//! - D-NeRF's `time` of a frame, which nerfstudio reads, too, often goes from 0 to 1. Nothing says
+//!   in what unit.
 //! - Paths count from the folder that the file lies in.
 
 use super::build;
@@ -12,7 +14,8 @@ use super::json::{self, Json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Files that a `transforms.json` names beside the photos; they need not exist.
+/// Files that a `transforms.json` names beside the photos, which need not exist, and when these
+/// were taken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilesBeside {
     /// Ignore masks, by the images' names as [`read_transforms`](super::read_transforms) has
@@ -20,16 +23,19 @@ pub struct FilesBeside {
     pub masks: BTreeMap<String, PathBuf>,
     /// Depth maps, likewise.
     pub depth_maps: BTreeMap<String, PathBuf>,
+    /// Times of photos, likewise, in a unit of the file's own.
+    pub times: BTreeMap<String, f64>,
     /// The sparse points.
     pub points: Option<PathBuf>,
     /// What depths are to be multiplied by to be in the poses' units.
     pub applied_scale: f64,
 }
 
-/// Reads which files a `transforms.json` names beside the photos.
+/// Reads which files a `transforms.json` names beside the photos, and when these were taken.
 ///
 /// # Errors
-/// An unreadable file; paths that are no texts, a scale that is no positive number.
+/// An unreadable file; paths that are no texts, times that are no finite numbers, a scale that is
+/// no positive one.
 pub fn read_files_beside(path: &Path) -> Result<FilesBeside, FormatError> {
     parse_files_beside(path, &build::read(path)?)
 }
@@ -53,6 +59,7 @@ pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, Form
     let mut beside = FilesBeside {
         masks: BTreeMap::new(),
         depth_maps: BTreeMap::new(),
+        times: BTreeMap::new(),
         points: file(&root, "ply_file_path")?,
         applied_scale: 1.0,
     };
@@ -68,6 +75,9 @@ pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, Form
         let name = build::name(file_path.text()?).map_err(|p| file_path.error(p))?;
         if let Some(mask) = file(&frame, "mask_path")? {
             beside.masks.insert(name.clone(), mask);
+        }
+        if let Some(time) = frame.optional("time") {
+            beside.times.insert(name.clone(), time.number()?);
         }
         if let Some(depth) = file(&frame, "depth_file_path")? {
             beside.depth_maps.insert(name, depth);

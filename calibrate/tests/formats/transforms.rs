@@ -299,6 +299,20 @@ fn small_deviations_become_the_nearest_rotation() {
 }
 
 #[test]
+fn times_are_those_of_the_frames() {
+    let read = |text: &str| parse_files_beside(Path::new("a/transforms.json"), text.as_bytes());
+    let text = r#"{"frames": [{"file_path": "./train/1", "time": 0},
+        {"file_path": "train/2", "time": 0.25}, {"file_path": "train/3", "time": null}]}"#;
+    let expected = [("train/1".to_owned(), 0.0), ("train/2".to_owned(), 0.25)];
+    assert_eq!(read(text).unwrap().times, BTreeMap::from(expected));
+    let error = read(&text.replace("0.25", "\"noon\""))
+        .unwrap_err()
+        .to_string();
+    let said = "a/transforms.json, frames[1].time: found \"noon\", expected a finite number";
+    assert!(error.starts_with(said), "{error}");
+}
+
+#[test]
 fn masks_depth_maps_and_points_are_named_from_the_file_s_folder() {
     let named = |text: &str| parse_files_beside(Path::new("a/transforms.json"), text.as_bytes());
     let beside = named(
