@@ -1,10 +1,9 @@
 //! The files that pictures and calibrations follow from.
 
-use calibrate::opencv::{self, Keys};
-use calibrate::{colmap, formats};
+use calibrate::colmap;
 use capture::{PhotoSet, find_photos_folder};
 use lumigraph::scene::file::SceneFile;
-use lumigraph::scene::{Photo, Scene};
+use lumigraph::scene::{self, Photo, Scene};
 use proxy::interior::Interior;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -106,18 +105,7 @@ pub(super) fn calibration_in(path: &Path) -> Option<PathBuf> {
         let is_model = model_files(folder).iter().any(|file| file == path);
         return Some(if is_model { folder } else { path }.to_owned());
     }
-    if let Ok(model) = colmap::find_model(path) {
-        return Some(model);
-    }
-    let of_opencv = opencv::find_calibrations(path, &Keys::default());
-    let mut usable = of_opencv.usable.into_iter();
-    let of_others = || {
-        let mut files = files_in(path).into_iter();
-        files.find(|file| formats::detect(file).is_some())
-    };
-    // One whose matrices were chosen by name.
-    let by_keys = || Some(of_opencv.unusable.first()?.path().to_owned());
-    usable.next().or_else(of_others).or_else(by_keys)
+    scene::calibration_in(path)
 }
 
 /// The files of a calibration: its own, or those of a COLMAP model in a folder.

@@ -18,6 +18,13 @@ pub(super) enum Source {
 }
 
 impl Source {
+    /// The file, or a COLMAP model's folder.
+    fn path(&self) -> &Path {
+        match self {
+            Self::Colmap(path) | Self::OpenCv(path) | Self::Other(_, path) => path,
+        }
+    }
+
     /// For messages.
     pub(super) fn text(&self) -> String {
         match self {
@@ -28,8 +35,9 @@ impl Source {
 }
 
 /// The calibration of a capture: the file or folder given, else what the capture's folder
-/// holds. A COLMAP model comes before an OpenCV file; what is passed over is noted, and where
-/// nothing else is there, a calibration that cannot be used is the error.
+/// holds. A COLMAP model comes before an OpenCV file and others, but for one in `colmap`, which
+/// comes last; what is passed over is noted, and where nothing else is there, a calibration that
+/// cannot be used is the error.
 pub(super) fn find(
     capture: &Path,
     options: &ImportOptions,
@@ -88,15 +96,12 @@ fn search(
 
     // 1. What is there.
     let folder = given.unwrap_or(capture);
-    let model = colmap::find_model(folder);
-    let of_opencv = opencv::find_calibrations(folder, &options.keys);
-    let (others, damaged) = others(folder);
-    let model_found = model.as_ref().ok().cloned().map(Source::Colmap);
-    let opencv_found = of_opencv.usable.into_iter().map(Source::OpenCv);
-    let mut found = model_found.into_iter().chain(opencv_found).chain(others);
-    let damaged = damaged.into_iter().map(SceneError::Format);
-    let unusable = of_opencv.unusable.into_iter().map(SceneError::OpenCv);
-    let mut unusable = damaged.chain(unusable);
+    let Candidates {
+        model,
+        usable,
+        unusable,
+    } = Candidates::within(folder, &options.keys);
+    let mut found = usable.into_iter();
 
     // 2. The first of it.
     let source = match (found.next(), model) {
@@ -104,7 +109,7 @@ fn search(
         (None, Ok(model)) => Source::Colmap(model),
         (None, Err(error)) => {
             let is_nothing = is_nothing_there(&error);
-            return Err(match unusable.next() {
+            return Err(match unusable.into_iter().next() {
                 Some(reason) if is_nothing => reason,
                 _ if is_nothing && given.is_none() => SceneError::Uncalibrated {
                     folder: folder.to_owned(),
@@ -121,18 +126,13 @@ fn search(
     {
         warnings.extend(other_models(model).map(Warning::Note));
     }
-    if let Some(Source::OpenCv(other) | Source::Other(_, other)) = found.next() {
-        warnings.push(Warning::Note(format!(
-            "the calibration is {}; for that in {} say --calibration {1}",
-            source.text(),
-            other.display()
-        )));
-    }
+    let others: Vec<Source> = found.collect();
+    warnings.extend(others_text(&source, &others).map(Warning::Note));
     // OpenCV's calibrations may be in several files, of which one alone can be read.
     let is_part = |error: &SceneError| {
         matches!(source, Source::OpenCv(_)) && matches!(error, SceneError::OpenCv(_))
     };
-    for reason in unusable.filter(|error| !is_part(error)) {
+    for reason in unusable.into_iter().filter(|error| !is_part(error)) {
         warnings.push(Warning::Note(format!(
             "the calibration is {}; not used: {reason}",
             source.text()
@@ -141,11 +141,111 @@ fn search(
     Ok(source)
 }
 
+/// The calibrations in a folder.
+struct Candidates {
+    /// The COLMAP model.
+    model: Result<PathBuf, ColmapError>,
+    /// All of them, the one to take first.
+    usable: Vec<Source>,
+    /// What is wrong with others.
+    unusable: Vec<SceneError>,
+}
+
+impl Candidates {
+    fn within(folder: &Path, keys: &Keys) -> Self {
+        let model = colmap::find_model(folder);
+        let of_opencv = opencv::find_calibrations(folder, keys);
+        let (others, damaged) = others(folder);
+        let files = of_opencv.usable.into_iter().map(Source::OpenCv);
+        let mut usable: Vec<Source> = files.chain(others).collect();
+        if let Ok(model) = &model {
+            // What another program made of COLMAP's own work is what its user goes by.
+            let place = if is_own_work(folder, model) {
+                usable.len()
+            } else {
+                0
+            };
+            usable.insert(place, Source::Colmap(model.clone()));
+        }
+        let damaged = damaged.into_iter().map(SceneError::Format);
+        let unusable = of_opencv.unusable.into_iter().map(SceneError::OpenCv);
+        Self {
+            model,
+            usable,
+            unusable: damaged.chain(unusable).collect(),
+        }
+    }
+}
+
+/// Whether a folder's model is in its `colmap`, where nerfstudio has COLMAP work.
+fn is_own_work(folder: &Path, model: &Path) -> bool {
+    model.starts_with(folder.join("colmap"))
+}
+
+/// The calibration that is taken of those in a folder, if there is one and nobody says which: a
+/// COLMAP model's folder or a file. That may be one of OpenCV's that needs names of matrices.
+pub fn calibration_in(folder: &Path) -> Option<PathBuf> {
+    let model = colmap::find_model(folder).ok();
+    if let Some(model) = model.filter(|model| !is_own_work(folder, model)) {
+        return Some(model);
+    }
+    let found = Candidates::within(folder, &Keys::default());
+    let by_keys = || {
+        let mut unusable = found.unusable.iter();
+        unusable.find_map(|error| match error {
+            SceneError::OpenCv(error) => Some(error.path().to_owned()),
+            _ => None,
+        })
+    };
+    let usable = found.usable.first().map(|source| source.path().to_owned());
+    usable.or_else(by_keys)
+}
+
+/// What to say of calibrations that are passed over, if there are any.
+fn others_text(source: &Source, others: &[Source]) -> Option<String> {
+    let paths = others
+        .iter()
+        .map(|other| other.path().display().to_string());
+    let paths: Vec<String> = paths.collect();
+    let change = match &paths[..] {
+        [] => return None,
+        [other] => format!("for that in {other} say --calibration {other}"),
+        _ => format!("--calibration takes another: {}", some_of(paths)),
+    };
+    let lacks_points = matches!(
+        source,
+        Source::OpenCv(_) | Source::Other(Format::Transforms | Format::Llff, _)
+    );
+    let model = others
+        .iter()
+        .find(|other| matches!(other, Source::Colmap(_)));
+    let gain = model
+        .filter(|_| lacks_points)
+        .map_or_else(String::new, |model| {
+            let model = model.text();
+            format!(" ({model} may have sparse points, which this has not)")
+        });
+    Some(format!(
+        "the calibration is {}; {change}{gain}",
+        source.text()
+    ))
+}
+
+/// The first few of a list, for people.
+fn some_of(mut listed: Vec<String>) -> String {
+    // More are only counted.
+    const SHOWN: usize = 3;
+    if listed.len() > SHOWN {
+        let more = listed.len() - SHOWN;
+        listed.truncate(SHOWN);
+        listed.push(format!("{more} more"));
+    }
+    listed.join(", ")
+}
+
 /// What to say of the models beside one of several that COLMAP could not join, if there are
 /// others.
 pub fn other_models(model: &Path) -> Option<String> {
-    // More are only counted.
-    const SHOWN: usize = 3;
     let text = |one: &SubModel| {
         let photos = match one.images {
             Some(photos) => format!("{photos} photos"),
@@ -156,18 +256,13 @@ pub fn other_models(model: &Path) -> Option<String> {
     let all = colmap::side_by_side(model);
     let taken = text(all.iter().find(|one| one.folder == model)?);
     let others = all.iter().filter(|one| one.folder != model);
-    let mut listed: Vec<String> = others.map(text).collect();
+    let listed: Vec<String> = others.map(text).collect();
     if listed.is_empty() {
         return None;
     }
-    if listed.len() > SHOWN {
-        let more = listed.len() - SHOWN;
-        listed.truncate(SHOWN);
-        listed.push(format!("{more} more"));
-    }
     Some(format!(
         "the calibration is the COLMAP model in {taken}; --calibration takes another: {}",
-        listed.join(", ")
+        some_of(listed)
     ))
 }
 
@@ -176,12 +271,12 @@ fn is_nothing_there(error: &ColmapError) -> bool {
     matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
 }
 
-/// The other programs' calibrations in a folder, by name, and what is wrong with files that are
-/// called like one.
+/// The other programs' calibrations in a folder, by name, but parts of a data set that are not to
+/// be trained on last; and what is wrong with files that are called like one.
 fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
-    files.sort();
+    files.sort_by_cached_key(|file| (is_test_split(file), file.clone()));
     let (mut found, mut damaged) = (Vec::new(), Vec::new());
     for file in files {
         if let Some(format) = formats::detect(&file) {
@@ -192,4 +287,14 @@ fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
         }
     }
     (found, damaged)
+}
+
+/// Whether a file is called like a part of a data set other than the one to train on, as
+/// `transforms_test.json` beside `transforms_train.json`.
+fn is_test_split(file: &Path) -> bool {
+    let name = file.file_name().and_then(|name| name.to_str());
+    let name = name.map(str::to_ascii_lowercase).unwrap_or_default();
+    let part = name.strip_prefix("transforms_");
+    let part = part.and_then(|part| part.strip_suffix(".json"));
+    part.is_some_and(|part| part != "train")
 }

@@ -1,6 +1,6 @@
 //! Small captures imported: which files the names in a calibration lead to.
 
-use super::{ImportOptions, Scene, SceneError};
+use super::{ImportOptions, Scene, SceneError, calibration_in};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3, colmap};
 use image::{GrayImage, Luma, RgbImage};
 use std::fs;
@@ -59,6 +59,16 @@ impl Captures {
             ..Reconstruction::default()
         };
         colmap::write_text(&model, &self.at(place)).unwrap();
+    }
+
+    /// Saves a transforms.json of frames that have these keys beside their poses.
+    fn transforms(&self, path: &str, keys: &[String]) {
+        let pose = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]";
+        let frames = keys.iter();
+        let frames = frames.map(|keys| format!("{{{keys}, \"transform_matrix\": {pose}}}"));
+        let frames: Vec<String> = frames.collect();
+        let text = format!("{{\"fl_x\": 8, \"frames\": [{}]}}", frames.join(", "));
+        fs::write(self.room_for(path), text).unwrap();
     }
 
     /// Imports one of them, with what is said of it.
@@ -228,16 +238,11 @@ fn times_of_frames_are_read() {
     let captures = Captures::new();
     captures.photos("wall/train", &["a.png", "b.png", "c.png"], SIZE);
     let frames = |times: [&str; 3]| {
-        let frame = |(name, time): (&str, &str)| {
-            format!(
-                "{{\"file_path\": \"./train/{name}\", \"time\": {time}, \"transform_matrix\": \
-                 [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}"
-            )
-        };
-        let frames = ["a", "b", "c"].into_iter().zip(times).map(frame);
+        let frames = ["a", "b", "c"].into_iter().zip(times);
+        let frames = frames
+            .map(|(name, time)| format!("\"file_path\": \"./train/{name}\", \"time\": {time}"));
         let frames: Vec<String> = frames.collect();
-        let text = format!("{{\"fl_x\": 8, \"frames\": [{}]}}", frames.join(", "));
-        fs::write(captures.at("wall/transforms_train.json"), text).unwrap();
+        captures.transforms("wall/transforms_train.json", &frames);
     };
     let times_of =
         |scene: &Scene| -> Vec<Option<f64>> { scene.photos.iter().map(|p| p.time_s).collect() };
@@ -266,4 +271,48 @@ fn times_of_frames_are_read() {
     let (scene, said) = captures.import("wall");
     assert_eq!(times_of(&scene), [None; 3]);
     assert!(said.is_empty(), "{said:?}");
+}
+
+#[test]
+fn of_a_data_set_s_parts_that_to_train_on_goes_first() {
+    let captures = Captures::new();
+    let frames = |part: &str| ["a", "b"].map(|name| format!("\"file_path\": \"./{part}/{name}\""));
+    for part in ["test", "train", "val"] {
+        captures.photos(&format!("wall/{part}"), &["a.png", "b.png"], SIZE);
+        captures.transforms(&format!("wall/transforms_{part}.json"), &frames(part));
+    }
+    let (scene, said) = captures.import("wall");
+    assert_eq!(scene.names(), ["train/a.png", "train/b.png"]);
+    let note = "the calibration is ROOT/wall/transforms_train.json; --calibration takes another: \
+                ROOT/wall/transforms_test.json, ROOT/wall/transforms_val.json";
+    assert_eq!(said[0], note);
+    let first = calibration_in(&captures.at("wall"));
+    assert_eq!(first, Some(captures.at("wall/transforms_train.json")));
+
+    captures.transforms("wall/transforms.json", &frames("val"));
+    let (scene, _) = captures.import("wall");
+    assert_eq!(scene.names(), ["val/a.png", "val/b.png"]);
+}
+
+/// As nerfstudio's `ns-process-data` leaves it.
+#[test]
+fn colmap_s_work_for_another_program_is_used_where_that_left_nothing() {
+    let captures = Captures::new();
+    captures.photos("wall/images", &["a.png", "b.png"], SIZE);
+    captures.model("wall/colmap/sparse/0", &["a.png", "b.png"]);
+    let (scene, said) = captures.import("wall");
+    assert_eq!(scene.names(), ["a.png", "b.png"]);
+    assert!(said.is_empty(), "{said:?}");
+    let first = || calibration_in(&captures.at("wall"));
+    assert_eq!(first(), Some(captures.at("wall/colmap/sparse/0")));
+
+    let frames = ["a", "b"].map(|name| format!("\"file_path\": \"images/{name}.png\""));
+    captures.transforms("wall/transforms.json", &frames);
+    let (scene, said) = captures.import("wall");
+    assert_eq!(scene.names(), ["a.png", "b.png"]);
+    let note = "the calibration is ROOT/wall/transforms.json; for that in ROOT/wall/colmap/sparse/0 say \
+                --calibration ROOT/wall/colmap/sparse/0 (the COLMAP model in \
+                ROOT/wall/colmap/sparse/0 may have sparse points, which this has not)";
+    assert_eq!(said, [note]);
+    assert_eq!(first(), Some(captures.at("wall/transforms.json")));
 }
