@@ -97,7 +97,8 @@ pub struct FrameCost {
     pub samples: usize,
     /// Samples of LDIs in columns that were clipped away.
     pub samples_clipped: usize,
-    /// Pixels of portals that nothing was drawn in.
+    /// Pixels of portals that nothing was drawn in. Where images leave open what geometry is mixed into, a pixel
+    /// counts as far as images are in it, which is how far it is transparent.
     pub holes: usize,
     /// Reference images made for this frame.
     pub references_made: usize,

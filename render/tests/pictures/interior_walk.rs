@@ -378,6 +378,35 @@ fn nothing_pops_as_one_comes_nearer() {
 }
 
 #[test]
+fn holes_are_what_is_transparent_also_where_geometry_is_mixed_in() {
+    let (house, contents) = small_house(2, 1);
+    // Few samples, a pixel each.
+    let mut options = WalkOptions {
+        splat: Splat::Fixed(1),
+        ..WalkOptions::default()
+    };
+    options.library.size = [8, 8];
+    let mut walk = Walk::new(&house.interior, &contents, &house.model, options);
+    let portal = &house.interior.portals[0];
+    let away = portal.width(DVec3::Y) * portal.polygon.normal();
+    // From 1.25 widths on images are mixed in, from 1.5 on they are alone.
+    let mut before = 0;
+    for off in [1.1, 1.3, 1.4, 1.499, 1.6] {
+        let eye = portal.polygon.center() + off * away;
+        let desired = view(eye, eye - away, [80, 60]);
+        let holes = walk.draw(&desired, PortalFill::Warp1).unwrap().holes;
+        let open = |color: &[u8; 4]| f64::from(255 - color[3]) / 255.0;
+        let open: f64 = walk.picture().color.iter().map(open).sum();
+        eprintln!("{off}: {holes} holes, {open:.1} pixels transparent");
+        // Alpha is rounded.
+        assert!((holes as f64 - open).abs() < 12.0, "{off}: {holes}, {open}");
+        assert!(holes > before || off < 1.25, "{off}: {holes}");
+        before = holes;
+    }
+    assert!(before > 2000, "{before}");
+}
+
+#[test]
 fn frames_do_not_depend_on_threads_or_on_what_was_drawn_before() {
     let (house, contents) = small_house(4, 3);
     let mut first = walk_of(&house, &contents);

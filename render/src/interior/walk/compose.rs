@@ -8,8 +8,12 @@ use crate::interior::{Pinhole, Target};
 use calibrate::View;
 use rayon::prelude::*;
 
+/// A pixel, where those left open are added up: as whole numbers, whose sum is the same in any order.
+const PIXEL: u64 = 1 << 16;
+
 impl Walk<'_> {
-    /// The picture; how many pixels of portals nothing was drawn in. `floor` is [`Walk::floor`].
+    /// The picture; how many pixels of portals nothing was drawn in ([`FrameCost::holes`](super::FrameCost::holes)).
+    /// `floor` is [`Walk::floor`].
     pub(super) fn compose(
         &mut self,
         view: &View,
@@ -41,7 +45,7 @@ impl Walk<'_> {
         let colors = self.picture.color.par_chunks_mut(width);
         let rows = colors.zip(self.picture.inverse_depth.par_chunks_mut(width));
         let row = |(y, (colors, depths)): (usize, (&mut [[u8; 4]], &mut [f32]))| {
-            let mut holes = 0;
+            let mut holes = 0_u64;
             let owners = &owners[y * width..][..width];
             for (x, (color, depth)) in colors.iter_mut().zip(depths).enumerate() {
                 let Some(f) = fills.get(usize::from(owners[x]).wrapping_sub(1)) else {
@@ -57,34 +61,48 @@ impl Walk<'_> {
                     continue;
                 }
                 let mut image = filled.color[pixel];
-                if image[3] == 0 && own.is_some() && is_captured {
+                let covers = image[3];
+                if covers == 0 && own.is_some() && is_captured {
                     // All that might be there was met.
                     continue;
                 }
-                if image[3] == 0 {
-                    holes += usize::from(own.is_none());
-                    if is_alike {
-                        image = last.color[pixel];
-                    }
+                holes += left_open(f, covers, own.is_some());
+                if covers == 0 && is_alike {
+                    image = last.color[pixel];
                 }
-                let covers = filled.color[pixel][3];
                 if f.share < 1.0 {
                     *color = mixed(*color, image, f.share);
                 } else if covers > 0 && own.is_some() && f.leaves_open(covers) {
                     // A hole of one of two LDIs shows what is behind as far as the other leaves it open.
                     let opaque = [image[0], image[1], image[2], u8::MAX];
                     *color = mixed(*color, opaque, f64::from(covers) / 255.0);
-                } else if own.is_none() || filled.color[pixel][3] > 0 {
+                } else if own.is_none() || covers > 0 {
                     *color = image;
                 }
-                if own.is_none() || (f.share >= 1.0 && filled.color[pixel][3] > 0) {
+                if own.is_none() || (f.share >= 1.0 && covers > 0) {
                     *depth = filled.inverse_depth[pixel];
                 }
             }
             holes
         };
-        Ok(rows.enumerate().map(row).sum())
+        let holes: u64 = rows.enumerate().map(row).sum();
+        Ok(((holes + PIXEL / 2) / PIXEL) as usize)
     }
+}
+
+/// How much of a pixel is left open, of [`PIXEL`], where a portal's images have that alpha: all that they leave
+/// open; where there is geometry, as far as they are mixed with it, and nothing where they are to be alone, as it shows.
+fn left_open(f: &Filled<'_>, covers: u8, has_geometry: bool) -> u64 {
+    if !f.leaves_open(covers) {
+        return 0;
+    }
+    let of_images = match has_geometry {
+        false => 1.0,
+        true if f.share < 1.0 => f.share,
+        true => 0.0,
+    };
+    let open = f64::from(u8::MAX - covers) / f64::from(u8::MAX);
+    (PIXEL as f64 * of_images * open).round() as u64
 }
 
 /// Colours with coverage mixed, `share` of the second.
