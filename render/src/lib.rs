@@ -86,6 +86,6 @@ pub enum RenderError {
     #[error("graphics device: it was lost ({0})")]
     DeviceLost(String),
     /// The file of a layered depth image cannot be used.
-    #[error("{0} (`lumigraph ldis` makes it again; where it is removed, the walk does)")]
+    #[error("{} (`lumigraph ldis` makes it again; where it is removed, the walk does)", ldi::fault(.0))]
     LdiFile(String),
 }

@@ -9,7 +9,7 @@ use super::stamp::in_unicode;
 use anyhow::Context;
 use render::RenderError;
 use render::interior::{Painter, Walk, WalkOptions};
-use render::ldi::write;
+use render::ldi::{fault, write};
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -116,8 +116,7 @@ fn make(walk: &mut Walk<'_>, opened: &Opened, folder: PathBuf) -> anyhow::Result
             Ok(found) => found.is_some(),
             Err(RenderError::LdiFile(why)) => {
                 // What is asked for is done.
-                let why = why.strip_suffix("; make it again").unwrap_or(&why);
-                say!("note: {why}; it is made again");
+                say!("note: {}; it is made again", fault(&why));
                 false
             }
             Err(error) => return Err(error.into()),

@@ -113,13 +113,20 @@ fn what_is_missing_or_broken_is_made_again() {
         "{error}"
     );
     assert!(error.contains("`lumigraph ldis` makes it again"), "{error}");
+    assert!(!error.contains("make it again"), "{error}");
     // Of something else, under another's name.
     for name in &all[1..] {
         std::fs::write(own.join(name), &whole).unwrap();
     }
+    // A bit of its last sample is another.
+    let mut damaged = whole.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    std::fs::write(own.join(&all[1]), damaged).unwrap();
     let ran = lumigraph(here, &format!("{MAKE} --json")).ok();
     assert_eq!(ran.json()["made"], all.len());
     assert!(ran.stderr.contains("expected portal "), "{}", ran.stderr);
+    let said = "damaged: its checksum is another; it is made again";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
     assert!(!ran.stderr.contains("; make it again"), "{}", ran.stderr);
     std::fs::remove_file(own.join("mine.txt")).unwrap();
     assert!(files(&own) == before);

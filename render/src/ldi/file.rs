@@ -1,4 +1,4 @@
-//! LDIs as files, version 2.
+//! LDIs as files, version 3.
 //!
 //! Little-endian, every part at a multiple of 8 bytes:
 //!
@@ -9,7 +9,7 @@
 //! | 7 × 8 | `camera_from_world`: quaternion x, y, z, w, translation |
 //! | 4 × 8 | focal lengths, principal point, in pixels |
 //! | 8 | near: the least depth, world units |
-//! | 4 × 4 | portal, width, height, 0 |
+//! | 4 × 4 | portal, width, height, checksum of all bytes but its own |
 //! | 4 × (height + 1) | how many samples are before each row; all |
 //! | width × height | how many samples each pixel has |
 //! | 12 each | samples, back to front: rgb8, a byte of [`Ends`], f32 inverse depth, two i8 offsets, u16 look |
@@ -21,6 +21,8 @@ use calibrate::Rigid3;
 use glam::{DQuat, DVec2, DVec3};
 use proxy::interior::SemicircleView;
 use std::io::Write;
+use std::mem::offset_of;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Why a file is no LDI.
@@ -38,7 +40,7 @@ pub enum LdiFileError {
     #[error("{}: no LDI: it does not begin with LUMI-LDI", .0.display())]
     Magic(PathBuf),
     /// Of a version that this program does not know.
-    #[error("{}: LDI version {found}; expected {VERSION}: make it again with this program", .path.display())]
+    #[error("{}: LDI version {found}; expected {VERSION}; make it again", .path.display())]
     Version {
         /// Of the file.
         path: PathBuf,
@@ -79,6 +81,9 @@ pub enum LdiFileError {
         /// What it was to be of.
         expected: String,
     },
+    /// Its bytes are not those that were written.
+    #[error("{}: damaged: its checksum is another; make it again", .0.display())]
+    Checksum(PathBuf),
     /// What it holds is no LDI.
     #[error("{}: {source}; make it again", .path.display())]
     Content {
@@ -89,8 +94,14 @@ pub enum LdiFileError {
     },
 }
 
+/// What is wrong, of what a [`LdiFileError`] says: without that the file is to be made again, for who does that,
+/// or tells how.
+pub fn fault(said: &str) -> &str {
+    said.strip_suffix("; make it again").unwrap_or(said)
+}
+
 const MAGIC: [u8; 8] = *b"LUMI-LDI";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// As the file begins.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -106,10 +117,12 @@ struct Header {
     portal: u32,
     width: u32,
     height: u32,
-    nothing: u32,
+    checksum: u32,
 }
 
 const HEADER: usize = size_of::<Header>();
+/// Where the checksum is.
+const CHECKSUM: Range<usize> = offset_of!(Header, checksum)..HEADER;
 
 /// A sample as the file has it.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -130,13 +143,18 @@ fn padded(bytes: u64) -> u64 {
 /// Reads an LDI.
 ///
 /// # Errors
-/// A file that cannot be read, or is none, or contradicts itself.
+/// A file that cannot be read, or is none, or contradicts itself, or has other bytes than were written.
 pub fn read(path: &Path) -> Result<Layered, LdiFileError> {
     let io = |source| LdiFileError::Io {
         path: path.to_owned(),
         source,
     };
-    parse(path, &std::fs::read(path).map_err(io)?)
+    let content = std::fs::read(path).map_err(io)?;
+    let ldi = parse(path, &content)?;
+    if content[CHECKSUM] != checksum(&content).to_le_bytes() {
+        return Err(LdiFileError::Checksum(path.to_owned()));
+    }
+    Ok(ldi)
 }
 
 /// Reads an LDI whose camera stands at a place before a portal.
@@ -157,10 +175,10 @@ pub fn read_before(path: &Path, place: &SemicircleView) -> Result<Layered, LdiFi
     })
 }
 
-/// Reads an LDI from a file's content; `path` is for errors.
+/// Reads an LDI from a file's content, whatever its checksum; `path` is for errors.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read`], but for bytes that were changed and make an LDI all the same.
 pub fn parse(path: &Path, content: &[u8]) -> Result<Layered, LdiFileError> {
     let path = || path.to_owned();
     let size = |expected: u64, what: &str| LdiFileError::Size {
@@ -299,7 +317,8 @@ fn bytes(ldi: &Layered) -> Vec<u8> {
         portal: ldi.portal.to_le(),
         width: width.to_le(),
         height: height.to_le(),
-        nothing: 0,
+        // Once there are all bytes.
+        checksum: 0,
     };
     let mut bytes = bytemuck::bytes_of(&header).to_vec();
     let pad = |bytes: &mut Vec<u8>| bytes.resize(padded(bytes.len() as u64) as usize, 0);
@@ -324,5 +343,28 @@ fn bytes(ldi: &Layered) -> Vec<u8> {
         };
         bytes.extend(bytemuck::bytes_of(&record));
     }
+    let sum = checksum(&bytes).to_le_bytes();
+    bytes[CHECKSUM].copy_from_slice(&sum);
     bytes
+}
+
+/// Of a file's bytes but its own, against damage, not people. In words of 8 bytes, so that it takes a small part of
+/// what reading them does; each step has an inverse, so that no change of one word leaves the sum, but for the half
+/// of it that is cut off in the end.
+fn checksum(content: &[u8]) -> u32 {
+    const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+    let (before, rest) = content.split_at(CHECKSUM.start);
+    let mut sum = content.len() as u64;
+    let mut add = |word: [u8; 8]| {
+        sum = (sum ^ u64::from_le_bytes(word)).wrapping_mul(FACTOR);
+        sum ^= sum >> 32;
+    };
+    for part in [before, &rest[CHECKSUM.len()..]] {
+        let (words, end) = part.as_chunks();
+        words.iter().for_each(|word| add(*word));
+        let mut last = [0; 8];
+        last[..end.len()].copy_from_slice(end);
+        add(last);
+    }
+    sum as u32
 }

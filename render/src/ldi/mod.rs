@@ -29,7 +29,7 @@ pub use construct::{
     Conflict, ConstructOptions, Constructed, construct, construct_around, construct_of_photos,
 };
 pub use ends::Ends;
-pub use file::{LdiFileError, parse, read, read_before, write};
+pub use file::{LdiFileError, fault, parse, read, read_before, write};
 pub use fragments::Pieces;
 pub use free::{Free, FreeCost, FreeOptions, free};
 pub use layered::{Layered, LdiError, Sample};

@@ -1,6 +1,7 @@
 //! Kept in files.
 
 use super::*;
+use render::ldi::{LdiFileError, fault};
 
 #[test]
 fn files_read_back_the_same_and_bad_ones_are_refused() {
@@ -36,7 +37,7 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     };
     assert_eq!(
         text(&changed(8, &[9])),
-        "a.ldi: LDI version 9; expected 2: make it again with this program"
+        "a.ldi: LDI version 9; expected 3; make it again"
     );
     // Sizes that would need more memory than there is.
     for (at, bytes) in [
@@ -56,6 +57,31 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     assert!(text(&changed(16, &f64::NAN.to_le_bytes())).contains("camera"));
     let last = good.len() - 8;
     assert!(text(&changed(last, &(-1.0_f32).to_le_bytes())).contains("expected a positive number"));
+}
+
+#[test]
+fn a_file_with_any_bit_changed_is_told_to_be_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.ldi");
+    write(&path, &places::random_ldi(&[2; 20], [5, 4], 9)).unwrap();
+    let good = std::fs::read(&path).unwrap();
+    assert!(read(&path).is_ok());
+    let mut by_checksum = 0;
+    for at in 0..good.len() {
+        let mut content = good.clone();
+        content[at] ^= 1 << (at % 8);
+        std::fs::write(&path, &content).unwrap();
+        let error = read(&path).unwrap_err();
+        by_checksum += usize::from(matches!(error, LdiFileError::Checksum(_)));
+        assert!(parse(&path, &content).is_err() || matches!(error, LdiFileError::Checksum(_)));
+    }
+    // Most of it is samples.
+    assert!(by_checksum > good.len() / 2, "{by_checksum}");
+    let said = LdiFileError::Checksum("a.ldi".into()).to_string();
+    assert_eq!(fault(&said), "a.ldi: damaged: its checksum is another");
+    assert_eq!(fault("a.ldi: no file"), "a.ldi: no file");
+    let said = render::RenderError::LdiFile(said).to_string();
+    assert!(!said.contains("make it again") && said.contains("`lumigraph ldis` makes it again"));
 }
 
 /// What `fuzz/targets/ldi.rs` asserts, of files changed in several places at once, as a fuzzer does: bytes
