@@ -21,7 +21,7 @@ use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
-use render::interior::{Painter, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms};
 use serde_json::{Value, json};
@@ -170,6 +170,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         },
         false => way(args, &opened)?,
     };
+    check_views(args, &way.frames)?;
     let mut inputs = opened.files();
     let scenes = match opened.photos {
         Some(_) => scenes_of(&opened.file, &opened.interior),
@@ -194,7 +195,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     std::thread::scope(|scope| {
         let mut walk = Walk::with(painter, interior, contents, model, options);
-        walk.make_ahead(scope)?;
+        if let Err(error) = walk.make_ahead(scope) {
+            let note = format!("{error}; no LDI is made ahead of need");
+            say!("note: {note}");
+            notes.push(note);
+        }
         if let Some(folder) = &ldis {
             walk.use_ldi_files(folder);
         }
@@ -434,6 +439,17 @@ fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
         fps: path.fps,
         tour,
     })
+}
+
+/// Fails where a frame's view is none that interiors are drawn for, before any is drawn.
+fn check_views(args: &Args, frames: &[Named]) -> anyhow::Result<()> {
+    for Named { name, view, .. } in frames {
+        Pinhole::new(view).with_context(|| match &args.path {
+            Some(path) => format!("{}: frame {name}", path.display()),
+            None => format!("frame {name}"),
+        })?;
+    }
+    Ok(())
 }
 
 /// Draws those frames that are not there, into their files.

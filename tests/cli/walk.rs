@@ -119,7 +119,23 @@ fn a_house_is_walked_through() {
     let noted = ran.stderr.contains("note: graphics device: ");
     assert_eq!(noted, ran.stdout.contains("drawn by CPU"), "{}", ran.stdout);
     assert_eq!(names(&here.join("device")).len(), 7);
-    // What is wrong is said.
+    // What is wrong is said, of a frame that cannot be drawn before others are.
+    let path: Value = serde_json::from_slice(&read("out/path.json")).unwrap();
+    let mut bent = path.clone();
+    bent["frames"][1]["model"] = "OPENCV_FISHEYE".into();
+    bent["frames"][1]["params"] = [45, 45, 32, 24, 1, 0, 0, 0].to_vec().into();
+    let mut large = path;
+    large["frames"][1]["width"] = 100_000.into();
+    for (path, said) in [
+        (bent, "its lens is distorted"),
+        (large, "its picture has 100000 × 48 pixels"),
+    ] {
+        std::fs::write(here.join("odd.json"), path.to_string()).unwrap();
+        let error = lumigraph(here, "walk house --path odd.json -o odd").error(1);
+        let expected = format!("odd.json: frame frame_0001: {said}");
+        assert!(error.contains(&expected), "{error}");
+        assert!(!here.join("odd").exists());
+    }
     let scenes = r#"{"version": 1, "up": [0, 1, 0], "eye_height": 1.6,
         "cells": [{"name": "a", "scene": "../a"}], "portals": []}"#;
     std::fs::write(here.join("interior.json"), scenes).unwrap();
