@@ -3,36 +3,51 @@
 use std::fmt::Write;
 use std::ops::RangeInclusive;
 
+/// A plot over the steps that others share: what its axis measures, and its lines.
+pub(super) struct Panel<'a> {
+    pub(super) up: &'a str,
+    pub(super) lines: Vec<Line<'a>>,
+}
+
 /// A line: its name, and the steps that it has values at, one after the other, with those.
 pub(super) struct Line<'a> {
     pub(super) name: &'a str,
     pub(super) values: &'a [(usize, f64)],
 }
 
+/// Of a panel.
 const SIZE: (f64, f64) = (960.0, 420.0);
 /// Left, top, right and bottom of the axes.
 const ROOM: (f64, f64, f64, f64) = (64.0, 24.0, 24.0, 44.0);
 const COLORS: [&str; 5] = ["#c0392b", "#2c6fbb", "#2e8b57", "#b8860b", "#7d3c98"];
 
-/// A plot of lines that share both axes: across those steps, and up from zero. A line is broken where
-/// steps have no values.
-pub(super) fn plot(
-    lines: &[Line<'_>],
-    steps: RangeInclusive<usize>,
-    across: &str,
-    up: &str,
-) -> String {
+/// Panels below each other, whose lines share both axes: across those steps, and up from zero. A line is broken
+/// where steps have no values.
+pub(super) fn plot(panels: &[Panel<'_>], steps: &RangeInclusive<usize>, across: &str) -> String {
+    let (width, height) = SIZE;
+    let mut svg = opened((width, height * panels.len() as f64));
+    for (place, panel) in panels.iter().enumerate() {
+        let down = height * place as f64;
+        svg += &format!("<g transform=\"translate(0 {down})\">\n");
+        add(&mut svg, panel, steps, across);
+        svg += "</g>\n";
+    }
+    svg + "</svg>\n"
+}
+
+/// Adds a panel, where its left upper corner is the origin.
+fn add(svg: &mut String, panel: &Panel<'_>, steps: &RangeInclusive<usize>, across: &str) {
+    let Panel { up, lines } = panel;
     let values = lines.iter().flat_map(|l| l.values);
     let greatest = values.map(|(_, value)| *value).fold(0.0, f64::max);
     let step = step(greatest);
     let top = (greatest / step).ceil().max(1.0) * step;
-    let (first, last) = steps.into_inner();
+    let (first, last) = (*steps.start(), *steps.end());
     let (width, height) = SIZE;
     let (left, above, right, below) = ROOM;
     let length = last.saturating_sub(first).max(1) as f64;
     let x = |i: usize| left + (width - left - right) * (i as f64 - first as f64) / length;
     let y = |v: f64| height - below - (height - above - below) * v / top;
-    let mut svg = opened(SIZE);
     // Writing to a string cannot fail.
     let rows = (top / step).round() as usize;
     for row in 0..=rows {
@@ -81,7 +96,6 @@ pub(super) fn plot(
             line.name
         );
     }
-    svg + "</svg>\n"
 }
 
 /// The beginning of a plot of so many pixels.
@@ -119,10 +133,11 @@ mod tests {
             [(0, 0.5), (1, 0.5), (2, 3.9)],
         );
         let lines = [("one", &a[..]), ("two", &b[..])].map(|(name, values)| Line { name, values });
-        let svg = plot(&lines, 0..=2, "frame", "ms");
+        let panel = |lines| Panel { up: "ms", lines };
+        let svg = plot(&[panel(lines.into())], &(0..=2), "frame");
         assert_eq!(svg.matches("<polyline").count(), 2);
         assert!(svg.contains("64.0,") && svg.contains(">one<") && svg.ends_with("</svg>\n"));
-        assert!(plot(&[], 0..=0, "frame", "ms").contains("</svg>"));
+        assert!(plot(&[panel(Vec::new())], &(0..=0), "frame").contains("</svg>"));
     }
 
     #[test]
@@ -132,7 +147,11 @@ mod tests {
             name: "one",
             values: &values,
         };
-        let svg = plot(&[line], 120..=240, "frame", "ms");
+        let panel = Panel {
+            up: "ms",
+            lines: vec![line],
+        };
+        let svg = plot(&[panel], &(120..=240), "frame");
         assert!(svg.contains("frame (120 to 240)"), "{svg}");
         for points in [
             "64.0,24.0 71.3,24.0",
@@ -140,6 +159,31 @@ mod tests {
             "936.0,24.0 936.0,24.0",
         ] {
             assert!(svg.contains(&format!("points=\"{points}\"")), "{svg}");
+        }
+    }
+
+    #[test]
+    fn panels_are_below_each_other_each_with_an_axis_of_its_own() {
+        let (low, high) = ([(0, 1.0), (1, 4.0)], [(0, 1.0), (1, 4000.0)]);
+        let panels = [("ms", &low), ("ms, with making", &high)].map(|(up, values)| Panel {
+            up,
+            lines: vec![Line {
+                name: "one",
+                values,
+            }],
+        });
+        let svg = plot(&panels, &(0..=1), "frame");
+        assert!(svg.contains("viewBox=\"0 0 960 840\""), "{svg}");
+        let parts: Vec<&str> = svg.split("<g transform=\"translate(0 ").collect();
+        assert!(parts.len() == 3 && svg.matches("</g>").count() == 2);
+        for (part, [down, up, top]) in parts[1..].iter().zip([
+            ["0)", ">ms<", ">4<"],
+            ["420)", ">ms, with making<", ">4000<"],
+        ]) {
+            assert!(part.starts_with(down), "{svg}");
+            assert!(part.contains(up) && part.contains(top), "{svg}");
+            // Both reach the top at their greatest.
+            assert!(part.contains(" 936.0,24.0\""), "{svg}");
         }
     }
 }

@@ -11,7 +11,6 @@ use super::made::{self, Made};
 use super::options::{cut, resized, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
-use super::plot::{Line, plot};
 use super::references::ReferenceArgs;
 use super::session::progress;
 use super::targets::check_folder;
@@ -23,7 +22,7 @@ use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
 use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
-use report::{Drawn, Report, Scored, Walked, ms};
+use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -32,9 +31,10 @@ use std::path::PathBuf;
 /// The room one is in is drawn as geometry; what lies beyond its portals as geometry too, or out of
 /// images made before the portals: as textures, warped, or as layered depth images. Geometry has
 /// the model's colours, or those of the photos of a capture's rooms. Frames are PNGs; times.svg
-/// plots the time of each frame, path.json is the tour (no other path is written over). --held-out
-/// draws the photos that were held out when the interior was made, and scores them as `evaluate`
-/// does.
+/// plots how long each takes to draw, and below that, where portals show images, how long with
+/// making those that are not there yet: so long one stands still ("with making", at worst).
+/// path.json is the tour (no other path is written over). --held-out draws the photos that were
+/// held out when the interior was made, and scores them as `evaluate` does.
 ///
 ///     lumigraph walk house --portals all -o walk
 ///     lumigraph walk house --path film/path.json -o frames --video film.mp4
@@ -281,18 +281,10 @@ fn report(
     let references = walk.library().residency();
     let photos = walk.painter().captured();
     let decoded = photos.map(|captured| captured.lumigraph().photos.residency());
-    let times: Vec<Vec<(usize, f64)>> = walks.iter().map(Walked::times_ms).collect();
-    let lines = walks.iter().zip(&times);
-    let lines: Vec<Line<'_>> = lines
-        .filter(|(_, values)| !values.is_empty())
-        .map(|(walk, values)| Line {
-            name: walk.fill.name(),
-            values,
-        })
-        .collect();
     // Where all frames are from before, so is their plot.
-    if let (Some(first), Some(last), false) = (frames.first(), frames.last(), lines.is_empty()) {
-        let svg = plot(&lines, first.index..=last.index, "frame", "ms a frame");
+    if let (Some(first), Some(last)) = (frames.first(), frames.last())
+        && let Some(svg) = times_svg(walks, &(first.index..=last.index))
+    {
         write_file(&args.output.join("times.svg"), svg.as_bytes())?;
     }
     if args.json {
@@ -315,11 +307,12 @@ fn report(
     }
     say!("{}", whole.text());
     let mut text = format!(
-        "{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>7} {:>5}",
+        "{:<10} {:>9} {:>9} {:>9} {:>11} {:>9} {:>9} {:>8} {:>7} {:>5}",
         "portals",
         "median ms",
         "95 % ms",
         "worst ms",
+        "with making",
         "triangles",
         "samples",
         "holes",
@@ -482,6 +475,8 @@ fn draw(
             cost.ldis_made += first.ldis_made;
             cost.ldis_read += first.ldis_read;
             cost.ldis_ahead += first.ldis_ahead;
+            cost.references += first.references;
+            cost.waited += first.waited;
             let score = truth.score(&walk.picture().picture())?;
             scored = Some(Scored { score, cpu_ms });
         }

@@ -123,9 +123,14 @@ pub struct FrameCost {
 }
 
 impl FrameCost {
-    /// All of the frame but making reference images.
+    /// Drawing the frame: all of it but [`Self::references`].
     pub fn time(&self) -> Duration {
         self.visibility + self.geometry + self.fill + self.shade
+    }
+
+    /// All of the frame: how long one stands still for it.
+    pub fn with_making(&self) -> Duration {
+        self.time() + self.references
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a walk says of itself: lines for people, and JSON.
 
+use super::super::plot::{Line, Panel, plot};
 use super::super::stamp::in_unicode;
 use super::super::took::{Memory, Start, Took};
 use lumigraph::scene::TruthScore;
@@ -8,7 +9,9 @@ use render::interior::{FrameCost, PortalFill, Walk};
 use render::score::mean_of;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// A walk with one kind of portals.
 pub(super) struct Walked {
@@ -47,11 +50,15 @@ struct FrameReport<'a> {
     name: &'a str,
     file: PathBuf,
     cell: Option<&'a str>,
+    /// Drawing it: the sum of visibility, geometry, fill and shade.
     ms: f64,
+    /// That and `references_ms`: how long one stands still for it.
+    with_making_ms: f64,
     visibility_ms: f64,
     geometry_ms: f64,
     fill_ms: f64,
     shade_ms: f64,
+    /// Making images and LDIs, reading LDIs, and waiting for one.
     references_ms: f64,
     references_made: usize,
     /// By this frame itself.
@@ -138,15 +145,69 @@ impl Report {
     }
 }
 
-pub(super) fn ms(time: std::time::Duration) -> f64 {
+pub(super) fn ms(time: Duration) -> f64 {
     1e3 * time.as_secs_f64()
 }
 
+/// What frames took, those from a first to a last: a plot of drawing them, and where portals show images below it
+/// one of all that they took. Making images may take many times as long. Nothing where no frame was drawn.
+pub(super) fn times_svg(walks: &[Walked], frames: &RangeInclusive<usize>) -> Option<String> {
+    let drawn = walks.iter().filter(|walk| !walk.frames.is_empty());
+    let drawn: Vec<&Walked> = drawn.collect();
+    if drawn.is_empty() {
+        return None;
+    }
+    let alone: Vec<Times> = drawn.iter().map(|walk| walk.times_ms()).collect();
+    let all: Vec<Times> = drawn.iter().map(|walk| walk.with_making_ms()).collect();
+    let mut panels = vec![Panel {
+        up: "ms a frame",
+        lines: lines(&drawn, &alone),
+    }];
+    if drawn.iter().any(|walk| walk.shows_images()) {
+        panels.push(Panel {
+            up: "ms a frame, with making what portals show",
+            lines: lines(&drawn, &all),
+        });
+    }
+    Some(plot(&panels, frames, "frame"))
+}
+
+/// A walk's line for each.
+fn lines<'a>(walks: &[&'a Walked], times: &'a [Times]) -> Vec<Line<'a>> {
+    let line = |(walk, values): (&&'a Walked, &'a Times)| Line {
+        name: walk.fill.name(),
+        values,
+    };
+    walks.iter().zip(times).map(line).collect()
+}
+
+/// Of frames, their places in the path and their times in milliseconds.
+type Times = Vec<(usize, f64)>;
+
 impl Walked {
-    /// Of each frame that was drawn, its place in the path and its time.
-    pub(super) fn times_ms(&self) -> Vec<(usize, f64)> {
+    /// How long each frame that was drawn took to draw.
+    fn times_ms(&self) -> Times {
         let times = self.frames.iter().map(|f| (f.index, ms(f.cost.time())));
         times.collect()
+    }
+
+    /// The same with making what it needed.
+    fn with_making_ms(&self) -> Times {
+        let frames = self.frames.iter();
+        frames
+            .map(|f| (f.index, ms(f.cost.with_making())))
+            .collect()
+    }
+
+    /// For how long one stands still at most; nothing where no frame was drawn.
+    fn worst_with_making_ms(&self) -> Option<f64> {
+        let times = self.with_making_ms().into_iter().map(|(_, time)| time);
+        times.max_by(f64::total_cmp)
+    }
+
+    /// Whether its portals do.
+    fn shows_images(&self) -> bool {
+        self.fill == PortalFill::Ldi || self.fill.references() > 0
     }
 
     /// How many frames were there before.
@@ -154,7 +215,7 @@ impl Walked {
         self.files.len() - self.frames.len()
     }
 
-    /// The median, what 95 % stay below, and the worst; nothing where no frame was drawn.
+    /// Of drawing alone, the median, what 95 % stay below, and the worst; nothing where no frame was drawn.
     fn spread(&self) -> Option<[f64; 3]> {
         let mut times: Vec<f64> = self.times_ms().into_iter().map(|(_, time)| time).collect();
         times.sort_by(f64::total_cmp);
@@ -196,16 +257,18 @@ impl Walked {
             format!(" {psnr:>8.2} {ssim:>8.4} {coverage:>8.4} {cpu_ms:>8.1}")
         });
         let name = self.fill.name();
-        let Some([median, most, worst]) = self.spread() else {
+        let (Some([median, most, worst]), Some(still)) =
+            (self.spread(), self.worst_with_making_ms())
+        else {
             let none = "-";
             return format!(
-                "{name:<10} {none:>9} {none:>9} {none:>9} {none:>9} {none:>9} {none:>8} {none:>7} \
-                 {none:>5}\n"
+                "{name:<10} {none:>9} {none:>9} {none:>9} {none:>11} {none:>9} {none:>9} {none:>8} \
+                 {none:>7} {none:>5}\n"
             );
         };
         format!(
-            "{name:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {:>9.0} {:>9.0} {:>8.1} {:>7} {:>5}\
-             {scored}\n",
+            "{name:<10} {median:>9.1} {most:>9.1} {worst:>9.1} {still:>11.1} {:>9.0} {:>9.0} {:>8.1} \
+             {:>7} {:>5}{scored}\n",
             self.mean(|c| c.triangles_tried),
             self.mean(|c| c.samples),
             self.mean(|c| c.holes),
@@ -225,6 +288,7 @@ impl Walked {
             }),
             cell: c.cell.map(|id| interior.cell(id).name.as_str()),
             ms: ms(c.time()),
+            with_making_ms: ms(c.with_making()),
             visibility_ms: ms(c.visibility),
             geometry_ms: ms(c.geometry),
             fill_ms: ms(c.fill),
@@ -252,6 +316,7 @@ impl Walked {
             "median_ms": spread.map(|s| s[0]),
             "percentile_95_ms": spread.map(|s| s[1]),
             "worst_ms": spread.map(|s| s[2]),
+            "worst_with_making_ms": self.worst_with_making_ms(),
             "references_used": self.references_used,
             "references_made": self.references_made,
             "references_made_ahead": self.references_made - self.sum(|c| c.references_made),
@@ -262,5 +327,78 @@ impl Walked {
             "mean": self.scored(),
             "frames": frames,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames that take so many milliseconds to draw, and so many more for what they show.
+    fn walked(fill: PortalFill, frames: &[(u64, u64)]) -> Walked {
+        let drawn = |(index, &(drawing, making)): (usize, &(u64, u64))| Drawn {
+            index,
+            name: index.to_string(),
+            file: PathBuf::from(format!("{index}.png")),
+            cost: FrameCost {
+                fill: Duration::from_millis(drawing),
+                references: Duration::from_millis(making),
+                ..FrameCost::default()
+            },
+            scored: None,
+        };
+        let frames: Vec<Drawn> = frames.iter().enumerate().map(drawn).collect();
+        Walked {
+            fill,
+            files: frames.iter().map(|f| f.file.clone()).collect(),
+            frames,
+            references_used: 0,
+            ldis_used: 0,
+            references_made: 0,
+        }
+    }
+
+    #[test]
+    fn how_long_a_frame_stands_still_is_said_beside_what_drawing_takes() {
+        let walk = walked(PortalFill::Ldi, &[(5, 0), (6, 2000), (7, 0)]);
+        let cells = walk.line();
+        let cells: Vec<&str> = cells.split_whitespace().take(5).collect();
+        assert_eq!(cells, ["ldi", "6.0", "7.0", "7.0", "2006.0"]);
+        let interior = Interior {
+            model: None,
+            up: glam::DVec3::Y,
+            eye_height: 1.6,
+            cells: Vec::new(),
+            portals: Vec::new(),
+            held_out: Vec::new(),
+            other: Default::default(),
+        };
+        let report = walk.json(&interior);
+        let is = |value: &Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-6;
+        assert!(is(&report["worst_ms"], 7.0), "{report}");
+        assert!(is(&report["worst_with_making_ms"], 2006.0), "{report}");
+        for (i, [ms, making]) in [[5.0, 0.0], [6.0, 2000.0], [7.0, 0.0]].iter().enumerate() {
+            let frame = &report["frames"][i];
+            assert!(is(&frame["ms"], *ms), "{report}");
+            assert!(is(&frame["references_ms"], *making), "{report}");
+            assert!(is(&frame["with_making_ms"], ms + making), "{report}");
+        }
+    }
+
+    #[test]
+    fn what_making_takes_is_plotted_where_portals_show_images() {
+        let frames = [(5, 0), (6, 2000)];
+        let walks = [PortalFill::Geometry, PortalFill::Ldi].map(|fill| walked(fill, &frames));
+        let panels = |walks: &[Walked]| {
+            let svg = times_svg(walks, &(0..=1)).unwrap();
+            let with_making = svg.contains(">ms a frame, with making what portals show<");
+            assert_eq!(svg.contains(">2000<"), with_making, "{svg}");
+            (svg.matches("<polyline").count(), with_making)
+        };
+        assert_eq!(panels(&walks[..1]), (1, false));
+        assert_eq!(panels(&walks[1..]), (2, true));
+        assert_eq!(panels(&walks), (4, true));
+        assert!(times_svg(&[walked(PortalFill::Ldi, &[])], &(0..=1)).is_none());
+        assert!(times_svg(&[], &(0..=1)).is_none());
     }
 }
