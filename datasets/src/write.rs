@@ -8,7 +8,7 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Depth maps hold this many steps to a world unit: millimetres where units are metres.
+/// Depth maps of a [`Dataset`] hold this many steps to a world unit: millimetres, as its units are metres.
 pub const DEPTH_STEPS_PER_UNIT: f64 = 1000.0;
 
 /// What [`write()`] has written.
@@ -138,6 +138,7 @@ fn capture_of(dataset: &Dataset) -> Capture<'_> {
         photos: &dataset.photos,
         held_out: &dataset.held_out,
         reconstruction: &dataset.reconstruction,
+        depth_steps_per_unit: DEPTH_STEPS_PER_UNIT,
         readme: readme(dataset),
     }
 }
@@ -147,6 +148,8 @@ pub(crate) struct Capture<'a> {
     pub(crate) photos: &'a [Photo],
     pub(crate) held_out: &'a [String],
     pub(crate) reconstruction: &'a Reconstruction,
+    /// Of its depth maps, to a world unit.
+    pub(crate) depth_steps_per_unit: f64,
     pub(crate) readme: String,
 }
 
@@ -167,7 +170,7 @@ impl<'a> Capture<'a> {
         for photo in self.photos {
             let (picture, depth) = seen(photo);
             save(picture, &images.join(&photo.name))?;
-            let depth = DynamicImage::from(depth_steps(photo, &depth));
+            let depth = DynamicImage::from(depth_steps(photo, &depth, self.depth_steps_per_unit));
             let name = Path::new(&photo.name).with_extension("png");
             save(depth, &depths.join(name))?;
         }
@@ -188,9 +191,13 @@ impl<'a> Capture<'a> {
 }
 
 /// Depth along z in steps; 0 where there is no surface or it is too far to say.
-fn depth_steps(photo: &Photo, depths: &[f64]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+fn depth_steps(
+    photo: &Photo,
+    depths: &[f64],
+    steps_per_unit: f64,
+) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let steps = depths.iter().map(|depth| {
-        let steps = (depth * DEPTH_STEPS_PER_UNIT).round();
+        let steps = (depth * steps_per_unit).round();
         if (0.0..=f64::from(u16::MAX)).contains(&steps) {
             steps as u16
         } else {

@@ -7,7 +7,7 @@ use super::output::{print, say};
 use super::session::spinner;
 use anyhow::Context;
 use datasets::house::{self, HouseOptions};
-use datasets::{DatasetError, Options, Written};
+use datasets::{DEPTH_STEPS_PER_UNIT, DatasetError, Options, Written};
 use std::path::{Path, PathBuf};
 
 /// Write a synthetic scene with exact truth, in users' formats
@@ -91,9 +91,22 @@ fn survey(args: &Args, interior: &Path, options: &Options) -> anyhow::Result<Wri
     let named = || interior.display().to_string();
     let bar = spinner("photographing the rooms");
     let survey = datasets::survey(&opened.interior, &opened.model, options).map_err(usage);
-    let written = survey.map(|survey| datasets::write_survey(&survey, &args.output));
+    let written = survey.map(|survey| {
+        let written = datasets::write_survey(&survey, &args.output);
+        (written, survey.depth_steps_per_unit)
+    });
     bar.finish_and_clear();
-    Ok(written.with_context(named)??)
+    let (written, depth_steps) = written.with_context(named)?;
+    let written = written?;
+    if depth_steps != DEPTH_STEPS_PER_UNIT {
+        let (step, folder) = (1.0 / depth_steps, args.output.display());
+        say!(
+            "note: a step of its depth maps is {step} world units, as eyes are {} over the floor: \
+             `lumigraph import {folder} --depth-scale {step}` reads them",
+            opened.interior.eye_height
+        );
+    }
+    Ok(written)
 }
 
 fn house(args: &Args) -> anyhow::Result<()> {

@@ -76,7 +76,8 @@ pub struct House {
 pub const MODEL_FILE: &str = "house.glb";
 /// The name of the interior's file.
 pub const INTERIOR_FILE: &str = "interior.json";
-const EYE_HEIGHT: f64 = 1.6;
+/// How high eyes are over the floor, in metres.
+pub(crate) const EYE_HEIGHT: f64 = 1.6;
 const TRIANGLES_PER_ROOM: usize = 12_000;
 
 /// A house by its options: the same for the same options, whatever the machine's threads.

@@ -16,10 +16,11 @@
 mod places;
 
 use crate::dataset::{posed, settled};
+use crate::house::EYE_HEIGHT;
 use crate::model_picture::{look, render_model};
 use crate::points::{Seen, sparse_points};
 use crate::write::{Capture, in_new_folder};
-use crate::{DEPTH_STEPS_PER_UNIT, DatasetError, Options, Photo, Written};
+use crate::{DatasetError, Options, Photo, Written};
 use calibrate::{Camera, ModelKind, Reconstruction, Rigid3, View};
 use glam::{DQuat, DVec3};
 use image::DynamicImage;
@@ -39,6 +40,9 @@ pub struct Survey<'a> {
     pub held_out: Vec<String>,
     /// Cameras, poses and sparse points, all exact.
     pub reconstruction: Reconstruction,
+    /// Depth maps hold this many steps to a world unit: the power of ten that comes nearest to
+    /// millimetres, by how high eyes are over the floor.
+    pub depth_steps_per_unit: f64,
     model: &'a Model,
     solid: Solid,
     samples_per_side: u32,
@@ -59,8 +63,7 @@ const SEED: u32 = 31;
 /// steps of 45°, by turns a little up and down, with a field of view of 90°.
 ///
 /// By default 32 for each room, of 320 × 256 pixels; rooms have none for which fewer than eight
-/// a room are too few. World units should be metres, as depth
-/// maps hold thousandths of them.
+/// a room are too few.
 ///
 /// # Errors
 /// An option out of its range; cells that the model lacks; no room has a place to stand in.
@@ -124,10 +127,17 @@ pub fn survey<'a>(
         held_out: held_out.map(|i| photos[i].name.clone()).collect(),
         photos,
         reconstruction,
+        depth_steps_per_unit: depth_steps_per_unit(interior.eye_height),
         model,
         solid,
         samples_per_side: chosen.samples_per_side,
     })
+}
+
+/// The power of ten of steps to a world unit that comes nearest to millimetres.
+fn depth_steps_per_unit(eye_height: f64) -> f64 {
+    let meter = eye_height / EYE_HEIGHT;
+    10_f64.powi((1000.0 / meter).log10().round() as i32)
 }
 
 /// The camera of photo `i`.
@@ -168,6 +178,7 @@ pub fn write_survey(survey: &Survey, folder: &Path) -> Result<Written, DatasetEr
         photos: &survey.photos,
         held_out: &survey.held_out,
         reconstruction: &survey.reconstruction,
+        depth_steps_per_unit: survey.depth_steps_per_unit,
         readme: readme(survey),
     };
     in_new_folder(
@@ -200,12 +211,14 @@ fn readme(survey: &Survey) -> String {
          - {photos} images of {width} x {height} (images/), depth/; {held_out} held out in \
          split.json (one of each place).\n\
          - Calibration: poses, {points} points and depth are exact. depth/NAME.png is 16-bit \
-         along z at pixel centres, 1/{DEPTH_STEPS_PER_UNIT} of a world unit a step, 0 = no \
-         surface.\n",
+         along z at pixel centres, {step} world units a step (`import --depth-scale {step}`), \
+         0 = no surface within {reach}.\n",
         photos = survey.photos.len(),
         width = camera.width,
         height = camera.height,
         held_out = survey.held_out.len(),
         points = points.len(),
+        step = 1.0 / survey.depth_steps_per_unit,
+        reach = f64::from(u16::MAX) / survey.depth_steps_per_unit,
     )
 }
