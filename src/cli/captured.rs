@@ -1,7 +1,7 @@
 //! An interior opened, with the photos that show its cells.
 
 use super::exposure::{ExposureArgs, ExposureUsed};
-use super::inputs::files_of;
+use super::inputs::{files_of, files_of_mesh};
 use super::interior::open;
 use super::options::{drop_weak_of_interior, print_warnings};
 use super::output::say;
@@ -59,10 +59,11 @@ impl Opened {
         })
     }
 
-    /// The files that it was read from, and its photos'.
+    /// The files that it was read from, those beside its model's included, and its photos'.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         let photos = self.photos.iter().flat_map(Photos::files);
         let model = model_file(&self.file, &self.interior);
+        let model = model.into_iter().flat_map(files_of_mesh);
         photos.chain(model).chain([self.file.clone()]).collect()
     }
 
@@ -248,5 +249,45 @@ impl Photos {
             }
         }
         Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::inputs::files_behind;
+    use super::*;
+    use image::RgbaImage;
+
+    /// A triangle; its corners and its texture lie beside it.
+    const WALL: &str = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}], "images": [{"uri": "wall.png"}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": "wall.bin"}]}"#;
+    const ROOM: &str = r#"{"version": 1, "model": "wall.gltf", "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [{"name": "room", "box": {"min": [-1, -1, -1], "max": [2, 2, 2]}}], "portals": []}"#;
+
+    #[test]
+    fn what_lies_beside_a_model_is_among_an_interiors_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let corners: Vec<u8> = corners.into_iter().flat_map(f32::to_le_bytes).collect();
+        std::fs::write(at("wall.bin"), corners).unwrap();
+        RgbaImage::new(1, 1).save(at("wall.png")).unwrap();
+        std::fs::write(at("wall.gltf"), WALL).unwrap();
+        std::fs::write(at("interior.json"), ROOM).unwrap();
+        let opened = Opened::new(folder.path(), None, |_| {}).unwrap();
+        let mut files = opened.files();
+        files.sort();
+        let of_model = ["wall.bin", "wall.gltf", "wall.png"].map(at);
+        assert_eq!(files[0], at("interior.json"));
+        assert_eq!(files[1..], of_model);
+        // Of a mesh that an option names, too.
+        let mut files = files_behind([at("wall.gltf")], &[]);
+        files.sort();
+        assert_eq!(files, of_model);
     }
 }

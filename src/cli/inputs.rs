@@ -5,6 +5,7 @@ use capture::{PhotoSet, find_photos_folder};
 use lumigraph::scene::file::SceneFile;
 use lumigraph::scene::{self, Photo, Scene};
 use proxy::interior::Interior;
+use proxy::mesh::files_beside;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +43,7 @@ pub(super) fn files_behind_scene(given: &Path, scene: &Scene) -> Vec<PathBuf> {
 }
 
 /// The files that frames are made of, besides photos and what lies beside these: those that options name (of a
-/// folder, the COLMAP model in it), and the calibrations of scenes and captures.
+/// folder, the COLMAP model in it; of a mesh, what it has beside it, too), and the calibrations of scenes and captures.
 pub(super) fn files_behind(
     named: impl IntoIterator<Item = PathBuf>,
     scenes: &[PathBuf],
@@ -51,11 +52,20 @@ pub(super) fn files_behind(
     for path in named {
         match colmap::find_model(&path) {
             Ok(model) => all.extend(model_files(&model)),
-            Err(_) => all.push(path),
+            Err(_) => all.extend(files_of_mesh(path)),
         }
     }
     all.extend(scenes.iter().flat_map(|folder| files_of_places(folder)));
     all
+}
+
+/// A mesh's or a model's file, and those beside it that it has numbers and textures in; of any other file, that
+/// alone.
+pub(super) fn files_of_mesh(file: PathBuf) -> Vec<PathBuf> {
+    // What is wrong with it is said where it is read.
+    let mut files = files_beside(&file).unwrap_or_default();
+    files.push(file);
+    files
 }
 
 /// The folders of the scenes that show an interior's cells; `file` is the interior's.

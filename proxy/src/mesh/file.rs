@@ -2,7 +2,7 @@
 
 use super::{ExportError, Mesh, MeshFileError, Model, gltf, obj, ply, to_glb, to_ply};
 use calibrate::View;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads a mesh from a .glb, .gltf, .ply or .obj file. Its coordinates are taken as the file
 /// states them, whatever way it calls up; see [`Mesh::transform`].
@@ -63,6 +63,18 @@ pub fn parse_model(path: &Path, bytes: &[u8]) -> Result<(Model, Vec<String>), Me
         return Err(MeshFileError::NoTriangles(path.to_owned(), corners));
     }
     Ok((model, warnings))
+}
+
+/// The files beside a .glb or .gltf file that it has buffers and pictures in, by their paths, whether or not
+/// they are there; none of other files. What lies elsewhere is not read, and not among them.
+///
+/// # Errors
+/// The file cannot be read, or is no glTF file.
+pub fn files_beside(path: &Path) -> Result<Vec<PathBuf>, MeshFileError> {
+    match extension(path).as_str() {
+        "glb" | "gltf" => gltf::files_beside(path),
+        _ => Ok(Vec::new()),
+    }
 }
 
 /// Writes a mesh as .glb, for looking at, with cameras and extras, or as .ply, which keeps

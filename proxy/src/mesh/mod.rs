@@ -22,7 +22,7 @@ mod texture;
 
 pub use coloring::{Coloring, FEW, Neighbours};
 pub use error::{ExportError, MeshFileError};
-pub use file::{parse, parse_model, read, read_model, write};
+pub use file::{files_beside, parse, parse_model, read, read_model, write};
 pub use glb::to_glb;
 pub use look::lies_where_cameras_look;
 pub(crate) use model::PORTAL_NODE;

@@ -537,6 +537,46 @@ fn what_is_corrupt_is_named() {
 }
 
 #[test]
+fn files_beside_a_model_are_known_by_what_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let listed = |name: &str, bytes: &[u8]| {
+        std::fs::write(at(name), bytes).unwrap();
+        mesh::files_beside(&at(name)).unwrap()
+    };
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    assert!(listed("m.glb", &bytes).is_empty());
+    let view = small_view(&bytes);
+    let with_uri = |uri: &str| changed(&bytes, |t| t.replace(&view, &format!("\"uri\":\"{uri}\"")));
+    // Those that are read, there or not.
+    assert_eq!(listed("m.glb", &with_uri("a%20b.png")), [at("a b.png")]);
+    let (_, warnings) = mesh::read_model(&at("m.glb")).unwrap();
+    assert!(warnings[0].contains("a b.png: "), "{warnings:?}");
+    let white = RgbaImage::from_pixel(1, 1, Rgba([255; 4]));
+    white.save(at("a b.png")).unwrap();
+    assert_eq!(mesh::read_model(&at("m.glb")).unwrap().1, [""; 0]);
+    for elsewhere in [
+        "../a.png",
+        "https://example.org/a.png",
+        "data:image/png;base64,AAAA",
+    ] {
+        assert!(
+            listed("m.glb", &with_uri(elsewhere)).is_empty(),
+            "{elsewhere}"
+        );
+    }
+    let text = br#"{"buffers": [{"uri": "m.bin", "byteLength": 4}, {"byteLength": 4}],
+        "images": [{"uri": "b.png"}, {"bufferView": 0}, {"uri": "in/a.png"}, {"uri": "b.png"}]}"#;
+    let expected = ["b.png", "in/a.png", "m.bin"].map(at);
+    assert_eq!(listed("m.gltf", text), expected);
+    // Other meshes' files are whole; and what is no glTF file is said.
+    assert!(listed("m.ply", text).is_empty());
+    std::fs::write(at("m.gltf"), "ply").unwrap();
+    let error = mesh::files_beside(&at("m.gltf")).unwrap_err().to_string();
+    assert!(error.contains("m.gltf: not a glTF file: "), "{error}");
+}
+
+#[test]
 fn the_captured_house_has_its_textures() {
     let Some(folder) = common::find_capture("interior-house") else {
         return;

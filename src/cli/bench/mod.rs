@@ -16,7 +16,7 @@ mod variants;
 use super::Usage;
 use super::captured::Opened;
 use super::exposure::ExposureArgs;
-use super::inputs::{files_of, files_of_places, scenes_of};
+use super::inputs::{files_of, files_of_mesh, files_of_places, scenes_of};
 use super::options::DeviceName;
 use super::output::{print, print_json, say, write_file};
 use super::session::progress;
@@ -241,7 +241,8 @@ fn inputs(given: &Given) -> anyhow::Result<Vec<Stamp>> {
     let mut scenes = vec![folder.clone()];
     if folder.join(super::interior::INTERIOR).is_file() {
         let (file, interior) = super::interior::open(folder)?;
-        files.extend(interior.model.iter().map(|name| folder.join(name)));
+        let model = interior.model.iter().map(|name| folder.join(name));
+        files.extend(model.flat_map(files_of_mesh));
         scenes = scenes_of(&file, &interior);
         files.push(file);
     }

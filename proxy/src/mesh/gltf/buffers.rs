@@ -4,6 +4,9 @@ use crate::mesh::MeshFileError;
 use base64::Engine;
 use serde::Deserialize;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 #[derive(Deserialize)]
@@ -84,7 +87,7 @@ pub(super) fn fetch(
             None => Err(failed("its data: uri is not base64".to_owned())),
         };
     }
-    let Some(beside) = percent_decoded(uri).filter(|p| is_beside(p)) else {
+    let Some(beside) = path_beside(uri) else {
         return Err(failed(format!(
             "its bytes are at `{}`; put them into a file beside this one, or export the mesh \
              as .glb",
@@ -100,6 +103,53 @@ pub(super) fn fetch(
     });
     let bytes = read.map_err(|e| MeshFileError::Io(path, e))?;
     Ok((bytes, true))
+}
+
+/// All that may lie in files of their own.
+#[derive(Deserialize)]
+struct Root {
+    #[serde(default)]
+    buffers: Vec<Buffer>,
+    /// Told by uris as buffers are.
+    #[serde(default)]
+    images: Vec<Buffer>,
+}
+
+/// The files beside a .glb or .gltf file that its buffers and pictures are fetched from, in the order of
+/// their paths, whether or not they are there.
+pub(in crate::mesh) fn files_beside(path: &Path) -> Result<Vec<PathBuf>, MeshFileError> {
+    let bytes = up_to_json(path).map_err(|e| MeshFileError::Io(path.to_owned(), e))?;
+    let (json, _) = super::split(path, &bytes)?;
+    let failed = |e| MeshFileError::File(path.to_owned(), format!("not a glTF file: {e}"));
+    let root: Root = serde_json::from_slice(json).map_err(failed)?;
+    let entries = root.buffers.iter().chain(&root.images);
+    let uris = entries.filter_map(|entry| entry.uri.as_deref());
+    let uris = uris.filter(|uri| !uri.starts_with("data:"));
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = uris.filter_map(path_beside).map(|file| folder.join(file));
+    let files: BTreeSet<PathBuf> = files.collect();
+    Ok(files.into_iter().collect())
+}
+
+/// The bytes of a file; of a GLB those up to the end of its JSON.
+fn up_to_json(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    // The header, and the first chunk's.
+    let mut bytes = Vec::new();
+    file.by_ref().take(20).read_to_end(&mut bytes)?;
+    let length = bytes.get(12..16).and_then(|b| b.try_into().ok());
+    let length = length.map(u32::from_le_bytes).unwrap_or_default();
+    let rest = match bytes.starts_with(b"glTF") {
+        true => u64::from(length),
+        false => u64::MAX,
+    };
+    file.take(rest).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The path that a uri stands for, from the folder of the file that names it, where it may be followed.
+fn path_beside(uri: &str) -> Option<PathBuf> {
+    percent_decoded(uri).filter(|path| is_beside(path))
 }
 
 /// Whether a path leads to a file in the same folder or below it.

@@ -10,6 +10,7 @@ mod looks;
 mod materials;
 mod pictures;
 
+pub(super) use buffers::files_beside;
 pub(super) use looks::parse_model;
 
 use super::{Mesh, MeshFileError};
