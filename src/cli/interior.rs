@@ -18,7 +18,7 @@ use proxy::interior::{
     Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare, fit_to_sight,
     interior_from_nodes, read_interior, strays, surface_of, write_interior,
 };
-use proxy::mesh::{MeshFileError, Model, model_to_glb, parse_model};
+use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
 use std::ffi::OsString;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -186,7 +186,7 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
         let text = "--hold-out is for captures; a model has no photos";
         return Err(Usage(text.to_owned()).into());
     }
-    // A .glb is one file, and can be copied as it is.
+    // A .glb is one file as a rule, and can be copied as it is.
     let is_glb = args
         .model
         .extension()
@@ -210,6 +210,11 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     }
     let file = model_name(args);
     let named = || args.model.display().to_string();
+    let bytes = match files_beside(&args.model)?.is_empty() {
+        true => bytes,
+        // What lies beside it is not there beside a copy.
+        false => model_to_glb(&model).with_context(named)?,
+    };
     let given = match told.rooms {
         rooms @ Some(_) => rooms,
         None if args.find || args.up.is_some() => None,

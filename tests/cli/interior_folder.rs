@@ -2,6 +2,8 @@
 
 use crate::interior::{ROOMS, names, with_house};
 use crate::run::{files, lumigraph};
+use image::{Rgba, RgbaImage};
+use proxy::mesh::read_model;
 
 #[test]
 fn the_folder_one_stands_in_is_filled_and_replaced_like_any_other() {
@@ -81,4 +83,52 @@ fn who_stands_in_a_folder_that_is_replaced_stays_in_it() {
         lumigraph(&here.join("two"), &format!("{line}{force}")).ok();
         assert_eq!(number(), before);
     }
+}
+
+/// A triangle; its corners and its texture lie beside it.
+const WALL: &str = r#"{"asset": {"version": "2.0"}, "nodes": [{"name": "wall", "mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
+    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+    "textures": [{"source": 0}], "images": [{"uri": "in/wall.png"}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3},
+        {"bufferView": 1, "componentType": 5126, "type": "VEC2", "count": 3}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36},
+        {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
+    "buffers": [{"byteLength": 60, "uri": "wall.bin"}]}"#;
+
+#[test]
+fn what_a_model_has_beside_it_is_in_its_copy() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut text = WALL.as_bytes().to_vec();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let length = text.len() as u32;
+    let glb = [
+        b"glTF".as_slice(),
+        &2_u32.to_le_bytes(),
+        &(20 + length).to_le_bytes(),
+        &length.to_le_bytes(),
+        b"JSON",
+        text.as_slice(),
+    ]
+    .concat();
+    std::fs::write(here.join("wall.glb"), glb).unwrap();
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let uvs: [f32; 6] = [0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+    let numbers = corners.into_iter().chain(uvs);
+    let numbers: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
+    std::fs::write(here.join("wall.bin"), numbers).unwrap();
+    std::fs::create_dir(here.join("in")).unwrap();
+    let picture = RgbaImage::from_fn(4, 4, |x, y| Rgba([60 * x as u8, 60 * y as u8, 9, 255]));
+    picture.save(here.join("in/wall.png")).unwrap();
+    std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
+    let ran = lumigraph(here, "interior wall.glb --rooms rooms.json -o room").ok();
+    assert_eq!(ran.stderr, "");
+    // Nothing else is needed, and it looks the same.
+    assert_eq!(names(&here.join("room")), ["interior.json", "wall.glb"]);
+    let (model, warnings) = read_model(&here.join("room/wall.glb")).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    let (given, _) = read_model(&here.join("wall.glb")).unwrap();
+    assert_eq!(model.textures.len(), 1);
+    assert!(model == given);
 }
