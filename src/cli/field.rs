@@ -99,7 +99,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         // Kinds are compared by what is drawn, which is exposed alike.
         args.exposure.choose(&mut scene, &without);
     }
-    let proxy = args.proxy.choose(&scene, &without)?;
+    let proxy = args.proxy.choose(&scene, &without, args.scene.strict)?;
+    without.extend(proxy.left_out.keys().cloned());
     let lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
     let (view, time_s) = match known {
         Ok(known) => known,

@@ -152,7 +152,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 // Kinds are compared by what is drawn, which is exposed alike.
                 ExposureArgs::default().choose(&mut scene, &without);
             }
-            let fitted = fit(&scene, kind, &without)?;
+            let fitted = fit(&scene, kind, &without, args.scene.strict)?;
             (fitted.proxy, fitted.how, Some(&without))
         }
     };

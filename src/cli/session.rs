@@ -69,7 +69,7 @@ impl Session {
     /// proxy and matching exposures either.
     pub(super) fn new(
         mut scene: Scene,
-        without: BTreeSet<String>,
+        mut without: BTreeSet<String>,
         strict: bool,
         proxy: &ProxyArgs,
         exposure: &ExposureArgs,
@@ -84,12 +84,13 @@ impl Session {
         let (exposure, proxy) = if proxy.is_searched(&scene, &without) {
             // What is drawn to choose a proxy is exposed as all that is drawn later.
             let exposure = exposure.choose(&mut scene, &without);
-            (exposure, proxy.choose(&scene, &without)?)
+            (exposure, proxy.choose(&scene, &without, strict)?)
         } else {
             // What cannot be read is said at once.
-            let proxy = proxy.choose(&scene, &without)?;
+            let proxy = proxy.choose(&scene, &without, strict)?;
             (exposure.choose(&mut scene, &without), proxy)
         };
+        without.extend(proxy.left_out.keys().cloned());
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;

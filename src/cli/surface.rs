@@ -6,10 +6,10 @@ use super::session::spinner;
 use anyhow::Context;
 use clap::Args;
 use glam::DVec3;
-use lumigraph::scene::{Fitted, Kind, Scene, SceneProxy, Trial, trials_text};
+use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trials_text};
 use proxy::Proxy;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Instant;
 
@@ -28,13 +28,17 @@ pub(super) struct ChosenProxy {
     pub(super) proxy: Proxy,
     origin: String,
     trials: Vec<Trial>,
+    /// Photos that were found damaged as it was fitted, by name, with what is wrong with each.
+    pub(super) left_out: BTreeMap<String, String>,
 }
 
-/// Fits a proxy of a kind, or the best, and says on stderr what people should know of it.
+/// Fits a proxy of a kind, or the best, and says on stderr what people should know of it. With
+/// `strict` a photo that it finds damaged is an error.
 pub(super) fn fit(
     scene: &Scene,
     kind: Option<Kind>,
     without: &BTreeSet<String>,
+    strict: bool,
 ) -> anyhow::Result<Fitted> {
     let start = Instant::now();
     let busy = spinner("fitting the proxy");
@@ -44,6 +48,12 @@ pub(super) fn fit(
     };
     busy.finish_and_clear();
     let fitted = fitted.context("no such proxy can be fitted to this scene")?;
+    for (name, reason) in fitted.left_out.clone() {
+        if strict {
+            return Err(SceneError::Strict { name, reason }.into());
+        }
+        say!("warning: photo {name} is left out: {reason}");
+    }
     if let Some(note) = scene.note_of_unobserved(kind) {
         say!("note: {note}");
     }
@@ -77,18 +87,21 @@ impl ProxyArgs {
         }
     }
 
-    /// The proxy asked for. A fitted one rests on none of the photos in `without`.
+    /// The proxy asked for. A fitted one rests on none of the photos in `without`. With `strict` a
+    /// photo that fitting it finds damaged is an error.
     pub(super) fn choose(
         &self,
         scene: &Scene,
         without: &BTreeSet<String>,
+        strict: bool,
     ) -> anyhow::Result<ChosenProxy> {
         let fitted = |kind: Option<Kind>| {
-            let fitted = fit(scene, kind, without)?;
+            let fitted = fit(scene, kind, without, strict)?;
             Ok(ChosenProxy {
                 proxy: fitted.proxy,
                 origin: fitted.how,
                 trials: fitted.trials,
+                left_out: fitted.left_out,
             })
         };
         match self.proxy.as_deref() {
@@ -110,6 +123,7 @@ impl ProxyArgs {
                     proxy,
                     origin: file.to_owned(),
                     trials: Vec::new(),
+                    left_out: BTreeMap::new(),
                 })
             }
             Some(other) => Err(Usage(format!(
@@ -134,6 +148,7 @@ impl ProxyArgs {
                         proxy: own.proxy.clone(),
                         origin: "the scene's own".to_owned(),
                         trials: Vec::new(),
+                        left_out: BTreeMap::new(),
                     })
                 }
                 None => {

@@ -261,7 +261,7 @@ impl Load {
         if !is_ready {
             let text = "choosing the proxy that shows best what photos show: this may take a while";
             teller.doing(text);
-            let chosen = proxy.choose(&scene, &without)?;
+            let chosen = proxy.choose(&scene, &without, self.scene.strict)?;
             let text = proxy_text(&chosen.proxy);
             show(&scene, chosen.proxy)?;
             teller.say(Progress::Note(format!("proxy: {text}")));

@@ -28,11 +28,20 @@ pub struct Trial {
 
 impl Scene {
     /// The kind of proxy that shows best what photos left out for the purpose show, fitted
-    /// without the photos of the given names, which have no say in it.
+    /// without the photos of the given names, which have no say in it; nor have those that cannot
+    /// be decoded, as long as two others remain; see [`Fitted::left_out`].
     ///
     /// # Errors
-    /// Nothing can be fitted; photos that cannot be decoded.
+    /// Nothing can be fitted; too few photos that can be decoded.
     pub fn fit_best(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        self.fit_without_damaged(without, |fewer| self.best_of_all(fewer))
+    }
+
+    /// The same, all other photos having a say.
+    ///
+    /// # Errors
+    /// As [`Self::fit_best`]; [`SceneError::Damaged`] of photos that cannot be decoded.
+    fn best_of_all(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         let rest: Vec<&str> = self
             .photos
             .iter()
@@ -46,13 +55,8 @@ impl Scene {
 
         // 1. Too few photos to spare any: the kind that suits most scenes.
         if rest.len() < FEWEST {
-            let kinds = [Kind::Points, Kind::Hull, Kind::Plane];
-            let kind = kinds.into_iter().find(|k| candidates.contains(k));
-            let mut fitted = self.fit(kind.unwrap_or(Kind::Plane), without)?;
-            fitted.note.get_or_insert_with(|| {
-                format!("{} photos are too few to compare proxies by", rest.len())
-            });
-            return Ok(fitted);
+            let why = format!("{} photos are too few to compare proxies by", rest.len());
+            return self.fit_usual(&candidates, without, why);
         }
 
         // 2. Each kind, judged by photos spread over the rest, each drawn without itself.
@@ -60,7 +64,7 @@ impl Scene {
         let mut bench = Trials::new(self, without, JUDGES.min(rest.len()))?;
         let mut leader: Option<Scores> = None;
         let mut best: Option<(Kind, bool)> = None;
-        for kind in candidates {
+        for &kind in &candidates {
             if matches!(kind, Kind::Dense | Kind::CarvedDense) && rest.len() > MOST_COMPARED {
                 let score = Err(format!("{} photos take long to compare", rest.len()));
                 trials.push(Trial::of(kind, true, score));
@@ -68,6 +72,8 @@ impl Scene {
             }
             let (scores, plain) = match bench.scores(kind, leader.as_ref()) {
                 Ok(scores) => scores,
+                // It would have a say in some kinds and not in others.
+                Err(damaged @ SceneError::Damaged(_)) => return Err(damaged),
                 Err(error) => {
                     trials.push(Trial::of(kind, true, Err(error.to_string())));
                     continue;
@@ -91,12 +97,16 @@ impl Scene {
         }
 
         // 3. The best, from all.
-        let (kind, occludes) = best.unwrap_or((Kind::Plane, true));
+        let Some((kind, occludes)) = best else {
+            let why = "no kind of proxy could be judged by photos".to_owned();
+            let fitted = self.fit_usual(&candidates, without, why)?;
+            return Ok(Fitted { trials, ..fitted });
+        };
         let mut fitted = match kind {
             Kind::Dense => bench.dense()?,
             Kind::CarvedDense => bench.carved_dense()?,
             Kind::Points => bench.points()?,
-            _ => self.fit(kind, without)?,
+            _ => self.fit_to_all(kind, without)?,
         };
         if let (false, Proxy::Mesh(solid)) = (occludes, &mut fitted.proxy)
             && let Some(own) = Arc::get_mut(solid)
@@ -104,6 +114,20 @@ impl Scene {
             own.hide_nothing();
         }
         fitted.trials = trials;
+        Ok(fitted)
+    }
+
+    /// The kind that suits most scenes, where photos do not tell, and a note of why.
+    fn fit_usual(
+        &self,
+        candidates: &[Kind],
+        without: &BTreeSet<String>,
+        why: String,
+    ) -> Result<Fitted, SceneError> {
+        let kinds = [Kind::Points, Kind::Hull, Kind::Plane];
+        let kind = kinds.into_iter().find(|k| candidates.contains(k));
+        let mut fitted = self.fit_to_all(kind.unwrap_or(Kind::Plane), without)?;
+        fitted.note.get_or_insert(why);
         Ok(fitted)
     }
 

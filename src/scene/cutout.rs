@@ -1,11 +1,11 @@
 //! The hull that bounds surfaces of points, where photos show nothing but an object.
 
+use super::damaged::of_each;
 use super::fit::unfit;
-use super::{Photo, Scene, SceneError};
+use super::{Scene, SceneError};
 use calibrate::View;
 use proxy::hull::{self, Silhouette};
 use proxy::{MeshKind, Solid};
-use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl Scene {
     /// allowances it takes.
     ///
     /// # Errors
-    /// A photo or its matte cannot be decoded.
+    /// Photos or their mattes that cannot be decoded ([`SceneError::Damaged`]).
     pub(super) fn cutout(
         &self,
         without: &BTreeSet<String>,
@@ -48,16 +48,12 @@ impl Scene {
             return Ok(None);
         }
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
-        let silhouette = |(photo, view): &(&Photo, View)| -> Result<Silhouette, SceneError> {
-            let pixels = photo.decode((view.width, view.height))?;
+        let silhouettes = of_each(&sources, |photo, size| {
+            let pixels = photo.decode(size)?;
             let alpha: Vec<u8> = pixels.pixels().map(|p| p.0[3]).collect();
             Silhouette::from_values(pixels.width(), pixels.height(), &alpha)
                 .ok_or_else(|| unfit(format!("photo {}: it has no pixels", photo.name)))
-        };
-        let silhouettes: Vec<Result<Silhouette, SceneError>> =
-            sources.par_iter().map(silhouette).collect();
-        // The first photo's error, whichever thread is the first to meet one.
-        let silhouettes: Vec<Silhouette> = silhouettes.into_iter().collect::<Result<_, _>>()?;
+        })?;
         let opaque = |s: &Silhouette| s.inside().iter().all(|inside| *inside);
         if silhouettes.iter().all(opaque) {
             return Ok(None);

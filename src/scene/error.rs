@@ -1,3 +1,5 @@
+use super::damaged::damaged_text;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -75,6 +77,10 @@ pub enum SceneError {
     /// A kind of proxy does not suit the scene.
     #[error("{0}")]
     Unfit(String),
+    /// Photos, or what says which part of them is the object, that cannot be decoded, by name, with what is
+    /// wrong with each.
+    #[error("{}", damaged_text(.0))]
+    Damaged(BTreeMap<String, String>),
     /// The list of times cannot be read.
     #[error(transparent)]
     Times(#[from] capture::TimeListError),

@@ -2,18 +2,18 @@
 
 use super::auto::Trial;
 use super::carved_points::CarvedPoints;
+use super::damaged::of_each;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
 use glam::DVec3;
 use proxy::dense::{DenseOptions, Matching};
 use proxy::depth;
-use proxy::hull::{self, Silhouette};
+use proxy::hull;
 use proxy::{
     FitBasis, FitError, Form, ILL_CONDITIONED, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint,
     Tunnel,
 };
 use proxy::{carve, tunnel};
-use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -111,14 +111,29 @@ pub struct Fitted {
     pub note: Option<String>,
     /// Where the kind was chosen by trial: what became of each.
     pub trials: Vec<Trial>,
+    /// Photos that were found damaged and had no part in it, by name, with what is wrong with each.
+    pub left_out: BTreeMap<String, String>,
 }
 
 impl Scene {
-    /// Fits a proxy when the photos of the given names were never taken.
+    /// Fits a proxy when the photos of the given names were never taken, nor those that it takes and
+    /// that cannot be decoded, as long as two others remain; see [`Fitted::left_out`].
     ///
     /// # Errors
     /// The scene does not have what it takes; the message says what that is.
     pub fn fit(&self, kind: Kind, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        self.fit_without_damaged(without, |fewer| self.fit_to_all(kind, fewer))
+    }
+
+    /// The same, all other photos being taken.
+    ///
+    /// # Errors
+    /// As [`Self::fit`]; [`SceneError::Damaged`] of photos that cannot be decoded.
+    pub(super) fn fit_to_all(
+        &self,
+        kind: Kind,
+        without: &BTreeSet<String>,
+    ) -> Result<Fitted, SceneError> {
         match kind {
             Kind::Plane => {
                 let fit = self.fit_plane(without)?;
@@ -197,12 +212,7 @@ impl Scene {
     fn fit_hull(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
         let sources = self.sources(without)?;
         let views: Vec<View> = sources.iter().map(|(_, view)| view.clone()).collect();
-        let silhouettes: Vec<Result<Silhouette, SceneError>> = sources
-            .par_iter()
-            .map(|(photo, view)| photo.decode_silhouette((view.width, view.height)))
-            .collect();
-        // The first photo's error, whichever thread is the first to meet one.
-        let silhouettes: Vec<Silhouette> = silhouettes.into_iter().collect::<Result<_, _>>()?;
+        let silhouettes = of_each(&sources, Photo::decode_silhouette)?;
         let hull = hull::carve(&views, &silhouettes, &hull::Options::default()).map_err(unfit)?;
         let mut how = format!(
             "covers {:.2} % of the silhouettes, {:.2} of intersection over union",
@@ -374,6 +384,7 @@ impl Fitted {
             how: how.into(),
             note: None,
             trials: Vec::new(),
+            left_out: BTreeMap::new(),
         }
     }
 

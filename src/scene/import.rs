@@ -63,7 +63,7 @@ impl Default for ImportOptions {
 }
 
 /// Photos that must remain for others to be left out.
-const ENOUGH: usize = 2;
+pub(super) const ENOUGH: usize = 2;
 /// What to do where too few of a calibration's photos are there, or of a scene's.
 const OTHERS: &str = "check that the calibration belongs to these photos";
 const MOVED: &str = "photos stay where they are, and a scene says how to get there from its own folder: move \

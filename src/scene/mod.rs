@@ -11,6 +11,7 @@ mod beside;
 mod calibration;
 mod carved_points;
 mod cutout;
+mod damaged;
 mod depth;
 mod error;
 mod exposure;

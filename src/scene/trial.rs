@@ -9,7 +9,7 @@ use image::RgbaImage;
 use proxy::dense::{DensePoints, Matching};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
-use render::{FieldOptions, Frame, Lumigraph, Method, Part, Visibility, cpu, score};
+use render::{FieldOptions, Frame, Lumigraph, Method, Part, RenderError, Visibility, cpu, score};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -83,7 +83,7 @@ impl<'a> Trials<'a> {
     /// The photos but those of the names in `without`, `count` of which judge.
     ///
     /// # Errors
-    /// A camera without a lens; none of the judges can be decoded.
+    /// A camera without a lens; [`SceneError::Damaged`] of judges that cannot be decoded.
     pub(super) fn new(
         scene: &'a Scene,
         without: &'a BTreeSet<String>,
@@ -92,22 +92,25 @@ impl<'a> Trials<'a> {
         let lumigraph = scene.reduced_lumigraph(without, Proxy::ViewPlane, PHOTO_SIDE)?;
         let names: Vec<String> = lumigraph.sources.iter().map(|s| s.name.clone()).collect();
         let spread = (0..count).map(|i| (2 * i + 1) * names.len() / (2 * count));
-        let judge = |source_idx: usize| {
+        let (mut judges, mut damaged) = (Vec::new(), BTreeMap::new());
+        for source_idx in spread {
             let name = &names[source_idx];
-            let view = scene.view(name).ok()?;
+            let view = scene.view(name)?;
             let (width, height) = capture::reduced_size((view.width, view.height), LONG_SIDE);
-            // One that cannot be decoded is no judge; drawing will report it.
-            let truth = scene.truth(name, without).ok()?.ok()?;
-            Some(Judge {
-                source_idx,
-                name: name.clone(),
-                desired: view.resized(width, height),
-                truth: truth.resized(width, height).pixels,
-            })
-        };
-        let judges: Vec<Judge> = spread.filter_map(judge).collect();
-        if judges.is_empty() {
-            return Err(unfit("no photo to judge by"));
+            match scene.truth(name, without)? {
+                Ok(truth) => judges.push(Judge {
+                    source_idx,
+                    name: name.clone(),
+                    desired: view.resized(width, height),
+                    truth: truth.resized(width, height).pixels,
+                }),
+                Err(error) => {
+                    damaged.insert(name.clone(), error.to_string());
+                }
+            }
+        }
+        if !damaged.is_empty() {
+            return Err(SceneError::Damaged(damaged));
         }
         Ok(Self {
             scene,
@@ -127,7 +130,8 @@ impl<'a> Trials<'a> {
     /// anyone, where that makes a difference.
     ///
     /// # Errors
-    /// It cannot be fitted.
+    /// It cannot be fitted; [`SceneError::Damaged`] of photos that cannot be decoded, without which
+    /// all kinds are to be judged.
     pub(super) fn scores(
         &mut self,
         kind: Kind,
@@ -294,7 +298,7 @@ impl<'a> Trials<'a> {
             }
             // A box may happen to suit a few photos of anything.
             Kind::Tunnel => (self.scene.fit_hallway(&fewer)?.proxy, Vec::new()),
-            _ => (self.scene.fit(kind, &fewer)?.proxy, Vec::new()),
+            _ => (self.scene.fit_to_all(kind, &fewer)?.proxy, Vec::new()),
         };
         self.lumigraph.visibility = Visibility::of(&proxy, &self.lumigraph.sources);
         self.lumigraph.proxy = proxy;
@@ -318,7 +322,18 @@ impl<'a> Trials<'a> {
         };
         let (desired, options) = (judge.desired.clone(), FieldOptions::default());
         let frame = Frame::with(&self.lumigraph, desired, options, &part);
-        let picture = cpu::render(&frame, Method::Exact).map_err(unfit)?;
+        let picture = cpu::render(&frame, Method::Exact).map_err(|e| self.undrawn(e))?;
         Ok(score::score(&picture, &judge.truth).map_err(unfit)?.psnr)
+    }
+
+    /// Why a picture could not be drawn.
+    fn undrawn(&self, error: RenderError) -> SceneError {
+        match error {
+            RenderError::Photo(error) => {
+                let name = self.names[error.source_idx].clone();
+                SceneError::Damaged(BTreeMap::from([(name, error.message)]))
+            }
+            error => unfit(error),
+        }
     }
 }

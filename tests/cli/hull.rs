@@ -188,6 +188,28 @@ fn masks_that_show_nothing_or_everything_are_told() {
 }
 
 #[test]
+fn a_photo_that_cannot_be_decoded_takes_no_part_in_the_hull() {
+    let folder = with_car();
+    let here = folder.path();
+    lumigraph(here, "import car --mattes masks -o scene").ok();
+    let photo = here.join("car/images/0003.png");
+    let whole = fs::read(&photo).unwrap();
+    fs::write(&photo, &whole[..whole.len() / 2]).unwrap();
+    let line = "render scene --proxy hull --path orbit --frames 1 --size 48x36 --json -o out";
+    let ran = lumigraph(here, line).ok();
+    // Drawing does not ask for it again.
+    let warning = "warning: photo 0003.png is left out: cannot decode ";
+    assert_eq!(ran.stderr.matches(warning).count(), 1, "{}", ran.stderr);
+    assert_eq!(ran.json()["report"]["photos_total"], PHOTOS - 1);
+    let error = lumigraph(here, "proxy scene hull --strict -o hull.ply").error(1);
+    assert!(
+        error.starts_with("photo 0003.png: cannot decode ") && error.contains("--strict"),
+        "{error}"
+    );
+    assert!(!here.join("hull.ply").exists());
+}
+
+#[test]
 fn inverted_masks_are_told() {
     let folder = with_car();
     for i in 0..PHOTOS {
