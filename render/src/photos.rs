@@ -157,6 +157,37 @@ impl PhotoStore {
         self
     }
 
+    /// Goes on where another store ends, of the same photos and one more: that of its source view
+    /// `gone`. What it holds of the others stays in memory, and its counts and its budget hold for
+    /// both.
+    ///
+    /// # Panics
+    /// If the other has not one photo more.
+    pub fn go_on_from(&mut self, other: Self, gone: usize) {
+        assert_eq!(other.len(), self.len() + 1);
+        let shelf = other.shelf.into_inner();
+        let mut shelf = shelf.unwrap_or_else(PoisonError::into_inner);
+        shelf.put(gone, None);
+        shelf.slots.remove(gone);
+        shelf.awaited = 0;
+        for (source_idx, slot) in shelf.slots.iter_mut().enumerate() {
+            slot.awaited = 0;
+            if let Some(error) = &mut slot.error {
+                error.source_idx = source_idx;
+            }
+        }
+        self.shelf = Mutex::new(shelf);
+        *self.decode_nanos.get_mut() += other.decode_nanos.into_inner();
+        // Those that cannot be decoded say so again, by their new places.
+        let masks = other.masks.into_iter().enumerate();
+        let masks = masks.filter(|(source_idx, _)| *source_idx != gone);
+        for (own, (_, mask)) in self.masks.iter_mut().zip(masks) {
+            if let (Some(own), Some(Ok(mask))) = (own, mask.and_then(OnceLock::into_inner)) {
+                *own = OnceLock::from(Ok(mask));
+            }
+        }
+    }
+
     /// How many photos there are.
     pub fn len(&self) -> usize {
         self.decoding.len()
@@ -496,6 +527,46 @@ mod tests {
             "the photo has 4 × 4 pixels and its ignore mask 4 × 3; make the mask as large as \
              the photo"
         );
+    }
+
+    #[test]
+    fn a_store_of_one_photo_less_goes_on_where_the_other_ended() {
+        // 1. The second of five cannot be decoded, nor can the fourth; all but the last are masked.
+        let images = |i: usize| match i {
+            1 | 3 => Err(format!("{i}.png: corrupt")),
+            _ => Ok(RgbaImage::new(4 + i as u32, 4)),
+        };
+        let mask = |i: usize| Ok(GrayImage::new(4 + i as u32, 4));
+        let mut before = PhotoStore::new(5, images);
+        before = before.with_masks(&[true, true, true, true, false], mask);
+        before.set_budget(Some(1000));
+        for i in [0, 1, 2, 3] {
+            assert_eq!(before.get(i).is_ok(), i % 2 == 0);
+        }
+        let (counted, time) = (before.residency(), before.decode_time());
+        assert_eq!((counted.loads, counted.peak), (4, counted.held));
+
+        // 2. Without the second nothing that was decoded is decoded again.
+        let others = |i: usize| i + usize::from(i > 0);
+        let mut after = PhotoStore::new(4, move |i| match others(i) {
+            4 => images(4),
+            i => Err(format!("{i} was there")),
+        });
+        after = after.with_masks(&[true, true, true, false], |i| {
+            Err(format!("{i} was there"))
+        });
+        after.go_on_from(before, 1);
+        assert_eq!((after.residency(), after.decode_time()), (counted, time));
+        assert_eq!(after.get(0).unwrap().levels[0].dimensions(), (4, 4));
+        assert_eq!(after.get(1).unwrap().levels[0].dimensions(), (6, 4));
+        let error = after.get(2).unwrap_err();
+        assert_eq!((error.source_idx, &*error.message), (2, "3.png: corrupt"));
+        assert_eq!(after.check_masks(0..4), Ok(()));
+        assert!((0..2).all(|i| after.try_mask(i).is_ok()));
+
+        // 3. What was not is counted on top.
+        assert!(!after.was_decoded(3) && after.get(3).is_ok());
+        assert_eq!((after.decoded(), after.residency().loads), (4, 5));
     }
 
     #[test]

@@ -24,8 +24,8 @@ pub(super) struct Report {
     /// Where a graphics processor draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     gpu_memory: Option<Memory>,
-    /// What draws in place of what was asked for, what the graphics device did not do, and what became of it; and
-    /// what is odd about the frames.
+    /// What draws in place of what was asked for, what the graphics device did not do, and what became of it; which
+    /// photos were found damaged; and what is odd about the frames.
     notes: Vec<String>,
     /// Those that show nothing at all.
     frames_empty: usize,
@@ -132,7 +132,7 @@ pub(super) struct Costs {
     /// Of views that were drawn each by itself: how many the CPU drew, and how many show nothing.
     alone_by_cpu: usize,
     alone_empty: usize,
-    /// By source view, whether any frame scored it; begun anew where photos were left out.
+    /// By source view, whether any frame scored it.
     ever_scored: Vec<bool>,
 }
 
@@ -207,6 +207,13 @@ impl Costs {
         let by_cpu = engine.gpu().is_none() || engine.last_by_cpu();
         self.alone_by_cpu += usize::from(by_cpu);
         self.alone_empty += usize::from(is_empty(picture));
+    }
+
+    /// Goes on with one source view less.
+    pub(super) fn leave_out(&mut self, source_idx: usize) {
+        if source_idx < self.ever_scored.len() {
+            self.ever_scored.remove(source_idx);
+        }
     }
 
     /// How many frames the CPU drew.
@@ -398,7 +405,7 @@ impl Skipped {
         };
         let decoded = never(&|i| photos.was_decoded(i));
         let gpu = session.engine().and_then(Engine::gpu);
-        let uploaded = gpu.map(|gpu| never(&|i| gpu.was_loaded(photos, i)));
+        let uploaded = gpu.map(|_| never(&|i| session.was_uploaded(i)));
         let costs = &session.costs;
         let unscored = costs.ever_scored.iter().filter(|scored| !**scored);
         let pinhole = |source: &&SourceView| source.view.lens.distortion() == Distortion::None;

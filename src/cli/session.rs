@@ -21,6 +21,7 @@ use render::{
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::io::IsTerminal as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
@@ -47,6 +48,10 @@ pub(super) struct Session {
     notes_said: usize,
     /// Held-out photos, and those found corrupt.
     without: BTreeSet<String>,
+    /// What was said of the latter.
+    left_out: Vec<String>,
+    /// Photos that were brought to the graphics processor before another was left out.
+    uploaded: BTreeSet<String>,
     lumigraph: Lumigraph,
     engine: Option<Engine>,
     device: DeviceChoice,
@@ -91,6 +96,7 @@ impl Session {
             (exposure.choose(&mut scene, &without), proxy)
         };
         without.extend(proxy.left_out.keys().cloned());
+        let left_out = proxy.left_out.iter().map(left_out_text).collect();
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;
@@ -108,6 +114,8 @@ impl Session {
             method: field.method(),
             max_error: None,
             without,
+            left_out,
+            uploaded: BTreeSet::new(),
             lumigraph,
             engine: None,
             device: draw.device(),
@@ -161,6 +169,14 @@ impl Session {
     /// What photos took on the graphics processor, where one draws.
     pub(super) fn gpu_residency(&self) -> Option<Residency> {
         Some(self.engine()?.gpu()?.residency())
+    }
+
+    /// Whether a photo was ever brought to the graphics processor.
+    pub(super) fn was_uploaded(&self, source_idx: usize) -> bool {
+        let gpu = self.engine.as_ref().and_then(Engine::gpu);
+        let name = &self.lumigraph.sources[source_idx].name;
+        gpu.is_some_and(|gpu| gpu.was_loaded(&self.lumigraph.photos, source_idx))
+            || self.uploaded.contains(name)
     }
 
     /// Opens the engine; with `--no-skip` decodes every photo. Drawing does so by itself,
@@ -265,11 +281,11 @@ impl Session {
         Ok(())
     }
 
-    /// All that was said of what draws and of the frames of [`Self::draw_all`].
+    /// All that was said of what draws, of photos left out and of the frames of [`Self::draw_all`].
     pub(super) fn notes(&self) -> Vec<String> {
         let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();
-        let own = self.notes.iter().chain(engine).cloned();
-        own.chain(self.note_of_empty()).collect()
+        let said = self.notes.iter().chain(engine).chain(&self.left_out);
+        said.cloned().chain(self.note_of_empty()).collect()
     }
 
     /// What to say of frames of [`Self::draw_all`] that show nothing, if there are any.
@@ -397,12 +413,12 @@ impl Session {
 
     /// A photo of the scene to compare with; `None`, with a warning, for one that is corrupt,
     /// unless `--strict`.
-    pub(super) fn truth(&self, name: &str) -> anyhow::Result<Option<Truth>> {
+    pub(super) fn truth(&mut self, name: &str) -> anyhow::Result<Option<Truth>> {
         match self.scene.truth(name, &self.without)? {
             Ok(truth) => Ok(Some(truth)),
             Err(error) if self.strict => Err(error.into()),
             Err(error) => {
-                say!("warning: photo {name} is left out: {error}");
+                self.say_left_out(name, &error.to_string());
                 Ok(None)
             }
         }
@@ -413,14 +429,32 @@ impl Session {
         if self.strict {
             bail!("photo {name}: {error}; without --strict it would be left out");
         }
-        say!("warning: photo {name} is left out: {error}");
+        self.say_left_out(&name, &error.message);
         self.without.insert(name);
-        self.lumigraph = self
-            .scene
-            .lumigraph(&self.without, self.proxy.proxy.clone())?;
-        self.lumigraph.photos.set_budget(self.cpu_memory);
+        let count = self.lumigraph.sources.len();
+        let uploaded = (0..count).filter(|i| self.was_uploaded(*i));
+        let uploaded = uploaded.map(|i| self.lumigraph.sources[i].name.clone());
+        self.uploaded = uploaded.collect();
+        let proxy = self.proxy.proxy.clone();
+        let fewer = self.scene.lumigraph(&self.without, proxy)?;
+        let before = std::mem::replace(&mut self.lumigraph, fewer);
+        // The report is on the whole run.
+        let photos = &mut self.lumigraph.photos;
+        photos.go_on_from(before.photos, error.source_idx);
+        self.costs.leave_out(error.source_idx);
         Ok(())
     }
+
+    fn say_left_out(&mut self, name: &str, reason: &str) {
+        let text = left_out_text((name, reason));
+        say!("warning: {text}");
+        self.left_out.push(text);
+    }
+}
+
+/// What to say of a photo that is left out.
+fn left_out_text((name, reason): (impl Display, impl Display)) -> String {
+    format!("photo {name} is left out: {reason}")
 }
 
 /// Says what the engine has to say, once.

@@ -167,7 +167,13 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
         "{}",
         ran.stderr
     );
-    assert_eq!(ran.json()["report"]["photos_total"], 8);
+    let report = ran.json()["report"].clone();
+    assert_eq!(report["photos_total"], 8);
+    let note = report["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("photo 0004.png is left out: "), "{report}");
+    // No photo is decoded again for it, and what came before counts.
+    let decoded = report["photos_decoded"].as_u64().unwrap();
+    assert_eq!(report["cpu_memory"]["loads"], decoded + 1, "{report}");
     let left = files(&folder.path().join("left"));
     assert_eq!(left.len(), 9);
 
@@ -236,6 +242,9 @@ fn a_corrupt_held_out_photo_cannot_be_scored() {
         "{}",
         ran.stderr
     );
+    let report = ran.json()["report"].clone();
+    let note = report["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("photo 0008.png is left out: "), "{report}");
     let error = lumigraph(folder.path(), "evaluate wall --proxy plane --strict").error(1);
     assert!(error.contains("0008.png"), "{error}");
 }

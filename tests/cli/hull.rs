@@ -200,7 +200,10 @@ fn a_photo_that_cannot_be_decoded_takes_no_part_in_the_hull() {
     // Drawing does not ask for it again.
     let warning = "warning: photo 0003.png is left out: cannot decode ";
     assert_eq!(ran.stderr.matches(warning).count(), 1, "{}", ran.stderr);
-    assert_eq!(ran.json()["report"]["photos_total"], PHOTOS - 1);
+    let report = ran.json()["report"].clone();
+    assert_eq!(report["photos_total"], PHOTOS - 1);
+    let note = report["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("photo 0003.png is left out: "), "{note}");
     let error = lumigraph(here, "proxy scene hull --strict -o hull.ply").error(1);
     assert!(
         error.starts_with("photo 0003.png: cannot decode ") && error.contains("--strict"),
