@@ -36,6 +36,14 @@ pub enum ToolError {
         /// Why.
         source: io::Error,
     },
+    /// What it is to read cannot be had, or not be given to it.
+    #[error("what {} was to read is not to be had: {source}", program.display())]
+    Input {
+        /// Its name or path.
+        program: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// Its log cannot be written.
     #[error("{}: cannot write the log: {source}", path.display())]
     Log {
@@ -156,7 +164,7 @@ impl Tool {
     /// prints is only kept for its error.
     ///
     /// # Errors
-    /// The program is missing, cannot be started or fails, or `write_stdin` does.
+    /// The program is missing, cannot be started or fails, or `write_stdin` does, which is told apart.
     pub fn feed(
         &self,
         arguments: &[impl AsRef<OsStr>],
@@ -181,7 +189,11 @@ impl Tool {
         // A program that fails closes its input: that is the consequence, not the cause.
         match written {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                return Err(self.run_error(error));
+                let program = self.program.clone();
+                return Err(ToolError::Input {
+                    program,
+                    source: error,
+                });
             }
             _ => self.check(arguments, status, last_lines, None)?,
         }

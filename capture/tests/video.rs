@@ -216,6 +216,7 @@ fn a_missing_program_says_how_to_install_it() {
 #[cfg(unix)]
 mod scripts {
     use super::*;
+    use std::io::{self, ErrorKind, Write as _};
     use std::os::unix::fs::PermissionsExt;
 
     fn script(folder: &Path, text: &str) -> Tool {
@@ -250,6 +251,26 @@ mod scripts {
         // A second run's lines follow the first's.
         tool.run(&["match"], &log, &mut |_| {}).unwrap_err();
         assert_eq!(fs::read_to_string(&log).unwrap().lines().count(), 22);
+    }
+
+    #[test]
+    fn what_cannot_be_fed_to_a_program_is_not_its_fault() {
+        let here = tempfile::tempdir().unwrap();
+        let tool = script(here.path(), "cat > /dev/null");
+        // By their kinds these could be taken for a program that is missing or does not start.
+        for kind in [ErrorKind::NotFound, ErrorKind::Other] {
+            let gone = |_| Err(io::Error::new(kind, "b.png: it is gone"));
+            let error = tool.feed(&["-"], gone).unwrap_err();
+            assert_eq!(
+                error.to_string(),
+                format!(
+                    "what {} was to read is not to be had: b.png: it is gone",
+                    tool.program.display()
+                )
+            );
+        }
+        tool.feed(&["-"], |mut stdin| stdin.write_all(b"all of it"))
+            .unwrap();
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::output::write_file;
 use super::stamp::{Stamp, changes, in_unicode, stamps};
 use super::targets::check_inputs;
 use anyhow::{Context, bail};
+use calibrate::View;
 use image::{Rgba, RgbaImage};
 use render::score::on_black;
 use serde::{Deserialize, Serialize};
@@ -242,6 +243,34 @@ impl FilmArgs {
             ))
             .into()),
             made => made.context(named),
+        }
+    }
+
+    /// Fails early where frames of these names and views make no film, as they are not of one size.
+    pub(super) fn check_sizes<'a>(
+        &self,
+        frames: impl IntoIterator<Item = (&'a str, &'a View)>,
+    ) -> anyhow::Result<()> {
+        let Some(video) = &self.video else {
+            return Ok(());
+        };
+        let mut frames = frames.into_iter();
+        let Some((first, own)) = frames.next() else {
+            return Ok(());
+        };
+        let size = |view: &View| (view.width, view.height);
+        match frames.find(|(_, view)| size(view) != size(own)) {
+            None => Ok(()),
+            Some((other, view)) => Err(Usage(format!(
+                "--video {}: frames of a film are of one size, but {first} has {}x{} pixels and \
+                 {other} {}x{}; give --size",
+                video.display(),
+                own.width,
+                own.height,
+                view.width,
+                view.height
+            ))
+            .into()),
         }
     }
 

@@ -15,6 +15,7 @@ use super::surface::ProxyArgs;
 use super::targets::{check_folder, check_inputs, others};
 use super::time::{AtArgs, TimeArgs};
 use super::took::Start;
+use calibrate::View;
 use lumigraph::scene::picture_files;
 use serde_json::json;
 use std::path::PathBuf;
@@ -82,6 +83,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .say_unused(args.views.views.as_ref().or(file.as_ref()));
     check_folder(&args.output)?;
     args.film.check(&args.output)?;
+    if let Asked::Read(frames, _) = &asked {
+        // What need not be derived is checked first: fitting a proxy may take long.
+        desired(args, &chosen.of(frames.iter().collect())?)?;
+    }
     let mut session = Session::open(
         &args.scene,
         &args.hold_out,
@@ -97,11 +102,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let count = chosen.count(FRAMES);
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
     let frames = chosen.of(frames)?;
-    let resized = |frame: &NamedView| args.draw.resized(&frame.name, frame.view.clone());
-    let desired = frames
-        .iter()
-        .map(resized)
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output)?;
     // Photos that are left out, too, are nobody's to replace.
@@ -171,4 +172,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             there => format!(", {there} of them from before"),
         }
     ))
+}
+
+/// The views of frames in the size that is asked for.
+///
+/// # Errors
+/// One cannot be drawn so large; a film is asked for, and they are not of one size.
+fn desired(args: &Args, frames: &[&NamedView]) -> anyhow::Result<Vec<View>> {
+    let resized = |frame: &&NamedView| args.draw.resized(&frame.name, frame.view.clone());
+    let desired = frames
+        .iter()
+        .map(resized)
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let names = frames.iter().map(|frame| frame.name.as_str());
+    args.film.check_sizes(names.zip(&desired))?;
+    Ok(desired)
 }

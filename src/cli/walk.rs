@@ -171,6 +171,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         false => way(args, &opened)?,
     };
     check_views(args, &way.frames)?;
+    let views = way.frames.iter().map(|f| (f.name.as_str(), &f.view));
+    args.film.check_sizes(views)?;
     let mut inputs = opened.files();
     let scenes = match opened.photos {
         Some(_) => scenes_of(&opened.file, &opened.interior),

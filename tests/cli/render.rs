@@ -2,7 +2,7 @@
 
 use crate::interior::with_house;
 use crate::run::{files, lumigraph, run, with_wall};
-use calibrate::{Rigid3, colmap};
+use calibrate::{Camera, ModelKind, Rigid3, colmap};
 use render::path::{CameraPath, PathFrame};
 use std::fs;
 
@@ -395,6 +395,36 @@ fn a_film_by_no_name_of_films_is_refused_before_anything_is_drawn() {
         render(video).ok();
         assert!(folder.path().join(video).is_file(), "{video}");
     }
+}
+
+#[test]
+fn frames_of_several_sizes_are_no_film_and_none_is_drawn() {
+    let folder = with_wall();
+    let frame = |name: &str, width: u32| {
+        let camera = Camera {
+            model: ModelKind::Pinhole,
+            width,
+            height: 36,
+            params: vec![40.0, 40.0, 24.0, 18.0],
+        };
+        PathFrame::new(name.to_owned(), camera, Rigid3::IDENTITY, None).unwrap()
+    };
+    let path = CameraPath::new(30.0, vec![frame("a", 48), frame("b", 48), frame("c", 64)]);
+    render::path::write(&folder.path().join("path.json"), &path.unwrap()).unwrap();
+    let film = |options: &str| {
+        let line =
+            format!("render wall --proxy plane --path path.json -o out --video f.mp4{options}");
+        lumigraph(folder.path(), &line)
+    };
+    let error = film("").error(2);
+    assert_eq!(
+        error,
+        "--video f.mp4: frames of a film are of one size, but a has 48x36 pixels and c 64x36; give --size"
+    );
+    assert!(!folder.path().join("out").exists());
+    // Those that are not drawn are not in the film, and all can be of one size.
+    film(" --frames 0..2").ok();
+    film(" --size 32x24").ok();
 }
 
 #[cfg(target_os = "linux")]
