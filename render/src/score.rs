@@ -185,6 +185,14 @@ fn check_sizes(rendered: &RgbaImage, photo: &RgbaImage) -> Result<(), ScoreError
             photo: photo.dimensions(),
         });
     }
+    check_size(width, height)
+}
+
+/// Fails where pictures of so many pixels are too small for [`score`].
+///
+/// # Errors
+/// A side is below 11 pixels.
+pub fn check_size(width: u32, height: u32) -> Result<(), ScoreError> {
     if (width.min(height) as usize) < WINDOW {
         return Err(ScoreError::TooSmall(width, height));
     }

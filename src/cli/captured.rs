@@ -3,7 +3,7 @@
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::inputs::{files_of, files_of_mesh};
 use super::interior::open;
-use super::options::{drop_weak_of_interior, print_warnings};
+use super::options::{compared, drop_weak_of_interior, print_warnings};
 use super::output::say;
 use anyhow::{Context, bail};
 use calibrate::View;
@@ -231,15 +231,15 @@ impl Photos {
         Ok(Painter::of_photos(captured.with_depth_maps(depth_maps?)))
     }
 
-    /// The photos that were held out, to compare pictures with, as large as those are: all of them are
-    /// kept. Those that are corrupt are left out, with a warning.
+    /// The photos that were held out, to compare pictures with: as large as those, which may be of a size
+    /// that is asked for. All of them are kept; those that are corrupt are left out, with a warning.
     pub(super) fn held_out(
         &self,
-        resized: impl Fn(View) -> View,
+        size: Option<(u32, u32)>,
     ) -> anyhow::Result<Vec<(String, View, Truth)>> {
         let mut found = Vec::new();
         for name in &self.without {
-            let view = resized(self.scene.view(name)?);
+            let view = compared(name, self.scene.view(name)?, size)?;
             match self.scene.truth(name, &self.without)? {
                 Ok(truth) => {
                     let truth = truth.resized(view.width, view.height);

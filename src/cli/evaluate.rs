@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::inputs::files_behind_scene;
-use super::options::{DrawArgs, FieldArgs, SceneArgs, resized};
+use super::options::{DrawArgs, FieldArgs, SceneArgs, compared};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::Report;
@@ -79,6 +79,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     output.map_or(Ok(()), check_folder)?;
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
+    // What cannot be compared is said at once: fitting a proxy may take long.
+    for name in &held_out {
+        compared(name, scene.view(name)?, args.draw.size)?;
+    }
     let kept = files_behind_scene(&args.scene.scene, &scene);
     let mut session = Session::new(
         scene,
@@ -151,7 +155,7 @@ fn score_photos(
         let Some(truth) = session.truth(name)? else {
             continue;
         };
-        let desired = resized(view, size);
+        let desired = compared(name, view, size)?;
         let truth = truth.resized(desired.width, desired.height);
         let moment = session.moment(&format!("photo {name}"), session.scene.time_s(name))?;
         let drawn = session.draw_timed(&desired, moment.as_ref())?;

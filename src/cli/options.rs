@@ -2,7 +2,7 @@
 
 use super::interior::check_no_interior;
 use super::output::say;
-pub(super) use super::shape::{cut, resized};
+pub(super) use super::shape::{compared, cut};
 use calibrate::View;
 use calibrate::WeakGroup;
 use calibrate::opencv::Keys;

@@ -1,8 +1,10 @@
 //! Pictures of a size that is asked for: whatever its shape, pixels stay square.
 
 use super::output::say;
+use anyhow::anyhow;
 use calibrate::View;
 use glam::DVec2;
+use render::score::check_size;
 use std::sync::Once;
 
 /// Stretching by so little comes of rounding, and nobody sees it.
@@ -43,9 +45,23 @@ pub(super) fn cut(view: View, asked: Option<(u32, u32)>) -> View {
     }
 }
 
-/// The view of a photo that a picture is to be compared with, with so many pixels, where a size is asked
-/// for: of another shape than the photo's, with as many as fit in it. That is said, once a run.
-pub(super) fn resized(view: View, asked: Option<(u32, u32)>) -> View {
+/// The view of a photo of this name that a picture is to be compared with, with so many pixels, where a size
+/// is asked for: of another shape than the photo's, with as many as fit in it. That is said, once a run.
+///
+/// # Errors
+/// Those are too few to be compared.
+pub(super) fn compared(name: &str, view: View, asked: Option<(u32, u32)>) -> anyhow::Result<View> {
+    let view = resized(view, asked);
+    let remedy = match asked {
+        Some(_) => "give a larger --size",
+        None => "hold out larger photos",
+    };
+    check_size(view.width, view.height)
+        .map_err(|error| anyhow!("photo {name}: {error}; {remedy}"))?;
+    Ok(view)
+}
+
+fn resized(view: View, asked: Option<(u32, u32)>) -> View {
     static SAID: Once = Once::new();
     let own = (view.width, view.height);
     let Some(asked) = asked.filter(|asked| *asked != own) else {
@@ -170,5 +186,21 @@ mod tests {
             let found = resized(whole.clone(), Some(asked));
             assert_eq!(found, whole.resized(expected.0, expected.1));
         }
+    }
+
+    #[test]
+    fn what_is_too_small_to_be_compared_is_told_with_what_helps() {
+        let error = |asked| {
+            let found = compared("a.png", view(100, 8), asked);
+            found.unwrap_err().to_string()
+        };
+        assert_eq!(
+            error(Some((50, 4))),
+            "photo a.png: the pictures have 50 × 4 pixels; SSIM needs at least 11 × 11; give a larger \
+             --size"
+        );
+        assert!(error(None).ends_with("; hold out larger photos"));
+        let found = compared("a.png", view(100, 80), Some((50, 40)));
+        assert_eq!(found.unwrap(), view(100, 80).resized(50, 40));
     }
 }

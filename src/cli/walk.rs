@@ -8,7 +8,7 @@ use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
 use super::made::{self, Made};
-use super::options::{cut, resized, size};
+use super::options::{cut, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
 use super::references::ReferenceArgs;
@@ -393,7 +393,7 @@ struct Named {
 
 /// The photos that were held out.
 fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result<Vec<Named>> {
-    let held_out = photos.map(|photos| photos.held_out(|view| resized(view, size)));
+    let held_out = photos.map(|photos| photos.held_out(size));
     let held_out = held_out.transpose()?;
     let named = |(index, (name, view, truth)): (usize, (String, View, Truth))| Named {
         index,

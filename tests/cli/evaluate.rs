@@ -105,6 +105,18 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
 }
 
 #[test]
+fn pictures_too_small_to_be_scored_are_refused_before_any_is_drawn() {
+    let folder = with_wall();
+    let line = "evaluate wall --proxy plane --size 8x6 -o out";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert_eq!(
+        error,
+        "photo 0000.png: the pictures have 8 × 6 pixels; SSIM needs at least 11 × 11; give a larger --size"
+    );
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
 fn which_photos_are_held_out() {
     let folder = with_wall();
     let evaluated = |line: &str| {
