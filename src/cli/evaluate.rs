@@ -174,6 +174,9 @@ fn score_photos(
     if lines.is_empty() {
         bail!("none of the held-out photos can be decoded");
     }
+    if let Some(note) = session.note_of_empty() {
+        say!("note: {note}");
+    }
     Ok(lines)
 }
 

@@ -129,7 +129,9 @@ impl Report {
 #[derive(Default)]
 pub(super) struct Costs {
     frames: Vec<FrameCost>,
-    /// Of views that were drawn each by itself: how many the CPU drew, and how many show nothing.
+    /// Views that were drawn each by itself, of photos held out; how many of them the CPU drew, and how many
+    /// show nothing.
+    alone: usize,
     alone_by_cpu: usize,
     alone_empty: usize,
     /// By source view, whether any frame scored it.
@@ -205,6 +207,7 @@ impl Costs {
     /// Notes a view that was drawn by itself, however often.
     pub(super) fn note_alone(&mut self, engine: &Engine, picture: &RgbaImage) {
         let by_cpu = engine.gpu().is_none() || engine.last_by_cpu();
+        self.alone += 1;
         self.alone_by_cpu += usize::from(by_cpu);
         self.alone_empty += usize::from(is_empty(picture));
     }
@@ -226,14 +229,21 @@ impl Costs {
         self.frames.iter().filter(|frame| frame.is_empty).count()
     }
 
-    /// What to say of frames that show nothing at all, if there are any, where there are so many photos.
+    /// What to say of pictures that show nothing at all, if there are any, where there are so many photos.
     pub(super) fn note_of_empty(&self, photos: usize) -> Option<String> {
-        let (empty, all) = (self.empty(), self.frames.len());
-        let why = match photos {
-            0 | 1 => "one photo alone does not tell where things are",
-            _ => "does the path lie in this scene's world (see --dataparser-transforms)?",
+        let (of_path, alone) = (self.empty(), self.alone_empty);
+        let of_all = |empty: usize, all: usize, what: &str, otherwise: &str| {
+            let why = match photos {
+                0 | 1 => "one photo alone does not tell where things are",
+                _ => otherwise,
+            };
+            (empty > 0).then(|| format!("{empty} of {all} {what} show nothing: {why}"))
         };
-        (empty > 0).then(|| format!("{empty} of {all} frames show nothing: {why}"))
+        let lost = "does the path lie in this scene's world (see --dataparser-transforms)?";
+        let unseen = "the proxy does not reach where those photos look; hold out fewer, or try another \
+                      --proxy";
+        of_all(of_path, self.frames.len(), "frames", lost)
+            .or_else(|| of_all(alone, self.alone, "pictures", unseen))
     }
 
     /// A frame's, for `--json`.

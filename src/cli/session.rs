@@ -282,13 +282,14 @@ impl Session {
     }
 
     /// All that was said of what draws, of photos left out and of the frames of [`Self::draw_all`].
+    /// All that was said of what draws and of pictures that show nothing.
     pub(super) fn notes(&self) -> Vec<String> {
         let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();
         let said = self.notes.iter().chain(engine).chain(&self.left_out);
         said.cloned().chain(self.note_of_empty()).collect()
     }
 
-    /// What to say of frames of [`Self::draw_all`] that show nothing, if there are any.
+    /// What to say of pictures that show nothing, if there are any.
     pub(super) fn note_of_empty(&self) -> Option<String> {
         self.costs.note_of_empty(self.lumigraph.photos.len())
     }

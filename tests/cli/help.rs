@@ -120,8 +120,8 @@ fn frames_that_show_nothing_are_told() {
     let split = format!("{{\"test\": [{}]}}", but_one.join(", "));
     std::fs::write(folder.path().join("far.json"), far).unwrap();
     std::fs::write(folder.path().join("one.json"), split).unwrap();
-    let render = |options: &str| {
-        let line = format!("render wall --proxy points --size 32x24 --json -o out {options}");
+    let run = |line: &str| {
+        let line = format!("{line} --proxy points --size 32x24 --json");
         let ran = lumigraph(folder.path(), &line).ok();
         let report = &ran.json()["report"];
         let notes = report["notes"].as_array().unwrap().iter();
@@ -131,6 +131,7 @@ fn frames_that_show_nothing_are_told() {
         }
         (report["frames_empty"].as_u64().unwrap(), notes.join("\n"))
     };
+    let render = |options: &str| run(&format!("render wall -o out {options}"));
     let (empty, notes) = render("--path far.json");
     let lost = "1 of 1 frames show nothing: does the path lie in this scene's world (see \
                 --dataparser-transforms)?";
@@ -142,6 +143,10 @@ fn frames_that_show_nothing_are_told() {
         "{notes}"
     );
     assert_eq!(render("--path orbit --frames 2"), (0, String::new()));
+    let (empty, notes) = run("evaluate wall --hold-out one.json");
+    let alone = "8 of 8 pictures show nothing: one photo alone does not tell where things are";
+    assert_eq!((empty, notes.as_str()), (8, alone));
+    assert_eq!(run("evaluate wall"), (0, String::new()));
 }
 
 #[test]
