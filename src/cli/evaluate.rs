@@ -197,17 +197,13 @@ fn json(session: &Session, lines: &[Line], report: &Report) -> Value {
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
-    let mut result = json!({
+    json!({
         "photos": lines,
         "mean": mean,
         "proxy": session.proxy.json(),
         "exposure": session.exposure.json(),
         "report": report,
-    });
-    if let Some(time) = session.time_json() {
-        result["time"] = time;
-    }
-    result
+    })
 }
 
 /// For people.
