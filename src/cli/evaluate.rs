@@ -83,6 +83,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for name in &held_out {
         compared(name, scene.view(name)?, args.draw.size)?;
     }
+    let times = held_out
+        .iter()
+        .map(|name| (named(name), scene.time_s(name)));
+    args.time.check(None, &scene, times)?;
     let kept = files_behind_scene(&args.scene.scene, &scene);
     let mut session = Session::new(
         scene,
@@ -105,6 +109,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     say!("exposure: {}", session.exposure.text());
     say!("{}", report.text());
     print(&table(&lines))
+}
+
+/// A photo, as what is said of its view begins.
+fn named(name: &str) -> String {
+    format!("photo {name}")
 }
 
 /// Of how many photos one is held out: not of each.
@@ -157,7 +166,7 @@ fn score_photos(
         };
         let desired = compared(name, view, size)?;
         let truth = truth.resized(desired.width, desired.height);
-        let moment = session.moment(&format!("photo {name}"), session.scene.time_s(name))?;
+        let moment = session.moment(&named(name), session.scene.time_s(name))?;
         let drawn = session.draw_timed(&desired, moment.as_ref())?;
         if output.is_some() {
             capture::write_png(&file, &drawn.picture)?;

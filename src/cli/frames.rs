@@ -3,10 +3,11 @@
 use super::Usage;
 use calibrate::{View, colmap};
 use glam::DVec3;
-use lumigraph::scene::SceneError;
+use lumigraph::scene::{Scene, SceneError};
 use render::Lumigraph;
 use render::path::{self, CameraPath, NerfstudioFrame, PathFrame};
 use render::trajectory::{self, Trajectory};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Which views to render.
@@ -91,6 +92,21 @@ impl Asked {
             return Err(Usage(message).into());
         }
         of_file(Path::new(asked), frame)
+    }
+
+    /// The same, where views without a time have that of the photo of their name, as those of a COLMAP model
+    /// may.
+    pub(super) fn timed(mut self, scene: &Scene) -> Self {
+        let photos = scene.photos.iter();
+        let times = photos.filter_map(|photo| Some((photo.name.as_str(), photo.time_s?)));
+        let times: BTreeMap<&str, f64> = times.collect();
+        if let Self::Read(views, _) = &mut self {
+            for view in views {
+                let of_photo = times.get(view.name.as_str()).copied();
+                view.time_s = view.time_s.or(of_photo);
+            }
+        }
+        self
     }
 
     /// Whether it is a derived path, which has as many frames as one asks for.

@@ -83,19 +83,27 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .say_unused(args.views.views.as_ref().or(file.as_ref()));
     check_folder(&args.output)?;
     args.film.check(&args.output)?;
-    if let Asked::Read(frames, _) = &asked {
-        // What need not be derived is checked first: fitting a proxy may take long.
-        desired(args, &chosen.of(frames.iter().collect())?)?;
-    }
-    let mut session = Session::open(
-        &args.scene,
-        &args.hold_out,
+    let scene = args.scene.open()?;
+    let without = args.hold_out.names(&scene)?;
+    let asked = asked.timed(&scene);
+    // What need not be derived is checked first: fitting a proxy may take long.
+    let known: Vec<&NamedView> = match &asked {
+        Asked::Read(frames, _) => chosen.of(frames.iter().collect())?,
+        Asked::Derived(_) => Vec::new(),
+    };
+    desired(args, &known)?;
+    let times = known.iter().map(|f| (f.name.clone(), f.time_s));
+    args.time.check(args.at.time, &scene, times)?;
+    let mut session = Session::new(
+        scene,
+        without,
+        args.scene.strict,
         &args.proxy,
         &args.exposure,
         &args.field,
         &args.draw,
         &args.time,
-        &args.at,
+        args.at.time,
     )?;
     session.max_error = args.max_error;
     let points = || session.points();

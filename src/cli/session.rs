@@ -2,11 +2,11 @@
 
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::ledger::{Ledger, Stage};
-use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
+use super::options::{DrawArgs, FieldArgs};
 use super::output::say;
 use super::report::Costs;
 use super::surface::{ChosenProxy, ProxyArgs};
-use super::time::{AtArgs, Clock, InWindow, TimeArgs};
+use super::time::{Clock, InWindow, TimeArgs};
 use anyhow::bail;
 use calibrate::View;
 use cpu_time::ProcessTime;
@@ -125,25 +125,6 @@ impl Session {
             cpu_memory: draw.cpu_memory,
             gpu_memory: draw.gpu_memory,
         })
-    }
-
-    /// A session from the options that `render` and `field` share.
-    pub(super) fn open(
-        scene: &SceneArgs,
-        hold_out: &HoldOutArgs,
-        proxy: &ProxyArgs,
-        exposure: &ExposureArgs,
-        field: &FieldArgs,
-        draw: &DrawArgs,
-        time: &TimeArgs,
-        at: &AtArgs,
-    ) -> anyhow::Result<Self> {
-        let opened = scene.open()?;
-        let without = hold_out.names(&opened)?;
-        let strict = scene.strict;
-        Self::new(
-            opened, without, strict, proxy, exposure, field, draw, time, at.time,
-        )
     }
 
     pub(super) fn lumigraph(&self) -> &Lumigraph {

@@ -3,8 +3,9 @@
 use super::options::positive;
 use super::output::say;
 use super::session::spinner;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow};
 use clap::Args;
+use lumigraph::scene::Scene;
 use render::{Lumigraph, Moment};
 use serde_json::{Value, json};
 use std::sync::Once;
@@ -90,6 +91,40 @@ impl Span {
     }
 }
 
+impl TimeArgs {
+    /// Fails early where a scene's photos have no times though they count by them; and, where no time is given
+    /// for all, where one of the views, of such names and times, has none of its own.
+    pub(super) fn check(
+        &self,
+        time_s: Option<f64>,
+        scene: &Scene,
+        views: impl IntoIterator<Item = (String, Option<f64>)>,
+    ) -> anyhow::Result<()> {
+        if self.period.is_none() && self.time_window.is_none() && time_s.is_none() {
+            return Ok(());
+        }
+        if scene.photos.iter().all(|photo| photo.time_s.is_none()) {
+            return Err(no_times());
+        }
+        let mut views = views.into_iter();
+        match views.find(|(_, own)| own.or(time_s).is_none()) {
+            Some((name, _)) => Err(no_time(&name)),
+            None => Ok(()),
+        }
+    }
+}
+
+fn no_times() -> anyhow::Error {
+    anyhow!(
+        "no photo has a time; import the photos with --times FILE.csv (name,seconds) \
+         or --frame-rate F"
+    )
+}
+
+fn no_time(name: &str) -> anyhow::Error {
+    anyhow!("{name} has no time; give one, or --time for all")
+}
+
 impl Clock {
     /// The clock asked for; `None` where no option speaks of time. Looks for the period in
     /// the photos with `--period auto`.
@@ -103,10 +138,7 @@ impl Clock {
         }
         let times_s: Vec<f64> = lumigraph.sources.iter().filter_map(|s| s.time_s).collect();
         let Some(photos) = Span::of(&times_s) else {
-            bail!(
-                "no photo has a time; import the photos with --times FILE.csv (name,seconds) \
-                 or --frame-rate F"
-            );
+            return Err(no_times());
         };
         let period_s = match args.period {
             None => None,
@@ -126,8 +158,7 @@ impl Clock {
     pub(super) fn moment(&self, name: &str, own: Option<f64>) -> anyhow::Result<Moment> {
         static SAID: Once = Once::new();
         let asked_s = self.time_s.or(own);
-        let asked_s =
-            asked_s.ok_or_else(|| anyhow!("{name} has no time; give one, or --time for all"))?;
+        let asked_s = asked_s.ok_or_else(|| no_time(name))?;
         let mut time_s = asked_s;
         if self.period_s.is_none() {
             time_s = self.photos.nearest_s(asked_s, self.window_s);

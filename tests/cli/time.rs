@@ -80,6 +80,18 @@ fn frames_show_their_moment() {
     )
     .ok();
 
+    // A model's views are of the photos of their names.
+    let views = |line: &str, out: &str| {
+        let line = format!("render {line} --proxy plane --size 32x24 -o {out}");
+        lumigraph(folder.path(), &line)
+    };
+    let photos = "helicopter --views helicopter --frames 2..3 --period 1.37";
+    views(photos, "views").ok();
+    views(&format!("{photos} --time 0.4"), "same").ok();
+    views(&format!("{photos} --time 0.9"), "other").ok();
+    let made = |out: &str| files(&folder.path().join(out));
+    assert!(made("views") == made("same") && made("views") != made("other"));
+
     // What plays no part is not decoded, and decoding it changes nothing.
     let (eager, _) = render(" --period 1.37 --time 0.25 --no-skip", "eager");
     assert!(eager == early);
@@ -159,6 +171,10 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
     // A held-out photo without a time cannot be drawn at its own.
     let error = lumigraph(folder.path(), "evaluate list --every 2 --time-window 1").error(1);
     assert!(error.contains("photo 0000.png has no time"), "{error}");
+    let line = "render list --views helicopter --frames 0..1 --time-window 1 -o out";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert_eq!(error, "0000.png has no time; give one, or --time for all");
+    assert!(!folder.path().join("out").exists());
 }
 
 #[test]
