@@ -64,10 +64,11 @@ impl Listed {
 impl List {
     pub(super) fn of(frame: &Frame<'_>, corners: [&Vertex; 3]) -> Self {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| corner.point) else {
-            // The lens ends inside the triangle. With nothing known beyond, only what the
-            // other corners say counts.
+            // Nothing is near a corner: only what the others say counts.
             return Self::of_weights(frame, corners);
         };
+
+        let ends_with_lens = corners.iter().any(|corner| corner.is_beyond_lens);
 
         // 1. The views that may matter: where the corners' differences bound the threshold, all
         // within it.
@@ -75,7 +76,12 @@ impl List {
             frame,
             corners,
             points: [a, b, c],
-            reaches: reaches([a, b, c]),
+            // What is seen of it may lie beside all three.
+            reaches: match ends_with_lens {
+                true => [f64::INFINITY; 3],
+                false => reaches([a, b, c]),
+            },
+            ends_with_lens,
             patch: OnceCell::new(),
             asked: OnceCell::new(),
         };
@@ -211,6 +217,8 @@ struct Triangle<'a> {
     points: [ProxyPoint; 3],
     /// How far it reaches from each, in the world.
     reaches: [f64; 3],
+    /// Whether the desired lens has no ray at some corner: then they don't tell how a view sees the triangle.
+    ends_with_lens: bool,
     patch: OnceCell<Patch>,
     asked: OnceCell<Vec<Near>>,
 }
@@ -294,7 +302,10 @@ impl Triangle<'_> {
         let is_in_image = |pixel: Pixel| frame.fov_blend(source_idx, pixel) >= 0.0;
         Listed {
             source_idx,
-            sees: self.how_it_is_seen(source_idx, pixels),
+            sees: match self.ends_with_lens {
+                true => Sees::Part,
+                false => self.how_it_is_seen(source_idx, pixels),
+            },
             diffs: known.map(|at| at.map_or(f64::INFINITY, |(diff, _)| diff)),
             unsure: [0, 1, 2].map(|c| {
                 known[c].is_none() && !self.is_told_of_all(c) && !pixels[c].is_some_and(is_in_image)

@@ -8,6 +8,7 @@
 //! mask ignores, crosses the triangle, weights change faster than any grid can follow: fovBlend rises within a few
 //! pixels, and the threshold t of all the others moves with it. There the *differences*
 //! are interpolated, which are smooth, and each pixel blends by its own fovBlend and masks.
+//! So they are where the desired lens ends, beyond which corners have the differences of what it sees nearby.
 //! (Interpolating feathered weights instead cost 15 to 20 dB against the exact picture;
 //! interpolating weights and feathering each pixel still cost 5 to 20 dB near borders.)
 
@@ -27,11 +28,11 @@ use crate::surface::Surface;
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
 use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use image::RgbaImage;
 use list::List;
 use rayon::prelude::*;
-use vertex::Vertex;
+use vertex::{Vertex, ray_within};
 
 /// The field over the triangles of the image plane that show the proxy.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,8 +56,8 @@ pub struct FieldTriangle {
     pub first_entry: u32,
     /// How many entries it has; at most [`MAX_LISTED`].
     pub entry_count: u32,
-    /// Whether the border of a photo or of a mask crosses it: its entries are differences,
-    /// and each pixel blends by its own fovBlend and masks. Otherwise they are weights.
+    /// Whether the border of a photo or of a mask crosses it, or it reaches beyond the desired lens: its entries
+    /// are differences, and each pixel blends by its own fovBlend and masks. Otherwise they are weights.
     pub bordered: bool,
 }
 
@@ -99,12 +100,8 @@ impl TriangulatedField {
         let seen = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|i| plane.vertices[i as usize]);
             match &frame.surface {
-                // Its horizon is an edge of the triangulation.
-                Surface::Plane(_) | Surface::Nothing => {
-                    let centroid = (a + b + c) / 3.0;
-                    let pixel = Pixel::new(centroid.x, centroid.y);
-                    frame.proxy_point(pixel).is_some()
-                }
+                Surface::Nothing => false,
+                Surface::Plane(q) => shows_plane(frame, *q, [a, b, c]),
                 // Any pixel may have it, as long as edges of the proxy are not.
                 Surface::Facets(map) => map.any_within(a.min(b).min(c), a.max(b).max(c)),
             }
@@ -248,6 +245,21 @@ impl TriangulatedField {
         contributors.iter_mut().for_each(|c| c.weight /= sum);
         contributors
     }
+}
+
+/// Whether the plane q is seen through a triangle with these corners: its horizon is an edge of the
+/// triangulation, but where the desired lens ends is none.
+fn shows_plane(frame: &Frame<'_>, q: DVec3, corners: [DVec2; 3]) -> bool {
+    let [a, b, c] = corners;
+    let centroid = (a + b + c) / 3.0;
+    if let Some(ray) = ray_within(frame, centroid, 0.0) {
+        return q.dot(ray) >= 0.0;
+    }
+    let far = corners.map(|corner| corner.distance(centroid));
+    let reach = far.into_iter().fold(0.0, f64::max);
+    let ray = |at: DVec2| ray_within(frame, at, reach);
+    let shows = |at: DVec2| ray(at).is_some_and(|ray| q.dot(ray) >= 0.0);
+    ray(centroid).is_some() && [centroid, a, b, c].into_iter().any(shows)
 }
 
 /// The picture of a triangulated field in plain f64: what [`crate::cpu`] and

@@ -6,7 +6,7 @@ use crate::near::Near;
 use crate::planted::{Fault, is_planted};
 use crate::surface::{NO_FACET, Surface};
 use calibrate::Pixel;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use std::sync::OnceLock;
 
 /// How far short of the plane's horizon vertices on it are evaluated: the sine of the angle.
@@ -16,8 +16,10 @@ const SHORT_OF_HORIZON: f64 = 1e-6;
 pub(super) struct Vertex {
     /// In pixels of the desired image.
     pub(super) at: DVec2,
-    /// `None` where the lens has no ray or nothing is near, and where no triangle needs it.
+    /// `None` where nothing is near, and where no triangle needs it.
     pub(super) point: Option<ProxyPoint>,
+    /// Whether the lens has no ray there: the point is one that it sees nearby.
+    pub(super) is_beyond_lens: bool,
     /// The source views that matter there, and in about the triangles around it.
     pub(super) near: Near,
     /// Made when first asked for.
@@ -30,6 +32,7 @@ impl Vertex {
         Self {
             at,
             point: None,
+            is_beyond_lens: false,
             near: Near::default(),
             weights: OnceLock::new(),
         }
@@ -42,13 +45,18 @@ impl Vertex {
             true => at + DVec2::new(0.5, 0.0),
             false => at,
         };
-        let point = point_at(frame, seen_at, cell);
+        let ray = frame
+            .desired
+            .lens
+            .unproject(Pixel::new(seen_at.x, seen_at.y));
+        let point = point_at(frame, seen_at, ray, cell);
         let near = point.map_or_else(Near::default, |point| {
             frame.near(&point, extent(frame, at, cell, &point), guess)
         });
         Self {
             at,
             point,
+            is_beyond_lens: ray.is_none(),
             weights: OnceLock::new(),
             near,
         }
@@ -77,17 +85,31 @@ fn extent(frame: &Frame<'_>, at: DVec2, cell: DVec2, point: &ProxyPoint) -> f64 
     corners.into_iter().map(offset).fold(0.0, f64::max)
 }
 
-/// The proxy point at a position in the desired image; `None` where the lens has no ray. Where
-/// nothing is there, what is nearest to it in the image, within a `cell` of it, goes on, if
-/// anything is.
-fn point_at(frame: &Frame<'_>, at: DVec2, cell: DVec2) -> Option<ProxyPoint> {
+/// The ray through a position in the desired image. Where the lens has none, as it ends before, the one where
+/// it ends on the way from its middle, within so many pixels; `None` if it does not.
+pub(super) fn ray_within(frame: &Frame<'_>, at: DVec2, reach: f64) -> Option<DVec3> {
+    let lens = &frame.desired.lens;
+    let to_middle = lens.principal - at;
+    let steps = reach.min(to_middle.length()).ceil() as usize;
+    let step = to_middle.normalize_or_zero();
+    (0..=steps).find_map(|i| {
+        let there = at + i as f64 * step;
+        lens.unproject(Pixel::new(there.x, there.y))
+    })
+}
+
+/// The proxy point at a position in the desired image, through which this `ray` is. Where the lens has none, or
+/// nothing is there, what is nearest to it in the image, within a `cell` of it, goes on, if anything is.
+fn point_at(frame: &Frame<'_>, at: DVec2, ray: Option<DVec3>, cell: DVec2) -> Option<ProxyPoint> {
     let pixel = Pixel::new(at.x, at.y);
-    let ray = frame.desired.lens.unproject(pixel)?;
     if let Surface::Facets(map) = &frame.surface
-        && map.facet_at(pixel) == NO_FACET
+        && (ray.is_none() || map.facet_at(pixel) == NO_FACET)
     {
         let beside = map.nearest(pixel, cell.max_element().ceil() as i64)?;
         let beside = frame.proxy_point(beside)?;
+        let Some(ray) = ray else {
+            return Some(beside);
+        };
         let by_length = beside.inverse_distance * ray.length() / beside.ray.length();
         return Some(ProxyPoint {
             ray,
@@ -95,6 +117,7 @@ fn point_at(frame: &Frame<'_>, at: DVec2, cell: DVec2) -> Option<ProxyPoint> {
             plane: ray * (by_length / ray.length_squared()),
         });
     }
+    let ray = ray.or_else(|| ray_within(frame, at, cell.length()))?;
     let plane = frame.surface.plane_at(pixel).unwrap_or_default();
     // Snapping may have put a vertex of the horizon a little beyond it. On it every view's
     // angle is zero and they all tie; just short of it they don't, and that is what the

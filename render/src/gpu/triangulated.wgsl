@@ -104,8 +104,8 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
         }
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
-        // Every listed view sees all of the triangle: fovBlend and mask are one. But where a desired lens that
-        // bends ends inside the triangle, nobody knows.
+        // Every listed view sees all of the triangle: fovBlend and mask are one. But a desired lens may bend more
+        // between corners than they tell.
         var fov = select(0.0, 1.0, sight.depth > 0.0);
         if RAYS_IN_TABLE {
             fov = fov_blend(source_idx, sight);

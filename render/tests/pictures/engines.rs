@@ -6,7 +6,7 @@ use calibrate::{Distortion, Lens, Pixel, Rigid3, View, colmap};
 use common::{METHODS, Shot, assert_close, by_all, by_reference, gpu, pinhole, psnr, psnr_covered};
 use glam::{DQuat, DVec2, DVec3};
 use image::{Rgba, RgbaImage};
-use proxy::{Plane, Proxy};
+use proxy::{Mesh, MeshKind, Plane, Proxy, Solid};
 use render::field::FieldEntry;
 use render::picture::contributors_exact;
 use render::{
@@ -152,6 +152,52 @@ fn beyond_a_photos_border_it_shows_nothing_at_the_end_of_the_desired_lens() {
         }
     }
     assert!(without_ray > 1000, "{without_ray}");
+}
+
+/// There triangles show all that the lens sees, whatever their corners do.
+#[test]
+fn triangles_reach_to_the_end_of_the_desired_lens() {
+    let shot = Shot::of("wall", 9, None);
+    let wall = shot.dataset.scene.objects()[0].world_from_shape;
+    let corner =
+        |x: f64, y: f64| wall.translation + wall.rotation * DVec3::new(9.0 * x, 9.0 * y, 0.0);
+    let mesh = Mesh {
+        positions: vec![
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let meshed = Lumigraph {
+        proxy: Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh))),
+        ..shot.lumigraph()
+    };
+    let folding = Distortion::Rational {
+        k: [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        p: [0.0; 2],
+    };
+    let lens = Lens::new(DVec2::splat(150.0), DVec2::new(80.0, 60.0), folding);
+    for (name, lumigraph) in [("plane", shot.lumigraph()), ("mesh", meshed)] {
+        for i in [1, 4] {
+            let desired = View {
+                lens,
+                ..shot.views[i].clone()
+            };
+            let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+            let exact = by_reference(&frame, Method::Exact).unwrap();
+            for (engine, picture) in by_all(&frame, Method::TRIANGULATED) {
+                let picture = picture.unwrap();
+                let pixels = exact.pixels().zip(picture.pixels());
+                let holes = pixels.filter(|(e, p)| e.0[3] == 255 && p.0[3] < 128);
+                assert_eq!(holes.count(), 0, "{name}, photo {i}, {engine}");
+                let db = psnr(&picture, &exact);
+                println!("{name}, photo {i}, {engine}: {db:.1} dB");
+                assert!(db >= 35.0, "{name}, photo {i}, {engine}: {db} dB");
+            }
+        }
+    }
 }
 
 // ---------------------------------------------------------------- Engine against engine
