@@ -262,8 +262,7 @@ impl Session {
         Ok(())
     }
 
-    /// All that was said of what draws, of photos left out and of the frames of [`Self::draw_all`].
-    /// All that was said of what draws and of pictures that show nothing.
+    /// All that was said of what draws, of photos left out and of pictures that show nothing.
     pub(super) fn notes(&self) -> Vec<String> {
         let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();
         let said = self.notes.iter().chain(engine).chain(&self.left_out);
