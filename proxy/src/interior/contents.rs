@@ -2,7 +2,9 @@
 
 use super::locate::is_loose;
 use super::seen::Seen;
-use super::{Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box};
+use super::{
+    CellId, Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box,
+};
 use crate::mesh::{Mesh, Model, PORTAL_NODE};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -34,11 +36,39 @@ impl Contents {
         model: &Model,
     ) -> Result<(Self, Vec<InteriorWarning>), InteriorError> {
         let (mut contents, odd) = Self::listed(interior, model)?;
-        if contents.is_any_bounds_shared(interior) {
-            let seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
-            contents.seen = Some(Arc::new(seen));
-        }
+        contents.look_where_shared(interior, model);
         Ok((contents, odd))
+    }
+
+    /// Finds anew what is in some cells whose boxes have changed; as [`Self::new`] would.
+    pub(super) fn refill(&mut self, interior: &Interior, model: &Model, ids: &[CellId]) {
+        let is_opening = openings(model);
+        for id in ids {
+            let Some(room) = interior.cell(*id).content.room() else {
+                continue;
+            };
+            let place = id.0 as usize;
+            self.triangles[place] = touching(model, &room, &is_opening);
+            self.bounds[place] = Some(room);
+        }
+        self.find_rest(is_opening);
+        self.look_where_shared(interior, model);
+    }
+
+    fn look_where_shared(&mut self, interior: &Interior, model: &Model) {
+        self.seen = self.is_any_bounds_shared(interior).then(|| {
+            let seen = Seen::new(model, &self.triangles, &self.elsewhere);
+            Arc::new(seen)
+        });
+    }
+
+    /// What is in no cell, but for what is taken already, by triangle.
+    fn find_rest(&mut self, mut is_taken: Vec<bool>) {
+        for i in self.triangles.iter().flatten() {
+            is_taken[*i as usize] = true;
+        }
+        let all = 0..is_taken.len() as u32;
+        self.elsewhere = all.filter(|i| !is_taken[*i as usize]).collect();
     }
 
     /// The same without what tells where a viewer is.
@@ -50,12 +80,12 @@ impl Contents {
         let is_opening = openings(model);
         let mut contents = Self::default();
         for cell in &interior.cells {
-            let mut triangles = match &cell.content {
+            let triangles = match &cell.content {
                 Content::Scene { room: None, .. } => Vec::new(),
                 Content::Scene {
                     room: Some(room), ..
                 }
-                | Content::Box(room) => touching(model, room),
+                | Content::Box(room) => touching(model, room, &is_opening),
                 Content::Nodes(names) => {
                     let known = |name: &String| model.nodes.iter().any(|n| n.name == *name);
                     if let Some(node) = names.iter().find(|name| !known(name)) {
@@ -64,10 +94,11 @@ impl Contents {
                             node: node.clone(),
                         });
                     }
-                    below(model, |name| names.iter().any(|n| n == name))
+                    let mut triangles = below(model, |name| names.iter().any(|n| n == name));
+                    triangles.retain(|i| !is_opening[*i as usize]);
+                    triangles
                 }
             };
-            triangles.retain(|i| !is_opening[*i as usize]);
             let bounds = match &cell.content {
                 Content::Nodes(_) => span(model, &triangles),
                 content => content.room(),
@@ -76,12 +107,7 @@ impl Contents {
             contents.bounds.push(bounds);
         }
         // 2. The rest.
-        let mut is_taken = is_opening;
-        for i in contents.triangles.iter().flatten() {
-            is_taken[*i as usize] = true;
-        }
-        let all = 0..model.mesh.triangles.len() as u32;
-        contents.elsewhere = all.filter(|i| !is_taken[*i as usize]).collect();
+        contents.find_rest(is_opening);
         // 3. What is odd.
         let mut odd = Vec::new();
         for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
@@ -132,8 +158,12 @@ fn openings(model: &Model) -> Vec<bool> {
     is_opening
 }
 
-fn touching(model: &Model, room: &RoomBox) -> Vec<u32> {
-    let is_in = |i: &u32| triangle_touches_box(model.mesh.corners(*i as usize), room);
+/// The triangles that touch a box, without what stands for openings.
+fn touching(model: &Model, room: &RoomBox, is_opening: &[bool]) -> Vec<u32> {
+    let is_in = |i: &u32| {
+        let idx = *i as usize;
+        triangle_touches_box(model.mesh.corners(idx), room) && !is_opening[idx]
+    };
     let all = 0..model.mesh.triangles.len() as u32;
     all.into_par_iter().filter(is_in).collect()
 }
@@ -231,6 +261,44 @@ mod tests {
             assert_eq!(contents.triangles, [[0]]);
             assert_eq!(contents.bounds, [Some(bounds)]);
             assert_eq!((contents.elsewhere.len(), odd.len()), (0, 0));
+        }
+    }
+
+    #[test]
+    fn what_is_filled_anew_is_as_if_found_at_first() {
+        let model = with_opening();
+        let cell = |name: &str, min: f64, max: f64| Cell {
+            name: name.to_owned(),
+            content: Content::Box(RoomBox {
+                min: DVec3::splat(min),
+                max: DVec3::splat(max),
+            }),
+            floor: None,
+            other: Extra::new(),
+        };
+        let mut interior = Interior {
+            model: None,
+            up: DVec3::Y,
+            eye_height: 1.6,
+            cells: vec![cell("a", 5.0, 6.0), cell("b", -1.0, 3.0)],
+            portals: Vec::new(),
+            held_out: Vec::new(),
+            other: Extra::new(),
+        };
+        let (mut contents, _) = Contents::new(&interior, &model).unwrap();
+        let mut seen = Seen::new(&model, &contents.triangles, &contents.elsewhere);
+        // Both cells have the triangle; then only the first; then none.
+        for (a, b) in [(-1.0, -1.0), (-1.0, 2.0), (5.0, 2.0)] {
+            interior.cells = vec![cell("a", a, 6.0), cell("b", b, 3.0)];
+            contents.refill(&interior, &model, &[CellId(0), CellId(1)]);
+            let (expected, _) = Contents::new(&interior, &model).unwrap();
+            assert_eq!(contents, expected);
+            seen.regroup(&contents.triangles);
+            let anew = Seen::new(&model, &expected.triangles, &expected.elsewhere);
+            assert_eq!(seen, anew);
+            let (_, cells) = seen.first(DVec3::new(0.2, 1.0, 0.2), -DVec3::Y).unwrap();
+            let ids = [(0, a), (1, b)].map(|(id, low)| (low < 0.0).then_some(CellId(id)));
+            assert_eq!(cells, ids.into_iter().flatten().collect::<Vec<CellId>>());
         }
     }
 

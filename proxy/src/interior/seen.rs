@@ -10,11 +10,15 @@ use glam::DVec3;
 pub(super) const TURN: f64 = 2.399_963_229_728_653;
 /// What is farther from the world's origin is not looked at: squares of it must fit into f32.
 const FARTHEST: f64 = 1e15;
+/// The place of a triangle that rays do not meet.
+const NOT_SEEN: u32 = u32::MAX;
 
 /// Triangles that rays meet, each with the cells that have it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Seen {
     solid: Solid,
+    /// By triangle of the model, which of `solid` it is; [`NOT_SEEN`] of others.
+    places: Vec<u32>,
     /// By triangle of `solid`, where its cells begin; and where the last one's end.
     begins: Vec<u32>,
     cells: Vec<CellId>,
@@ -24,34 +28,60 @@ impl Seen {
     /// Of a model's triangles those of its cells, in their order, and others that are of none, but hide
     /// what is behind them.
     pub(super) fn new(model: &Model, by_cell: &[Vec<u32>], others: &[u32]) -> Self {
-        let all = in_reach(model, by_cell, others);
-        let triangles = all.chunk_by(|a, b| a.0 == b.0);
-        let triangles = triangles.map(|same| model.mesh.triangles[same[0].0 as usize]);
+        let mut is_there = vec![false; model.mesh.triangles.len()];
+        for i in by_cell.iter().flatten().chain(others) {
+            is_there[*i as usize] = is_in_reach(&model.mesh, *i);
+        }
+        let mut count = 0;
+        let mut place = |is_there: bool| {
+            count += u32::from(is_there);
+            if is_there { count - 1 } else { NOT_SEEN }
+        };
+        let places: Vec<u32> = is_there.iter().map(|is| place(*is)).collect();
+        let triangles = model.mesh.triangles.iter().zip(&is_there);
+        let triangles = triangles.filter(|(_, is_there)| **is_there);
         let mut mesh = Mesh {
             positions: model.mesh.positions.clone(),
-            triangles: triangles.collect(),
+            triangles: triangles.map(|(triangle, _)| *triangle).collect(),
         };
         mesh.drop_unused();
         let mut seen = Self {
             solid: Solid::new(MeshKind::Mesh, mesh),
-            begins: Vec::new(),
+            places,
+            begins: vec![0; count as usize + 1],
             cells: Vec::new(),
         };
-        seen.share_out(&all);
+        seen.regroup(by_cell);
         seen
     }
 
-    /// The same triangles with other cells: all of `others` that have one now, and the other way round.
-    pub(super) fn regroup(&mut self, model: &Model, by_cell: &[Vec<u32>], others: &[u32]) {
-        self.share_out(&in_reach(model, by_cell, others));
-    }
-
-    fn share_out(&mut self, all: &[(u32, Option<CellId>)]) {
-        self.begins = vec![0];
+    /// The same triangles with other cells: those that are in none now hide what is behind them all the same.
+    pub(super) fn regroup(&mut self, by_cell: &[Vec<u32>]) {
+        let listed = by_cell.iter().map(|list| {
+            let places = list.iter().map(|i| self.places[*i as usize]);
+            let places = places.filter(|place| *place != NOT_SEEN);
+            places.map(|place| place as usize).collect()
+        });
+        let by_cell: Vec<Vec<usize>> = listed.collect();
+        // 1. How many cells each has; where they begin.
+        self.begins.fill(0);
+        for place in by_cell.iter().flatten() {
+            self.begins[*place + 1] += 1;
+        }
+        let mut total = 0;
+        for begin in &mut self.begins {
+            total += *begin;
+            *begin = total;
+        }
+        // 2. Which.
+        let mut next = self.begins.clone();
         self.cells.clear();
-        for same in all.chunk_by(|a, b| a.0 == b.0) {
-            self.cells.extend(same.iter().filter_map(|(_, id)| *id));
-            self.begins.push(self.cells.len() as u32);
+        self.cells.resize(total as usize, CellId(0));
+        for (id, list) in (0..).map(CellId).zip(&by_cell) {
+            for place in list {
+                self.cells[next[*place] as usize] = id;
+                next[*place] += 1;
+            }
         }
     }
 
@@ -67,18 +97,7 @@ impl Seen {
     }
 }
 
-/// Triangles that rays may meet, in order, with each cell that has them.
-fn in_reach(model: &Model, by_cell: &[Vec<u32>], others: &[u32]) -> Vec<(u32, Option<CellId>)> {
-    let is_in_reach = |i: u32| {
-        let corners = model.mesh.corners(i as usize);
-        corners.iter().all(|p| p.abs().max_element() < FARTHEST)
-    };
-    let ids = (0..).map(|i| Some(CellId(i)));
-    let of_cells = ids.zip(by_cell);
-    let of_cells = of_cells.flat_map(|(id, list)| list.iter().map(move |i| (*i, id)));
-    let of_none = others.iter().map(|i| (*i, None));
-    let all = of_cells.chain(of_none).filter(|(i, _)| is_in_reach(*i));
-    let mut all: Vec<(u32, Option<CellId>)> = all.collect();
-    all.sort_unstable();
-    all
+fn is_in_reach(mesh: &Mesh, triangle_idx: u32) -> bool {
+    let corners = mesh.corners(triangle_idx as usize);
+    corners.iter().all(|p| p.abs().max_element() < FARTHEST)
 }

@@ -111,9 +111,16 @@ pub fn fit_to_sight(
         while !left.is_empty() && share <= 1.0 {
             let fitted = |stray: &Stray| fit(interior, stray, share * reach, MARGIN * reach);
             let fitted: Vec<Option<Fitted>> = left.iter().map(fitted).collect();
-            if fitted.contains(&Some(Fitted::Box)) {
-                contents = Contents::new(interior, model)?.0;
-                seen.regroup(model, &contents.triangles, &contents.elsewhere);
+            let grown = fitted.iter().filter_map(|fitted| match fitted {
+                Some(Fitted::Box(id)) => Some(*id),
+                _ => None,
+            });
+            let mut grown: Vec<CellId> = grown.collect();
+            grown.sort_unstable();
+            grown.dedup();
+            if !grown.is_empty() {
+                contents.refill(interior, model, &grown);
+                seen.regroup(&contents.triangles);
             }
             if fitted.iter().all(Option::is_none) {
                 share *= 2.0;
@@ -133,7 +140,7 @@ pub fn fit_to_sight(
 /// What reaches farther than before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fitted {
-    Box,
+    Box(CellId),
     Portal,
 }
 
@@ -174,7 +181,7 @@ fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Optio
             room.min = room.min.min(stray.seen - margin);
             room.max = room.max.max(stray.seen + margin);
         }
-        return Some(Fitted::Box);
+        return Some(Fitted::Box(id));
     }
     let (_, i, at) = passed.filter(|_| least <= reach)?;
     let polygon = &mut interior.portals[i].polygon;
