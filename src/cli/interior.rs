@@ -154,6 +154,12 @@ fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     let surface = scene.surface(&without);
     busy.finish_and_clear();
     let surface = surface.with_context(named)?;
+    for (name, reason) in &surface.left_out {
+        say!("warning: photo {name} is left out: {reason}");
+    }
+    for (name, reason) in &surface.maps_left_out {
+        say!("note: the depth map of photo {name} is left out: {reason}");
+    }
     let fused_s = start.elapsed().as_secs_f64();
     // 2. Its rooms.
     let start = Instant::now();

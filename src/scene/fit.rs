@@ -5,6 +5,7 @@ use super::carved_points::CarvedPoints;
 use super::damaged::of_each;
 use super::{Photo, Scene, SceneError};
 use calibrate::View;
+use capture::DepthMap;
 use glam::DVec3;
 use proxy::dense::{DenseOptions, Matching};
 use proxy::depth;
@@ -245,7 +246,9 @@ impl Scene {
             .iter()
             .filter(|(p, _)| p.depth_map.is_some())
             .count();
-        let fusion = fuse_depth(&sources, MOST_TRIANGLES)?;
+        let decode =
+            |photo: &Photo, size: (u32, u32)| photo.decode_depth(size).map_err(SceneError::from);
+        let fusion = fuse_depth(&sources, MOST_TRIANGLES, decode)?;
         let how = format!(
             "{maps} depth maps fused in voxels of {:.4}",
             fusion.voxel_size
@@ -441,18 +444,20 @@ impl Fitted {
 /// and rays through them take longer.
 const MOST_TRIANGLES: usize = 200_000;
 
-/// The surface of the depth maps that some photos have, of about so many triangles at most.
+/// The surface of the depth maps that some photos have, of about so many triangles at most. `decode` gives a
+/// photo's map, of a size in pixels; it is asked several times.
 pub(super) fn fuse_depth(
     sources: &[(&Photo, View)],
     most_triangles: usize,
+    mut decode: impl FnMut(&Photo, (u32, u32)) -> Result<Option<DepthMap>, SceneError>,
 ) -> Result<depth::Fusion, SceneError> {
     let with_maps: Vec<&(&Photo, View)> = sources
         .iter()
         .filter(|(photo, _)| photo.depth_map.is_some())
         .collect();
-    let frame = |i: usize| -> Result<(View, capture::DepthMap), SceneError> {
+    let frame = |i: usize| -> Result<(View, DepthMap), SceneError> {
         let (photo, view) = with_maps[i];
-        let map = photo.decode_depth((view.width, view.height))?;
+        let map = decode(photo, (view.width, view.height))?;
         let map = map.ok_or_else(|| unfit(format!("{}: no depth map", photo.name)))?;
         Ok((view.clone(), map))
     };

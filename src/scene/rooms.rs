@@ -1,16 +1,18 @@
 //! An interior out of a capture: a coloured model, its rooms and doorways, and what photos show of it.
 
 use super::fit::{fuse_depth, unfit};
-use super::{Scene, SceneError};
+use super::import::ENOUGH;
+use super::{Photo, Scene, SceneError};
 use calibrate::{Pixel, View};
 use capture::DepthMap;
 use glam::DVec3;
+use proxy::depth::Fusion;
 use proxy::interior::Contents;
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior, sights};
 use proxy::mesh::{Material, Mesh, Model, ModelNode, Painting, Part};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// The surface of a capture, and what its cameras say of the space between.
@@ -20,6 +22,12 @@ pub struct SceneSurface {
     pub model: Model,
     /// Photos whose depth maps were fused; none where the mesh is the scene's own.
     pub maps: usize,
+    /// Photos that cannot be decoded and colour nothing, by name, with what is wrong with each. Their
+    /// depth maps count.
+    pub left_out: BTreeMap<String, String>,
+    /// Photos whose depth maps cannot be decoded, by name, with what is wrong with each: they count as photos
+    /// that have none.
+    pub maps_left_out: BTreeMap<String, String>,
     /// The photos' centres and which way is up for them.
     cameras: Vec<(DVec3, DVec3)>,
     /// Lines of sight, from a camera to what it saw.
@@ -38,16 +46,19 @@ const SAME_PLACE: f64 = 3.0;
 
 impl Scene {
     /// Fuses the photos' depth maps and colours what comes out, as if the photos of the given names
-    /// had never been taken. Without depth maps it is the scene's own mesh, if it has one.
+    /// had never been taken. Without depth maps it is the scene's own mesh, if it has one. Photos and depth
+    /// maps that cannot be decoded are left out; see [`SceneSurface::left_out`].
     ///
     /// # Errors
-    /// No depth maps and no mesh, depth maps without a surface, photos that cannot be decoded.
+    /// No depth maps and no mesh, depth maps without a surface; fewer than two photos without those that cannot be
+    /// decoded, or none that colours anything.
     pub fn surface(&self, without: &BTreeSet<String>) -> Result<SceneSurface, SceneError> {
         let sources = self.sources(without)?;
         let maps = sources
             .iter()
             .filter(|(p, _)| p.depth_map.is_some())
             .count();
+        let mut maps_left_out = BTreeMap::new();
         let (mesh, tolerance, own) = match maps {
             0 => {
                 let solid = self.own_mesh(without)?;
@@ -55,7 +66,7 @@ impl Scene {
                 (solid.mesh().clone(), 0.0, Some(solid))
             }
             _ => {
-                let mut fusion = fuse_depth(&sources, MOST_TRIANGLES)?;
+                let mut fusion = fuse_decodable(&sources, &mut maps_left_out)?;
                 fusion.mesh.close_holes(SMALL_HOLE * fusion.voxel_size);
                 (fusion.mesh, SAME_PLACE * fusion.voxel_size, None)
             }
@@ -65,23 +76,40 @@ impl Scene {
         let front_only = own.is_none_or(|solid| solid.kind().has_front_sides_only());
         let mut painting = Painting::new(&mesh, tolerance, front_only);
         let mut lines = Vec::new();
+        let mut left_out = BTreeMap::new();
+        let mut painted = 0;
         for (photo, view) in &sources {
             let size = (view.width, view.height);
             let map = match own {
                 Some(solid) => Some(depth_of(solid, view)),
+                None if maps_left_out.contains_key(&photo.name) => None,
                 None => photo.decode_depth(size)?,
             };
             let Some(map) = map else { continue };
             let pixels = f64::from(map.width) * f64::from(map.height);
             let every = (pixels / SIGHTS).sqrt().round().max(1.0);
             lines.extend(sights(view, &map, every as u32));
-            painting.add(view, &photo.decode_usable(size)?, &map);
+            match photo.decode_usable(size) {
+                Ok(pixels) => {
+                    painting.add(view, &pixels, &map);
+                    painted += 1;
+                }
+                Err(error) => {
+                    left_out.insert(photo.name.clone(), error.to_string());
+                }
+            }
+        }
+        let rest = sources.len() - left_out.len();
+        if !left_out.is_empty() && (rest < ENOUGH || painted == 0) {
+            return Err(SceneError::Damaged(left_out));
         }
         let colors = painting.colors();
         let cameras = sources.iter().map(|(_, v)| (v.center(), v.up())).collect();
         Ok(SceneSurface {
             model: model_of(mesh, colors),
-            maps,
+            maps: maps - maps_left_out.len(),
+            left_out,
+            maps_left_out,
             cameras,
             sights: lines,
         })
@@ -142,6 +170,38 @@ impl SceneSurface {
         };
         find_interior(&evidence, file, options).map_err(unfit)
     }
+}
+
+/// The surface of those depth maps that can be decoded. What is wrong with the others is added to `left_out`, by
+/// their photos' names.
+fn fuse_decodable(
+    sources: &[(&Photo, View)],
+    left_out: &mut BTreeMap<String, String>,
+) -> Result<Fusion, SceneError> {
+    let decode = |photo: &Photo, (width, height): (u32, u32)| {
+        let map = photo.decode_depth((width, height));
+        Ok(map.unwrap_or_else(|error| {
+            left_out.insert(photo.name.clone(), error.to_string());
+            // Nothing is known.
+            Some(DepthMap {
+                width,
+                height,
+                depths: vec![0.0; width as usize * height as usize],
+            })
+        }))
+    };
+    let fused = fuse_depth(sources, MOST_TRIANGLES, decode);
+    fused.map_err(|error| match left_out.first_key_value() {
+        None => error,
+        Some((name, reason)) => {
+            let text = format!("{error}; left out: the depth map of photo {name}: {reason}");
+            let more = left_out.len() - 1;
+            unfit(match more {
+                0 => text,
+                _ => format!("{text}; and {more} more"),
+            })
+        }
+    })
 }
 
 /// Corners with colours, as one node.

@@ -15,6 +15,7 @@ mod gpu;
 mod help;
 mod hull;
 mod interior;
+mod interior_damaged;
 mod interior_folder;
 mod kinds;
 mod ldis;
