@@ -1,6 +1,7 @@
 //! What must hold of an interior, and what is odd about one.
 
-use super::{CellId, Content, Interior, InteriorError, InteriorWarning, RoomBox};
+use super::{CellId, Content, Interior, InteriorError, InteriorWarning, Polygon, RoomBox};
+use glam::{DMat3, DVec3};
 use std::collections::BTreeSet;
 
 /// What may be due to rounding, in shares of a box's or polygon's size.
@@ -98,6 +99,15 @@ impl Interior {
                 found.push(InteriorWarning::NoPortal(cell.name.clone()));
             }
         }
+        for cell in &self.cells {
+            let floor = cell.floor.as_ref().zip(cell.content.room());
+            if let Some(distance) = floor.and_then(|(floor, room)| self.floor_away(floor, &room)) {
+                found.push(InteriorWarning::FloorAway {
+                    cell: cell.name.clone(),
+                    distance,
+                });
+            }
+        }
         for portal in &self.portals {
             let center = portal.polygon.center();
             for id in portal.cells.into_iter().flatten() {
@@ -119,6 +129,25 @@ impl Interior {
             }
         }
         found
+    }
+
+    /// How far a cell's floor is from its box, in world units, where no part of its outline is over the box, it
+    /// is above the box, or so far below that not even eyes over it are in the box.
+    fn floor_away(&self, floor: &Polygon, room: &RoomBox) -> Option<f64> {
+        let across = self.up.any_orthonormal_vector();
+        let to_plan = DMat3::from_cols(across, self.up, self.up.cross(across)).transpose();
+        let span = |points: &[DVec3]| {
+            let places = points.iter().map(|p| to_plan * *p);
+            places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            })
+        };
+        let (low, high) = span(&room.corners());
+        let (floor_low, floor_high) = span(floor.corners());
+        let apart = |below: DVec3| (floor_low - high).max(low - floor_high - below);
+        let eyes = DVec3::new(0.0, self.eye_height, 0.0);
+        let is_outside = apart(eyes).cmpgt(-ROUNDING * (high - low)).any();
+        is_outside.then(|| apart(DVec3::ZERO).max(DVec3::ZERO).length())
     }
 }
 

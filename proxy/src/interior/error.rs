@@ -107,6 +107,17 @@ pub enum InteriorWarning {
         /// In world units, from the portal's centre.
         distance: f64,
     },
+    /// A floor is not in its cell's box.
+    #[error(
+        "the floor of cell `{cell}` is outside the cell's box, {distance} away: eyes are placed over it, on tours and \
+         before portals; correct its `floor`, or its `box`"
+    )]
+    FloorAway {
+        /// The cell.
+        cell: String,
+        /// In world units; zero where they touch.
+        distance: f64,
+    },
     /// A portal's outline goes the other way round.
     #[error(
         "portal `{0}` seems to be turned round: its corners are to be counter-clockwise as seen \

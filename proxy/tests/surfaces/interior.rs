@@ -5,9 +5,9 @@ use crate::common;
 use glam::DVec3;
 use proptest::prelude::*;
 use proxy::interior::{
-    CellId, Content, Contents, Interior, InteriorFileError, InteriorWarning, PortalId, RoomBox,
-    SemicircleOptions, interior_from_nodes, parse_interior, parse_rooms, read_rooms, semicircles,
-    write_interior,
+    CellId, Content, Contents, Interior, InteriorFileError, InteriorWarning, Polygon, PortalId,
+    RoomBox, SemicircleOptions, interior_from_nodes, parse_interior, parse_rooms, read_rooms,
+    semicircles, write_interior,
 };
 use proxy::mesh::{self, Mesh, Model, ModelNode, Part};
 use std::path::Path;
@@ -241,6 +241,47 @@ fn what_is_odd_is_told() {
     interior.portals[0].polygon = interior.portals[0].polygon.clone().reversed();
     let warnings = interior.check().unwrap();
     assert_eq!(warnings, [InteriorWarning::Turned("door".to_owned())]);
+}
+
+#[test]
+fn floors_outside_their_boxes_are_told() {
+    // The west room is 4 × 3 × 4.
+    let with_floor = |[x, to_x]: [f64; 2], y: f64| {
+        let mut interior = two_rooms();
+        let corners = [[x, y, 0.0], [x, y, 4.0], [to_x, y, 4.0], [to_x, y, 0.0]];
+        let floor = Polygon::new(corners.map(DVec3::from_array).to_vec());
+        interior.cells[0].floor = Some(floor.unwrap());
+        interior
+    };
+    let own = [0.0, 4.0];
+    for (x, y, distance) in [
+        // In it, or where eyes are in it.
+        (own, 0.0, None),
+        (own, 1.0, None),
+        (own, -0.5, None),
+        ([3.0, 8.0], 0.0, None),
+        // Over it, and under it.
+        (own, 50.0, Some(47.0)),
+        (own, -2.0, Some(2.0)),
+        // The next room's, and farther.
+        ([4.0, 8.0], 0.0, Some(0.0)),
+        ([20.0, 24.0], 0.0, Some(16.0)),
+    ] {
+        let told = distance.map(|distance| InteriorWarning::FloorAway {
+            cell: "west".to_owned(),
+            distance,
+        });
+        let warnings = with_floor(x, y).check().unwrap();
+        assert_eq!(warnings, Vec::from_iter(told), "{x:?} {y}");
+    }
+    // Whichever way is up.
+    for (y, is_told) in [(0.0, false), (50.0, true)] {
+        let mut interior = with_floor(own, y);
+        interior.up = DVec3::new(0.1, 0.9, -0.2).normalize();
+        let warnings = interior.check().unwrap();
+        let is_of_floor = |w: &InteriorWarning| matches!(w, InteriorWarning::FloorAway { .. });
+        assert_eq!(warnings.iter().any(is_of_floor), is_told, "{warnings:?}");
+    }
 }
 
 /// A model of single triangles.
