@@ -7,7 +7,7 @@ use glam::{DMat4, DQuat, DVec3};
 use house::small_house;
 use proxy::Mesh;
 use proxy::interior::find::{
-    Evidence, FindError, FindOptions, FoundInterior, find_interior, sights,
+    Evidence, FindError, FindOptions, FoundInterior, Place, find_interior, sights,
 };
 use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
 use proxy::mesh::Model;
@@ -521,4 +521,44 @@ fn what_was_not_seen_of_a_room_is_of_it() {
     // Nobody knows what is behind who looks.
     assert!(off[0] < 1.2 && off[1] < 1.0, "{of:?}");
     assert!(off[2].abs() < 0.2 && off[3].abs() < 0.2, "{of:?}");
+}
+
+#[test]
+fn what_no_surface_is_in_is_no_room() {
+    // A room, and a piece of floor far away.
+    let size = DVec3::new(5.0, 2.6, 4.0);
+    let mut mesh = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let far = DVec3::new(29.0, 0.0, 0.0);
+    mesh.append(&open_box(far, far + DVec3::new(1.0, 0.0, 6.0), &[2]));
+    // Lines of sight over rectangles of the plan, by their least and greatest x and z.
+    let found = |seen: &[[f64; 4]]| {
+        let mut sights = Vec::new();
+        for [x0, x1, z0, z1] in seen {
+            for i in 0..=((z1 - z0) / 0.05) as usize {
+                let z = z0 + 0.05 * i as f64;
+                let at = |x: f64, y: f64| DVec3::new(x, y, z);
+                sights.extend([1.52, 1.62].map(|y| [at(*x0, y), at(*x1, y)]));
+            }
+        }
+        let evidence = Evidence {
+            mesh: &mesh,
+            cameras: &[(DVec3::new(2.5, 1.6, 2.0), DVec3::Y)],
+            sights: &sights,
+        };
+        find_interior(&evidence, "model.glb", &FindOptions::default())
+    };
+    let own = [0.2, 4.8, 0.2, 3.8];
+    let alone = found(&[own]).unwrap();
+    assert_eq!(alone.interior.cells.len(), 1);
+    // Beside it one looked over a place where there is nothing, which comes first in the plan.
+    let beside = [8.0, 11.0, 2.0, 5.0];
+    let with = found(&[own, beside]).unwrap();
+    look_at(&with, "nothing-beside");
+    assert_eq!(with.interior, alone.interior);
+    assert_eq!(with.warnings, []);
+    let is_of = |id: CellId| with.plan.places.contains(&Place::Room(id));
+    assert!(is_of(CellId(0)) && !is_of(CellId(1)));
+    // Over more such places than rooms.
+    let error = found(&[own, beside, [14.0, 17.0, 2.0, 5.0]]).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
 }

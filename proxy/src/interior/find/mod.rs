@@ -27,12 +27,13 @@ pub use sights::sights;
 
 use super::{
     Cell, CellId, Content, Extra, Interior, InteriorError, InteriorWarning, Polygon, Portal,
-    RoomBox,
+    RoomBox, triangle_touches_box,
 };
 use crate::mesh::Mesh;
 use columns::Columns;
 use glam::{DVec2, DVec3};
 use openings::Opening;
+use rayon::prelude::*;
 
 /// How rooms are looked for. Lengths are in metres; [`Self::meter`] says what that is.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,7 +130,7 @@ pub enum FindError {
     /// No floor.
     #[error("no floor: nothing level lies below; say which way is up, or give the rooms by hand")]
     NoFloor,
-    /// A floor, but nobody could stand there.
+    /// A floor, but nobody could stand there, or there is no surface around most places where one could.
     #[error(
         "no rooms: over the floor nothing of {0} m² or more is free at eye height and enclosed; \
          is the scale right (a metre is {1} world units), and which way is up?"
@@ -176,7 +177,7 @@ pub fn find_interior(
         return Err(FindError::NoRooms(options.min_area, options.meter));
     }
     // 4. Cells and portals.
-    let interior = interior(evidence, &columns, &grown, openings, model, options)?;
+    let (interior, ids) = interior(evidence, &columns, &grown, openings, model, options)?;
     let mut warnings = interior.check()?;
     if columns.step_m > options.cell_size * (1.0 + 1e-9) {
         warnings.push(InteriorWarning::Coarse {
@@ -189,7 +190,11 @@ pub fn find_interior(
         _ if columns.is_lintel(i) => Place::Lintel,
         0 if columns.is_free(i) => Place::Free,
         0 => Place::Unknown,
-        label => Place::Room(CellId(label - 1)),
+        label => match ids[label as usize - 1] {
+            Some(id) => Place::Room(id),
+            None if columns.is_free(i) => Place::Free,
+            None => Place::Unknown,
+        },
     };
     let plan = FloorPlan {
         level,
@@ -211,6 +216,10 @@ const EYE_HEIGHT: f64 = 1.6;
 /// Boxes begin below the floor and end above the ceiling by this, in metres: surfaces are rough.
 const HEADROOM: f64 = 0.1;
 
+/// Cells and portals; and by label, less one, the room's cell. What no triangle is in is no room, and has none.
+///
+/// # Errors
+/// Most of what was found is no room.
 fn interior(
     evidence: &Evidence,
     columns: &Columns,
@@ -218,13 +227,14 @@ fn interior(
     mut openings: Vec<Opening>,
     model: &str,
     options: &FindOptions,
-) -> Result<Interior, FindError> {
+) -> Result<(Interior, Vec<Option<CellId>>), FindError> {
     let level = columns.level;
     let mut outlines: Vec<Vec<DVec2>> = (1..=grown.count)
         .map(|label| outline::outline(columns, &grown.labels, label))
         .collect();
     outline::snap(&mut outlines, &mut openings, 2.5 * columns.step);
     let mut cells = Vec::new();
+    let mut ids = Vec::new();
     for (i, outline) in outlines.iter().enumerate() {
         let top = columns.top_of(&grown.labels, i as u32 + 1) * options.meter;
         let heights = [-HEADROOM * options.meter, top + HEADROOM * options.meter];
@@ -234,15 +244,28 @@ fn interior(
         let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
             (l.min(p), h.max(p))
         });
+        let room = RoomBox { min, max };
+        if !is_any_in(evidence.mesh, &room) {
+            ids.push(None);
+            continue;
+        }
+        ids.push(Some(CellId(cells.len() as u32)));
         cells.push(Cell {
-            name: format!("room {}", i + 1),
-            content: Content::Box(RoomBox { min, max }),
+            name: format!("room {}", cells.len() + 1),
+            content: Content::Box(room),
             floor: floor(&level, outline),
             other: Extra::new(),
         });
     }
+    if 2 * cells.len() < outlines.len() {
+        return Err(FindError::NoRooms(options.min_area, options.meter));
+    }
     let mut portals = Vec::new();
     for opening in &openings {
+        let rooms = opening.rooms.map(|label| ids[label as usize - 1]);
+        if rooms.contains(&None) {
+            continue;
+        }
         let [from, to] = opening.ends();
         let corners = vec![
             level.to_world(from, opening.sill),
@@ -264,7 +287,7 @@ fn interior(
         portals.push(Portal {
             name: format!("{kind} {}", portals.len() + 1),
             polygon,
-            cells: opening.rooms.map(|label| Some(CellId(label - 1))),
+            cells: rooms,
             radius: None,
             other: Extra::new(),
         });
@@ -274,7 +297,7 @@ fn interior(
     heights.sort_by(f64::total_cmp);
     let usual = EYE_HEIGHT * options.meter;
     let eye_height = heights.get(heights.len() / 2).copied().unwrap_or(usual);
-    Ok(Interior {
+    let interior = Interior {
         model: Some(model.to_owned()),
         up: level.up(),
         eye_height,
@@ -282,7 +305,14 @@ fn interior(
         portals,
         held_out: Vec::new(),
         other: Extra::new(),
-    })
+    };
+    Ok((interior, ids))
+}
+
+/// Whether any of a mesh's triangles is in a box.
+fn is_any_in(mesh: &Mesh, room: &RoomBox) -> bool {
+    let all = (0..mesh.triangles.len()).into_par_iter();
+    all.any(|i| triangle_touches_box(mesh.corners(i), room))
 }
 
 /// The floor of a room with an outline on the plan; where that is no polygon, the rectangle around it.
