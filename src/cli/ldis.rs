@@ -2,13 +2,14 @@
 
 use super::captured::Opened;
 use super::made::{FOLDER, Made, folder_of};
+use super::notes::Notes;
 use super::output::{print, print_json, say};
 use super::references::ReferenceArgs;
 use super::session::progress;
 use super::stamp::in_unicode;
 use anyhow::Context;
 use render::RenderError;
-use render::interior::{Painter, Walk, WalkOptions};
+use render::interior::{LdiSource, Painter, Walk, WalkOptions};
 use render::ldi::{fault, write};
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -64,7 +65,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let exposure = (!references.no_photos).then_some(&references.exposure);
     let mut opened = Opened::new(&args.interior, exposure, |text| say!("warning: {text}"))?;
     let files = opened.files();
-    let painter = match &opened.photos {
+    let mut painter = match &opened.photos {
         Some(photos) => {
             say!("exposure: {}", photos.exposure.text());
             opened.painter(references.device(), references.cpu_memory)?
@@ -82,21 +83,29 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = folder_of(&opened.file).join(FOLDER);
     made.begin(&folder, |text| say!("note: {text}"))?;
     // 3. What is missing.
+    let mut notes = Notes::default();
+    if options.library.ldi_of == LdiSource::Photos {
+        // LDIs of views take far longer.
+        painter.check_depth_maps();
+    }
+    notes.say_new(&painter);
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     let mut walk = Walk::with(painter, interior, contents, model, options);
-    let mut report = make(&mut walk, &opened, folder)?;
+    let mut report = make(&mut walk, &opened, folder, &mut notes)?;
     report.seconds = start.elapsed().as_secs_f64();
-    for note in walk.painter().notes() {
-        say!("note: {note}");
-    }
     if args.json {
         return print_json(&report);
     }
     print(&text(&report))
 }
 
-/// Makes what a folder has no file of, or one that cannot be read.
-fn make(walk: &mut Walk<'_>, opened: &Opened, folder: PathBuf) -> anyhow::Result<Report> {
+/// Makes what a folder has no file of, or one that cannot be read, and says what there is to say after each.
+fn make(
+    walk: &mut Walk<'_>,
+    opened: &Opened,
+    folder: PathBuf,
+    notes: &mut Notes,
+) -> anyhow::Result<Report> {
     walk.use_ldi_files(&folder);
     let mut report = Report {
         files: 0,
@@ -122,6 +131,7 @@ fn make(walk: &mut Walk<'_>, opened: &Opened, folder: PathBuf) -> anyhow::Result
             Err(error) => return Err(error.into()),
         };
         let is_there = is_there || write_one(walk, place, &file, &mut report)?;
+        bar.suspend(|| notes.say_new(walk.painter()));
         match is_there {
             true => {
                 let found = std::fs::metadata(&file);

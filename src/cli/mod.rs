@@ -19,6 +19,7 @@ mod interior;
 mod ldis;
 mod ledger;
 mod made;
+mod notes;
 mod npz;
 mod options;
 mod output;

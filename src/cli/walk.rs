@@ -8,6 +8,7 @@ use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
 use super::made::{self, Made};
+use super::notes::Notes;
 use super::options::{cut, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
@@ -20,7 +21,7 @@ use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
-use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{LdiSource, Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
@@ -188,32 +189,33 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(photos) = &opened.photos {
         say!("exposure: {}", photos.exposure.text());
     }
-    let painter = opened.painter(references.device(), references.cpu_memory)?;
-    let mut notes = Vec::new();
+    let mut painter = opened.painter(references.device(), references.cpu_memory)?;
+    let mut notes = Notes::default();
     let ldis = match fills.contains(&PortalFill::Ldi) && !args.no_ldi_files {
         true => ldi_files(&opened, &options, &painter, &mut notes)?,
         false => None,
     };
+    let of_photos = options.library.ldi_of == LdiSource::Photos;
+    if of_photos && fills.contains(&PortalFill::Ldi) && ldis.is_none() {
+        // LDIs of views take far longer.
+        painter.check_depth_maps();
+    }
+    notes.say_new(&painter);
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     std::thread::scope(|scope| {
         let mut walk = Walk::with(painter, interior, contents, model, options);
         if let Err(error) = walk.make_ahead(scope) {
-            let note = format!("{error}; no LDI is made ahead of need");
-            say!("note: {note}");
-            notes.push(note);
+            notes.say(format!("{error}; no LDI is made ahead of need"));
         }
         if let Some(folder) = &ldis {
             walk.use_ldi_files(folder);
         }
-        let walks = walk_all(args, &mut walk, &fills, &way, &inputs)?;
+        let walks = walk_all(args, &mut walk, &fills, &way, &inputs, &mut notes)?;
         if let [walked] = &walks[..] {
             args.film.finish(&walked.files, way.fps)?;
         }
-        for note in walk.painter().notes() {
-            say!("note: {note}");
-            notes.push(note.to_owned());
-        }
-        let whole = Report::new(&walk, notes, &start);
+        notes.say_new(walk.painter());
+        let whole = Report::new(&walk, notes.into_all(), &start);
         report(args, &opened, &walk, &walks, &way.frames, &whole)
     })
 }
@@ -224,16 +226,13 @@ fn ldi_files(
     opened: &Opened,
     options: &WalkOptions,
     painter: &Painter,
-    notes: &mut Vec<String>,
+    notes: &mut Notes,
 ) -> anyhow::Result<Option<PathBuf>> {
     let made = || {
         let (files, photos) = (opened.files(), opened.photos.as_ref());
         Made::new(&opened.file, &files, &options.library, painter, photos)
     };
-    made::usable(&opened.file, made, |text| {
-        say!("note: {text}");
-        notes.push(text);
-    })
+    made::usable(&opened.file, made, |text| notes.say(text))
 }
 
 /// Draws all frames, by each kind of portals.
@@ -243,6 +242,7 @@ fn walk_all(
     fills: &[PortalFill],
     way: &Way,
     inputs: &[PathBuf],
+    notes: &mut Notes,
 ) -> anyhow::Result<Vec<Walked>> {
     // 1. Which frames are there.
     let mut begun = Vec::new();
@@ -264,7 +264,8 @@ fn walk_all(
     let mut walks = Vec::new();
     for (fill, files, is_there) in begun {
         walk.begin();
-        walks.push(draw(walk, fill, &way.frames, files, &is_there, &args.film)?);
+        let drawn = draw(walk, fill, &way.frames, files, &is_there, &args.film, notes);
+        walks.push(drawn?);
     }
     Ok(walks)
 }
@@ -447,7 +448,7 @@ fn check_views(args: &Args, frames: &[Named]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Draws those frames that are not there, into their files.
+/// Draws those frames that are not there, into their files, and says what there is to say after each.
 fn draw(
     walk: &mut Walk<'_>,
     fill: PortalFill,
@@ -455,6 +456,7 @@ fn draw(
     files: Vec<PathBuf>,
     is_there: &[bool],
     film: &FilmArgs,
+    notes: &mut Notes,
 ) -> anyhow::Result<Walked> {
     let missing = is_there.iter().filter(|is_there| !**is_there).count();
     let bar = progress(missing, fill.name());
@@ -483,6 +485,7 @@ fn draw(
             scored = Some(Scored { score, cpu_ms });
         }
         film.write(file, walk.picture().picture())?;
+        bar.suspend(|| notes.say_new(walk.painter()));
         drawn.push(Drawn {
             index: frame.index,
             name: frame.name.clone(),

@@ -1,5 +1,6 @@
 //! Interiors of captures of which a part is damaged.
 
+use crate::interior::HALVES;
 use crate::run::{Ran, lumigraph, with_wall};
 use std::fs;
 use std::path::Path;
@@ -101,4 +102,27 @@ fn a_damaged_photo_is_left_out_where_the_mesh_is_the_scenes_own() {
     assert_eq!(ran.stderr.matches(said).count(), 1, "{}", ran.stderr);
     let said = "the scene's own mesh, coloured";
     assert!(ran.stderr.contains(said), "{}", ran.stderr);
+}
+
+/// LDIs of views take far longer.
+#[test]
+fn that_no_depth_map_can_be_used_is_told_before_any_frame_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    fs::write(here.join("halves.json"), HALVES).unwrap();
+    lumigraph(here, "interior hall --rooms halves.json -o two").ok();
+    for entry in fs::read_dir(here.join("hall/depth")).unwrap() {
+        damage(&entry.unwrap().path());
+    }
+    let walk = "walk two --tour --frames 1 --size 48x32 --reference-size 16x16 \
+                --reference-views 3 --portals ldi -o walk";
+    let said = "note: LDIs are made of views: the depth maps cannot be used: cannot decode ";
+    // The second time there is none to draw.
+    for (line, from_before) in [(walk.to_owned(), false), (format!("{walk} --resume"), true)] {
+        let ran = lumigraph(here, &line).ok();
+        assert_eq!(ran.stderr.matches(said).count(), 1, "{}", ran.stderr);
+        let is_from_before = ran.stdout.contains("1 of them from before");
+        assert_eq!(is_from_before, from_before, "{}", ran.stdout);
+    }
 }

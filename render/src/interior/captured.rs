@@ -13,6 +13,7 @@ use crate::options::{FieldOptions, Method};
 use crate::surface::{FacetMap, NO_FACET};
 use crate::{PhotoError, RenderError};
 use calibrate::View;
+use proxy::depth::DepthNoise;
 use proxy::interior::{Contents, Interior};
 use proxy::mesh::Model;
 use rayon::prelude::*;
@@ -89,6 +90,21 @@ impl Captured {
     /// The photos' depth maps, if they were given.
     pub(super) fn depth_maps(&self) -> Option<&DepthMaps> {
         self.depth_maps.as_ref()
+    }
+
+    /// How noisy the depth maps are; nothing without any, or where they cannot be used, with a note.
+    pub(super) fn depth_noise(&mut self) -> Option<DepthNoise> {
+        let sources = &self.lumigraph.sources;
+        let noise = self.depth_maps.as_ref()?;
+        let noise = noise.noise(|i| sources[i].view.clone());
+        match noise {
+            Ok(noise) => Some(noise),
+            Err(error) => {
+                let why = "LDIs are made of views: the depth maps cannot be used";
+                self.note(format!("{why}: {error}"));
+                None
+            }
+        }
     }
 
     /// What is drawn from.

@@ -57,6 +57,14 @@ impl Painter {
         self.captured.as_deref_mut()
     }
 
+    /// Finds out whether LDIs can be made of the photos' depth maps, which is found out anyway when the first is
+    /// needed; a note says why not.
+    pub fn check_depth_maps(&mut self) {
+        if let Some(captured) = &mut self.captured {
+            captured.depth_noise();
+        }
+    }
+
     /// Brings a model to a graphics device: with [`DeviceChoice::Auto`] to a real one only. Where
     /// that cannot be, the CPU draws, and a note says why; with `Auto` none does where there is
     /// no real device.

@@ -132,7 +132,10 @@ pub(super) fn photographed(
     size: [u32; 2],
     captured: &mut Captured,
 ) -> Result<Option<Photographed>, RenderError> {
-    let Some((place, maps)) = side.get(side.len() / 2).zip(captured.depth_maps()) else {
+    let Some(place) = side.get(side.len() / 2) else {
+        return Ok(None);
+    };
+    let Some(noise) = captured.depth_noise() else {
         return Ok(None);
     };
     let portal = interior.portal(place.portal);
@@ -142,18 +145,10 @@ pub(super) fn photographed(
         height: size[1],
         camera_from_world: place.camera_from_world,
     });
-    let sources = &captured.lumigraph().sources;
-    let noise = match maps.noise(|i| sources[i].view.clone()) {
-        Ok(noise) => noise,
-        Err(error) => {
-            let why = "LDIs are made of views: the depth maps cannot be used";
-            captured.note(format!("{why}: {error}"));
-            return Ok(None);
-        }
-    };
-    let Ok(camera) = camera else {
+    let (Ok(camera), Some(maps)) = (camera, captured.depth_maps()) else {
         return Ok(None);
     };
+    let sources = &captured.lumigraph().sources;
     // 1. Who may see it.
     let mut ranked: Vec<(bool, f64, usize)> = (0..sources.len())
         .filter(|i| maps.has(*i) && !captured.is_left_out(*i))
