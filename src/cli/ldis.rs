@@ -4,12 +4,12 @@ use super::captured::Opened;
 use super::made::{FOLDER, Made, folder_of};
 use super::notes::Notes;
 use super::output::{print, print_json, say};
-use super::references::ReferenceArgs;
+use super::references::{ReferenceArgs, before_ldis};
 use super::session::progress;
 use super::stamp::in_unicode;
 use anyhow::Context;
 use render::RenderError;
-use render::interior::{LdiSource, Painter, Walk, WalkOptions};
+use render::interior::{Painter, Walk, WalkOptions};
 use render::ldi::{fault, write};
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -84,11 +84,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     made.begin(&folder, |text| say!("note: {text}"))?;
     // 3. What is missing.
     let mut notes = Notes::default();
-    if options.library.ldi_of == LdiSource::Photos {
-        // LDIs of views take far longer.
-        painter.check_depth_maps();
-    }
+    let note = before_ldis(&options.library, &mut painter);
     notes.say_new(&painter);
+    if let Some(note) = note {
+        notes.say(note);
+    }
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     let mut walk = Walk::with(painter, interior, contents, model, options);
     let mut report = make(&mut walk, &opened, folder, &mut notes)?;

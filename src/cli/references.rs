@@ -3,9 +3,10 @@
 use super::Usage;
 use super::exposure::ExposureArgs;
 use super::options::{bytes, size};
+use super::took::megabytes;
 use clap::ValueEnum;
 use render::DeviceChoice;
-use render::interior::{CAPTURED_REFERENCE_SIZE, LdiSource, LibraryOptions};
+use render::interior::{CAPTURED_REFERENCE_SIZE, LdiSource, LibraryOptions, Painter};
 
 /// What decides what images and LDIs before portals show.
 #[derive(clap::Args)]
@@ -96,4 +97,22 @@ impl ReferenceArgs {
         };
         options
     }
+}
+
+/// To be asked before LDIs are made: whether they can be of photos, which a note of the painter's says where
+/// they were to be, and what is to be said of the memory that it takes if they are of views.
+pub(super) fn before_ldis(options: &LibraryOptions, painter: &mut Painter) -> Option<String> {
+    let options = options.with_photos(painter.captured());
+    let of_photos = options.ldi_of == LdiSource::Photos && painter.check_depth_maps();
+    let (needed, budget) = (options.making_bytes(), options.budget?);
+    let [width, height] = options.size;
+    (!of_photos && needed > budget).then(|| {
+        format!(
+            "making a layered depth image of {} views of {width} × {height} pixels may take {}, more than \
+             --cpu-memory {}; a smaller --reference-size takes less, and so do fewer --reference-views",
+            options.views_of_ldi(),
+            megabytes(needed),
+            megabytes(budget)
+        )
+    })
 }

@@ -12,7 +12,7 @@ use super::notes::Notes;
 use super::options::{cut, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
-use super::references::ReferenceArgs;
+use super::references::{ReferenceArgs, before_ldis};
 use super::session::progress;
 use super::targets::check_folder;
 use super::took::Start;
@@ -21,7 +21,7 @@ use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
-use render::interior::{LdiSource, Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
@@ -195,12 +195,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         true => ldi_files(&opened, &options, &painter, &mut notes)?,
         false => None,
     };
-    let of_photos = options.library.ldi_of == LdiSource::Photos;
-    if of_photos && fills.contains(&PortalFill::Ldi) && ldis.is_none() {
-        // LDIs of views take far longer.
-        painter.check_depth_maps();
-    }
+    let note = match fills.contains(&PortalFill::Ldi) && ldis.is_none() {
+        true => before_ldis(&options.library, &mut painter),
+        false => None,
+    };
     notes.say_new(&painter);
+    if let Some(note) = note {
+        notes.say(note);
+    }
     let (interior, contents, model) = (&opened.interior, &opened.contents, &opened.model);
     std::thread::scope(|scope| {
         let mut walk = Walk::with(painter, interior, contents, model, options);

@@ -245,3 +245,21 @@ fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
     let notes = walked(here, "").2;
     assert!(notes.contains("other options: calibration was "), "{notes}");
 }
+
+#[test]
+fn that_making_one_takes_more_than_the_budget_is_told() {
+    let folder = with_house();
+    let here = folder.path();
+    let walk = "walk house --frames 1 --size 32x24 --reference-size 24x24 -o out";
+    let said = "note: making a layered depth image of 13 views of 24 × 24 pixels may take ";
+    for (line, is_told) in [
+        (format!("{walk} --portals ldi --cpu-memory 100kB"), true),
+        (format!("{walk} --portals ldi --cpu-memory 1MB"), false),
+        (format!("{walk} --portals ldi"), false),
+        (format!("{walk} --portals warp2 --cpu-memory 100kB"), false),
+        (format!("{MAKE} --cpu-memory 100kB"), true),
+    ] {
+        let ran = lumigraph(here, &line).ok();
+        assert_eq!(ran.stderr.contains(said), is_told, "{line}: {}", ran.stderr);
+    }
+}

@@ -57,12 +57,11 @@ impl Painter {
         self.captured.as_deref_mut()
     }
 
-    /// Finds out whether LDIs can be made of the photos' depth maps, which is found out anyway when the first is
-    /// needed; a note says why not.
-    pub fn check_depth_maps(&mut self) {
-        if let Some(captured) = &mut self.captured {
-            captured.depth_noise();
-        }
+    /// Whether LDIs can be made of the photos' depth maps, which is found out anyway when the first is needed; a
+    /// note says why not.
+    pub fn check_depth_maps(&mut self) -> bool {
+        let captured = self.captured.as_mut();
+        captured.is_some_and(|captured| captured.depth_noise().is_some())
     }
 
     /// Brings a model to a graphics device: with [`DeviceChoice::Auto`] to a real one only. Where

@@ -142,6 +142,16 @@ pub fn construct_around(
     made(&central.place, &central.camera, &images, 0, 0.0, options)
 }
 
+/// About the most bytes that making an LDI of so many images takes, of so many pixels each and all of them
+/// showing something: beside the images, what is kept of all their pixels, and of those of one of them.
+pub(crate) fn making_bytes(images: u64, pixels: u64, options: &ConstructOptions) -> u64 {
+    let kept = match options.fit {
+        true => size_of::<Node>() + size_of::<Offered>(),
+        false => size_of::<Node>(),
+    };
+    pixels * (images * kept as u64 + size_of::<(usize, Node)>() as u64)
+}
+
 /// An LDI of photos with measured depths, the most trusted first, as a camera at a place sees what
 /// they show. There is no central image: all samples are alike, in depth order.
 ///

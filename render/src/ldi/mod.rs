@@ -39,6 +39,7 @@ pub use ordered::{Ordered, OrderedCost, OrderedOptions, ordered, ordered_by};
 pub use splat::Stamp;
 pub use stats::{Layers, layers};
 
+pub(crate) use construct::making_bytes;
 // What the twin on a graphics device shares.
 pub(crate) use fill::fill;
 pub(crate) use free::{BEYOND, bounds};

@@ -1,7 +1,7 @@
 //! How reference images and LDIs are made.
 
-use crate::interior::{Captured, REFERENCE_SIZE};
-use crate::ldi::ConstructOptions;
+use crate::interior::{Captured, REFERENCE_SIZE, Reference};
+use crate::ldi::{ConstructOptions, making_bytes};
 use proxy::interior::SemicircleOptions;
 
 /// What LDIs are made of.
@@ -59,5 +59,47 @@ impl LibraryOptions {
             _ => self.ldi_of = LdiSource::Views,
         }
         self
+    }
+
+    /// How many views an LDI of views is made of, at most.
+    pub fn views_of_ldi(&self) -> usize {
+        let all = self.semicircles.views;
+        let nearest_and_middle = self.ldi_views.map(|count| count.max(1) + 1);
+        nearest_and_middle.map_or(all, |count| count.min(all))
+    }
+
+    /// About how many bytes it takes to make an LDI of views, whatever the budget: its images, and what is kept
+    /// of their pixels meanwhile. Where the portal is small or little is beyond it, it takes less.
+    pub fn making_bytes(&self) -> u64 {
+        let views = self.views_of_ldi() as u64;
+        let [width, height] = self.size.map(u64::from);
+        let images = views * Reference::bytes(self.size);
+        images + making_bytes(views, width * height, &self.ldi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_making_an_ldi_takes_grows_with_its_views_pixels() {
+        let mut options = LibraryOptions {
+            size: [4096, 4096],
+            ..LibraryOptions::default()
+        };
+        let of_all = options.making_bytes();
+        // 13 views of 4096 × 4096 took 18.6 GB in all.
+        assert!((15e9..20e9).contains(&(of_all as f64)), "{of_all}");
+        options.size = [2048, 2048];
+        let of_quarter = options.making_bytes();
+        assert!(4 * of_quarter > of_all && 4 * of_quarter < of_all + of_all / 100);
+        // The three nearest, and the middle one.
+        options.size = [4096, 4096];
+        options.ldi_views = Some(3);
+        assert_eq!(options.views_of_ldi(), 4);
+        assert!(2 * options.making_bytes() < of_all);
+        options.ldi_views = Some(99);
+        assert_eq!(options.making_bytes(), of_all);
     }
 }
