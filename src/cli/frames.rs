@@ -166,13 +166,7 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
 
 /// The frames of a path file, or the one that a screenshot was taken of.
 fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
-    let is_shot = file
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
-    let (views, fps) = named(match is_shot {
-        true => path::read_shot(file)?,
-        false => path::read_in(file, frame)?,
-    });
+    let (views, fps) = named(path::read_in(file, frame)?);
     Ok(Asked::Read(views, fps))
 }
 

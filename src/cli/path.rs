@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// The path, in either format
+    /// The path, in either format, or a screenshot of `view`
     path: PathBuf,
     /// Whose format
     #[arg(long, value_enum)]

@@ -55,8 +55,8 @@ pub(super) struct Args {
     /// What is behind where nothing is shown: #RRGGBB, or transparent, shown as squares
     #[arg(long, value_name = "COLOR", default_value = "#1c1c20", value_parser = background)]
     background: Background,
-    /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too; they keep
-    /// their lenses and times
+    /// Begin with the keyframes of a path that was saved before, by nerfstudio's viewer too, or with where a
+    /// screenshot was taken; they keep their lenses and times
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
     #[command(flatten)]

@@ -45,7 +45,7 @@ use std::path::PathBuf;
 pub(super) struct Args {
     /// The interior: a folder with interior.json, or that file
     interior: PathBuf,
-    /// A path file, nerfstudio's too
+    /// A path file, nerfstudio's too, or a screenshot of `view`
     #[arg(long, value_name = "FILE", conflicts_with = "tour")]
     path: Option<PathBuf>,
     #[command(flatten)]

@@ -1,7 +1,9 @@
 //! `lumigraph path`, and paths of nerfstudio.
 
+use crate::interior::with_house;
 use crate::run::{files, lumigraph, with_wall};
 use image::RgbaImage;
+use render::path::{read, write_shot};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -81,6 +83,32 @@ fn paths_go_to_nerfstudio_and_back() {
         &format!("{render} own.json --dataparser-transforms own.json -o x"),
     );
     assert!(error.error(1).contains("dataparser_transforms.json"));
+}
+
+#[test]
+fn a_screenshot_is_a_path_wherever_one_is_read() {
+    let folder = with_house();
+    let here = folder.path();
+    // As the window writes one: of a tour's frame, whatever it shows.
+    lumigraph(here, "walk house --frames 2 --size 32x24 -o tour").ok();
+    let tour = read(&here.join("tour/path.json")).unwrap();
+    let view = &tour.frames[1].view;
+    let picture = pixels(&here.join("tour/frame_0001.png"));
+    write_shot(&here.join("shot_0001.png"), &picture, view, "picture").unwrap();
+    // Interiors are drawn again, and it goes where paths go.
+    lumigraph(here, "walk house --path shot_0001.png -o again").ok();
+    assert!(pixels(&here.join("again/shot_0001.png")) == picture);
+    for format in ["lumigraph", "nerfstudio"] {
+        let line = format!("path shot_0001.png --format {format} -o {format}.json");
+        let said = lumigraph(here, &line).ok().stdout;
+        assert_eq!(said, format!("{format}.json: 1 frames, 30 a second\n"));
+    }
+    let again = read(&here.join("lumigraph.json")).unwrap();
+    assert_eq!(again.frames[0].view, *view);
+    // Pictures from elsewhere are not.
+    let error = lumigraph(here, "walk house --path tour/frame_0001.png -o x").error(1);
+    let expected = "tour/frame_0001.png: no pose is stored in it; expected a screenshot";
+    assert!(error.starts_with(expected), "{error}");
 }
 
 #[test]

@@ -502,7 +502,7 @@ mod tests {
         let News::Shot(Ok(file)) = wait() else {
             panic!("a shot");
         };
-        let again = render::path::read_shot(&file).unwrap();
+        let again = render::path::read(&file).unwrap();
         let lumigraph = wall(100);
         let frame = Frame::new(&lumigraph, again.frames[0].view.clone(), Default::default());
         let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
@@ -529,7 +529,7 @@ mod tests {
         worker.end(Duration::ZERO);
         for name in ["shot_0001.png", "shot_0002.png"] {
             let file = options.output.join(name);
-            assert!(render::path::read_shot(&file).is_ok(), "{name}");
+            assert!(render::path::read(&file).is_ok(), "{name}");
         }
         // With nothing to show there is nothing to wait for.
         let mut worker = Worker::start(options, |_| {});

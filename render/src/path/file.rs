@@ -1,7 +1,8 @@
-//! Path files, version 1: JSON with either frames or keyframes. Those of nerfstudio are told by their
-//! content.
+//! Path files, version 1: JSON with either frames or keyframes. Those of nerfstudio, and screenshots that
+//! hold a path, are told by their content.
 
 use super::nerfstudio::{self, NerfstudioFrame};
+use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
 use calibrate::{Camera, ModelKind, Rigid3};
 use glam::{DMat3, DVec3};
@@ -30,6 +31,12 @@ pub enum PathFileError {
     /// A path of nerfstudio's, or where its world lies, cannot be read.
     #[error("{path}: nerfstudio's: {reason}", path = .0.display(), reason = .1)]
     Nerfstudio(PathBuf, String),
+    /// A screenshot is a damaged PNG, or cannot be made one.
+    #[error("{path}: as a PNG: {reason}", path = .0.display(), reason = .1)]
+    Png(PathBuf, String),
+    /// A PNG from elsewhere.
+    #[error("{}: no pose is stored in it; expected a screenshot taken by `lumigraph view`", .0.display())]
+    NoPose(PathBuf),
 }
 
 /// What the file says.
@@ -75,7 +82,8 @@ struct StoredFrame {
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
 /// Reads a path; keyframes are sampled at its frame rate. Of nerfstudio's, which are told by their
-/// content, the frames are read, as if its world were ours.
+/// content, the frames are read, as if its world were ours. A screenshot, told by its content, too, is a
+/// path of one frame that is called as the file.
 ///
 /// Keys that this version does not know are kept in `extra`, except those of keyframes,
 /// which end with the sampling.
@@ -96,14 +104,36 @@ pub fn read_in(path: &Path, frame: &NerfstudioFrame) -> Result<CameraPath, PathF
 
 /// Whether a file is a path of nerfstudio's, by its content; what cannot be read is none.
 pub fn is_nerfstudio(path: &Path) -> bool {
-    bytes_of(path).is_ok_and(|bytes| nerfstudio::is_nerfstudio(&bytes))
+    bytes_of(path).is_ok_and(|bytes| matches!(Form::of(&bytes), Form::Nerfstudio))
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, PathFileError> {
     std::fs::read(path).map_err(|e| PathFileError::Io(path.to_owned(), e))
 }
 
-/// Reads the content of a file; `path` is only named in errors.
+/// What wrote a file, by its content.
+enum Form {
+    /// This program, or people by its format.
+    Own,
+    /// nerfstudio.
+    Nerfstudio,
+    /// The window: a picture that holds a path.
+    Shot,
+}
+
+impl Form {
+    fn of(bytes: &[u8]) -> Self {
+        if shot::is_png(bytes) {
+            Self::Shot
+        } else if nerfstudio::is_nerfstudio(bytes) {
+            Self::Nerfstudio
+        } else {
+            Self::Own
+        }
+    }
+}
+
+/// Reads the content of a file; `path` is only named in errors, and gives a screenshot's frame its name.
 ///
 /// # Errors
 /// As for [`read`].
@@ -116,14 +146,15 @@ fn parse_in(
     bytes: &[u8],
     frame: &NerfstudioFrame,
 ) -> Result<CameraPath, PathFileError> {
-    match nerfstudio::is_nerfstudio(bytes) {
-        true => nerfstudio::frames(path, bytes, frame),
-        false => Ok(parse_own(path, bytes)?.0),
+    match Form::of(bytes) {
+        Form::Own => Ok(parse_own(path, bytes)?.0),
+        Form::Nerfstudio => nerfstudio::frames(path, bytes, frame),
+        Form::Shot => shot::parse_shot(path, bytes),
     }
 }
 
 /// A path, and its keyframes as they are, where it has some.
-fn parse_own(
+pub(super) fn parse_own(
     path: &Path,
     bytes: &[u8],
 ) -> Result<(CameraPath, Option<KeyframeFile>), PathFileError> {
@@ -218,8 +249,8 @@ pub struct KeyframeFile {
     pub interpolation: Interpolation,
 }
 
-/// Reads a path's keyframes as they are, not sampled; `None` of a path that has frames instead.
-/// `frame` is for nerfstudio's paths.
+/// Reads a path's keyframes as they are, not sampled; `None` of a path that has frames instead. A
+/// screenshot's frame is one. `frame` is for nerfstudio's paths.
 ///
 /// # Errors
 /// As for [`read`].
@@ -228,9 +259,10 @@ pub fn read_keyframes(
     frame: &NerfstudioFrame,
 ) -> Result<Option<KeyframeFile>, PathFileError> {
     let bytes = bytes_of(path)?;
-    match nerfstudio::is_nerfstudio(&bytes) {
-        true => nerfstudio::keyframes(path, &bytes, frame),
-        false => Ok(parse_own(path, &bytes)?.1),
+    match Form::of(&bytes) {
+        Form::Own => Ok(parse_own(path, &bytes)?.1),
+        Form::Nerfstudio => nerfstudio::keyframes(path, &bytes, frame),
+        Form::Shot => Ok(Some(shot::keyframes(&shot::parse_shot(path, &bytes)?))),
     }
 }
 

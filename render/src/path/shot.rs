@@ -1,35 +1,25 @@
 //! Screenshots that know where they were taken from: PNG files with a text chunk that holds the
-//! pose as a path of one frame, so that `render --path` can make the same picture again.
+//! pose as a path of one frame, so that whatever reads paths can make the same picture again.
 
-use super::{CameraPath, PathError, PathFileError, PathFrame, parse, text};
+use super::file::parse_own;
+use super::{
+    CameraPath, Interpolation, Keyframe, KeyframeFile, PathError, PathFileError, PathFrame, text,
+};
 use calibrate::View;
 use image::RgbaImage;
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
-use std::path::{Path, PathBuf};
+use std::io::{BufWriter, Cursor};
+use std::path::Path;
 
 /// The text chunk's keyword.
 pub const SHOT_KEYWORD: &str = "lumigraph path";
+/// What a PNG begins with.
+const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Why a screenshot cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub enum ShotError {
-    /// The file.
-    #[error("{path}: {error}", path = .0.display(), error = .1)]
-    Io(PathBuf, std::io::Error),
-    /// No PNG, or a damaged one.
-    #[error("{path}: {error}; expected a PNG", path = .0.display(), error = .1)]
-    Png(PathBuf, String),
-    /// A PNG from elsewhere.
-    #[error("{}: no pose is stored in it; expected a screenshot taken by `lumigraph view`", .0.display())]
-    NoPose(PathBuf),
-    /// The pose cannot be stored, or what is stored is none.
-    #[error("{path}: {error}", path = .0.display(), error = .1)]
-    Path(PathBuf, PathError),
-    /// What is stored is no path.
-    #[error(transparent)]
-    File(#[from] PathFileError),
+/// Whether a file's content is a PNG.
+pub(super) fn is_png(bytes: &[u8]) -> bool {
+    bytes.starts_with(&SIGNATURE)
 }
 
 /// Writes a picture with the view that it was drawn for, and what of it is shown ("picture", or
@@ -43,13 +33,13 @@ pub fn write_shot(
     picture: &RgbaImage,
     view: &View,
     layer: &str,
-) -> Result<(), ShotError> {
-    let io = |error| ShotError::Io(file.to_owned(), error);
+) -> Result<(), PathFileError> {
+    let io = |error| PathFileError::Io(file.to_owned(), error);
     let png = |error: png::EncodingError| match error {
         png::EncodingError::IoError(error) => io(error),
-        other => ShotError::Png(file.to_owned(), other.to_string()),
+        other => PathFileError::Png(file.to_owned(), other.to_string()),
     };
-    let of_path = |error| ShotError::Path(file.to_owned(), error);
+    let of_path = |error| PathFileError::Path(file.to_owned(), error);
     let frame = PathFrame::of_view("frame_0000".to_owned(), view).map_err(|error| {
         of_path(PathError::Camera {
             kind: "frame",
@@ -87,25 +77,42 @@ pub fn write_shot(
 /// The view that a screenshot was drawn for, as a path of one frame that is called as the file.
 ///
 /// # Errors
-/// No PNG, or one without a pose.
-pub fn read_shot(file: &Path) -> Result<CameraPath, ShotError> {
-    let opened = File::open(file).map_err(|error| ShotError::Io(file.to_owned(), error))?;
-    let decoder = png::Decoder::new(BufReader::new(opened));
+/// A damaged PNG, or one without a pose.
+pub(super) fn parse_shot(file: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    // It may be large beyond all measure, and says nothing of the pose.
+    decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info();
-    let reader = reader.map_err(|error| ShotError::Png(file.to_owned(), error.to_string()))?;
+    let reader = reader.map_err(|error| PathFileError::Png(file.to_owned(), error.to_string()))?;
     let chunks = &reader.info().uncompressed_latin1_text;
     let chunk = chunks.iter().find(|chunk| chunk.keyword == SHOT_KEYWORD);
-    let chunk = chunk.ok_or_else(|| ShotError::NoPose(file.to_owned()))?;
-    let mut path = parse(file, chunk.text.as_bytes())?;
+    let chunk = chunk.ok_or_else(|| PathFileError::NoPose(file.to_owned()))?;
+    let (mut path, _) = parse_own(file, chunk.text.as_bytes())?;
     if let ([frame], Some(stem)) = (path.frames.as_mut_slice(), file.file_stem()) {
         frame.name = stem.to_string_lossy().into_owned();
     }
     Ok(path)
 }
 
+/// A screenshot's frame as a keyframe, to begin a path with.
+pub(super) fn keyframes(shot: &CameraPath) -> KeyframeFile {
+    let keyframe = |(index, frame): (usize, &PathFrame)| Keyframe {
+        t_s: index as f64 / shot.fps,
+        camera_from_world: frame.view.camera_from_world,
+        camera: frame.camera.clone(),
+        time_s: frame.time_s,
+    };
+    KeyframeFile {
+        fps: shot.fps,
+        keyframes: shot.frames.iter().enumerate().map(keyframe).collect(),
+        interpolation: Interpolation::Spline,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::path::{NerfstudioFrame, is_nerfstudio, read, read_keyframes};
     use calibrate::{Lens, Rigid3};
     use glam::{DVec2, DVec3};
     use image::Rgba;
@@ -128,10 +135,21 @@ mod tests {
         let picture = RgbaImage::from_fn(32, 24, |x, y| Rgba([x as u8, y as u8, 7, (x * y) as u8]));
         write_shot(&file, &picture, &view(), "picture").unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), picture);
-        let path = read_shot(&file).unwrap();
+        let path = read(&file).unwrap();
         assert_eq!(path.frames.len(), 1);
         assert_eq!(path.frames[0].view, view());
         assert_eq!(path.frames[0].name, "shot_0001");
+        // It begins a path of keyframes, too.
+        let begun = read_keyframes(&file, &NerfstudioFrame::default());
+        let KeyframeFile {
+            fps,
+            keyframes,
+            interpolation,
+        } = begun.unwrap().unwrap();
+        assert_eq!(keyframes.len(), 1);
+        let again = CameraPath::from_keyframes(&keyframes, interpolation, fps).unwrap();
+        assert_eq!(again.frames[0].view, view());
+        assert!(!is_nerfstudio(&file));
     }
 
     #[test]
@@ -139,12 +157,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.png");
         RgbaImage::new(2, 2).save(&file).unwrap();
-        assert!(matches!(read_shot(&file), Err(ShotError::NoPose(_))));
+        assert!(matches!(read(&file), Err(PathFileError::NoPose(_))));
+        std::fs::write(&file, SIGNATURE).unwrap();
+        assert!(matches!(read(&file), Err(PathFileError::Png(..))));
         std::fs::write(&file, "no picture").unwrap();
-        assert!(matches!(read_shot(&file), Err(ShotError::Png(..))));
+        assert!(matches!(read(&file), Err(PathFileError::Json(..))));
         let gone = folder.path().join("gone/b.png");
-        assert!(matches!(read_shot(&gone), Err(ShotError::Io(..))));
+        assert!(matches!(read(&gone), Err(PathFileError::Io(..))));
         let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), "picture");
-        assert!(matches!(failed, Err(ShotError::Io(..))));
+        assert!(matches!(failed, Err(PathFileError::Io(..))));
     }
 }
