@@ -4,7 +4,7 @@ use super::output::{make_parent, print, say};
 use super::targets::check_apart;
 use clap::ValueEnum;
 use render::path::{
-    self, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
+    self, CameraPath, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
 };
 use std::path::PathBuf;
 
@@ -12,7 +12,8 @@ use std::path::PathBuf;
 ///
 /// Of keyframes the frames between them are written; nerfstudio's file keeps the keyframes beside
 /// them, for its viewer. It knows pinholes alone, with square pixels and their principal point in
-/// the middle: those that `view` and derived paths have.
+/// the middle: those that `view` and derived paths have. It has no place for times of the scene:
+/// read again, a frame is of the time at which a film shows it.
 ///
 ///     lumigraph path film/path.json --format nerfstudio -o camera_path.json
 ///     lumigraph path camera_path.json --format lumigraph -o path.json
@@ -72,6 +73,16 @@ impl NerfstudioArgs {
     }
 }
 
+/// Times nearer than this, in seconds, are the same but for rounding.
+const SAME_S: f64 = 1e-6;
+
+/// Whether a frame is of another time than the one at which a film shows it.
+fn has_times(path: &CameraPath) -> bool {
+    let frames = path.frames.iter().enumerate();
+    let mut timed = frames.filter_map(|(index, frame)| Some((index, frame.time_s?)));
+    timed.any(|(index, time_s)| (time_s - index as f64 / path.fps).abs() > SAME_S)
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();
@@ -83,6 +94,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Format::Nerfstudio => {
             let keyframes = read_keyframes(&args.path, &frame)?;
             write_nerfstudio(&args.output, &read, keyframes.as_ref(), &frame)?;
+            if has_times(&read) {
+                say!(
+                    "note: left out: the scene's times; nerfstudio's format has no place for them, and \
+                     read again a frame is of the time at which a film shows it"
+                );
+            }
         }
         Format::Lumigraph => {
             args.nerfstudio.say_unused(Some(&args.path));

@@ -138,6 +138,46 @@ fn a_path_is_not_written_over_what_it_is_made_of() {
 }
 
 #[test]
+fn times_of_the_scene_that_are_lost_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = |times: [Option<f64>; 2], format: &str| {
+        let mut path = keyframes();
+        for (keyframe, time_s) in path["keyframes"]
+            .as_array_mut()
+            .unwrap()
+            .iter_mut()
+            .zip(times)
+        {
+            if let Some(time_s) = time_s {
+                keyframe["time_s"] = json!(time_s);
+            }
+        }
+        std::fs::write(here.join("own.json"), path.to_string()).unwrap();
+        lumigraph(
+            here,
+            &format!("path own.json --format {format} -o {format}.json"),
+        )
+    };
+    let note = "note: left out: the scene's times; nerfstudio's format has no place for them";
+    for (times, format, is_told) in [
+        ([None, None], "nerfstudio", false),
+        // Those of the film.
+        ([Some(0.0), Some(1.0)], "nerfstudio", false),
+        ([Some(0.0), Some(0.7)], "nerfstudio", true),
+        ([Some(0.0), Some(0.7)], "lumigraph", false),
+    ] {
+        let said = run(times, format).ok().stderr;
+        assert_eq!(said.contains(note), is_told, "{times:?} {format}: {said}");
+    }
+    // With one of them nobody would know the other.
+    let error = run([Some(0.7), None], "lumigraph").error(1);
+    let expected = "own.json: keyframe 1: it has no time_s, though keyframe 0 has one; give one to all \
+                    keyframes, or to none";
+    assert_eq!(error, expected);
+}
+
+#[test]
 fn transforms_that_no_path_needs_are_told() {
     let folder = with_wall();
     let here = folder.path();

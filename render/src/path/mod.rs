@@ -53,7 +53,8 @@ pub struct Keyframe {
     pub camera_from_world: Rigid3,
     /// Its lens: model and size are the same at all keyframes.
     pub camera: Camera,
-    /// The scene's own time, in seconds, where that is another.
+    /// The scene's own time, in seconds, where that is another: all keyframes of a path have one, or none
+    /// has.
     pub time_s: Option<f64>,
 }
 
@@ -149,6 +150,17 @@ pub enum PathError {
         found: (ModelKind, u32, u32),
         /// Those of the first.
         first: (ModelKind, u32, u32),
+    },
+    /// Between a keyframe with a time of the scene's and one without nobody knows the time.
+    #[error(
+        "keyframe {index}: it has no time_s, though keyframe {timed} has one; give one to all \
+         keyframes, or to none"
+    )]
+    TimesDiffer {
+        /// The first without.
+        index: usize,
+        /// The first with one.
+        timed: usize,
     },
     /// Far more frames than anyone renders.
     #[error(
@@ -283,12 +295,12 @@ impl CameraPath {
     ///
     /// Camera centres and rotations are interpolated (not translations, which would swing
     /// about the world's origin); focal lengths and all other lens parameters linearly. A
-    /// frame's `time_s` is interpolated where every keyframe has one, and is the time on
+    /// frame's `time_s` is interpolated where the keyframes have one, and is the time on
     /// the path otherwise. A frame at a keyframe's time has its pose (see [`PathFrame::new`]).
     ///
     /// # Errors
-    /// No keyframes; times not increasing; cameras unusable or of different model or size;
-    /// more than [`MAX_FRAMES`].
+    /// No keyframes; times not increasing; cameras unusable or of different model or size; some
+    /// with a time of the scene's and some without; more than [`MAX_FRAMES`].
     pub fn from_keyframes(
         keyframes: &[Keyframe],
         interpolation: Interpolation,
@@ -314,7 +326,6 @@ impl CameraPath {
         // 2. Samples.
         let poses = keyframes.iter().map(|k| (k.t_s, k.camera_from_world));
         let curve = Curve::new(poses.collect(), interpolation);
-        let all_have_time = keyframes.iter().all(|k| k.time_s.is_some());
         let sample = |index: usize| {
             let t_s = (first.t_s + index as f64 / fps).min(last.t_s);
             let (before, share) = curve.locate(t_s);
@@ -329,7 +340,7 @@ impl CameraPath {
                 ..a.camera.clone()
             };
             let time_s = match (a.time_s, b.time_s) {
-                (Some(a), Some(b)) if all_have_time => between(a, b),
+                (Some(a), Some(b)) => between(a, b),
                 _ => t_s,
             };
             PathFrame::new(default_name(index), camera, curve.at(t_s), Some(time_s)).map_err(
@@ -381,7 +392,15 @@ fn check_keyframes(keyframes: &[Keyframe]) -> Result<(), PathError> {
             });
         }
     }
-    Ok(())
+    let first_of = |is_timed: bool| {
+        keyframes
+            .iter()
+            .position(|k| k.time_s.is_some() == is_timed)
+    };
+    match (first_of(false), first_of(true)) {
+        (Some(index), Some(timed)) => Err(PathError::TimesDiffer { index, timed }),
+        _ => Ok(()),
+    }
 }
 
 fn check_finite(

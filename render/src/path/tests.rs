@@ -296,6 +296,24 @@ fn bad_keyframes_are_named() {
         "keyframe 0: parameter fx of PINHOLE is NaN, not a finite number"
     );
     assert!(error(&[still(0.0)], f64::NAN).starts_with("fps is NaN"));
+    let timed = |t_s| Keyframe {
+        time_s: Some(7.0),
+        ..still(t_s)
+    };
+    for (keys, index, other) in [
+        ([timed(0.0), still(1.0), still(2.0)], 1, 0),
+        ([still(0.0), timed(1.0), timed(2.0)], 0, 1),
+    ] {
+        assert_eq!(
+            error(&keys, 30.0),
+            format!(
+                "keyframe {index}: it has no time_s, though keyframe {other} has one; give one to all \
+                 keyframes, or to none"
+            )
+        );
+    }
+    let all = CameraPath::from_keyframes(&[timed(0.0), timed(1.0)], Interpolation::Spline, 1.0);
+    assert_eq!(all.unwrap().frames[1].time_s, Some(7.0));
 }
 
 #[test]
