@@ -94,7 +94,7 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
     let tour = read(&here.join("tour/path.json")).unwrap();
     let view = &tour.frames[1].view;
     let picture = pixels(&here.join("tour/frame_0001.png"));
-    write_shot(&here.join("shot_0001.png"), &picture, view, "picture").unwrap();
+    write_shot(&here.join("shot_0001.png"), &picture, view, None, "picture").unwrap();
     // Interiors are drawn again, and it goes where paths go.
     lumigraph(here, "walk house --path shot_0001.png -o again").ok();
     assert!(pixels(&here.join("again/shot_0001.png")) == picture);

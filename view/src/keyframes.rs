@@ -11,7 +11,7 @@ const APART_S: f64 = 2.0;
 struct Given {
     /// Its lens and size; those without one have the window's. All have one, or none has.
     camera: Option<Camera>,
-    /// The scene's own time.
+    /// The scene's own time. All have one, or none has: those of a few would not count.
     time_s: Option<f64>,
 }
 
@@ -79,13 +79,16 @@ impl Keyframes {
         with_its_choice == *other
     }
 
-    /// Adds one after the chosen one, and chooses it. Its lens and the scene's time are those of the
-    /// chosen one: all lenses of a path are of one model and size, and with one keyframe that has no
-    /// time, those of all others would not count.
-    pub fn add(&mut self, pose: Rigid3) {
+    /// Adds one after the chosen one, and chooses it. Its lens is that of the chosen one: all lenses of
+    /// a path are of one model and size. Its time of the scene's is `time_s`, in seconds, or without
+    /// that the chosen one's; where the others have none, it has none.
+    pub fn add(&mut self, pose: Rigid3, time_s: Option<f64>) {
         (self.passed_s, self.paced_s) = (self.times_s(), self.apart_s);
         let at = self.chosen().map_or(0, |i| i + 1);
-        let given = self.given.get(self.chosen).cloned().unwrap_or_default();
+        let mut given = self.given.get(self.chosen).cloned().unwrap_or_default();
+        if self.have_times_but(None) {
+            given.time_s = time_s.or(given.time_s);
+        }
         let before_s = at.checked_sub(1).map(|i| self.passed_s[i]);
         for later_s in &mut self.passed_s[at..] {
             *later_s += self.apart_s;
@@ -115,11 +118,21 @@ impl Keyframes {
         self.chosen = at.saturating_sub(1);
     }
 
-    /// Moves the chosen one to a pose.
-    pub fn place(&mut self, pose: Rigid3) {
+    /// Moves the chosen one to a pose, and to a time of the scene's, in seconds, if there is one and the
+    /// others have some, too.
+    pub fn place(&mut self, pose: Rigid3, time_s: Option<f64>) {
+        let have_times = self.have_times_but(Some(self.chosen));
         if let Some(chosen) = self.poses.get_mut(self.chosen) {
             *chosen = pose;
+            let given = &mut self.given[self.chosen];
+            given.time_s = time_s.filter(|_| have_times).or(given.time_s);
         }
+    }
+
+    /// Whether all have a time of the scene's, but for one that is not asked.
+    fn have_times_but(&self, other: Option<usize>) -> bool {
+        let mut given = self.given.iter().enumerate();
+        given.all(|(i, given)| given.time_s.is_some() || Some(i) == other)
     }
 
     /// Moves the chosen one to an earlier or later place in the order. When places are passed stays
@@ -154,6 +167,16 @@ impl Keyframes {
     /// Whether they have lenses of their own.
     pub fn has_lenses(&self) -> bool {
         self.given.iter().any(|given| given.camera.is_some())
+    }
+
+    /// Whether they have times of the scene's.
+    pub fn has_scene_times(&self) -> bool {
+        self.given.iter().any(|given| given.time_s.is_some())
+    }
+
+    /// The scene's time at the chosen one, in seconds, where it has one.
+    pub fn scene_time_s(&self) -> Option<f64> {
+        self.given.get(self.chosen)?.time_s
     }
 
     /// The chosen one's view, where it has a lens of its own.
@@ -257,20 +280,20 @@ mod tests {
         let mut keyframes = Keyframes::default();
         keyframes.delete();
         keyframes.shift(true);
-        keyframes.place(view(9.0).camera_from_world);
+        keyframes.place(view(9.0).camera_from_world, None);
         assert_eq!((keyframes.chosen(), keyframes.step(true)), (None, None));
         for x in [1.0, 2.0, 3.0] {
-            keyframes.add(view(x).camera_from_world);
+            keyframes.add(view(x).camera_from_world, None);
         }
         keyframes.choose(0);
-        keyframes.add(view(5.0).camera_from_world);
+        keyframes.add(view(5.0).camera_from_world, None);
         assert_eq!(
             (xs(&keyframes), keyframes.chosen()),
             (vec![1, 5, 2, 3], Some(1))
         );
         keyframes.shift(true);
         assert_eq!(xs(&keyframes), [1, 2, 5, 3]);
-        keyframes.place(view(7.0).camera_from_world);
+        keyframes.place(view(7.0).camera_from_world, None);
         keyframes.shift(true);
         keyframes.shift(true);
         assert_eq!(
@@ -291,7 +314,7 @@ mod tests {
         let mut keyframes = Keyframes::default();
         assert!(keyframes.film(&view(0.0)).is_err());
         for x in [0.0, 1.0, 3.0] {
-            keyframes.add(view(x).camera_from_world);
+            keyframes.add(view(x).camera_from_world, None);
         }
         let film = keyframes.film(&view(0.0)).unwrap();
         assert_eq!(film.frames.len(), 121);
@@ -354,7 +377,7 @@ mod tests {
         assert_eq!(longer, keyframes);
         // Another has the chosen one's lens, and takes as long as others do in the mean.
         keyframes.choose(1);
-        keyframes.add(view(9.0).camera_from_world);
+        keyframes.add(view(9.0).camera_from_world, None);
         assert_eq!(passed_s(&keyframes), [1.0, 1.5, 3.0, 5.5]);
         let focal = |k: &Keyframe| k.camera.params[0];
         let focals = |keyframes: &Keyframes| -> Vec<f64> {
@@ -374,7 +397,7 @@ mod tests {
         // Where none is left, those that come have the window's.
         keyframes.delete();
         keyframes.delete();
-        keyframes.add(view(0.0).camera_from_world);
+        keyframes.add(view(0.0).camera_from_world, None);
         assert!(!keyframes.has_lenses() && keyframes.duration_s() == 0.0);
     }
 
@@ -382,7 +405,7 @@ mod tests {
     fn the_scenes_times_go_with_their_keyframes() {
         let mut keyframes = Keyframes::default();
         for x in [0.0, 1.0, 2.0] {
-            keyframes.add(view(x).camera_from_world);
+            keyframes.add(view(x).camera_from_world, None);
         }
         let mut stored = keyframes.stored(&view(0.0));
         for (i, keyframe) in stored.iter_mut().enumerate() {
@@ -392,11 +415,39 @@ mod tests {
         assert_eq!(keyframes.stored(&view(0.0)), stored);
         keyframes.choose(1);
         keyframes.shift(false);
-        keyframes.add(view(5.0).camera_from_world);
+        keyframes.add(view(5.0).camera_from_world, None);
         keyframes.choose(3);
         keyframes.delete();
         assert_eq!(xs(&keyframes), [1, 5, 0]);
         let times = keyframes.stored(&view(0.0)).into_iter().map(|k| k.time_s);
         assert_eq!(times.collect::<Vec<_>>(), [10.0, 10.0, 0.0].map(Some));
+    }
+
+    #[test]
+    fn the_times_shown_are_kept_where_all_have_one() {
+        let mut keyframes = Keyframes::default();
+        let times = |keyframes: &Keyframes| -> Vec<Option<f64>> {
+            let stored = keyframes.stored(&view(0.0)).into_iter();
+            stored.map(|k| k.time_s).collect()
+        };
+        assert!(!keyframes.has_scene_times() && keyframes.scene_time_s().is_none());
+        for time_s in [Some(3.0), Some(4.0), None] {
+            keyframes.add(view(0.0).camera_from_world, time_s);
+        }
+        assert_eq!(times(&keyframes), [3.0, 4.0, 4.0].map(Some));
+        keyframes.place(view(1.0).camera_from_world, Some(9.0));
+        assert_eq!(keyframes.scene_time_s(), Some(9.0));
+        keyframes.place(view(2.0).camera_from_world, None);
+        assert_eq!(times(&keyframes), [3.0, 4.0, 9.0].map(Some));
+        assert!(keyframes.has_scene_times() && keyframes.film(&view(0.0)).is_ok());
+        // Beside those that have none nothing has one.
+        let mut keyframes = Keyframes::default();
+        keyframes.add(view(0.0).camera_from_world, None);
+        keyframes.add(view(0.0).camera_from_world, Some(5.0));
+        keyframes.place(view(1.0).camera_from_world, Some(5.0));
+        assert_eq!(times(&keyframes), [None, None]);
+        keyframes.delete();
+        keyframes.place(view(1.0).camera_from_world, Some(5.0));
+        assert_eq!(times(&keyframes), [Some(5.0)]);
     }
 }

@@ -112,6 +112,8 @@ struct Playing {
     film: CameraPath,
     /// Whether its lenses are a file's, and not the window's.
     has_lenses: bool,
+    /// Whether its frames' times are the scene's, and not just the film's.
+    has_times: bool,
     at_s: f64,
 }
 
@@ -306,12 +308,14 @@ impl State {
             }
             Action::AddKeyframe => {
                 if let Some(view) = self.view() {
-                    self.keyframes.add(view.camera_from_world);
+                    let time_s = self.look.moment.map(|moment| moment.time_s);
+                    self.keyframes.add(view.camera_from_world, time_s);
                 }
             }
             Action::PlaceKeyframe => {
                 if let Some(view) = self.view() {
-                    self.keyframes.place(view.camera_from_world);
+                    let time_s = self.look.moment.map(|moment| moment.time_s);
+                    self.keyframes.place(view.camera_from_world, time_s);
                 }
             }
             Action::DeleteKeyframe => self.keyframes.delete(),
@@ -321,6 +325,7 @@ impl State {
                 if let Some(pose) = self.keyframes.step(is_later) {
                     self.be_at(pose);
                     self.frame(self.keyframes.framing());
+                    self.be_when(self.keyframes.scene_time_s());
                 }
             }
             Action::Play => {
@@ -329,6 +334,7 @@ impl State {
                     (None, Some(view)) => self.keyframes.film(&view).ok().map(|film| Playing {
                         film,
                         has_lenses: self.keyframes.has_lenses(),
+                        has_times: self.keyframes.has_scene_times(),
                         at_s: 0.0,
                     }),
                     _ => None,
@@ -407,6 +413,16 @@ impl State {
         }
     }
 
+    /// Shows a scene where time plays a part as of a time, in seconds; without one, as before.
+    fn be_when(&mut self, time_s: Option<f64>) {
+        if let (Some(time_s), Some(moment)) = (time_s, &mut self.look.moment)
+            && moment.time_s != time_s
+        {
+            moment.time_s = time_s;
+            self.still_s = 0.0;
+        }
+    }
+
     /// Lets some time pass.
     pub fn step(&mut self, seconds: f64) {
         let seconds = seconds.clamp(0.0, LONGEST_STEP_S);
@@ -428,9 +444,10 @@ impl State {
         };
         let last = playing.film.frames.len() - 1;
         let index = ((playing.at_s * playing.film.fps).round() as usize).min(last);
-        let view = &playing.film.frames[index].view;
-        self.be_at(view.camera_from_world);
-        self.frame(playing.has_lenses.then(|| view.clone()));
+        let frame = &playing.film.frames[index];
+        self.be_at(frame.view.camera_from_world);
+        self.frame(playing.has_lenses.then(|| frame.view.clone()));
+        self.be_when(frame.time_s.filter(|_| playing.has_times));
         playing.at_s += seconds;
         self.playing = (index < last).then_some(playing);
     }

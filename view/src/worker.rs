@@ -364,8 +364,9 @@ impl<'s> Desk<'s> {
         let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
         std::fs::create_dir_all(folder).map_err(failed)?;
         let file = free_name(folder);
-        let layer = request.look.layer.name();
-        match write_shot(&file, picture, &request.view, layer) {
+        let look = &request.look;
+        let time_s = look.moment.map(|moment| moment.time_s);
+        match write_shot(&file, picture, &request.view, time_s, look.layer.name()) {
             Ok(()) => Ok(file),
             Err(error) => Err(error.to_string()),
         }
@@ -537,6 +538,36 @@ mod tests {
         let start = Instant::now();
         worker.end(Duration::ZERO);
         assert!(start.elapsed() < SHOT_PATIENCE / 2);
+    }
+
+    #[test]
+    fn a_shot_knows_the_moment_that_it_shows() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WorkerOptions {
+            device: DeviceChoice::Cpu,
+            gpu_memory: None,
+            skips: render::Skips::ALL,
+            walk: WalkOptions::default(),
+            output: folder.path().join("shots"),
+        };
+        let mut timed = wall(0);
+        let sources = &mut Arc::get_mut(&mut timed).unwrap().sources;
+        sources.iter_mut().for_each(|s| s.time_s = Some(0.25));
+        let content = Content::Scene(timed);
+        let space = Arc::new(Space::of(&content));
+        let mut worker = Worker::start(options.clone(), |_| {});
+        worker.show(content, space, 1);
+        let mut asked = request(1, 0.25);
+        asked.look.moment = Some(render::Moment {
+            time_s: 0.5,
+            period_s: Some(2.0),
+            window_s: None,
+        });
+        worker.ask(asked);
+        worker.shoot();
+        worker.end(Duration::ZERO);
+        let shot = render::path::read(&options.output.join("shot_0001.png")).unwrap();
+        assert_eq!(shot.frames[0].time_s, Some(0.5));
     }
 
     #[test]

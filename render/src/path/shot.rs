@@ -22,16 +22,17 @@ pub(super) fn is_png(bytes: &[u8]) -> bool {
     bytes.starts_with(&SIGNATURE)
 }
 
-/// Writes a picture with the view that it was drawn for, and what of it is shown ("picture", or
-/// another layer's name). The file appears complete or not at
-/// all.
+/// Writes a picture with the view that it was drawn for, the time that it shows the scene as of, in
+/// seconds, if time plays a part, and what of it is shown ("picture", or another layer's name). The file
+/// appears complete or not at all.
 ///
 /// # Errors
-/// A file that cannot be written; a view that no file can hold.
+/// A file that cannot be written; a view or a time that no file can hold.
 pub fn write_shot(
     file: &Path,
     picture: &RgbaImage,
     view: &View,
+    time_s: Option<f64>,
     layer: &str,
 ) -> Result<(), PathFileError> {
     let io = |error| PathFileError::Io(file.to_owned(), error);
@@ -40,13 +41,14 @@ pub fn write_shot(
         other => PathFileError::Png(file.to_owned(), other.to_string()),
     };
     let of_path = |error| PathFileError::Path(file.to_owned(), error);
-    let frame = PathFrame::of_view("frame_0000".to_owned(), view).map_err(|error| {
+    let mut frame = PathFrame::of_view("frame_0000".to_owned(), view).map_err(|error| {
         of_path(PathError::Camera {
             kind: "frame",
             index: 0,
             error,
         })
     })?;
+    frame.time_s = time_s;
     let one = CameraPath::new(30.0, vec![frame]).map_err(of_path)?;
     let text = text(&one)?;
     let mut temporary = file.as_os_str().to_owned();
@@ -133,11 +135,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("shot_0001.png");
         let picture = RgbaImage::from_fn(32, 24, |x, y| Rgba([x as u8, y as u8, 7, (x * y) as u8]));
-        write_shot(&file, &picture, &view(), "picture").unwrap();
+        write_shot(&file, &picture, &view(), Some(1.5), "picture").unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), picture);
         let path = read(&file).unwrap();
         assert_eq!(path.frames.len(), 1);
         assert_eq!(path.frames[0].view, view());
+        assert_eq!(path.frames[0].time_s, Some(1.5));
         assert_eq!(path.frames[0].name, "shot_0001");
         // It begins a path of keyframes, too.
         let begun = read_keyframes(&file, &NerfstudioFrame::default());
@@ -164,7 +167,7 @@ mod tests {
         assert!(matches!(read(&file), Err(PathFileError::Json(..))));
         let gone = folder.path().join("gone/b.png");
         assert!(matches!(read(&gone), Err(PathFileError::Io(..))));
-        let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), "picture");
+        let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), None, "picture");
         assert!(matches!(failed, Err(PathFileError::Io(..))));
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::content::House;
+use crate::content::{House, Times};
 use crate::picture::{Lines, Support};
 use calibrate::Camera;
 use datasets::house::{HouseOptions, house};
@@ -8,7 +8,7 @@ use image::RgbaImage;
 use proxy::interior::Contents;
 use proxy::{Plane, Proxy};
 use render::path::{Interpolation, Keyframe};
-use render::{Lumigraph, PhotoStore, SourceView};
+use render::{Lumigraph, Moment, PhotoStore, SourceView};
 
 fn wall() -> Content {
     let source = |x: f64| SourceView {
@@ -273,6 +273,68 @@ fn a_film_with_lenses_of_its_own_zooms() {
     assert_eq!(focal(&state), 600.0);
     state.act(Action::Go(0));
     assert_eq!(focal(&state), own);
+}
+
+#[test]
+fn keyframes_are_of_the_moment_shown_and_show_theirs() {
+    let content = wall();
+    let mut space = Space::of(&content);
+    space.times = Some(Times {
+        moment: Moment {
+            time_s: 0.5,
+            period_s: Some(1.5),
+            window_s: None,
+        },
+        range_s: [0.0, 2.0],
+    });
+    let mut state = State::new(Look::default());
+    state.resize(400, 300);
+    let _ = state.show(content, Arc::new(space));
+    let shown_s = |state: &State| state.look.moment.unwrap().time_s;
+    // As the slider does it.
+    let slide = |state: &mut State, time_s| state.look.moment.as_mut().unwrap().time_s = time_s;
+    // 1. Added and moved, on the spot.
+    state.act(Action::AddKeyframe);
+    slide(&mut state, 1.0);
+    state.act(Action::AddKeyframe);
+    let view = state.view().unwrap();
+    let kept = |state: &State| -> Vec<Option<f64>> {
+        let stored = state.keyframes.stored(&view).into_iter();
+        stored.map(|keyframe| keyframe.time_s).collect()
+    };
+    assert_eq!(kept(&state), [0.5, 1.0].map(Some));
+    slide(&mut state, 1.25);
+    state.act(Action::PlaceKeyframe);
+    assert_eq!(kept(&state), [0.5, 1.25].map(Some));
+    // 2. One after the other.
+    let _ = state.wanted();
+    step(&mut state, 1.0);
+    state.act(Action::StepKeyframe(false));
+    let asked = state.wanted().unwrap();
+    assert_eq!(asked.look.moment.unwrap().time_s, 0.5);
+    assert!(asked.is_moving, "another moment");
+    // 3. As a film.
+    state.act(Action::Play);
+    let mut times = Vec::new();
+    while state.is_playing() {
+        state.step(0.1);
+        times.push(shown_s(&state));
+    }
+    assert!(times.is_sorted_by(|a, b| a < b), "{times:?}");
+    assert_eq!((times[0], times.last()), (0.5, Some(&1.25)));
+    // 4. Those without times leave the moment alone, and have none beside them.
+    let mut untimed = state.keyframes.stored(&view);
+    untimed
+        .iter_mut()
+        .for_each(|keyframe| keyframe.time_s = None);
+    state.keyframes.load(&untimed, Interpolation::Linear, 30.0);
+    state.act(Action::StepKeyframe(true));
+    state.act(Action::Play);
+    state.step(0.1);
+    state.step(0.1);
+    assert_eq!(shown_s(&state), 1.25);
+    state.act(Action::AddKeyframe);
+    assert_eq!(kept(&state), [None; 3]);
 }
 
 #[test]

@@ -327,7 +327,7 @@ mod tests {
         state.resize(size.0, size.1);
         let _ = state.show(Content::Scene(Arc::new(lumigraph)), Arc::new(space));
         (state.alpha, state.beta) = (20.0, 5.0);
-        state.keyframes.add(calibrate::Rigid3::IDENTITY);
+        state.keyframes.add(calibrate::Rigid3::IDENTITY, None);
         state.keyframes.apart_s = 15.03;
         let mut panels = Panels::warm(1.0, size, TEXTURE_SIDE);
         for _ in 0..3 {

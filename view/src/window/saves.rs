@@ -174,8 +174,8 @@ mod tests {
         };
         let mut keyframes = Keyframes::default();
         keyframes.apart_s = apart_s;
-        keyframes.add(Rigid3::IDENTITY);
-        keyframes.add(Rigid3::IDENTITY);
+        keyframes.add(Rigid3::IDENTITY, None);
+        keyframes.add(Rigid3::IDENTITY, None);
         KeyframeFile {
             fps: keyframes.fps,
             keyframes: keyframes.stored(&view),
