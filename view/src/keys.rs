@@ -47,6 +47,23 @@ pub(crate) enum Key {
     Close,
 }
 
+impl Key {
+    /// Whether it does something in interiors, too: of theirs there is neither a blending field nor a
+    /// proxy, and no photo beside the picture.
+    pub(crate) fn is_of_interiors(self) -> bool {
+        match self {
+            Self::Layer(layer) => layer.is_of_interiors(),
+            Self::Triangulation
+            | Self::Epipoles
+            | Self::Wireframe
+            | Self::Exact
+            | Self::Weights
+            | Self::Wipe => false,
+            _ => true,
+        }
+    }
+}
+
 /// What a key does, with those that are held beside it.
 pub(crate) fn of(code: KeyCode, held: ModifiersState) -> Option<Key> {
     if held.control_key() || held.super_key() {

@@ -133,8 +133,7 @@ fn contents(
     ui.label("Show");
     ui.horizontal_wrapped(|ui| {
         for layer in Layer::ALL {
-            let is_there = !is_interior || !matches!(layer, Layer::Field | Layer::Shaded);
-            if is_there {
+            if !is_interior || layer.is_of_interiors() {
                 ui.selectable_value(&mut state.look.layer, layer, layer.name());
             }
         }

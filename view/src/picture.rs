@@ -35,6 +35,11 @@ impl Layer {
         Self::Shaded,
     ];
 
+    /// Whether interiors have it, too: of theirs there is neither a blending field nor a proxy.
+    pub fn is_of_interiors(self) -> bool {
+        !matches!(self, Self::Field | Self::Shaded)
+    }
+
     /// For people, and for the trace.
     pub fn name(self) -> &'static str {
         match self {

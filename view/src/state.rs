@@ -6,7 +6,7 @@ use crate::camera::{Glide, angle_between, pose_of};
 use crate::compose::nearest_stop;
 use crate::content::{Content, Space};
 use crate::keyframes::Keyframes;
-use crate::picture::{DepthGrid, Look, Request, Shown};
+use crate::picture::{DepthGrid, Layer, Look, Request, Shown};
 use calibrate::{Lens, Pixel, Rigid3, View};
 use glam::{DVec2, DVec3};
 use hands::Drag;
@@ -206,6 +206,11 @@ impl State {
             }
             if space.is_interior {
                 self.mode = Mode::Walk;
+                // What was chosen before anybody knew.
+                self.wipe = None;
+                if !self.look.layer.is_of_interiors() {
+                    self.look.layer = Layer::default();
+                }
             }
         }
         self.look.moment = self.look.moment.or(space.times.map(|times| times.moment));

@@ -10,6 +10,10 @@ use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{ModifiersState, PhysicalKey};
 
+/// What is said where a key shows what interiors do not have.
+const OF_SCENES: &str =
+    "this key is for scenes: an interior has no field, no proxy and no photo beside it";
+
 /// So near, in pixels, the wipe is taken hold of.
 const WIPE_PX: f64 = 8.0;
 
@@ -25,6 +29,11 @@ impl App {
         let Some(shows) = &mut self.shows else {
             return;
         };
+        let is_interior = self.state.space().is_some_and(|space| space.is_interior);
+        if is_interior && !key.is_of_interiors() {
+            self.status.said = Some(OF_SCENES.to_owned());
+            return;
+        }
         let look = &mut self.state.look;
         let flip = |value: &mut bool| *value = !*value;
         match key {
@@ -219,9 +228,15 @@ impl App {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::content::{Content, House, Space};
+    use crate::loader::Progress;
     use crate::panel::Shows;
+    use crate::picture::Layer;
     use crate::window::tests::app;
+    use datasets::house::{HouseOptions, house};
+    use proxy::interior::Contents;
     use std::path::PathBuf;
+    use std::sync::Arc;
     use std::time::Duration;
 
     #[test]
@@ -233,6 +248,51 @@ mod tests {
         assert!(!app.escape());
         assert_eq!(app.shows, Some(Shows::fitting(2000.0)));
         assert!(app.escape());
+        app.worker.end(Duration::from_secs(10));
+    }
+
+    #[test]
+    fn what_interiors_do_not_have_no_key_shows() {
+        let options = HouseOptions {
+            rooms: 2,
+            triangles: Some(1),
+            ..HouseOptions::default()
+        };
+        let made = house(&options).unwrap();
+        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
+        let house = House::new(made.interior, contents, made.model);
+        let content = Content::Interior(Arc::new(house));
+        let space = Arc::new(Space::of(&content));
+        let mut app = app(PathBuf::new(), None);
+        app.shows = Some(Shows::fitting(2000.0));
+        // Before anybody knows what it is.
+        for key in [Key::Layer(Layer::Field), Key::Wipe] {
+            app.do_key(key, true, false);
+        }
+        app.progress(Progress::Show(content, space));
+        assert_eq!(app.state.look.layer, Layer::Picture);
+        assert_eq!((app.state.wipe, &app.status.said), (None, &None));
+        let before = app.state.look.clone();
+        for key in [
+            Key::Layer(Layer::Field),
+            Key::Layer(Layer::Shaded),
+            Key::Triangulation,
+            Key::Wireframe,
+            Key::Exact,
+            Key::Epipoles,
+            Key::Weights,
+            Key::Wipe,
+        ] {
+            app.status.said = None;
+            app.do_key(key, true, false);
+            assert_eq!(app.status.said.as_deref(), Some(OF_SCENES), "{key:?}");
+            assert_eq!(app.state.look, before, "{key:?}");
+        }
+        assert!(app.state.wipe.is_none() && !app.state.tells_weights);
+        assert_eq!(app.shows, Some(Shows::fitting(2000.0)));
+        // What they have, keys show.
+        app.do_key(Key::Layer(Layer::Depth), true, false);
+        assert_eq!(app.state.look.layer, Layer::Depth);
         app.worker.end(Duration::from_secs(10));
     }
 }
