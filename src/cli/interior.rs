@@ -432,6 +432,11 @@ pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Whether an interior is given to what opens others, too: a folder that holds one, or its file.
+pub(super) fn is_interior(given: &Path) -> bool {
+    given.join(INTERIOR).is_file() || given.file_name().is_some_and(|name| name == INTERIOR)
+}
+
 /// Whether a folder holds an interior and nothing else.
 fn is_ours(folder: &Path) -> bool {
     folder.join(INTERIOR).exists() && matches!(beside_interior(folder), Ok(None))

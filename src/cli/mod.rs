@@ -38,6 +38,7 @@ mod targets;
 mod time;
 mod took;
 mod uncalibrated;
+mod unused;
 #[cfg(feature = "window")]
 mod view;
 mod walk;
@@ -92,8 +93,8 @@ struct Usage(String);
 pub(super) fn main() -> ExitCode {
     let matches = command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    if let Some((_, given)) = matches.subcommand() {
-        options::say_unused(given);
+    if let Some((command, given)) = matches.subcommand() {
+        unused::say_unused(command, given);
     }
     let done = start_threads(cli.threads).and_then(|()| run(cli));
     let Err(error) = done else {

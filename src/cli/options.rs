@@ -6,11 +6,9 @@ pub(super) use super::shape::{compared, cut};
 use calibrate::View;
 use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
-use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, ValueEnum};
+use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{Photo, Scene, Warning};
-use render::interior::PortalFill;
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
 
 use std::collections::BTreeSet;
@@ -173,7 +171,7 @@ pub(super) struct FieldArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Renderer {
+pub(super) enum Renderer {
     /// At vertices, and interpolated: fast
     Triangulated,
     /// At every pixel
@@ -196,54 +194,6 @@ enum ResolutionName {
     Distance,
     /// The difference of distances, in world units: Buehler et al. 2001, literally
     Length,
-}
-
-/// Says which of a command's options were given for nothing, as another leaves them no effect.
-pub(super) fn say_unused(given: &ArgMatches) {
-    // Of options that the command does not have nobody may ask.
-    let has = |id: &str| matches!(given.try_contains_id(id), Ok(true));
-    let is_given = |id: &str| has(id) && given.value_source(id) == Some(ValueSource::CommandLine);
-    let renderer = given.try_get_one::<Renderer>("renderer");
-    // A triangulation that is drawn has a grid, whatever renders.
-    if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {
-        say!("note: --grid changes nothing: --renderer exact has no grid");
-    }
-    if has("portals") && has("splat") {
-        let portals = given.try_get_many::<String>("portals");
-        let portals = portals.ok().flatten().unwrap_or_default();
-        say_unused_of_walk(&portals.map(String::as_str).collect::<Vec<_>>(), is_given);
-    }
-}
-
-/// Of `walk`, by what portals show.
-fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
-    type Holds = fn(&PortalFill) -> bool;
-    let is_ldi: Holds = |fill| *fill == PortalFill::Ldi;
-    let is_warped: Holds = |fill| matches!(fill, PortalFill::Warp1 | PortalFill::Warp2);
-    let is_image: Holds = |fill| *fill == PortalFill::Ldi || fill.references() > 0;
-    let of_images = ["near", "persist", "reference_size", "reference_views"];
-    let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files"];
-    for (is_meant, ids, why) in [
-        (is_image, &of_images[..], "portals show no images"),
-        (is_warped, &["splat"], "no image is warped"),
-        (is_ldi, &of_ldis, "portals show no LDIs"),
-    ] {
-        let kinds = PortalFill::ALL.into_iter().filter(is_meant);
-        let kinds: Vec<&str> = kinds.map(PortalFill::name).collect();
-        if portals.iter().any(|p| *p == "all" || kinds.contains(p)) {
-            continue;
-        }
-        let given = ids.iter().filter(|id| is_given(id));
-        let option = |id: &&str| format!("--{}", id.replace('_', "-"));
-        let given: Vec<String> = given.map(option).collect();
-        let change = match given.len() {
-            0 => continue,
-            1 => "changes",
-            _ => "change",
-        };
-        let (given, kinds) = (given.join(" and "), kinds.join(", "));
-        say!("note: {given} {change} nothing: {why} (--portals {kinds} or all)");
-    }
 }
 
 impl FieldArgs {

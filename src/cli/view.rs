@@ -4,6 +4,7 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
+use super::interior::is_interior;
 use super::made::{self, Made};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
@@ -22,7 +23,7 @@ use view::{Content, House, Look, Progress, Teller, ViewOptions, WorkerOptions};
 /// Look around in a window
 ///
 /// A scene or a capture opens at its first photo's pose; what is fitted to it goes on behind. An
-/// interior is walked through. F1 shows which key does what.
+/// interior is walked through; options that are for scenes change nothing there. F1 shows which key does what.
 ///
 ///     lumigraph view scene
 ///     lumigraph view house -o film
@@ -79,6 +80,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--portals: unknown {:?}; expected {known}", args.portals);
         return Err(Usage(text).into());
     };
+    let given = &args.scene.scene;
+    if args.hold_out.hold_out.is_some() && is_interior(given) {
+        let text = "--hold-out: photos are held out of an interior when it is made; `lumigraph interior CAPTURE \
+                    --hold-out SPLIT.json` makes one without them";
+        return Err(Usage(text.to_owned()).into());
+    }
     let nerfstudio = args.nerfstudio.frame()?;
     let keyframes = match &args.path {
         Some(path) => {
@@ -91,7 +98,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut walk = WalkOptions::default();
     walk.library.budget = args.draw.cpu_memory;
     walk.library.ldi_views = args.ldi_views.map(usize::from);
-    let given = &args.scene.scene;
     let options = ViewOptions {
         title: format!("{} – lumigraph", given.display()),
         size: args.draw.size.unwrap_or(SIZE),
@@ -171,12 +177,7 @@ impl Load {
     }
 
     fn run(&self, teller: &Teller) -> anyhow::Result<()> {
-        let given = &self.scene.scene;
-        let is_interior = given.join("interior.json").is_file()
-            || given
-                .file_name()
-                .is_some_and(|name| name == "interior.json");
-        match is_interior {
+        match is_interior(&self.scene.scene) {
             true => self.load_house(teller),
             false => self.load_scene(teller),
         }

@@ -288,19 +288,26 @@ fn keyframe(t_s: f64, eye: DVec3, ahead: DVec3, up: DVec3) -> Keyframe {
     }
 }
 
-#[test]
-fn without_a_display_one_line_says_what_to_do() {
-    let folder = with_wall();
+/// What is said in a folder without a display, when no window can be opened.
+#[track_caller]
+fn said_without_a_display(folder: &TempDir, line: &str) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_lumigraph"))
         .current_dir(folder.path())
-        .args(["view", "wall", "--proxy", "plane"])
+        .args(line.split(' '))
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
         .output()
         .unwrap();
-    assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    said
+}
+
+#[test]
+fn without_a_display_one_line_says_what_to_do() {
+    let folder = with_wall();
+    let said = said_without_a_display(&folder, "view wall --proxy plane");
     assert!(
         said.starts_with("error: no display to open a window on"),
         "{said}"
@@ -311,6 +318,46 @@ fn without_a_display_one_line_says_what_to_do() {
     assert!(error.contains("nothing"), "{error}");
     let error = lumigraph(folder.path(), "view wall --portals mirrors");
     assert_eq!(error.code, 2, "{}", error.stderr);
+}
+
+#[test]
+fn options_that_change_nothing_are_told() {
+    let (wall, house) = (with_wall(), with_house());
+    let of_time = "--period auto --proxy tunnel --renderer exact --grid 8";
+    for (folder, line, expected) in [
+        (
+            &house,
+            format!("view house {of_time} --portals ldi --ldi-views 3"),
+            Some("--proxy, --renderer, --grid and --period change nothing: house is an interior"),
+        ),
+        (
+            &house,
+            "view house/interior.json --strict --cpu-memory 1GB".to_owned(),
+            Some("--strict changes nothing: house/interior.json is an interior"),
+        ),
+        (&house, "view house --portals warp1".to_owned(), None),
+        (
+            &wall,
+            "view wall --proxy plane --portals ldi --ldi-views 3".to_owned(),
+            Some("--portals and --ldi-views change nothing: wall is no interior"),
+        ),
+        (
+            &wall,
+            "view wall --renderer exact --grid 8".to_owned(),
+            Some("--grid changes nothing: --renderer exact has no grid"),
+        ),
+        (&wall, "view wall --k 3 --strict".to_owned(), None),
+    ] {
+        let said = said_without_a_display(folder, &line);
+        let notes: Vec<&str> = said.lines().filter(|l| l.contains("nothing: ")).collect();
+        let expected = expected.map(|expected| format!("note: {expected}"));
+        assert_eq!(notes, Vec::from_iter(expected.as_deref()), "{line}");
+    }
+    // The pictures would show what was to be held out.
+    let ran = lumigraph(house.path(), "view house --hold-out split.json");
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    let remedy = "`lumigraph interior CAPTURE --hold-out SPLIT.json` makes one";
+    assert!(ran.stderr.contains(remedy), "{}", ran.stderr);
 }
 
 #[test]

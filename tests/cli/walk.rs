@@ -32,6 +32,7 @@ fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
         assert_eq!(found, expected, "{portals}");
     }
     assert_eq!(said("--portals ldi --near 0.5"), Vec::<String>::new());
+    assert_eq!(said("--persist"), [format!("note: {images}")]);
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! Options that are given for nothing.
+
+use super::interior::is_interior;
+use super::options::Renderer;
+use super::output::say;
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use render::interior::PortalFill;
+use std::path::{Path, PathBuf};
+
+/// Says which of a command's options were given for nothing, as another, or what is opened, leaves them
+/// no effect.
+pub(super) fn say_unused(command: &str, given: &ArgMatches) {
+    // Of options that the command does not have nobody may ask.
+    let has = |id: &str| matches!(given.try_contains_id(id), Ok(true));
+    let is_given = |id: &str| has(id) && given.value_source(id) == Some(ValueSource::CommandLine);
+    if command == "view"
+        && let Ok(Some(scene)) = given.try_get_one::<PathBuf>("scene")
+    {
+        say_unused_of_view(scene, is_given);
+        if is_interior(scene) {
+            return;
+        }
+    }
+    let renderer = given.try_get_one::<Renderer>("renderer");
+    // A triangulation that is drawn has a grid, whatever renders.
+    if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {
+        say!("note: --grid changes nothing: --renderer exact has no grid");
+    }
+    if command == "walk" {
+        let portals = given.try_get_many::<String>("portals");
+        let portals = portals.ok().flatten().unwrap_or_default();
+        say_unused_of_walk(&portals.map(String::as_str).collect::<Vec<_>>(), is_given);
+    }
+}
+
+/// Says of those of some options that are given that they change nothing, and why.
+fn say_idle(ids: &[&str], is_given: impl Fn(&str) -> bool, why: &str) {
+    let given = ids.iter().filter(|id| is_given(id));
+    let option = |id: &&str| format!("--{}", id.replace('_', "-"));
+    let given: Vec<String> = given.map(option).collect();
+    let given = match &given[..] {
+        [] => return,
+        [one] => format!("{one} changes"),
+        [most @ .., last] => format!("{} and {last} change", most.join(", ")),
+    };
+    say!("note: {given} nothing: {why}");
+}
+
+/// Of `walk`, by what portals show.
+fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
+    type Holds = fn(&PortalFill) -> bool;
+    let is_ldi: Holds = |fill| *fill == PortalFill::Ldi;
+    let is_warped: Holds = |fill| matches!(fill, PortalFill::Warp1 | PortalFill::Warp2);
+    let is_image: Holds = |fill| *fill == PortalFill::Ldi || fill.references() > 0;
+    let of_images = ["near", "persist", "reference_size", "reference_views"];
+    let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files"];
+    for (is_meant, ids, why) in [
+        (is_image, &of_images[..], "portals show no images"),
+        (is_warped, &["splat"], "no image is warped"),
+        (is_ldi, &of_ldis, "portals show no LDIs"),
+    ] {
+        let kinds = PortalFill::ALL.into_iter().filter(is_meant);
+        let kinds: Vec<&str> = kinds.map(PortalFill::name).collect();
+        if !portals.iter().any(|p| *p == "all" || kinds.contains(p)) {
+            let why = format!("{why} (--portals {} or all)", kinds.join(", "));
+            say_idle(ids, &is_given, &why);
+        }
+    }
+}
+
+/// Of `view`, by what is opened, where there is something.
+fn say_unused_of_view(scene: &Path, is_given: impl Fn(&str) -> bool) {
+    let of_scenes = [
+        "strict",
+        "keep_weak",
+        "proxy",
+        "renderer",
+        "grid",
+        "blend",
+        "resolution",
+        "k",
+        "beta",
+        "no_skip",
+        "gpu_memory",
+        "period",
+        "time_window",
+        "time",
+    ];
+    let of_interiors = ["portals", "ldi_views"];
+    let (ids, what) = match is_interior(scene) {
+        true => (&of_scenes[..], "is an interior"),
+        false => (&of_interiors[..], "is no interior"),
+    };
+    if scene.exists() {
+        say_idle(ids, is_given, &format!("{} {what}", scene.display()));
+    }
+}
