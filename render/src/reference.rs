@@ -34,6 +34,23 @@ pub(crate) fn candidate(
     pixel: Pixel,
     diff: impl FnOnce() -> f64,
 ) -> Option<Candidate> {
+    let (fov, mask) = shown(frame, source_idx, point, pixel)?;
+    Some(Candidate {
+        source_idx,
+        diff: diff(),
+        fov,
+        mask: mask * frame.visible(source_idx, point, pixel),
+    })
+}
+
+/// fovBlend and mask where a proxy point falls on a pixel of a source view's image; `None` outside the image
+/// and where the mask ignores it.
+pub(crate) fn shown(
+    frame: &Frame<'_>,
+    source_idx: usize,
+    point: &ProxyPoint,
+    pixel: Pixel,
+) -> Option<(f64, f64)> {
     let fov = frame.fov_blend(source_idx, pixel);
     if fov < 0.0 {
         return None;
@@ -45,12 +62,7 @@ pub(crate) fn candidate(
         let ignored = f64::from(IGNORED);
         ((value * 255.0 - ignored) / (255.0 - ignored)).max(0.0)
     });
-    (mask > 0.0).then(|| Candidate {
-        source_idx,
-        diff: diff(),
-        fov,
-        mask: mask * frame.visible(source_idx, point, pixel),
-    })
+    (mask > 0.0).then_some((fov, mask))
 }
 
 /// The colour of a proxy point: premultiplied sRGB and coverage, 0…1.

@@ -1,6 +1,7 @@
 //! Which source views a triangle carries, and with what.
 
 use super::known::{ByLeast, Known, NOWHERE, known};
+use super::overlooked::overlooked;
 use super::patch::Patch;
 use super::vertex::Vertex;
 use super::{FieldEntry, MAX_LISTED};
@@ -116,6 +117,15 @@ impl List {
             }
             stays
         });
+        // 4. Where none has all of it, pixels between those points may see what only others have.
+        let overlooked = triangle.overlooked(&listed);
+        for &source_idx in &overlooked {
+            let mut view = Listed::unknown(source_idx, Sees::Part);
+            triangle.measure(&mut view);
+            listed.push(view);
+        }
+        listed.sort_unstable_by_key(|view| view.source_idx);
+
         let bordered = listed.iter().any(|view| view.sees == Sees::Part);
         if !bordered && !weights_turn_over(frame, corners) {
             return Self::of_weights(frame, corners);
@@ -124,7 +134,7 @@ impl List {
             // More borders than there is room for: the nearest of each part of the triangle
             // come first, then the second nearest. (The nearest of all alone left holes
             // beyond their borders.)
-            let ranks = triangle.ranks(&listed);
+            let ranks = triangle.ranks(&listed, &overlooked);
             let least = |view: &Listed| view.diffs.iter().copied().fold(f64::MAX, f64::min);
             let rank = |view: &Listed| ranks.get(&view.source_idx).copied().unwrap_or(usize::MAX);
             let key = |view: &Listed| (rank(view), least(view), view.source_idx);
@@ -447,17 +457,29 @@ impl Triangle<'_> {
         seers.map(|source_idx| source_idx as usize)
     }
 
+    /// The source views that pixels need which none of those listed has: where the surface jumps and none of them
+    /// has all of the triangle. (Where it does not, what is between the corners falls between them in photos, too.)
+    fn overlooked(&self, listed: &[Listed]) -> Vec<usize> {
+        let is_whole = || listed.iter().any(|view| view.sees == Sees::All);
+        let is_flat = || !matches!(self.frame.surface, Surface::Facets(_));
+        if is_whole() || is_flat() || self.patch().is_smooth() {
+            return Vec::new();
+        }
+        let known: Vec<usize> = listed.iter().map(|view| view.source_idx).collect();
+        overlooked(self.frame, self.corners.map(|corner| corner.at), &known)
+    }
+
     /// The best rank, by difference, that listed views have among those of them that count at a
     /// point, for points spread over the triangle.
-    fn ranks(&self, listed: &[Listed]) -> BTreeMap<usize, usize> {
+    fn ranks(&self, listed: &[Listed], overlooked: &[usize]) -> BTreeMap<usize, usize> {
         let is_listed = |i: usize| {
             listed
                 .binary_search_by_key(&i, |view| view.source_idx)
                 .is_ok()
         };
-        let mut ranks = BTreeMap::new();
+        // For some pixel it is the only one.
+        let mut ranks: BTreeMap<usize, usize> = overlooked.iter().map(|i| (*i, 0)).collect();
         if let Surface::Facets(map) = &self.frame.surface {
-            // For some pixel it is the only one.
             ranks.extend(self.moved_to(map).map(|source_idx| (source_idx, 0)));
         }
         for near in self.asked() {

@@ -15,6 +15,7 @@
 mod constraints;
 mod known;
 mod list;
+mod overlooked;
 mod patch;
 mod vertex;
 

@@ -36,6 +36,11 @@ impl Patch {
         }
     }
 
+    /// Whether they are all about as far as the corners say: nothing juts out between those.
+    pub(super) fn is_smooth(&self) -> bool {
+        self.smooth.is_some()
+    }
+
     /// The points at which there is something.
     fn points(&self) -> impl Iterator<Item = ProxyPoint> {
         self.points.iter().flatten().copied()

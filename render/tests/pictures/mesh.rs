@@ -102,7 +102,14 @@ fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
 }
 
 fn lumigraph_of(solid: &Arc<Solid>, photo: impl Fn(&View) -> RgbaImage) -> Lumigraph {
-    let views = views();
+    lumigraph_from(solid, views(), photo)
+}
+
+fn lumigraph_from(
+    solid: &Arc<Solid>,
+    views: Vec<View>,
+    photo: impl Fn(&View) -> RgbaImage,
+) -> Lumigraph {
     let photos = views.iter().map(photo).collect();
     let source = |(i, view): (usize, View)| SourceView {
         name: format!("{i}.png"),
@@ -172,6 +179,43 @@ fn every_engine_draws_the_same_picture() {
             let db = psnr(&unmoved(&frame, &picture), &unmoved(&frame, &exact));
             println!("{name}, {engine}, triangulated against exact: {db:.1} dB");
             assert!(db >= 40.0, "{name}, {engine}: {db} dB");
+        }
+    }
+}
+
+#[test]
+fn what_only_one_photo_has_between_the_corners_of_triangles_is_no_hole() {
+    // 1. A post so thin that no corner of a grid of eight cells sees it. The photo that has it has nothing of the
+    // wall that those see.
+    let post = |x: f64, y: f64| DVec3::new(0.5 / 110.0 * (10.0 + 1.5 * x), y, 0.5);
+    let mut mesh = wall();
+    mesh.append(&quad([
+        post(-1.0, -0.5),
+        post(1.0, -0.5),
+        post(1.0, 0.5),
+        post(-1.0, 0.5),
+    ]));
+    let solid = Arc::new(Solid::new(MeshKind::Mesh, mesh));
+    let size = (160, 120);
+    let aside = DVec3::new(-1.5, 0.0, 0.1);
+    let views = vec![
+        pinhole(DVec3::X * 2.5, DVec3::Z * 4.0, 110.0, size),
+        pinhole(DVec3::X * 2.4, DVec3::Z * 4.0, 110.0, size),
+        pinhole(aside, post(0.0, 0.0), 220.0, size),
+    ];
+    let lumigraph = lumigraph_from(&solid, views, |view| photo(&solid, view));
+    // 2. It is drawn all the same.
+    let desired = pinhole(DVec3::ZERO, DVec3::Z, 110.0, size);
+    let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+    let exact = reference::render_exact(&frame).unwrap();
+    let is_post = |x: u32| (88..92).contains(&x);
+    let of_post = exact.enumerate_pixels().filter(|(x, ..)| is_post(*x));
+    assert!(of_post.filter(|(.., p)| p.0[3] > 0).count() > 300);
+    let method = Method::Triangulated { cells_across: 8 };
+    for (engine, picture) in by_all(&frame, method) {
+        let picture = picture.unwrap();
+        for ((x, y, p), e) in picture.enumerate_pixels().zip(exact.pixels()) {
+            assert_eq!(p.0[3], e.0[3], "{engine}, {x}, {y}");
         }
     }
 }
