@@ -104,10 +104,11 @@ fn plain_color(pixel: vec2u, it: Listed) -> vec4f {
         }
         let source_idx = u32(listed.x);
         let sight = see(source_idx, ray, s);
-        // Every listed view sees all of the triangle: fovBlend and mask are one. But a desired lens may bend more
-        // between corners than they tell.
+        // By its corners every listed view sees all of the triangle: fovBlend and mask are one. But a lens may bend
+        // more between corners than they tell, the desired one or a photo's, and a facet may lie before or behind
+        // what is seen at all three. Of a plane through lenses that don't bend they tell all.
         var fov = select(0.0, 1.0, sight.depth > 0.0);
-        if RAYS_IN_TABLE {
+        if RAYS_IN_TABLE || FACETS || COMMON_LENS != LENS_PINHOLE {
             fov = fov_blend(source_idx, sight);
         }
         if fov > 0.0 {

@@ -2,6 +2,7 @@
 //!
 //! One program, as linking one for each file takes minutes.
 
+mod between_corners;
 mod blend;
 mod bounded;
 mod common;
