@@ -28,35 +28,8 @@ impl Reconstruction {
     /// (its poses were given), and is none. Nor is there one where the largest group is not
     /// the majority: nothing says which part would be the wrong one.
     pub fn weakly_tied(&self, trusted: usize) -> Vec<WeakGroup> {
-        // 1. Points shared by each pair of images.
-        let mut shared: BTreeMap<(ImageId, ImageId), usize> = BTreeMap::new();
-        for point in self.points.values() {
-            let seen_by: BTreeSet<ImageId> = point.track.iter().map(|(id, _)| *id).collect();
-            for (i, a) in seen_by.iter().enumerate() {
-                for b in seen_by.iter().skip(i + 1) {
-                    *shared.entry((*a, *b)).or_default() += 1;
-                }
-            }
-        }
-
-        // 2. Groups: each image starts alone; a trusted tie joins two groups.
-        let mut group_of: BTreeMap<ImageId, ImageId> =
-            self.images.keys().map(|i| (*i, *i)).collect();
-        for (a, b) in shared
-            .iter()
-            .filter(|(_, n)| **n >= trusted)
-            .map(|(pair, _)| *pair)
-        {
-            let (Some(&keep), Some(&gone)) = (group_of.get(&a), group_of.get(&b)) else {
-                continue;
-            };
-            if keep != gone {
-                group_of
-                    .values_mut()
-                    .filter(|g| **g == gone)
-                    .for_each(|g| *g = keep);
-            }
-        }
+        // 1. Groups, each by one of its images.
+        let group_of = self.groups(trusted);
         let mut groups: BTreeMap<ImageId, BTreeSet<ImageId>> = BTreeMap::new();
         for (image, group) in &group_of {
             groups.entry(*group).or_default().insert(*image);
@@ -68,7 +41,7 @@ impl Reconstruction {
             return Vec::new();
         }
 
-        // 3. What each of the others shares with everyone else.
+        // 2. What each of the others shares with everyone else.
         let across = self.points_across(&group_of);
         let others = groups.into_iter().filter(|(_, group)| *group != largest);
         let weak = others.filter_map(|(id, group)| {
@@ -83,6 +56,66 @@ impl Reconstruction {
         let mut weak: Vec<WeakGroup> = weak.collect();
         weak.sort_by(|a, b| a.names.cmp(&b.names));
         weak
+    }
+
+    /// The first image of what each image hangs together with, by ties of `trusted` shared points
+    /// or more.
+    ///
+    /// From an image on to all that it is tied to. What is in a group is taken off the tracks, as nothing
+    /// more is to be found out about it: of a long track of images that are tied little is left after
+    /// a few points. Two images whose ties are too weak share fewer points than `trusted`, so however
+    /// long tracks are, no pair is counted more often.
+    fn groups(&self, trusted: usize) -> BTreeMap<ImageId, ImageId> {
+        // 1. Who sees each point, and which points each image sees.
+        let ids: Vec<ImageId> = self.images.keys().copied().collect();
+        let index_of = |(id, _): &(ImageId, u32)| ids.binary_search(id).ok();
+        let mut points_of: Vec<Vec<usize>> = vec![Vec::new(); ids.len()];
+        let mut seen_by: Vec<Vec<usize>> = Vec::with_capacity(self.points.len());
+        for point in self.points.values() {
+            let mut images: Vec<usize> = point.track.iter().filter_map(index_of).collect();
+            images.sort_unstable();
+            images.dedup();
+            for &image in &images {
+                points_of[image].push(seen_by.len());
+            }
+            seen_by.push(images);
+        }
+
+        // 2. Each image that is in no group yet begins one.
+        let mut group_of: Vec<Option<ImageId>> = vec![None; ids.len()];
+        // With the image whose ties are looked for.
+        let mut shared = vec![0_usize; ids.len()];
+        let mut sharing: Vec<usize> = Vec::new();
+        let mut open: Vec<usize> = Vec::new();
+        for (first, id) in ids.iter().enumerate() {
+            if group_of[first].is_some() {
+                continue;
+            }
+            group_of[first] = Some(*id);
+            open.push(first);
+            while let Some(image) = open.pop() {
+                for &point in &points_of[image] {
+                    seen_by[point].retain(|&other| {
+                        if group_of[other].is_some() {
+                            return false;
+                        }
+                        if shared[other] == 0 {
+                            sharing.push(other);
+                        }
+                        shared[other] += 1;
+                        let is_tied = shared[other] >= trusted;
+                        if is_tied {
+                            group_of[other] = Some(*id);
+                            open.push(other);
+                        }
+                        !is_tied
+                    });
+                }
+                sharing.drain(..).for_each(|other| shared[other] = 0);
+            }
+        }
+        let group = |(image, group): (ImageId, Option<ImageId>)| Some((image, group?));
+        ids.into_iter().zip(group_of).filter_map(group).collect()
     }
 
     /// How many points images of each group see that others see, too; groups without any are
@@ -107,12 +140,14 @@ mod tests {
     use super::*;
     use crate::{CameraId, Image, Point3D, Point3DId, Rigid3};
     use glam::DVec3;
+    use proptest::collection;
+    use proptest::prelude::*;
 
     /// Images a, b, c, …; for each list, that many points seen by exactly those images.
     fn reconstruction(images: u32, points: &[(&[u32], usize)]) -> Reconstruction {
         let mut r = Reconstruction::default();
         for i in 0..images {
-            let name = char::from(b'a' + i as u8).to_string();
+            let name = char::from_u32(u32::from('a') + i).unwrap().to_string();
             let image = Image {
                 name,
                 camera_id: CameraId(0),
@@ -194,5 +229,62 @@ mod tests {
             [],
             "poses given, no points"
         );
+    }
+
+    /// Of 4,000 images eight million pairs share each point.
+    #[test]
+    fn tracks_may_be_long() {
+        let all: Vec<u32> = (0..4_000).collect();
+        let (most, last) = all.split_at(3_999);
+        let (across, elsewhere) = (&all[3_998..], last);
+        let weak = reconstruction(4_000, &[(most, 30), (across, 5), (elsewhere, 20)]);
+        let weak = weak.weakly_tied(TRUSTED_TIE);
+        assert_eq!(weak.len(), 1);
+        assert_eq!((weak[0].names.len(), weak[0].shared_points), (1, 5));
+    }
+
+    /// The same from the definition: all pairs of all tracks are counted, and those with enough join what
+    /// they are in.
+    fn groups_by_pairs(
+        reconstruction: &Reconstruction,
+        trusted: usize,
+    ) -> BTreeMap<ImageId, ImageId> {
+        let mut shared: BTreeMap<(ImageId, ImageId), usize> = BTreeMap::new();
+        for point in reconstruction.points.values() {
+            let seen_by: BTreeSet<ImageId> = point.track.iter().map(|(id, _)| *id).collect();
+            for a in &seen_by {
+                for b in seen_by.range(..*a) {
+                    *shared.entry((*a, *b)).or_default() += 1;
+                }
+            }
+        }
+        let ids = reconstruction.images.keys();
+        let mut group_of: BTreeMap<ImageId, ImageId> = ids.map(|id| (*id, *id)).collect();
+        for ((a, b), count) in shared {
+            let groups = (group_of.get(&a).copied(), group_of.get(&b).copied());
+            if let (true, (Some(a), Some(b))) = (count >= trusted, groups) {
+                let members = group_of.values_mut().filter(|g| **g == a || **g == b);
+                members.for_each(|g| *g = a.min(b));
+            }
+        }
+        group_of
+    }
+
+    proptest! {
+        /// Whatever the tracks: with repeats, and images that there are none of.
+        #[test]
+        fn groups_are_those_that_all_pairs_make(
+            tracks in collection::vec((collection::vec(0..16_u32, 0..7), 1..4_usize), 0..24),
+            images in 0..14_u32,
+            trusted in 0..6_usize,
+        ) {
+            let tracks: Vec<(&[u32], usize)> = tracks
+                .iter()
+                .map(|(track, count)| (track.as_slice(), *count))
+                .collect();
+            let reconstruction = reconstruction(images, &tracks);
+            let groups = reconstruction.groups(trusted);
+            prop_assert_eq!(groups, groups_by_pairs(&reconstruction, trusted));
+        }
     }
 }
