@@ -19,7 +19,7 @@ use crate::reference::color_at;
 use calibrate::Pixel;
 use rayon::prelude::*;
 
-/// Grids to choose from, in cells across the image's longer side. A coarser one than the default
+/// Grids to choose from, in cells across the image's width. A coarser one than the default
 /// is no faster: larger triangles meet more borders, and those cost more at every pixel.
 pub const GRIDS: [u32; 3] = [32, 64, 128];
 

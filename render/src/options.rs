@@ -112,7 +112,7 @@ pub enum Method {
     /// At the vertices of a triangulation of the image plane, and interpolated
     /// (Buehler 2001, §4.2).
     Triangulated {
-        /// Cells of the regular grid across the image's longer side.
+        /// Cells of the regular grid across the image's width; down it, as many as make them about square.
         cells_across: u32,
     },
 }

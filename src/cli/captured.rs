@@ -133,7 +133,7 @@ pub(super) fn hash_of(text: &str) -> String {
     format!("{:016x}", hash.0)
 }
 
-/// Cells across the image's longer side of the blending field's grid.
+/// Cells across the image's width of the blending field's grid.
 const GRID: u32 = 32;
 
 impl Photos {

@@ -153,7 +153,7 @@ pub(super) struct FieldArgs {
     /// The blending field at every pixel, or at vertices and interpolated
     #[arg(long, value_enum, default_value = "triangulated")]
     renderer: Renderer,
-    /// Cells of the triangulation's grid across the image's longer side
+    /// Cells of the triangulation's grid across the image's width; down it, as many as make them square
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = cells_across)]
     pub(super) grid: u32,
     /// The formula for the weights

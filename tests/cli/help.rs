@@ -149,6 +149,16 @@ fn frames_that_show_nothing_are_told() {
     assert_eq!(run("evaluate wall"), (0, String::new()));
 }
 
+/// Of portraits, too: the width is their shorter side.
+#[test]
+fn the_help_says_along_which_side_a_grid_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = lumigraph(folder.path(), "render --help").ok();
+    let said: Vec<&str> = ran.stdout.split_whitespace().collect();
+    let said = said.join(" ");
+    assert!(said.contains("grid across the image's width;"), "{said}");
+}
+
 #[test]
 fn the_demo_ends_with_scores_and_files() {
     let folder = tempfile::tempdir().unwrap();

@@ -48,12 +48,13 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid of about square cells, of a pixel or more.
+    /// A grid of about square cells, of a pixel or more; so many across the image's width.
     ///
     /// ```
     /// use render::triangulation::Grid;
     ///
     /// assert_eq!(Grid::for_image(1024, 768, 32), Grid { columns: 32, rows: 24 });
+    /// assert_eq!(Grid::for_image(768, 1024, 32), Grid { columns: 32, rows: 43 });
     /// ```
     pub fn for_image(width: u32, height: u32, cells_across: u32) -> Self {
         let columns = cells_across.clamp(1, width.max(1));
