@@ -30,7 +30,7 @@ const ALONE: usize = 1024;
 const FEWEST: usize = 48;
 /// Radians by which bounds are lowered, and lengths by which radii are raised, relative to what
 /// they are computed from: more than rounding can take.
-const SLACK: f64 = 1e-9;
+pub(crate) const SLACK: f64 = 1e-9;
 
 /// A part of space around the proxy, in the desired camera's frame.
 #[derive(Clone, Copy, Debug)]
@@ -303,7 +303,7 @@ fn arrange(views: &mut [(DVec3, u32)]) {
 
 /// The angle from the axis within which all of a photo lies; more than π where its lens does
 /// not say.
-fn widest(lens: &Lens, [width, height]: [f64; 2]) -> f64 {
+pub(crate) fn widest(lens: &Lens, [width, height]: [f64; 2]) -> f64 {
     const STEPS: u32 = 16;
     /// The border between two steps may bulge.
     const MARGIN: f64 = 1.05;

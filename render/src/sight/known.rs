@@ -1,19 +1,21 @@
-//! What is known to be seen by some photo without asking for each pixel.
+//! What is known without asking for each pixel: that some photo sees it, or that none could wherever it was.
 
-use super::has_all;
-use crate::frame::FrameSource;
+use super::reach::Beam;
+use super::views::Views;
+use super::{first_has_all, guess_has_all, nearest_tried};
 use crate::surface::{FacetMap, NO_FACET};
 use crate::tiles::TILE;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use proxy::Rays;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What is known to be seen without asking for each pixel.
+/// What needs no asking for each pixel.
 #[derive(Default)]
 pub(super) struct Known {
     pub(super) across: usize,
-    /// By tile, row by row: whether some source view has all that its pixels see.
+    /// By tile, row by row: whether some source view has all that its pixels see, or none would have any of it wherever it
+    /// is moved.
     pub(super) tiles: Vec<bool>,
     /// By facet: whether some source view has all that pixels of other tiles see of it.
     pub(super) facets: Vec<bool>,
@@ -22,10 +24,10 @@ pub(super) struct Known {
 }
 
 impl Known {
-    pub(super) fn of(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Self {
+    pub(super) fn of(map: &FacetMap, rays: &Rays, views: &Views<'_>) -> Self {
         // Large facets are asked alone, which mostly is enough.
         if rays.are_straight() && map.planes.len() * TILE * TILE <= map.facet_of.len() {
-            let (facets, is_all) = facets_seen_whole(map, rays, sources, &Self::default());
+            let (facets, is_all) = facets_seen_whole(map, rays, views, &Self::default());
             return Self {
                 facets,
                 is_all,
@@ -34,14 +36,14 @@ impl Known {
         }
         let mut known = Self {
             across: (map.size[0] as usize).div_ceil(TILE),
-            tiles: tiles_seen_whole(map, rays, sources),
+            tiles: tiles_seen_whole_or_never(map, rays, views),
             ..Self::default()
         };
-        (known.facets, known.is_all) = facets_seen_whole(map, rays, sources, &known);
+        (known.facets, known.is_all) = facets_seen_whole(map, rays, views, &known);
         known
     }
 
-    /// The tiles of one of their rows that are not known to be seen: their columns of pixels, and the facet that all
+    /// The tiles of one of their rows of which nothing is known: their columns of pixels, and the facet that all
     /// of these see, if it is one.
     pub(super) fn open_tiles(
         &self,
@@ -104,8 +106,9 @@ fn runs(row: &[u32]) -> impl Iterator<Item = &[u32]> {
 }
 
 /// For each tile, whether some source view has all that its pixels see: all between the least and the
-/// greatest inverse depth before the smallest rectangle around their rays, in the plane z = 1.
-fn tiles_seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec<bool> {
+/// greatest inverse depth before the smallest rectangle around their rays, in the plane z = 1. Or whether none
+/// reaches into that, from infinity to as near as anything is moved.
+fn tiles_seen_whole_or_never(map: &FacetMap, rays: &Rays, views: &Views<'_>) -> Vec<bool> {
     let [width, height] = map.size.map(|side| side as usize);
     let across = width.div_ceil(TILE);
     let mut whole = vec![false; across * height.div_ceil(TILE)];
@@ -139,7 +142,13 @@ fn tiles_seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec
                 let at = DVec2::new(side(0, least.x, most.x), side(1, least.y, most.y));
                 (at.extend(1.0), side(2, far, near))
             };
-            *whole = has_all(sources, &mut last, &std::array::from_fn::<_, 8, _>(corner));
+            let corners = std::array::from_fn::<_, 8, _>(corner);
+            *whole = guess_has_all(views.sources, last, &corners) || {
+                let beam = Beam::NONE.with(least.extend(1.0), near);
+                let beam = beam.with(most.extend(1.0), near);
+                let in_reach = views.within(&beam.nearer(nearest_tried()));
+                in_reach.is_empty() || first_has_all(views, &in_reach, &mut last, &corners)
+            };
         }
     };
     let rows = whole.par_chunks_mut(across.max(1)).enumerate();
@@ -153,7 +162,7 @@ fn tiles_seen_whole(map: &FacetMap, rays: &Rays, sources: &[FrameSource]) -> Vec
 pub(super) fn facets_seen_whole(
     map: &FacetMap,
     rays: &Rays,
-    sources: &[FrameSource],
+    views: &Views<'_>,
     known: &Known,
 ) -> (Vec<bool>, bool) {
     // 1. The rectangles.
@@ -217,25 +226,41 @@ pub(super) fn facets_seen_whole(
     let facets = boxes.par_chunks(FACETS).zip(map.planes.par_chunks(FACETS));
     let work = whole.par_chunks_mut(FACETS).zip(facets);
     work.for_each(|(whole, (boxes, planes))| {
-        // Facets beside one another are mostly seen by the same.
+        // Facets beside one another are mostly seen by the same. Else only those are asked that may see something of
+        // all of them.
         let mut last = 0;
-        for ((whole, (least, most)), plane) in whole.iter_mut().zip(boxes).zip(planes) {
-            if !(least.x <= most.x) {
+        let mut near = None;
+        for (whole, (seen, plane)) in whole.iter_mut().zip(boxes.iter().zip(planes)) {
+            let Some(corners) = corners_of(seen, *plane) else {
                 continue;
-            }
-            let corners = [
-                *least,
-                DVec2::new(most.x, least.y),
-                *most,
-                DVec2::new(least.x, most.y),
-            ];
-            let corners = corners.map(|at| (at.extend(1.0), plane.dot(at.extend(1.0))));
-            *whole = has_all(sources, &mut last, &corners);
+            };
+            *whole = guess_has_all(views.sources, last, &corners) || {
+                let near = near.get_or_insert_with(|| {
+                    let all = boxes.iter().zip(planes);
+                    let all = all.filter_map(|(seen, plane)| corners_of(seen, *plane));
+                    let with = |beam: Beam, (ray, s): (DVec3, f64)| beam.with(ray, s);
+                    views.within(&all.flatten().fold(Beam::NONE, with))
+                });
+                first_has_all(views, near, &mut last, &corners)
+            };
         }
     });
     let is_open = |(whole, (least, most)): (&bool, &Rectangle)| !whole && least.x <= most.x;
     let is_all = !whole.iter().zip(&boxes).any(is_open);
     (whole, is_all)
+}
+
+/// The corners of a part of a facet's plane, before a rectangle: rays, and at which inverse distances; `None` of
+/// nothing.
+fn corners_of((least, most): &Rectangle, plane: DVec3) -> Option<[(DVec3, f64); 4]> {
+    let corners = [
+        *least,
+        DVec2::new(most.x, least.y),
+        *most,
+        DVec2::new(least.x, most.y),
+    ];
+    let at = |corner: DVec2| (corner.extend(1.0), plane.dot(corner.extend(1.0)));
+    (least.x <= most.x).then(|| corners.map(at))
 }
 
 /// Its least and its greatest coordinates.
