@@ -308,3 +308,21 @@ fn typical_depth(lumigraph: &Lumigraph) -> Option<f64> {
     depths.sort_by(f64::total_cmp);
     depths.get(depths.len() / 2).copied()
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use datasets::house::{HouseOptions, house};
+
+    /// A small house.
+    pub(crate) fn two_rooms() -> Content {
+        let options = HouseOptions {
+            rooms: 2,
+            triangles: Some(1),
+            ..HouseOptions::default()
+        };
+        let made = house(&options).unwrap();
+        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
+        Content::Interior(Arc::new(House::new(made.interior, contents, made.model)))
+    }
+}

@@ -467,17 +467,21 @@ mod tests {
         worker.show(content, space, revision);
     }
 
-    #[test]
-    fn pictures_are_those_that_render_makes_and_shots_give_them_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let (send, news) = channel();
-        let options = WorkerOptions {
+    fn by_cpu(output: PathBuf) -> WorkerOptions {
+        WorkerOptions {
             device: DeviceChoice::Cpu,
             gpu_memory: None,
             skips: render::Skips::ALL,
             walk: WalkOptions::default(),
-            output: folder.path().join("shots"),
-        };
+            output,
+        }
+    }
+
+    #[test]
+    fn pictures_are_those_that_render_makes_and_shots_give_them_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let (send, news) = channel();
+        let options = by_cpu(folder.path().join("shots"));
         let mut worker = Worker::start(options, move |news| send.send(news).unwrap());
         // Asked before there is anything: drawn as soon as there is.
         worker.ask(request(1, 0.25));
@@ -515,13 +519,7 @@ mod tests {
     #[test]
     fn a_shot_that_was_asked_for_is_made_before_the_end() {
         let folder = tempfile::tempdir().unwrap();
-        let options = WorkerOptions {
-            device: DeviceChoice::Cpu,
-            gpu_memory: None,
-            skips: render::Skips::ALL,
-            walk: WalkOptions::default(),
-            output: folder.path().join("shots"),
-        };
+        let options = by_cpu(folder.path().join("shots"));
         let mut worker = Worker::start(options.clone(), |_| {});
         show(&worker, 0, 1);
         worker.ask(request(1, 0.25));
@@ -543,13 +541,7 @@ mod tests {
     #[test]
     fn a_shot_knows_the_moment_that_it_shows() {
         let folder = tempfile::tempdir().unwrap();
-        let options = WorkerOptions {
-            device: DeviceChoice::Cpu,
-            gpu_memory: None,
-            skips: render::Skips::ALL,
-            walk: WalkOptions::default(),
-            output: folder.path().join("shots"),
-        };
+        let options = by_cpu(folder.path().join("shots"));
         let mut timed = wall(0);
         let sources = &mut Arc::get_mut(&mut timed).unwrap().sources;
         sources.iter_mut().for_each(|s| s.time_s = Some(0.25));

@@ -9,6 +9,7 @@ use crate::mesh::{Mesh, Model, PORTAL_NODE};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// The triangles of each cell.
@@ -41,7 +42,7 @@ impl Contents {
     }
 
     /// Finds anew what is in some cells whose boxes have changed; as [`Self::new`] would.
-    pub(super) fn refill(&mut self, interior: &Interior, model: &Model, ids: &[CellId]) {
+    pub(super) fn refill(&mut self, interior: &Interior, model: &Model, ids: &BTreeSet<CellId>) {
         let is_opening = openings(model);
         for id in ids {
             let Some(room) = interior.cell(*id).content.room() else {
@@ -290,7 +291,7 @@ mod tests {
         // Both cells have the triangle; then only the first; then none.
         for (a, b) in [(-1.0, -1.0), (-1.0, 2.0), (5.0, 2.0)] {
             interior.cells = vec![cell("a", a, 6.0), cell("b", b, 3.0)];
-            contents.refill(&interior, &model, &[CellId(0), CellId(1)]);
+            contents.refill(&interior, &model, &[0, 1].map(CellId).into());
             let (expected, _) = Contents::new(&interior, &model).unwrap();
             assert_eq!(contents, expected);
             seen.regroup(&contents.triangles);

@@ -13,6 +13,7 @@ use super::{
 use crate::mesh::Model;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// A line of sight from a cell to a triangle that its portals hide.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,9 +116,7 @@ pub fn fit_to_sight(
                 Some(Fitted::Box(id)) => Some(*id),
                 _ => None,
             });
-            let mut grown: Vec<CellId> = grown.collect();
-            grown.sort_unstable();
-            grown.dedup();
+            let grown: BTreeSet<CellId> = grown.collect();
             if !grown.is_empty() {
                 contents.refill(interior, model, &grown);
                 seen.regroup(&contents.triangles);

@@ -122,9 +122,9 @@ impl List {
         for &source_idx in &overlooked {
             let mut view = Listed::unknown(source_idx, Sees::Part);
             triangle.measure(&mut view);
-            listed.push(view);
+            let at = listed.partition_point(|other| other.source_idx < source_idx);
+            listed.insert(at, view);
         }
-        listed.sort_unstable_by_key(|view| view.source_idx);
 
         let bordered = listed.iter().any(|view| view.sees == Sees::Part);
         if !bordered && !weights_turn_over(frame, corners) {

@@ -14,8 +14,9 @@ use glam::DVec2;
 const FRUITLESS: usize = 8;
 
 /// For each pixel whose centre is in a triangle of the image plane and that none of the `listed` source views has,
-/// the one that has it and differs least; each once, in no order. `corners` are in pixels, on the lattice that pixels'
-/// centres are on, too; of equal differences the first view counts.
+/// the one that has it and differs least; each once, in no order. Not all such pixels' are found where more than a few
+/// are in no photo. `corners` are in pixels, on the lattice that pixels' centres are on, too; of equal differences the
+/// first view counts.
 pub(super) fn overlooked(frame: &Frame<'_>, corners: [DVec2; 3], listed: &[usize]) -> Vec<usize> {
     let [a, b, c] = corners;
     let turn = (b - a).perp_dot(c - a).signum();
@@ -53,8 +54,8 @@ pub(super) fn overlooked(frame: &Frame<'_>, corners: [DVec2; 3], listed: &[usize
                 continue;
             }
             let near = frame.near(&point, 0.0, frame.first_guess());
-            let counting = near.candidates.iter().filter(|c| c.mask > 0.0);
-            let best = counting.min_by(|x, y| x.diff.total_cmp(&y.diff));
+            let candidates = near.candidates.iter();
+            let best = candidates.min_by(|x, y| x.diff.total_cmp(&y.diff));
             last = best.map(|best| best.source_idx);
             found.extend(last);
             if last.is_none() {

@@ -201,23 +201,14 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::content::{Content, House, Space};
+    use crate::content::Space;
+    use crate::content::tests::two_rooms;
     use crate::picture::Look;
-    use datasets::house::{HouseOptions, house};
-    use proxy::interior::Contents;
     use std::sync::Arc;
 
     #[test]
     fn who_turns_before_a_wall_moves() {
-        let options = HouseOptions {
-            rooms: 2,
-            triangles: Some(1),
-            ..HouseOptions::default()
-        };
-        let made = house(&options).unwrap();
-        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
-        let house = House::new(made.interior, contents, made.model);
-        let content = Content::Interior(Arc::new(house));
+        let content = two_rooms();
         let space = Arc::new(Space::of(&content));
         let mut state = State::new(Look::default());
         state.resize(320, 240);

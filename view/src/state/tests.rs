@@ -1,11 +1,10 @@
 use super::*;
-use crate::content::{House, Times};
+use crate::content::Times;
+use crate::content::tests::two_rooms;
 use crate::picture::{Lines, Support};
 use calibrate::Camera;
-use datasets::house::{HouseOptions, house};
 use egui::ColorImage;
 use image::RgbaImage;
-use proxy::interior::Contents;
 use proxy::{Plane, Proxy};
 use render::path::{Interpolation, Keyframe};
 use render::{Lumigraph, Moment, PhotoStore, SourceView};
@@ -373,17 +372,9 @@ fn the_grid_comes_back_with_the_triangulated_field() {
 
 #[test]
 fn one_walks_in_a_house_at_eye_height() {
-    let options = HouseOptions {
-        rooms: 2,
-        triangles: Some(1),
-        ..HouseOptions::default()
-    };
-    let made = house(&options).unwrap();
-    let contents = Contents::new(&made.interior, &made.model).unwrap().0;
-    let house = House::new(made.interior, contents, made.model);
     let mut state = State::new(Look::default());
     state.resize(320, 240);
-    state.show_alone(Content::Interior(Arc::new(house)));
+    state.show_alone(two_rooms());
     assert_eq!(state.mode, Mode::Walk);
     assert!(state.cell().is_some());
     let start = state.pose().center();

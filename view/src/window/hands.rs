@@ -228,13 +228,12 @@ impl App {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::content::{Content, House, Space};
+    use crate::content::Space;
+    use crate::content::tests::two_rooms;
     use crate::loader::Progress;
     use crate::panel::Shows;
     use crate::picture::Layer;
     use crate::window::tests::app;
-    use datasets::house::{HouseOptions, house};
-    use proxy::interior::Contents;
     use std::path::PathBuf;
     use std::sync::Arc;
     use std::time::Duration;
@@ -253,15 +252,7 @@ mod tests {
 
     #[test]
     fn what_interiors_do_not_have_no_key_shows() {
-        let options = HouseOptions {
-            rooms: 2,
-            triangles: Some(1),
-            ..HouseOptions::default()
-        };
-        let made = house(&options).unwrap();
-        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
-        let house = House::new(made.interior, contents, made.model);
-        let content = Content::Interior(Arc::new(house));
+        let content = two_rooms();
         let space = Arc::new(Space::of(&content));
         let mut app = app(PathBuf::new(), None);
         app.shows = Some(Shows::fitting(2000.0));
