@@ -309,9 +309,14 @@ proptest! {
         prop_assert!(projection.pixel.distance(lens.project(point).unwrap()) < 1e-9);
         let h: f64 = 1e-5 * depth;
         for (axis, step) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
-            let [ahead, behind] = [1.0, -1.0].map(|sign| lens.project(point + sign * h * step));
-            let (Some(ahead), Some(behind)) = (ahead, behind) else { continue };
-            let expected = DVec2::new(ahead.x - behind.x, ahead.y - behind.y) / (2.0 * h);
+            let central = |h: f64| {
+                let [ahead, behind] = [1.0, -1.0].map(|sign| lens.project(point + sign * h * step));
+                let (ahead, behind) = (ahead?, behind?);
+                Some(DVec2::new(ahead.x - behind.x, ahead.y - behind.y) / (2.0 * h))
+            };
+            let (Some(whole), Some(half)) = (central(h), central(0.5 * h)) else { continue };
+            // Without what goes with h², which is too much where the lens nearly is a pinhole and looks aside.
+            let expected = (4.0 * half - whole) / 3.0;
             let found = DVec2::new(projection.gradients[0][axis], projection.gradients[1][axis]);
             let scale = lens.focal.x / depth;
             prop_assert!(
