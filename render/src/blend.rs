@@ -119,22 +119,26 @@ impl FieldOptions {
     }
 
     /// The threshold t among views that all see the whole of what matters (a = 1), from
-    /// their differences, of which it sorts those that matter. More views can only lower it.
+    /// their differences, whose order it changes. More views can only lower it.
     pub(crate) fn threshold_of_seen(&self, diffs: &mut [f64]) -> f64 {
-        // The one after the last that may contribute caps it.
-        let last = MAX_CONTRIBUTORS.max(self.k);
-        let diffs = match diffs.len() > last + 1 {
-            true => {
-                let (below, ..) = diffs.select_nth_unstable_by(last, f64::total_cmp);
-                let count = below.len() + 1;
-                &mut diffs[..count]
+        if self.blend == Blend::Paper {
+            return nth(diffs, self.k - 1);
+        }
+        // What [`threshold`] finds among those that are sorted: with all in play t is no less than it should
+        // be, as those beyond it count against it; without them it is nearer, until there are none.
+        let m = self.full_weight();
+        let (mut t, mut in_play) = (f64::INFINITY, usize::MAX);
+        loop {
+            let (count, sum) = below(diffs, t);
+            if !(count as f64 > m) || count >= in_play {
+                break;
             }
-            false => diffs,
-        };
-        diffs.sort_unstable_by(f64::total_cmp);
-        match self.blend {
-            Blend::Paper => diffs.get(self.k - 1).copied().unwrap_or(f64::INFINITY),
-            Blend::Consistent => threshold_of(|i| Some((*diffs.get(i)?, 1.0)), self.full_weight()),
+            (t, in_play) = (sum / (count as f64 - m), count);
+        }
+        // The one after the last that may contribute caps it.
+        match in_play > MAX_CONTRIBUTORS {
+            true => t.min(nth(diffs, MAX_CONTRIBUTORS)),
+            false => t,
         }
     }
 
@@ -163,6 +167,32 @@ impl FieldOptions {
         };
         suffice || count > MAX_CONTRIBUTORS
     }
+}
+
+/// The n-th smallest, from zero on; infinite where there are not so many.
+fn nth(diffs: &mut [f64], n: usize) -> f64 {
+    match n < diffs.len() {
+        true => *diffs.select_nth_unstable_by(n, f64::total_cmp).1,
+        false => f64::INFINITY,
+    }
+}
+
+/// How many are less than t, and their sum.
+fn below(diffs: &[f64], t: f64) -> (usize, f64) {
+    // Several at once, none of which waits for the one before.
+    let (mut counts, mut sums) = ([0; 4], [0.0; 4]);
+    let mut add = |lane: usize, diff: f64| {
+        counts[lane] += usize::from(diff < t);
+        sums[lane] += if diff < t { diff } else { 0.0 };
+    };
+    let (fours, rest) = diffs.as_chunks::<4>();
+    for four in fours {
+        (0..4).for_each(|lane| add(lane, four[lane]));
+    }
+    rest.iter()
+        .zip(0..)
+        .for_each(|(diff, lane)| add(lane, *diff));
+    (counts.iter().sum(), sums.iter().sum())
 }
 
 fn contributors(
@@ -208,6 +238,41 @@ fn threshold_of(sorted: impl Fn(usize) -> Option<(f64, f64)>, m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The threshold of views that see all is that of the same ones in order, each counting in full.
+    #[test]
+    fn thresholds_take_no_order() {
+        let mut state = 7_u32;
+        let mut random = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        let mut finite = 0;
+        for round in 0..4_000 {
+            // Many are alike, some zero, some infinite.
+            let steps = 1 + random(60);
+            let diffs: Vec<f64> = (0..random(60))
+                .map(|_| match random(40) {
+                    0 => f64::INFINITY,
+                    _ => 0.01 * f64::from(random(steps)),
+                })
+                .collect();
+            let options = FieldOptions {
+                k: 1 + random(70) as usize,
+                ..FieldOptions::default()
+            };
+            let mut sorted: Vec<(f64, f64)> = diffs.iter().map(|d| (*d, 1.0)).collect();
+            sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
+            let expected = threshold(&sorted, options.full_weight());
+            let found = options.threshold_of_seen(&mut diffs.clone());
+            assert!(
+                found == expected || (found - expected).abs() <= 1e-12 * expected,
+                "{round}: {found} for {expected}, {options:?} {diffs:?}"
+            );
+            finite += u32::from(found.is_finite());
+        }
+        assert!(finite > 1_000, "{finite}");
+    }
 
     /// Where those that differ least suffice, all others change no weight.
     #[test]

@@ -18,6 +18,7 @@ use crate::planted::{Fault, is_planted};
 use calibrate::{Lens, Pixel};
 use glam::DVec3;
 use group::{Bounds, Group, Query};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Views of a group, and groups of the one above.
@@ -103,30 +104,36 @@ impl ViewTree {
         }
         let views: Vec<u32> = order.into_iter().map(|(_, i)| i).collect();
         // The views.
-        let mut last: Option<(Lens, [f64; 2], Option<[f64; 2]>)> = None;
-        let mut of_view = |i: u32| {
-            let source = &sources[i as usize];
-            // Most photos share their lens.
-            let spread = match last {
-                Some((lens, size, spread)) if lens == source.lens && size == source.size => spread,
-                _ => cosine_and_sine(widest(&source.lens, source.size)),
+        let of_some = |views: &[u32]| {
+            let mut last: Option<(Lens, [f64; 2], Option<[f64; 2]>)> = None;
+            let of_view = |i: &u32| {
+                let source = &sources[*i as usize];
+                // Most photos share their lens.
+                let spread = match last {
+                    Some((lens, size, spread)) if lens == source.lens && size == source.size => {
+                        spread
+                    }
+                    _ => cosine_and_sine(widest(&source.lens, source.size)),
+                };
+                last = Some((source.lens, source.size, spread));
+                Bounds {
+                    center: source.center,
+                    radius: 0.0,
+                    axis: source.rotation.row(2),
+                    spread,
+                    footprint_ratio: source.footprint_ratio,
+                    far: source.center.length(),
+                }
             };
-            last = Some((source.lens, source.size, spread));
-            Bounds {
-                center: source.center,
-                radius: 0.0,
-                axis: source.rotation.row(2),
-                spread,
-                footprint_ratio: source.footprint_ratio,
-                far: source.center.length(),
-            }
+            views.iter().map(of_view).collect::<Vec<Bounds>>()
         };
-        let bounds: Vec<Bounds> = views.iter().map(|i| of_view(*i)).collect();
+        let bounds: Vec<Bounds> = views.par_chunks(ALONE).flat_map_iter(of_some).collect();
         let mut levels = vec![in_groups(&bounds)];
         // What is above them.
         let mut below = bounds;
         while has_levels && below.len() > GROUP {
-            below = below.chunks(GROUP).map(Bounds::around).collect();
+            let around = below.par_chunks(GROUP).with_min_len(ALONE / GROUP);
+            below = around.map(Bounds::around).collect();
             levels.push(in_groups(&below));
         }
         Self { views, levels }
@@ -267,7 +274,8 @@ impl Around {
 }
 
 fn in_groups(bounds: &[Bounds]) -> Vec<Group> {
-    bounds.chunks(GROUP).map(Group::new).collect()
+    let groups = bounds.par_chunks(GROUP).with_min_len(ALONE / GROUP);
+    groups.map(Group::new).collect()
 }
 
 /// Sorts views such that each group of eight, eight such groups, and so on are near one another: parts are

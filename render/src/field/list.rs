@@ -377,10 +377,19 @@ impl Triangle<'_> {
     fn bounds(&self, listed: &[Listed]) -> [f64; 3] {
         let mut diffs = Vec::with_capacity(listed.len());
         [0, 1, 2].map(|c| {
-            diffs.clear();
-            let all = listed.iter().filter(|view| view.sees == Sees::All);
-            diffs.extend(all.map(|view| view.diffs[c]));
-            self.frame.options.threshold_of_seen(&mut diffs)
+            let mut threshold_within = |most: f64| {
+                let all = listed.iter().filter(|view| view.sees == Sees::All);
+                diffs.clear();
+                diffs.extend(all.map(|view| view.diffs[c]).filter(|diff| *diff <= most));
+                self.frame.options.threshold_of_seen(&mut diffs)
+            };
+            // Mostly it is no more than what the corner told of, and what differs by more does not matter.
+            let within = self.corners[c].near.within;
+            let threshold = threshold_within(within);
+            match threshold <= within {
+                true => threshold,
+                false => threshold_within(f64::INFINITY),
+            }
         })
     }
 
