@@ -53,10 +53,10 @@ impl Scene {
             .filter(|k| self.may_have(*k))
             .collect();
 
-        // 1. Too few photos to spare any: the kind that suits most scenes.
+        // 1. Too few photos to spare any: a kind that suits most scenes.
         if rest.len() < FEWEST {
             let why = format!("{} photos are too few to compare proxies by", rest.len());
-            return self.fit_usual(&candidates, without, why);
+            return self.fit_usual(&candidates, without, rest.len(), why);
         }
 
         // 2. Each kind, judged by photos spread over the rest, each drawn without itself.
@@ -99,7 +99,7 @@ impl Scene {
         // 3. The best, from all.
         let Some((kind, occludes)) = best else {
             let why = "no kind of proxy could be judged by photos".to_owned();
-            let fitted = self.fit_usual(&candidates, without, why)?;
+            let fitted = self.fit_usual(&candidates, without, rest.len(), why)?;
             return Ok(Fitted { trials, ..fitted });
         };
         let mut fitted = match kind {
@@ -117,18 +117,32 @@ impl Scene {
         Ok(fitted)
     }
 
-    /// The kind that suits most scenes, where photos do not tell, and a note of why.
+    /// Of the kinds that suit most scenes the first that can be fitted to so many photos, where these do not
+    /// tell which is best, and a note of why and of what could not be fitted before it.
+    ///
+    /// # Errors
+    /// Not even a plane can be fitted; [`SceneError::Damaged`] of photos that cannot be decoded.
     fn fit_usual(
         &self,
         candidates: &[Kind],
         without: &BTreeSet<String>,
+        photos: usize,
         why: String,
     ) -> Result<Fitted, SceneError> {
-        let kinds = [Kind::Points, Kind::Hull, Kind::Plane];
-        let kind = kinds.into_iter().find(|k| candidates.contains(k));
-        let mut fitted = self.fit_to_all(kind.unwrap_or(Kind::Plane), without)?;
-        fitted.note.get_or_insert(why);
-        Ok(fitted)
+        let takes_long = |kind: Kind| kind == Kind::Dense && photos > MOST_COMPARED;
+        let mut said = vec![why];
+        for kind in [Kind::Points, Kind::Hull, Kind::Dense] {
+            if !candidates.contains(&kind) || takes_long(kind) {
+                continue;
+            }
+            match self.fit_to_all(kind, without) {
+                Ok(fitted) => return Ok(noted(fitted, said)),
+                // Without these photos all kinds may be fitted.
+                Err(damaged @ SceneError::Damaged(_)) => return Err(damaged),
+                Err(error) => said.push(format!("no {} ({error})", kind.name())),
+            }
+        }
+        Ok(noted(self.fit_to_all(Kind::Plane, without)?, said))
     }
 
     /// Whether a scene has at all what a kind of proxy is made from.
@@ -143,6 +157,13 @@ impl Scene {
             Kind::Depth => self.photos.iter().any(|p| p.depth_map.is_some()),
         }
     }
+}
+
+/// A proxy with what was said before it was fitted, ahead of its own note.
+fn noted(mut fitted: Fitted, mut said: Vec<String>) -> Fitted {
+    said.extend(fitted.note.take());
+    fitted.note = Some(said.join("; "));
+    fitted
 }
 
 impl Trial {
@@ -170,4 +191,52 @@ pub fn trials_text(trials: &[Trial]) -> String {
         }
     };
     trials.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use datasets::Options;
+
+    #[test]
+    fn few_photos_without_points_are_compared_before_a_plane_is_taken() {
+        let options = Options {
+            size: Some((64, 48)),
+            views: Some(5),
+            samples_per_side: Some(2),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let capture = folder.path().join("wall");
+        let made = datasets::by_name("wall", &options).unwrap();
+        datasets::write(&made, &capture).unwrap();
+        let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        scene.reconstruction.points.clear();
+        for image in scene.reconstruction.images.values_mut() {
+            image.keypoints.clear();
+        }
+        for photo in &mut scene.photos {
+            photo.depth_map = None;
+        }
+
+        // 1. Photos that overlap.
+        let fitted = scene.fit_best(&BTreeSet::new()).unwrap();
+        assert_eq!(fitted.proxy.kind(), "dense");
+        let note = fitted.note.unwrap();
+        assert_eq!(note, "5 photos are too few to compare proxies by");
+
+        // 2. One alone agrees with none, and tells no depths.
+        let others: BTreeSet<String> = scene.names().into_iter().skip(1).collect();
+        let error = scene.fit_best(&others).unwrap_err().to_string();
+        assert!(error.contains("give the plane by hand"), "{error}");
+        scene.photos[0].depth_bounds = Some([2.0, 6.0]);
+        let fitted = scene.fit_best(&others).unwrap();
+        assert_eq!(fitted.proxy.kind(), "plane");
+        let note = fitted.note.unwrap();
+        assert!(
+            note.starts_with("1 photos are too few to compare proxies by; no dense ("),
+            "{note}"
+        );
+        let own = "; the proxy is a plane fitted to the nearest and farthest depths of 1 photos";
+        assert!(note.contains(own), "{note}");
+    }
 }
