@@ -1,7 +1,8 @@
 //! Pictures beside the photos: masks, mattes and depth maps, matched to photos by name.
 
 use crate::decode::{format_of, read_failed};
-use crate::{CaptureError, PhotoSet, decode};
+use crate::photo_set::other_files;
+use crate::{CaptureError, PhotoFile, PhotoSet, decode};
 use image::{
     ColorType, DynamicImage, GrayImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Luma,
     Rgb, RgbaImage,
@@ -61,18 +62,46 @@ pub fn match_jpegs_by_name(folder: &Path, photos: &[&str]) -> Result<Matched, Ca
     match_kind(folder, photos, |kind| kind != "png")
 }
 
+/// The same of files of any other kind, which are not read: `sub/a.jpg.tif` or else `sub/a.tif`, where there
+/// are any.
+///
+/// # Errors
+/// A folder that cannot be listed; a file whose name is not UTF-8, or that two photos could claim.
+pub fn match_others_by_name(folder: &Path, photos: &[&str]) -> Result<Matched, CaptureError> {
+    let called = |file: PhotoFile| {
+        let (name, extension) = file.name.rsplit_once('.')?;
+        // The point may be a folder's.
+        let is_own = !extension.contains('/');
+        let name = is_own.then(|| with_lower_extension(name))?;
+        Some((name, file))
+    };
+    let files = other_files(folder)?;
+    match_files(files.into_iter().filter_map(called), photos)
+}
+
 fn match_kind(
     folder: &Path,
     photos: &[&str],
     is_wanted: impl Fn(&str) -> bool,
 ) -> Result<Matched, CaptureError> {
-    let mut files: BTreeMap<String, (String, PathBuf)> = BTreeMap::new();
-    for file in PhotoSet::open(folder)?.photos {
+    let called = |file: PhotoFile| {
         let (name, kind) = split_extension(&file.name);
-        if kind.is_some_and(&is_wanted) {
-            let called = with_lower_extension(name);
-            files.entry(called).or_insert((file.name, file.path));
-        }
+        let is_it = kind.is_some_and(&is_wanted);
+        let name = is_it.then(|| with_lower_extension(name))?;
+        Some((name, file))
+    };
+    let files = PhotoSet::open(folder)?.photos;
+    match_files(files.into_iter().filter_map(called), photos)
+}
+
+/// Which of files belong to photos; each comes with its name less its own extension.
+fn match_files(
+    called: impl Iterator<Item = (String, PhotoFile)>,
+    photos: &[&str],
+) -> Result<Matched, CaptureError> {
+    let mut files: BTreeMap<String, (String, PathBuf)> = BTreeMap::new();
+    for (called, file) in called {
+        files.entry(called).or_insert((file.name, file.path));
     }
     let mut claimed: BTreeMap<&str, &str> = BTreeMap::new();
     let mut by_photo = BTreeMap::new();

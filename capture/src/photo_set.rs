@@ -33,7 +33,13 @@ impl PhotoSet {
     /// A folder that cannot be listed or holds no photo; a photo whose name is not UTF-8.
     pub fn open(folder: &Path) -> Result<PhotoSet, CaptureError> {
         let mut photos = Vec::new();
-        collect(folder, "", &mut Vec::new(), &mut photos)?;
+        collect(
+            folder,
+            "",
+            has_photo_extension,
+            &mut Vec::new(),
+            &mut photos,
+        )?;
         if photos.is_empty() {
             return Err(CaptureError::NoPhotos {
                 folder: folder.to_owned(),
@@ -54,6 +60,19 @@ impl PhotoSet {
             .ok()?;
         Some(&self.photos[index])
     }
+}
+
+/// The visible files in a folder and the folders within whose extensions are no photo's, by names like
+/// photos' and sorted by them.
+///
+/// # Errors
+/// A folder that cannot be listed; a file whose name is not UTF-8.
+pub(crate) fn other_files(folder: &Path) -> Result<Vec<PhotoFile>, CaptureError> {
+    let mut files = Vec::new();
+    let is_other = |path: &Path| !has_photo_extension(path);
+    collect(folder, "", is_other, &mut Vec::new(), &mut files)?;
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(files)
 }
 
 /// Where a capture's photos are: in its folder `images`, or else in the capture itself if
@@ -114,10 +133,11 @@ fn folders_in(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Appends the photos in `folder`, whose own name within the set is `prefix`.
+/// Appends the visible files in `folder` that are wanted, whose own name within the set is `prefix`.
 fn collect(
     folder: &Path,
     prefix: &str,
+    is_wanted: fn(&Path) -> bool,
     around: &mut Vec<PathBuf>,
     photos: &mut Vec<PhotoFile>,
 ) -> Result<(), CaptureError> {
@@ -136,7 +156,7 @@ fn collect(
         let Some(file_name) = path.file_name() else {
             continue;
         };
-        if is_hidden(&path) || !(is_photo(&path) || path.is_dir()) {
+        if is_hidden(&path) || !(is_wanted(&path) || path.is_dir()) {
             continue;
         }
         let Some(file_name) = file_name.to_str() else {
@@ -144,7 +164,7 @@ fn collect(
         };
         let name = format!("{prefix}{file_name}");
         if path.is_dir() {
-            collect(&path, &format!("{name}/"), around, photos)?;
+            collect(&path, &format!("{name}/"), is_wanted, around, photos)?;
         } else {
             photos.push(PhotoFile { name, path });
         }

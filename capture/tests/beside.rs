@@ -2,7 +2,7 @@
 
 use capture::{
     Beside, apply_matte, check_beside, decode_depth, decode_mask, is_black_and_white, is_in_alpha,
-    match_by_name, match_jpegs_by_name,
+    match_by_name, match_jpegs_by_name, match_others_by_name,
 };
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, Rgba, RgbaImage};
 use std::fs;
@@ -53,6 +53,31 @@ fn pictures_belong_to_photos_by_name() {
     let expected = expected.map(|(photo, file)| (photo.to_owned(), at(file)));
     assert_eq!(matched.by_photo.into_iter().collect::<Vec<_>>(), expected);
     assert_eq!(matched.unmatched, ["a.png", "astray.png"]);
+}
+
+#[test]
+fn files_of_other_kinds_belong_to_photos_by_name_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let none = match_others_by_name(folder.path(), &["a.jpg"]).unwrap();
+    assert!(none.by_photo.is_empty());
+    for name in [
+        "a.tif",
+        "a.JPG.exr",
+        "b.png",
+        "c.d/c.npy",
+        "c.d/e",
+        "stray.bmp",
+        ".b.tif",
+    ] {
+        save(&folder, name, GrayImage::new(2, 2));
+    }
+    let photos = ["a.jpg", "b.jpg", "c.d/c.png", "c.jpg"];
+    let matched = match_others_by_name(folder.path(), &photos).unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let expected = [("a.jpg", "a.JPG.exr"), ("c.d/c.png", "c.d/c.npy")];
+    let expected = expected.map(|(photo, file)| (photo.to_owned(), at(file)));
+    assert_eq!(matched.by_photo.into_iter().collect::<Vec<_>>(), expected);
+    assert_eq!(matched.unmatched, ["a.tif", "stray.bmp"]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::undistort::{MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, Warning};
 use capture::{
     Beside, CaptureError, DepthMap, Matched, apply_matte, check_beside, is_black_and_white,
-    is_in_alpha, match_by_name, match_jpegs_by_name,
+    is_in_alpha, match_by_name, match_jpegs_by_name, match_others_by_name,
 };
 use image::{GrayImage, RgbaImage};
 use std::collections::BTreeMap;
@@ -169,13 +169,24 @@ impl Scene {
         let names: Vec<&str> = names.map(String::as_str).collect();
         let total = self.photos.len();
         let by_name = meant.matched(&names, |names| match_by_name(folder, names));
-        let mut matched = match by_name {
-            // An empty folder that nobody mentioned is none.
-            Err(CaptureError::NoPhotos { .. }) if !asked => return Ok(()),
-            matched => matched?,
+        let (mut matched, has_pictures) = match by_name {
+            Err(CaptureError::NoPhotos { .. }) => (Matched::default(), false),
+            matched => (matched?, true),
         };
+        let mut unread = None;
         if matched.by_photo.is_empty() {
-            matched = jpegs(kind, folder, &names, meant, warnings).unwrap_or(matched);
+            match jpegs(kind, folder, &names, meant) {
+                Ok(masks) => matched = masks,
+                Err(why) => unread = why,
+            }
+        }
+        let unread = unread.or_else(|| others(kind, folder, &names, meant, &matched.by_photo));
+        let note_of_unread =
+            |unread: String| Warning::Note(format!("{}: {unread}", folder.display()));
+        if !has_pictures && !asked {
+            // An empty folder that nobody mentioned is none.
+            warnings.extend(unread.map(note_of_unread));
+            return Ok(());
         }
         let Matched {
             mut by_photo,
@@ -191,8 +202,10 @@ impl Scene {
                 folder: folder.to_owned(),
                 kind,
                 example: (*example).to_owned(),
+                unread,
             });
         }
+        warnings.extend(unread.map(note_of_unread));
         if found < total {
             warnings.push(Warning::Note(format!(
                 "{}: {found} of {total} photos have their {kind} here",
@@ -322,32 +335,65 @@ impl Scene {
     }
 }
 
-/// The JPEG files in a folder without PNG files for any photo, where they are black and white; of others a
-/// note says why they are not used.
+/// The JPEG files in a folder without PNG files for any photo, where they are black and white; of others why
+/// they are not used, if there are any.
 fn jpegs(
     kind: Beside,
     folder: &Path,
     names: &[&str],
     meant: &Meant,
-    warnings: &mut Vec<Warning>,
-) -> Option<Matched> {
+) -> Result<Matched, Option<String>> {
     // What two photos could claim is none's.
     let matched = meant.matched(names, |names| match_jpegs_by_name(folder, names));
-    let matched = matched.ok()?;
-    let (example, _) = matched.by_photo.first_key_value()?;
+    let Ok(matched) = matched else {
+        return Err(None);
+    };
+    let Some((example, _)) = matched.by_photo.first_key_value() else {
+        return Err(None);
+    };
     let is_mask = |file: &PathBuf| is_black_and_white(file).unwrap_or(false);
     let why = match kind {
         Beside::DepthMap => "depth does not fit into JPEG files: write 16-bit grey PNG",
-        _ if some_of(&matched.by_photo).all(is_mask) => return Some(matched),
+        _ if some_of(&matched.by_photo).all(is_mask) => return Ok(matched),
         _ => "the JPEG files are not black and white: write PNG",
     };
-    warnings.push(Warning::Note(format!(
-        "{}: {} of {} photos have a file of their name here that is no {kind} ({example}, for one): {why}",
-        folder.display(),
-        matched.by_photo.len(),
-        names.len()
-    )));
-    None
+    let count = matched.by_photo.len();
+    Err(Some(unread_text(kind, count, names.len(), example, why)))
+}
+
+/// Why files in a folder are not used whose names are those of photos that have nothing else there, if there
+/// are any: they are neither PNG nor JPEG. `found` is what other photos have.
+fn others(
+    kind: Beside,
+    folder: &Path,
+    names: &[&str],
+    meant: &Meant,
+    found: &BTreeMap<String, PathBuf>,
+) -> Option<String> {
+    let is_open = |name: &str| !found.contains_key(name);
+    let open: Vec<&str> = names.iter().copied().filter(|name| is_open(name)).collect();
+    if open.is_empty() {
+        return None;
+    }
+    // As of JPEG files.
+    let matched = meant.matched(&open, |names| match_others_by_name(folder, names));
+    let mut files = matched.ok()?.by_photo;
+    files.retain(|name, _| is_open(name));
+    let (_, example) = files.first_key_value()?;
+    let example = example.strip_prefix(folder).unwrap_or(example);
+    let why = match kind {
+        Beside::DepthMap => "only 16-bit grey PNG is read: write depths so",
+        _ => "only PNG is read, and JPEG in black and white: convert them",
+    };
+    let example = example.display().to_string();
+    Some(unread_text(kind, files.len(), names.len(), &example, why))
+}
+
+/// That some of all photos have a file that is not read, and why not.
+fn unread_text(kind: Beside, count: usize, total: usize, example: &str, why: &str) -> String {
+    format!(
+        "{count} of {total} photos have a file of their name here that is no {kind} ({example}, for one): {why}"
+    )
 }
 
 /// What to say of masks that have their shape in their alpha channel, if some that are asked do.

@@ -108,7 +108,7 @@ pub enum SceneError {
     /// A folder of masks, mattes or depth maps has none for any photo.
     #[error(
         "{}: no {kind} for any photo here; that of {example} would be called {example}.png, or \
-         so without its own extension", folder.display()
+         so without its own extension{}", folder.display(), more(unread.as_deref())
     )]
     NothingBeside {
         /// The folder.
@@ -117,6 +117,8 @@ pub enum SceneError {
         kind: capture::Beside,
         /// A photo's name.
         example: String,
+        /// What there is in its place and why it is not read, if there is anything.
+        unread: Option<String>,
     },
     /// A photo is missing or corrupt and none may be.
     #[error("photo {name}: {reason}; without --strict it would be left out")]
@@ -226,6 +228,11 @@ pub enum SceneError {
     /// Every photo is held out or corrupt.
     #[error("no photo is left to render from: all {0} are held out or corrupt")]
     NothingLeft(usize),
+}
+
+/// What else there is to say, after all.
+fn more(said: Option<&str>) -> String {
+    said.map_or_else(String::new, |said| format!("; {said}"))
 }
 
 /// The first few names, for people.

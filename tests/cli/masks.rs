@@ -225,6 +225,72 @@ fn masks_may_be_jpegs_and_are_not_looked_for_in_alpha() {
 }
 
 #[test]
+fn masks_and_depth_maps_of_kinds_that_are_not_read_are_told() {
+    let folder = with_wall();
+    fs::remove_dir_all(at(&folder, "wall/depth")).unwrap();
+    let write = |name: String| {
+        let file = at(&folder, &name);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, "of another program").unwrap();
+    };
+    for i in 0..9 {
+        write(format!("wall/masks/{i:04}.png.bmp"));
+        write(format!("wall/depth/{i:04}.EXR"));
+    }
+    // What belongs to no photo, or is hidden, is none's.
+    write("wall/depth/list.txt".to_owned());
+    write("wall/depth/.0000.txt".to_owned());
+    let of_masks = "9 of 9 photos have a file of their name here that is no ignore mask (0000.png.bmp, for one): \
+                    only PNG is read, and JPEG in black and white: convert them";
+    let of_depth = "9 of 9 photos have a file of their name here that is no depth map (0000.EXR, for one): only \
+                    16-bit grey PNG is read: write depths so";
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    let notes: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!(
+        notes,
+        [
+            format!("note: wall/masks: {of_masks}"),
+            format!("note: wall/depth: {of_depth}")
+        ]
+    );
+    // Of folders that were asked for it is the error.
+    for (option, kind, said) in [
+        ("--masks wall/masks", "ignore mask", of_masks),
+        ("--depth wall/depth", "depth map", of_depth),
+    ] {
+        let (_, place) = option.split_once(' ').unwrap();
+        let error = lumigraph(folder.path(), &format!("import wall {option} -o s")).error(1);
+        let expected = format!(
+            "{place}: no {kind} for any photo here; that of 0000.png would be called 0000.png.png, or so \
+             without its own extension; {said}"
+        );
+        assert_eq!(error, expected);
+    }
+    fs::create_dir(at(&folder, "bare")).unwrap();
+    let error = lumigraph(folder.path(), "import wall --mattes bare -o s").error(1);
+    assert!(
+        error.starts_with("bare: no object matte for any photo here; "),
+        "{error}"
+    );
+
+    // Where some photos have a mask, what others have in its place.
+    for i in 0..7 {
+        save(
+            at(&folder, &format!("wall/masks/{i:04}.png.png")),
+            &mask_of(i),
+        );
+    }
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    for said in [
+        "note: wall/masks: 7 of 9 photos have their ignore mask here\n",
+        "note: wall/masks: 2 of 9 photos have a file of their name here that is no ignore mask (0007.png.bmp, \
+         for one)",
+    ] {
+        assert!(ran.stderr.contains(said), "{said}: {}", ran.stderr);
+    }
+}
+
+#[test]
 fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
     let folder = with_wall();
     let mask = at(&folder, "wall/masks/0003.png.png");
