@@ -32,12 +32,10 @@ pub(super) fn is_beside(name: &str) -> bool {
 /// World units a step of depth maps, if nobody says: millimetres where units are metres.
 pub const DEPTH_UNITS_PER_STEP: f64 = 0.001;
 
-/// Alpha and mask agree where both are on the same side of half in this share of pixels.
-const AGREES: f64 = 0.99;
 /// An ignore mask's value below which depth is not used: masks have soft borders, and some are JPEG.
-const USED: u8 = 128;
+pub(super) const USED: u8 = 128;
 /// So many masks, spread over the photos, decide whether all are silhouettes.
-const MASKS_JUDGED: usize = 5;
+pub(super) const MASKS_JUDGED: usize = 5;
 
 impl Photo {
     /// Its pixels as stored, cut out by its object matte if it has one.
@@ -244,94 +242,6 @@ impl Scene {
             }
         }
         Ok(())
-    }
-
-    /// Says so where ignore masks are an object's silhouettes, and unless they were `asked`
-    /// for, keeps them as that only: as ignore masks they would take the background away, and
-    /// with it most of the picture.
-    pub(super) fn judge_masks(&mut self, asked: bool, warnings: &mut Vec<Warning>) {
-        let note = if let Some(name) = self.repeated_alpha() {
-            let remedy = if asked {
-                "--no-masks leaves them out"
-            } else {
-                "they ignore nothing"
-            };
-            format!(
-                "the ignore masks repeat the photos' alpha ({name}, for one), which is an object \
-                 matte already; {remedy}"
-            )
-        } else if !asked && self.masks_keep_little() {
-            let folder = self.masks_folder();
-            let folder = folder.display();
-            format!(
-                "the masks in {folder} keep less than half of each photo, as an object's \
-                 silhouettes do, and serve the hull only; --mattes {folder} cuts the photos \
-                 out along them, --masks {folder} ignores all else"
-            )
-        } else {
-            return;
-        };
-        warnings.push(Warning::Note(note));
-        if !asked {
-            for photo in &mut self.photos {
-                photo.silhouette = photo.ignore_mask.take();
-            }
-        }
-    }
-
-    /// Where the first ignore mask lies, as options may name it: from the capture's folder, if it
-    /// is in there.
-    fn masks_folder(&self) -> PathBuf {
-        let mut masks = self.photos.iter().filter_map(|p| p.ignore_mask.as_deref());
-        let folder = masks.next().and_then(Path::parent);
-        let capture = self.capture.as_deref().unwrap_or(Path::new(""));
-        let within = folder.map(|folder| match folder.strip_prefix(capture) {
-            Ok(within) if within != Path::new("") => within,
-            _ => folder,
-        });
-        match within {
-            // Or in folders of the same names as the photos'.
-            Some(folder) if !folder.starts_with(MASKS_FOLDER) => folder.to_owned(),
-            _ => PathBuf::from(MASKS_FOLDER),
-        }
-    }
-
-    /// Whether the ignore masks only repeat the photos' alpha channels, judged by the first
-    /// photo that has one; its name.
-    fn repeated_alpha(&self) -> Option<String> {
-        let photo = self.photos.iter().find(|p| p.ignore_mask.is_some())?;
-        // What is wrong with a file is said when it is needed.
-        let size = capture::photo_size(&photo.path).ok()?;
-        let pixels = photo.decode(size).ok()?;
-        let mask = photo.decode_ignore_mask(size).ok()??;
-        if pixels.pixels().all(|p| p.0[3] == 255) {
-            return None;
-        }
-        let both = pixels.pixels().zip(mask.pixels());
-        let agreeing = both
-            .filter(|(p, m)| (p.0[3] >= 128) == (m.0[0] >= 128))
-            .count();
-        let repeats = agreeing as f64 >= AGREES * pixels.pixels().len() as f64;
-        repeats.then(|| photo.name.clone())
-    }
-
-    /// Whether each of a few ignore masks keeps less than half of its photo.
-    fn masks_keep_little(&self) -> bool {
-        let masked: Vec<&Photo> = self
-            .photos
-            .iter()
-            .filter(|p| p.ignore_mask.is_some())
-            .collect();
-        let step = masked.len().div_ceil(MASKS_JUDGED).max(1);
-        let keeps_little = |photo: &&Photo| {
-            let size = capture::photo_size(&photo.path).ok();
-            let mask = size.and_then(|size| photo.decode_ignore_mask(size).ok()?);
-            mask.is_some_and(|mask| {
-                let kept = mask.pixels().filter(|p| p.0[0] >= 128).count();
-                2 * kept < mask.pixels().len()
-            })
-        };
-        !masked.is_empty() && masked.iter().step_by(step).all(keeps_little)
     }
 }
 

@@ -19,6 +19,7 @@ pub mod file;
 mod fit;
 mod home;
 mod import;
+mod kept;
 mod listed;
 mod lumigraph;
 mod meant;

@@ -426,6 +426,48 @@ fn silhouettes_are_no_ignore_masks_unless_asked_for() {
 }
 
 #[test]
+fn masks_whose_values_are_labels_are_told() {
+    let folder = with_wall();
+    let label = |is_used: &dyn Fn(u32, u32, u32) -> bool| {
+        for i in 0..9 {
+            let mask = GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+                Luma([if is_used(i, x, y) { 3 } else { 0 }])
+            });
+            save(at(&folder, &format!("wall/masks/{i:04}.png")), &mask);
+        }
+    };
+    let note = "note: wall/masks/0000.png: the greatest value of the ignore mask is 3, of 255 for what is used: ";
+    let silhouettes = "--mattes masks cuts";
+
+    // What is not 0 is most of each photo.
+    label(&|i, x, y| !someone(i, x, y));
+    for masks in ["", " --masks wall/masks"] {
+        let ran = lumigraph(
+            folder.path(),
+            &format!("import wall{masks} -o scene --force"),
+        )
+        .ok();
+        assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
+        assert!(!ran.stderr.contains(silhouettes), "{}", ran.stderr);
+        assert!(ran.stdout.contains(", 9 ignore masks"), "{}", ran.stdout);
+    }
+    // Or less than half.
+    label(&|_, x, _| x < 40);
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    for said in [note, silhouettes] {
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    // One that is ignored all over has no labels.
+    label(&|_, _, _| false);
+    let ran = lumigraph(
+        folder.path(),
+        "import wall --masks wall/masks -o scene --force",
+    )
+    .ok();
+    assert!(!ran.stderr.contains("greatest"), "{}", ran.stderr);
+}
+
+#[test]
 fn depth_maps_are_recorded_with_their_scale() {
     let folder = with_wall();
     let ran = lumigraph(folder.path(), "import wall -o scene").ok();
