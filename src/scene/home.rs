@@ -6,7 +6,7 @@ use super::{Scene, Warning};
 use std::path::{Path, PathBuf};
 
 /// Photos beside a model's folder.
-const IMAGES: &str = "images";
+pub(super) const IMAGES: &str = "images";
 
 /// The folder with the photos that a calibration is of, and with what lies beside them: the capture, or the one in
 /// it where a COLMAP model lies in `sparse` and photos in `images`, as in `dense`.

@@ -111,7 +111,7 @@ impl Scene {
             Source::Other(Format::Llff, file) => calibration::depth_bounds(file, &found)?,
             _ => BTreeMap::new(),
         };
-        let meant = Meant::of(&mut reconstruction, &found);
+        let meant = Meant::of(&mut reconstruction, &found, &home, source.path());
         let mut scene = Self::of(reconstruction, capture, &found, &bounds, options);
         for photo in &mut scene.photos {
             if let Some(file) = meant.photos.get(&photo.name) {

@@ -1,6 +1,8 @@
 //! Which photos a calibration means by names that no photo has to the letter.
 
 use super::Warning;
+use super::home::IMAGES;
+use super::import::ENOUGH;
 use calibrate::Reconstruction;
 use capture::{CaptureError, Matched, PhotoFile, PhotoSet, name_key, photo_size, stem_key};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +25,15 @@ impl Meant {
     /// A photo is meant where its name and the calibration's are the only ones that differ in letters'
     /// case or in how their marks are written alone, or else in what they end in, too, and it is as large
     /// as was calibrated.
-    pub(super) fn of(whole: &mut Reconstruction, found: &PhotoSet) -> Self {
+    ///
+    /// Of names that lead to photos from a folder within alone a message says how to import those: `home` is
+    /// the folder that they are looked for in, and `calibration` where that is.
+    pub(super) fn of(
+        whole: &mut Reconstruction,
+        found: &PhotoSet,
+        home: &Path,
+        calibration: &Path,
+    ) -> Self {
         name_directly(whole, found);
         name_from_within(whole, found);
         // 1. Names without a photo, and photos without a name.
@@ -38,6 +48,11 @@ impl Meant {
         if missing.is_empty() {
             return meant;
         }
+        let within = folder_within(&missing, found).filter(|_| missing.len() == sizes.len());
+        let elsewhere = within.map_or_else(
+            || IN_ANOTHER_FOLDER.to_owned(),
+            |(folder, count)| way_there(folder, count, missing.len(), found, home, calibration),
+        );
         let is_free = |photo: &&PhotoFile| !sizes.contains_key(photo.name.as_str());
         let free: Vec<&PhotoFile> = found.photos.iter().filter(is_free).collect();
 
@@ -56,7 +71,7 @@ impl Meant {
                     continue;
                 };
                 let why_not = match (&names[..], &files[..]) {
-                    _ if keys.len() == i + 1 => IN_ANOTHER_FOLDER.to_owned(),
+                    _ if keys.len() == i + 1 => elsewhere.clone(),
                     ([name], [file]) => match photo_size(&file.path) {
                         Ok(size) if size == sizes[name] => {
                             meant.photos.insert((*name).to_owned(), (*file).clone());
@@ -137,6 +152,46 @@ const NOT_ALONE: &str =
     "called nearly so, but others are, too: give the one that is meant that very name";
 const IN_ANOTHER_FOLDER: &str =
     "called so in another folder: names in a calibration begin in the folder of all photos";
+
+/// The one folder within the photos' from which names lead to photos, where there is no other, and how many do;
+/// `None` if they are too few for a scene.
+fn folder_within<'f>(names: &[&str], found: &'f PhotoSet) -> Option<(&'f str, usize)> {
+    let names: BTreeSet<&str> = names.iter().copied().collect();
+    let mut folders: BTreeMap<&str, usize> = BTreeMap::new();
+    for photo in &found.photos {
+        for (at, _) in photo.name.match_indices('/') {
+            if names.contains(&photo.name[at + 1..]) {
+                *folders.entry(&photo.name[..at]).or_default() += 1;
+            }
+        }
+    }
+    let (folder, count) = folders.pop_first()?;
+    (folders.is_empty() && count >= ENOUGH).then_some((folder, count))
+}
+
+/// How to have so many of all photos used that names lead to from a folder within the photos'.
+fn way_there(
+    folder: &str,
+    count: usize,
+    total: usize,
+    found: &PhotoSet,
+    home: &Path,
+    calibration: &Path,
+) -> String {
+    let folder = found.root.join(folder);
+    let folder = folder.display();
+    let calibration = calibration.display();
+    // What lies beside the photos is found again only where they are called so.
+    let rename = if found.root == home {
+        format!("rename {folder} to {}, or ", home.join(IMAGES).display())
+    } else {
+        String::new()
+    };
+    format!(
+        "called so in another folder, as {count} of {total} are: {rename}`lumigraph import {folder} \
+         --calibration {calibration} -o SCENE`"
+    )
+}
 
 /// Of what a name ends in after its last `/`.
 fn last_key(name: &str) -> String {

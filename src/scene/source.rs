@@ -19,7 +19,7 @@ pub(super) enum Source {
 
 impl Source {
     /// The file, or a COLMAP model's folder.
-    fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         match self {
             Self::Colmap(path) | Self::OpenCv(path) | Self::Other(_, path) => path,
         }

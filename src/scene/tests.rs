@@ -108,6 +108,41 @@ fn names_may_begin_in_a_folder_around_the_photos() {
 }
 
 #[test]
+fn photos_in_a_folder_of_another_name_are_told_how_to_be_found() {
+    let captures = Captures::new();
+    let names = ["a.png", "b.png", "c.png"];
+    captures.photos("wall/Images", &names[..2], SIZE);
+    captures.model("wall/sparse/0", &names);
+    let error = || captures.try_import("wall").unwrap_err().to_string();
+    let error = || error().replace(&captures.at("").display().to_string(), "");
+    let said = "Images/a.png is called so in another folder, as 2 of 3 are: rename wall/Images to wall/images, \
+                or `lumigraph import wall/Images --calibration wall/sparse/0 -o SCENE`; ";
+    assert!(error().contains(said), "{}", error());
+
+    // Either does.
+    let options = ImportOptions {
+        calibration: Some(captures.at("wall/sparse/0")),
+        ..ImportOptions::default()
+    };
+    let (scene, _) = Scene::import(&captures.at("wall/Images"), &options).unwrap();
+    assert_eq!(scene.names(), names[..2]);
+    fs::rename(captures.at("wall/Images"), captures.at("wall/images")).unwrap();
+    assert_eq!(captures.import("wall").0.names(), names[..2]);
+
+    // Within a folder of the right name only the latter would.
+    fs::rename(captures.at("wall/images"), captures.at("wall/all")).unwrap();
+    fs::create_dir(captures.at("wall/images")).unwrap();
+    fs::rename(captures.at("wall/all"), captures.at("wall/images/all")).unwrap();
+    let said = "as 2 of 3 are: `lumigraph import wall/images/all --calibration";
+    assert!(error().contains(said), "{}", error());
+
+    // Of two folders nobody knows which is meant.
+    captures.photos("wall/images/small", &names[..2], SIZE);
+    let said = "in another folder: names in a calibration begin";
+    assert!(error().contains(said), "{}", error());
+}
+
+#[test]
 fn photos_that_colmap_undistorted_are_those_of_the_model_beside_them() {
     let captures = Captures::new();
     let names = ["a.png", "b.png"];
