@@ -49,7 +49,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         {
             say!("note: {note}");
         }
-        return info_of_file::of_model(&model, args.json);
+        return info_of_file::of_model(&model, &args.keys.keys(), args.json);
     }
     let scene = open(args)?;
     if args.scene.strict {
@@ -84,6 +84,8 @@ fn bare_model(folder: &Path) -> Option<PathBuf> {
 fn open(args: &Args) -> anyhow::Result<Scene> {
     let folder = &args.scene.scene;
     if Scene::is_scene(folder) {
+        let own = format!("the COLMAP model of the scene {}", folder.display());
+        info_of_file::say_unused_keys(&args.keys.keys(), &own);
         return args.scene.open_whole();
     }
     let options = ImportOptions {

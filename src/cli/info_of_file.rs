@@ -11,6 +11,7 @@ use std::path::Path;
 pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()> {
     let info = match formats::detect(path).or_else(|| formats::meant(path)) {
         Some(format) => {
+            say_unused_keys(keys, &path.display().to_string());
             let (whole, sizes) = scene::read_bare(format, path)?;
             if sizes == Sizes::Unknown {
                 say!(
@@ -21,6 +22,7 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
             of_reconstruction(&whole, sizes)
         }
         None if colmap::is_part(path) => {
+            say_unused_keys(keys, &path.display().to_string());
             // One of a model's files stands for all, if the others are there.
             let folder = path.parent().unwrap_or(Path::new(""));
             let whole = match colmap::read_model(folder) {
@@ -44,9 +46,17 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
 }
 
 /// The same of the folder of a COLMAP model.
-pub(super) fn of_model(folder: &Path, as_json: bool) -> anyhow::Result<()> {
+pub(super) fn of_model(folder: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()> {
+    say_unused_keys(keys, &format!("the COLMAP model in {}", folder.display()));
     let whole = colmap::read_model(folder)?;
     print_info(&of_reconstruction(&whole, Sizes::Known), as_json)
+}
+
+/// Says which options for OpenCV's files change nothing of another calibration, called so for people.
+pub(super) fn say_unused_keys(keys: &Keys, calibration: &str) {
+    if let Some(note) = scene::unused_keys(keys, calibration) {
+        say!("note: {note}");
+    }
 }
 
 fn print_info(info: &Value, as_json: bool) -> anyhow::Result<()> {

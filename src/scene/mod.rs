@@ -51,7 +51,7 @@ pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
 pub use relative::{relative, relative_lossy};
 pub use rooms::SceneSurface;
-pub use source::{calibration_in, other_models};
+pub use source::{calibration_in, other_models, unused_keys};
 pub use split::SplitFile;
 pub use times::TimeSource;
 pub use truth::{Truth, TruthScore};

@@ -44,15 +44,15 @@ pub(super) fn find(
     warnings: &mut Vec<Warning>,
 ) -> Result<Source, SceneError> {
     let source = search(capture, options, warnings)?;
-    warnings.extend(unused_keys(&options.keys, &source));
+    if !matches!(source, Source::OpenCv(_)) {
+        warnings.extend(unused_keys(&options.keys, &source.text()).map(Warning::Note));
+    }
     Ok(source)
 }
 
-/// What to say of options for OpenCV's files that were given with another calibration, if any.
-fn unused_keys(keys: &Keys, source: &Source) -> Option<Warning> {
-    if matches!(source, Source::OpenCv(_)) {
-        return None;
-    }
+/// What to say of options for OpenCV's files that were given with another calibration, called so for people, if
+/// any.
+pub fn unused_keys(keys: &Keys, calibration: &str) -> Option<String> {
     let options = [
         ("--camera-matrix", keys.camera_matrix.is_some()),
         ("--distortion", keys.distortion.is_some()),
@@ -65,11 +65,10 @@ fn unused_keys(keys: &Keys, source: &Source) -> Option<Warning> {
         1 => "changes",
         _ => "change",
     };
-    Some(Warning::Note(format!(
-        "{} {change} nothing: the calibration is {}, none of OpenCV's",
-        given.join(" and "),
-        source.text()
-    )))
+    Some(format!(
+        "{} {change} nothing: the calibration is {calibration}, none of OpenCV's",
+        given.join(" and ")
+    ))
 }
 
 /// As [`find`], whatever other options there are.

@@ -56,6 +56,32 @@ fn matrices_under_unusual_names_are_chosen_in_a_capture() {
 }
 
 #[test]
+fn names_of_matrices_change_nothing_of_other_calibrations_aloud() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "export wall --format transforms -o transforms.json").ok();
+    for (what, calibration) in [
+        ("wall", "the COLMAP model in wall/sparse/0"),
+        ("wall/sparse/0", "the COLMAP model in wall/sparse/0"),
+        ("wall/sparse/0/cameras.bin", "wall/sparse/0/cameras.bin"),
+        ("transforms.json", "transforms.json"),
+        ("scene", "the COLMAP model of the scene scene"),
+    ] {
+        let said = |options: &str| {
+            let ran = lumigraph(here, &format!("info {what} {options}--json")).ok();
+            ran.stderr
+        };
+        let note = format!("changes nothing: the calibration is {calibration}, none of OpenCV's\n");
+        let with = said("--camera-matrix K ");
+        let expected = format!("note: --camera-matrix {note}");
+        assert!(with.contains(&expected), "{what}: {with}");
+        let without = said("");
+        assert!(!without.contains(&note), "{what}: {without}");
+    }
+}
+
+#[test]
 fn opencvs_files_that_cannot_be_used_are_told() {
     // Before the poses, and amid them.
     let cut = [
