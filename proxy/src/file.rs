@@ -5,6 +5,7 @@ use crate::dense::DensePoints;
 use crate::mesh::{self, MeshFileError};
 use crate::{MeshKind, Plane, PlaneError, Proxy, Solid, SparsePoint, glb};
 use calibrate::View;
+use capture::without_byte_order_mark;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -311,7 +312,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
     let mesh = || Ok(mesh::parse(path, bytes)?);
     match extension(path).as_str() {
         "json" => {
-            let stored: Stored = serde_json::from_slice(bytes).map_err(json)?;
+            let text = without_byte_order_mark(bytes);
+            let stored: Stored = serde_json::from_slice(text).map_err(json)?;
             stored.proxy(path, || Err(FileError::NoMesh(path.to_owned())))
         }
         "glb" => {
@@ -437,6 +439,13 @@ mod tests {
             2,
             "nothing left behind"
         );
+    }
+
+    #[test]
+    fn what_editors_put_before_text_is_passed_over() {
+        let text = "\u{feff}{\"version\": 1, \"kind\": \"view-plane\"}";
+        let read = parse(Path::new("p.json"), text.as_bytes()).unwrap();
+        assert_eq!(read, Proxy::ViewPlane);
     }
 
     #[test]

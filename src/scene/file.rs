@@ -14,6 +14,7 @@
 //! version does not know are kept when the file is written again.
 
 use super::SceneError;
+use capture::without_byte_order_mark;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -57,6 +58,7 @@ impl SceneFile {
             expected: "a scene",
             source,
         };
+        let bytes = without_byte_order_mark(bytes);
         // The version first: of a later one nothing else need be readable.
         let value: serde_json::Value = serde_json::from_slice(bytes).map_err(json)?;
         let version = value.get("version").and_then(serde_json::Value::as_u64);

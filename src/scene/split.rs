@@ -1,6 +1,7 @@
 //! Held-out photos: `split.json`, `{"test": ["a.jpg", …]}`.
 
 use super::{Photo, Scene, SceneError};
+use capture::without_byte_order_mark;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,7 +22,8 @@ impl SplitFile {
     /// # Errors
     /// It is not the JSON that was expected, or names no photo.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
-        let split: Self = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
+        let text = without_byte_order_mark(bytes);
+        let split: Self = serde_json::from_slice(text).map_err(|source| SceneError::Json {
             path: path.to_owned(),
             expected: "a split, {\"test\": [\"a.jpg\", …]}",
             source,
@@ -125,5 +127,22 @@ impl Scene {
     /// The photos' names, sorted.
     pub fn names(&self) -> Vec<String> {
         self.photos.iter().map(|p| p.name.clone()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::file::SceneFile;
+
+    #[test]
+    fn what_editors_put_before_text_is_passed_over() {
+        let path = Path::new("a.json");
+        let split = "\u{feff}{\"test\": [\"a.jpg\"]}";
+        let split = SplitFile::parse(path, split.as_bytes()).unwrap();
+        assert_eq!(split.test, ["a.jpg"]);
+        let scene = "\u{feff}{\"version\": 1, \"photos\": [], \"model\": \"model\"}";
+        let scene = SceneFile::parse(path, scene.as_bytes()).unwrap();
+        assert_eq!(scene.model, "model");
     }
 }

@@ -7,6 +7,7 @@ use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
+use capture::without_byte_order_mark;
 use proxy::Proxy;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -360,7 +361,8 @@ impl Scene {
             source,
         };
         let bytes = std::fs::read(&file).map_err(|e| io(&file, "read the scene", e))?;
-        let mut whole: Extra = serde_json::from_slice(&bytes).map_err(json)?;
+        let text = without_byte_order_mark(&bytes);
+        let mut whole: Extra = serde_json::from_slice(text).map_err(json)?;
         let entry = serde_json::to_value(proxy_entry(&own)).map_err(json)?;
         whole.insert("proxy".to_owned(), entry);
         write_json(&file, &whole)?;
@@ -448,7 +450,8 @@ fn is_own_model(folder: &Path) -> bool {
 /// Whether the scene in a folder was undistorted into it.
 fn holds_photos(folder: &Path) -> bool {
     let bytes = std::fs::read(folder.join(SCENE_FILE)).unwrap_or_default();
-    serde_json::from_slice::<SceneFile>(&bytes).is_ok_and(|file| file.settings.undistorted)
+    let text = without_byte_order_mark(&bytes);
+    serde_json::from_slice::<SceneFile>(text).is_ok_and(|file| file.settings.undistorted)
 }
 
 fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {

@@ -8,6 +8,7 @@ use super::error::{ColmapError, Place, malformed};
 use crate::{
     Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Reconstruction,
 };
+use capture::without_byte_order_mark;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
@@ -170,6 +171,7 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, ColmapError> {
+        let bytes = without_byte_order_mark(bytes);
         let text = str::from_utf8(bytes).map_err(|error| {
             let before = &bytes[..error.valid_up_to()];
             let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
@@ -179,8 +181,6 @@ impl<'a> Lines<'a> {
                 "the line is not UTF-8 text".to_owned(),
             )
         })?;
-        // Some editors put a byte order mark first.
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         Ok(Self {
             path,
             lines: text.lines().enumerate(),

@@ -5,6 +5,7 @@ use crate::{
     Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Pixel, Point3D, Point3DId,
     Reconstruction, Rigid3,
 };
+use capture::without_byte_order_mark;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
 use std::path::Path;
@@ -242,10 +243,10 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
 
 /// A file's bytes as text, without the byte order mark that some editors put first.
 pub(super) fn text<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str, FormatError> {
-    let text = str::from_utf8(bytes).map_err(|error| {
-        let at = error.valid_up_to();
+    let content = without_byte_order_mark(bytes);
+    str::from_utf8(content).map_err(|error| {
+        let at = bytes.len() - content.len() + error.valid_up_to();
         Problem::broken("found a byte that is not UTF-8, expected text")
             .at(path, format!("byte {at}"))
-    })?;
-    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+    })
 }

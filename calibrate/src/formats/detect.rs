@@ -1,11 +1,9 @@
+use capture::without_byte_order_mark;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
-
-/// What some editors put before UTF-8 text.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// The formats read here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,11 +51,7 @@ pub fn detect(path: &Path) -> Option<Format> {
 pub fn detect_content(mut file: impl BufRead + Seek) -> Option<Format> {
     let mut start = Vec::new();
     file.by_ref().take(256).read_to_end(&mut start).ok()?;
-    let mark = if start.starts_with(BYTE_ORDER_MARK) {
-        BYTE_ORDER_MARK.len()
-    } else {
-        0
-    };
+    let mark = start.len() - without_byte_order_mark(&start).len();
     start.drain(..mark);
     let begins = |magic: &str| start.starts_with(magic.as_bytes());
     if begins("# Bundle file v0.") {
@@ -124,12 +118,9 @@ pub fn meant(path: &Path) -> Option<Format> {
         let mut start = Vec::new();
         let file = File::open(path).ok()?;
         file.take(BEGINNING).read_to_end(&mut start).ok()?;
-        let start = String::from_utf8_lossy(&start);
+        let start = String::from_utf8_lossy(without_byte_order_mark(&start));
         let has = |key: &str| start.contains(&format!("\"{key}\""));
-        let is_json = start
-            .trim_start_matches('\u{feff}')
-            .trim_start()
-            .starts_with('{');
+        let is_json = start.trim_start().starts_with('{');
         if !is_json {
             None
         } else if has("transform_matrix") {

@@ -2,6 +2,7 @@
 
 use super::error::{OpenCvError, Problem};
 use super::{json, xml, yaml};
+use capture::without_byte_order_mark;
 use std::io::Read;
 use std::path::Path;
 
@@ -120,13 +121,12 @@ impl FileStorage {
         }
         // Dates and comments come in the encoding of whoever's computer it was. What we
         // look for is ASCII.
-        let text = String::from_utf8_lossy(bytes);
-        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let text = String::from_utf8_lossy(without_byte_order_mark(bytes));
         let parsed = match text.trim_start().chars().next() {
             None => return Err(not_storage("the file is empty".to_owned())),
-            Some('<') => xml::parse(text),
-            Some('{') => json::parse(text),
-            Some(_) => yaml::parse(text),
+            Some('<') => xml::parse(&text),
+            Some('{') => json::parse(&text),
+            Some(_) => yaml::parse(&text),
         };
         let entries = parsed.map_err(|Problem { line, problem }| OpenCvError::Malformed {
             path: path.to_owned(),

@@ -29,6 +29,7 @@ use super::{
     Polygon, PolygonError, Portal, RoomBox,
 };
 use crate::file::write_whole;
+use capture::without_byte_order_mark;
 use glam::DVec3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -104,6 +105,7 @@ pub(super) fn parse_version_1<T: DeserializeOwned>(
         version: Option<u64>,
     }
     let json = |e| InteriorFileError::Json(path.to_owned(), what, e);
+    let bytes = without_byte_order_mark(bytes);
     let Version { version } = serde_json::from_slice(bytes).map_err(json)?;
     if let Some(found) = version.filter(|v| *v != 1) {
         return Err(InteriorFileError::Version(path.to_owned(), found));

@@ -87,6 +87,12 @@ fn an_interior_comes_back_from_its_file_to_the_last_digit() {
     assert_eq!(back, shown);
 }
 
+#[test]
+fn what_editors_put_before_text_is_passed_over() {
+    let (interior, _) = rooms(&format!("\u{feff}{TWO_ROOMS}")).unwrap();
+    assert_eq!(interior, two_rooms());
+}
+
 /// What is said of an interior file.
 fn message(text: &str) -> String {
     match parse_interior(Path::new("i.json"), text.as_bytes()) {

@@ -5,6 +5,7 @@ use super::nerfstudio::{self, NerfstudioFrame};
 use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
 use calibrate::{Camera, ModelKind, Rigid3};
+use capture::without_byte_order_mark;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -159,6 +160,7 @@ pub(super) fn parse_own(
     bytes: &[u8],
 ) -> Result<(CameraPath, Option<KeyframeFile>), PathFileError> {
     let json = |e| PathFileError::Json(path.to_owned(), e);
+    let bytes = without_byte_order_mark(bytes);
     // The version first: a later one may have other keys.
     #[derive(Deserialize)]
     #[serde(expecting = "an object with version, fps, and frames or keyframes")]

@@ -107,6 +107,12 @@ fn unknown_keys_are_kept() {
 }
 
 #[test]
+fn what_editors_put_before_text_is_passed_over() {
+    let text = frames(&good_frame(""));
+    assert_eq!(read_text(&format!("\u{feff}{text}")), read_text(&text));
+}
+
+#[test]
 fn poses_are_read_row_by_row() {
     let path = read_text(&frames(&frame(
         "0,-1,0,1, 1,0,0,2, 0,0,1,3, 0,0,0,1",

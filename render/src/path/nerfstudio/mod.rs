@@ -17,6 +17,7 @@ pub use write::write_nerfstudio;
 
 use super::file::{PathFileError, pose_of_matrix};
 use calibrate::Rigid3;
+use capture::without_byte_order_mark;
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::path::Path;
@@ -64,8 +65,9 @@ impl NerfstudioFrame {
             );
             PathFileError::Nerfstudio(path.to_owned(), reason)
         };
+        let text = without_byte_order_mark(&bytes);
         let stored: StoredTransform =
-            serde_json::from_slice(&bytes).map_err(|e| bad(e.to_string()))?;
+            serde_json::from_slice(text).map_err(|e| bad(e.to_string()))?;
         let rows = stored.transform;
         if rows.len() != 3 || rows.iter().any(|row| row.len() != 4) {
             return Err(bad("transform is not 3 × 4".to_owned()));

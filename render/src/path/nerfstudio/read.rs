@@ -4,6 +4,7 @@ use super::{NerfstudioFrame, TRANSITION_S};
 use crate::path::file::{KeyframeFile, PathFileError};
 use crate::path::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name};
 use calibrate::{Camera, Lens, Rigid3};
+use capture::without_byte_order_mark;
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -56,14 +57,15 @@ pub(crate) fn is_nerfstudio(bytes: &[u8]) -> bool {
         version: Option<IgnoredAny>,
         camera_path: Option<IgnoredAny>,
     }
-    let keys: Result<Keys, _> = serde_json::from_slice(bytes);
+    let keys: Result<Keys, _> = serde_json::from_slice(without_byte_order_mark(bytes));
     keys.is_ok_and(|keys| keys.camera_path.is_some() && keys.version.is_none())
 }
 
 /// The file as it is, the size of its pictures, and frames a second.
 fn stored(path: &Path, bytes: &[u8]) -> Result<(Stored, (u32, u32), f64), PathFileError> {
     let bad = |reason: String| PathFileError::Nerfstudio(path.to_owned(), reason);
-    let stored: Stored = serde_json::from_slice(bytes).map_err(|e| bad(e.to_string()))?;
+    let text = without_byte_order_mark(bytes);
+    let stored: Stored = serde_json::from_slice(text).map_err(|e| bad(e.to_string()))?;
     if let Some(kind) = &stored.camera_type
         && !kind.eq_ignore_ascii_case("perspective")
     {

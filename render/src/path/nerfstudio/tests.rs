@@ -82,6 +82,21 @@ fn frame(fov: f64) -> Value {
 }
 
 #[test]
+fn what_editors_put_before_text_is_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.json");
+    let read = |content: String| {
+        std::fs::write(&path, content).unwrap();
+        read_in(&path, &NerfstudioFrame::default()).unwrap()
+    };
+    let text = file(json!([frame(50.0)]), json!([])).to_string();
+    assert_eq!(read(format!("\u{feff}{text}")), read(text));
+    let turn = r#"{"transform": [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]], "scale": 3}"#;
+    std::fs::write(&path, format!("\u{feff}{turn}")).unwrap();
+    assert_eq!(NerfstudioFrame::read(&path).unwrap().scale, 3.0);
+}
+
+#[test]
 fn cameras_look_back_along_z_and_the_field_of_view_is_vertical() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.json");
