@@ -9,7 +9,6 @@ use image::{
 };
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -161,14 +160,14 @@ pub fn check_beside(
     photo_size: (u32, u32),
 ) -> Result<(), CaptureError> {
     let failed = read_failed(path);
-    let mut reader = BufReader::new(File::open(path).map_err(&failed)?);
+    let mut reader = BufReader::new(decode::open(path).map_err(&failed)?);
     let mut head = Vec::new();
     Read::by_ref(&mut reader)
         .take(16)
         .read_to_end(&mut head)
         .map_err(&failed)?;
     let format = format_of(path, &head)?;
-    let file = BufReader::new(File::open(path).map_err(&failed)?);
+    let file = BufReader::new(decode::open(path).map_err(&failed)?);
     let decoder = ImageReader::with_format(file, format)
         .into_decoder()
         .map_err(|error| CaptureError::Decode {
@@ -192,7 +191,7 @@ const WHITE: u8 = 255 - JPEG_NOISE;
 /// # Errors
 /// As for [`crate::decode()`].
 pub fn is_black_and_white(path: &Path) -> Result<bool, CaptureError> {
-    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let bytes = decode::read(path).map_err(read_failed(path))?;
     let picture = decode::decode_any(path, &bytes, |_| Ok(()))?.into_rgb8();
     let count = |is_it: fn(u8) -> bool| {
         let is_it = |pixel: &&Rgb<u8>| pixel.0.iter().all(|value| is_it(*value));
@@ -210,7 +209,7 @@ pub fn is_black_and_white(path: &Path) -> Result<bool, CaptureError> {
 /// # Errors
 /// As for [`crate::decode()`].
 pub fn is_in_alpha(path: &Path) -> Result<bool, CaptureError> {
-    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let bytes = decode::read(path).map_err(read_failed(path))?;
     let reader = ImageReader::with_format(Cursor::new(&bytes), format_of(path, &bytes)?);
     let has_alpha = reader.into_decoder().map(|d| d.color_type().has_alpha());
     // What is wrong with the file decoding says.
@@ -328,7 +327,7 @@ fn decode_beside(
     photo_size: (u32, u32),
 ) -> Result<(DynamicImage, ImageFormat), CaptureError> {
     let check = |found| check_size(kind, path, found, photo, photo_size);
-    let bytes = std::fs::read(path).map_err(read_failed(path))?;
+    let bytes = decode::read(path).map_err(read_failed(path))?;
     let picture = decode::decode_any(path, &bytes, check)?;
     Ok((picture, format_of(path, &bytes)?))
 }

@@ -1,7 +1,7 @@
 use crate::{CaptureError, jpeg, reduced_size, resize};
 use image::{DynamicImage, ImageError, ImageFormat, ImageReader, RgbaImage};
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 /// Size of the first part of a JPEG in which its size is looked for; more only where
@@ -13,7 +13,7 @@ const HEAD_BYTES: u64 = 1 << 16;
 /// # Errors
 /// A file that cannot be read, or is no JPEG or PNG picture.
 pub fn photo_size(path: &Path) -> Result<(u32, u32), CaptureError> {
-    let file = File::open(path).map_err(read_failed(path))?;
+    let file = open(path).map_err(read_failed(path))?;
     content_size(path, BufReader::new(file))
 }
 
@@ -65,7 +65,7 @@ pub fn content_size(
 /// A file that cannot be read, is no JPEG or PNG picture, is damaged or cut short, needs
 /// more than 512 MiB, or has another size than `expected_size`.
 pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImage, CaptureError> {
-    let bytes = fs::read(path).map_err(read_failed(path))?;
+    let bytes = read(path).map_err(read_failed(path))?;
     decode_content(path, &bytes, expected_size)
 }
 
@@ -139,10 +139,27 @@ pub fn decode_reduced(
     Ok(resize(&picture, width, height))
 }
 
+/// Opens a regular file; anything else but a folder, as a pipe that nobody writes to, might be waited for
+/// without end.
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    let found = fs::metadata(path)?;
+    if !(found.is_file() || found.is_dir()) {
+        return Err(io::Error::other("it is no regular file"));
+    }
+    File::open(path)
+}
+
+/// The content of a file that [`open`] opens.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// A file's first part, which holds the EXIF data of a JPEG.
 pub(crate) fn head(path: &Path) -> Result<Vec<u8>, CaptureError> {
     let failed = read_failed(path);
-    let file = File::open(path).map_err(&failed)?;
+    let file = open(path).map_err(&failed)?;
     let mut head = Vec::new();
     // An EXIF segment has at most 64 KiB; a JFIF header may come before it.
     let read = file.take(2 * HEAD_BYTES).read_to_end(&mut head);

@@ -1,5 +1,7 @@
 //! Listing, decoding, reducing and writing photos.
 
+#[cfg(unix)]
+use capture::{Beside, check_beside, decode_mask, read_exif};
 use capture::{
     CaptureError, PhotoSet, decode, decode_reduced, find_photos_folder, find_photos_within,
     photo_size, reduced_size, resize, write_png,
@@ -90,6 +92,28 @@ fn links_are_followed_but_not_in_circles() {
     let set = PhotoSet::open(&set).unwrap();
     let names: Vec<_> = set.photos.iter().map(|photo| &photo.name).collect();
     assert_eq!(names, ["a.jpg", "there/b.jpg"]);
+}
+
+/// As one that is a pipe, which nobody may ever write to.
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_not_opened() {
+    let folder = folder();
+    let path = folder.path().join("a.png");
+    std::os::unix::fs::symlink("/dev/null", &path).unwrap();
+    let expected = "a.png: cannot read the picture: it is no regular file; check that it is there and \
+                    may be read";
+    let kind = Beside::IgnoreMask;
+    let errors = [
+        photo_size(&path).unwrap_err(),
+        decode(&path, None).unwrap_err(),
+        read_exif(&path).unwrap_err(),
+        check_beside(kind, &path, "a.jpg", (1, 1)).unwrap_err(),
+        decode_mask(kind, &path, "a.jpg", (1, 1)).unwrap_err(),
+    ];
+    for error in errors {
+        assert_eq!(text(&error, &path), expected);
+    }
 }
 
 #[test]
