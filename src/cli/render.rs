@@ -109,10 +109,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let points = || session.points();
     let count = chosen.count(FRAMES);
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
+    // Of all frames: those of several parts of a path share a folder.
+    let names = frames.iter().map(|f| (f.name.as_str(), true));
+    let files = picture_files("view", names, &args.output);
     let frames = chosen.of(frames)?;
     let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
-    let names = frames.iter().map(|f| (f.name.as_str(), true));
-    let files = picture_files("view", names, &args.output)?;
+    let files = chosen.of(files?)?;
     // Photos that are left out, too, are nobody's to replace.
     let kept = files_behind_scene(&args.scene.scene, &session.scene);
     check_inputs(files.iter().map(PathBuf::as_path), &kept)?;

@@ -25,7 +25,7 @@ use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Walk through an interior
 ///
@@ -253,8 +253,8 @@ fn walk_all(
             1 => args.output.clone(),
             _ => args.output.join(fill.name()),
         };
-        let names = way.frames.iter().map(|f| (f.name.as_str(), true));
-        let files = picture_files("frame", names, &folder)?;
+        let files = way.frames.iter().map(|frame| folder.join(&frame.file));
+        let files: Vec<PathBuf> = files.collect();
         let is_there = args.film.begin(&folder, &files, inputs)?;
         begun.push((*fill, files, is_there));
     }
@@ -389,6 +389,8 @@ struct Named {
     /// In the path, counted from 0.
     index: usize,
     name: String,
+    /// From the folder for the frames.
+    file: PathBuf,
     view: View,
     /// What the frame is to be compared with.
     truth: Option<Truth>,
@@ -397,15 +399,18 @@ struct Named {
 /// The photos that were held out.
 fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result<Vec<Named>> {
     let held_out = photos.map(|photos| photos.held_out(size));
-    let held_out = held_out.transpose()?;
-    let named = |(index, (name, view, truth)): (usize, (String, View, Truth))| Named {
+    let held_out = held_out.transpose()?.unwrap_or_default();
+    let names = held_out.iter().map(|(name, ..)| (name.as_str(), true));
+    let files = picture_files("frame", names, Path::new(""))?;
+    let held_out = held_out.into_iter().zip(files).enumerate();
+    let named = held_out.map(|(index, ((name, view, truth), file))| Named {
         index,
         name,
+        file,
         view,
         truth: Some(truth),
-    };
-    let held_out = held_out.into_iter().flatten().enumerate();
-    let named: Vec<Named> = held_out.map(named).collect();
+    });
+    let named: Vec<Named> = named.collect();
     if named.is_empty() {
         bail!(
             "no photos were held out when it was made; make it with `interior --hold-out SPLIT.json`"
@@ -423,17 +428,19 @@ fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
             (tour.clone(), Some(tour))
         }
     };
-    let named = |(index, frame): (usize, path::PathFrame)| Named {
+    // Of all frames: those of several parts of a path share a folder.
+    let names = path.frames.iter().map(|f| (f.name.as_str(), true));
+    let files = picture_files("frame", names, Path::new(""))?;
+    let frames = path.frames.into_iter().zip(files).enumerate();
+    let named = frames.map(|(index, (frame, file))| Named {
         index,
         name: frame.name,
+        file,
         view: cut(frame.view, args.size),
         truth: None,
-    };
-    let frames = args
-        .chosen()
-        .of(path.frames.into_iter().enumerate().collect())?;
+    });
     Ok(Way {
-        frames: frames.into_iter().map(named).collect(),
+        frames: args.chosen().of(named.collect())?,
         fps: path.fps,
         tour,
     })

@@ -32,19 +32,22 @@ pub enum NameError {
 }
 
 /// The files in `folder` for pictures of these names, sub-folders kept: each name as it is,
-/// or, where it comes with `true`, with its extension replaced by `.png`. `kind` is what
-/// they are, for messages.
+/// or, where it comes with `true`, with its extension replaced by `.png`. Where several would then be
+/// one, `a.jpg` and `a.png`, such a name keeps its extension, and the file is `a.jpg.png`, as masks are
+/// called. `kind` is what they are, for messages.
 ///
 /// # Errors
-/// Two names that give one file; a name that leads out of the folder.
+/// Two names that give one file even so; a name that leads out of the folder.
 pub fn picture_files<'a>(
     kind: &'static str,
     names: impl Iterator<Item = (&'a str, bool)>,
     folder: &Path,
 ) -> Result<Vec<PathBuf>, NameError> {
-    let mut files = Vec::new();
-    let mut taken: BTreeMap<PathBuf, &str> = BTreeMap::new();
-    for (name, as_png) in names {
+    // 1. What each would be called.
+    let names: Vec<(&str, bool)> = names.collect();
+    let mut short = Vec::new();
+    let mut sharing: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    for &(name, as_png) in &names {
         let path = Path::new(name);
         let inside = path.components().all(|c| matches!(c, Component::Normal(_)));
         if !inside || path.file_name().is_none() {
@@ -54,10 +57,24 @@ pub fn picture_files<'a>(
             });
         }
         let file = if as_png {
-            folder.join(path.with_extension("png"))
+            path.with_extension("png")
         } else {
-            folder.join(path)
+            path.to_owned()
         };
+        *sharing.entry(file.clone()).or_default() += 1;
+        short.push(file);
+    }
+
+    // 2. What it is called beside the others.
+    let mut files = Vec::new();
+    let mut taken: BTreeMap<PathBuf, &str> = BTreeMap::new();
+    for ((name, as_png), file) in names.into_iter().zip(short) {
+        let keeps_extension = as_png && sharing[&file] > 1 && file != Path::new(name);
+        let file = folder.join(if keeps_extension {
+            PathBuf::from(format!("{name}.png"))
+        } else {
+            file
+        });
         if let Some(first) = taken.insert(file.clone(), name) {
             return Err(NameError::Clash {
                 kind,
@@ -92,17 +109,36 @@ mod tests {
     }
 
     #[test]
-    fn clashes_and_escapes_are_refused() {
+    fn what_would_be_one_file_keeps_its_extension() {
         for second_as_png in [true, false] {
+            let names = [
+                ("b/a.jpg", true),
+                ("b/a.png", second_as_png),
+                ("a.jpg", true),
+            ];
+            let expected = ["out/b/a.jpg.png", "out/b/a.png", "out/a.png"];
+            assert_eq!(files(&names), Ok(expected.map(PathBuf::from).to_vec()));
+        }
+    }
+
+    #[test]
+    fn clashes_and_escapes_are_refused() {
+        for third_as_png in [true, false] {
+            let names = [
+                ("b/a.jpg", true),
+                ("b/a.png", true),
+                ("b/a.jpg.png", third_as_png),
+            ];
             assert_eq!(
-                files(&[("b/a.jpg", true), ("b/a.png", second_as_png)]),
+                files(&names),
                 Err(
-                    "views b/a.jpg and b/a.png would both be written to out/b/a.png; \
+                    "views b/a.jpg and b/a.jpg.png would both be written to out/b/a.jpg.png; \
                      rename one of them"
                         .to_owned()
                 )
             );
         }
+        assert!(files(&[("a.jpg", true), ("a.jpg", true)]).is_err());
         for name in ["../a.jpg", "/etc/a.jpg", "", ".."] {
             assert!(
                 files(&[(name, true)]).unwrap_err().contains("leads out"),

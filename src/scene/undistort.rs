@@ -29,7 +29,7 @@ impl Scene {
     /// at all, as [`Scene::save`] does.
     ///
     /// A pinhole's photos are copied as they are. All others become PNG files of the size that
-    /// [`calibrate::undistort`] chooses, their names' extension replaced; [`Photo::original`]
+    /// [`calibrate::undistort`] chooses, called as [`picture_files`] says; [`Photo::original`]
     /// is what they were called. Masks, mattes and silhouettes are undistorted likewise, as
     /// `masks/NAME.png`, `mattes/NAME.png` and `silhouettes/NAME.png`, and depth maps by their nearest pixels, as
     /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z.

@@ -308,19 +308,24 @@ fn an_undistorted_scene_holds_its_photos() {
     let error = lumigraph(folder.path(), "import wall -o thin --force").error(1);
     assert!(error.contains("holds images, which is no part"), "{error}");
 
-    // Two photos of one name, whose depth maps could not be told apart before that.
+    // Two photos of one name but for what it ends in, whose depth maps could not be told apart before that.
     fs::remove_dir_all(folder.path().join("wall/depth")).unwrap();
     fs::copy(images.join("0007.png"), images.join("0008.png")).unwrap();
     for image in whole.images.values_mut().filter(|i| i.name == "0007.png") {
         image.name = "0008.png".to_owned();
     }
     colmap::write_binary(&whole, &sparse).unwrap();
-    let error = lumigraph(folder.path(), "import wall --undistort -o clash").error(1);
-    assert_eq!(
-        error,
-        "photos 0008.jpg and 0008.png would both be written to 0008.png; rename one of them"
-    );
-    assert!(!folder.path().join("clash").exists());
+    run("import wall --undistort -o both");
+    let both = fs::read(folder.path().join("both/scene.json")).unwrap();
+    let both: serde_json::Value = serde_json::from_slice(&both).unwrap();
+    let (jpeg, png) = (&both["photos"][7], &both["photos"][8]);
+    assert_eq!(jpeg["name"], "0008.jpg.png");
+    assert_eq!(jpeg["path"], "images/0008.jpg.png");
+    assert_eq!(jpeg["original"], "0008.jpg");
+    assert_eq!(png["path"], "images/0008.png");
+    assert!(png.get("original").is_none());
+    let scored = run("evaluate both --proxy plane --json").json();
+    assert_eq!(scored["photos"][1]["name"], "0008.jpg.png");
 }
 
 #[test]

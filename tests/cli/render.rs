@@ -117,7 +117,8 @@ fn derived_paths_stay_within_cover() {
 fn names_that_clash_are_refused_before_rendering() {
     let folder = with_wall();
     let mut model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
-    for (image, name) in model.images.values_mut().zip(["a/x.png", "a/x.jpg"]) {
+    let names = ["a/x.png", "a/x.jpg", "a/x.jpg.png"];
+    for (image, name) in model.images.values_mut().zip(names) {
         image.name = name.to_owned();
     }
     colmap::write_text(&model, &folder.path().join("views")).unwrap();
@@ -127,7 +128,7 @@ fn names_that_clash_are_refused_before_rendering() {
     )
     .error(1);
     assert!(
-        error.contains("a/x.jpg") && error.contains("a/x.png") && error.contains("rename"),
+        error.contains("a/x.jpg and a/x.jpg.png") && error.contains("rename"),
         "{error}"
     );
     assert!(!folder.path().join("out").exists());
@@ -140,6 +141,27 @@ fn names_that_clash_are_refused_before_rendering() {
     )
     .error(1);
     assert!(error.contains("leads out of the output folder"), "{error}");
+}
+
+#[test]
+fn parts_of_a_path_agree_on_what_files_are_called() {
+    let folder = with_wall();
+    let mut model = colmap::read_model(&folder.path().join("wall/sparse/0")).unwrap();
+    for (image, name) in model.images.values_mut().zip(["a/x.png", "a/x.jpg"]) {
+        image.name = name.to_owned();
+    }
+    colmap::write_text(&model, &folder.path().join("views")).unwrap();
+    // The last of nine, by name.
+    for part in ["7..8", "8..9"] {
+        let line =
+            format!("render wall --proxy plane --views views --frames {part} --size 32x24 -o out");
+        lumigraph(folder.path(), &line).ok();
+    }
+    let written: Vec<_> = files(&folder.path().join("out")).into_keys().collect();
+    assert_eq!(
+        written,
+        ["a/x.jpg.png", "a/x.png"].map(std::path::Path::new)
+    );
 }
 
 #[test]
