@@ -93,7 +93,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     match args.format {
         Format::Nerfstudio => {
             let keyframes = read_keyframes(&args.path, &frame)?;
-            write_nerfstudio(&args.output, &read, keyframes.as_ref(), &frame)?;
+            let keyframes = keyframes.as_ref();
+            write_nerfstudio(&args.output, &args.path, &read, keyframes, &frame)?;
             if has_times(&read) {
                 say!(
                     "note: left out: the scene's times; nerfstudio's format has no place for them, and \

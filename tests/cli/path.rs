@@ -138,6 +138,20 @@ fn a_path_is_not_written_over_what_it_is_made_of() {
 }
 
 #[test]
+fn lenses_that_nerfstudio_does_not_know_are_told_of_the_path_that_has_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut path = keyframes();
+    path["keyframes"][0]["params"] = json!([60, 60, 33, 24]);
+    std::fs::write(folder.path().join("own.json"), path.to_string()).unwrap();
+    let line = "path own.json --format nerfstudio -o theirs.json";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert!(
+        error.starts_with("own.json: frame 0: its camera"),
+        "{error}"
+    );
+}
+
+#[test]
 fn times_of_the_scene_that_are_lost_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

@@ -145,16 +145,15 @@ fn write_path(
     write_keyframes(&own, file).map_err(|error| error.to_string())?;
     let sampled = CameraPath::from_keyframes(&file.keyframes, file.interpolation, file.fps);
     let sampled = sampled.map_err(|error| format!("{}: {error}", own.display()))?;
+    let written = write_nerfstudio(&other, &own, &sampled, Some(file), frame);
     let own = own.display();
-    Ok(
-        match write_nerfstudio(&other, &sampled, Some(file), frame) {
-            Ok(()) => {
-                let name = other.file_name().unwrap_or_default().to_string_lossy();
-                format!("saved {own}; {name} is nerfstudio's")
-            }
-            Err(error) => format!("saved {own}, but not for nerfstudio: {error}"),
-        },
-    )
+    Ok(match written {
+        Ok(()) => {
+            let name = other.file_name().unwrap_or_default().to_string_lossy();
+            format!("saved {own}; {name} is nerfstudio's")
+        }
+        Err(error) => format!("saved {own}, but not for nerfstudio: {error}"),
+    })
 }
 
 #[cfg(test)]

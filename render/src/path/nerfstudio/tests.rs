@@ -261,18 +261,18 @@ fn errors_say_what_is_wrong() {
     }
     // What cannot be said in it is not written.
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("p.json");
+    let (path, own) = (folder.path().join("p.json"), Path::new("own.json"));
     let mut sampled = sampled(&keyframes(2));
     sampled.frames[1].camera.params[2] += 1.0;
-    let error = write_nerfstudio(&path, &sampled, None, &NerfstudioFrame::default());
+    let error = write_nerfstudio(&path, own, &sampled, None, &NerfstudioFrame::default());
     let text = error.unwrap_err().to_string();
     assert!(
-        text.contains("frame 1") && text.contains("principal point"),
+        text.starts_with("own.json: frame 1: ") && text.contains("principal point"),
         "{text}"
     );
     sampled.frames.remove(1);
     sampled.frames[1].camera.width += 1;
-    let error = write_nerfstudio(&path, &sampled, None, &NerfstudioFrame::default());
+    let error = write_nerfstudio(&path, own, &sampled, None, &NerfstudioFrame::default());
     assert!(error.unwrap_err().to_string().contains("have one size"));
     assert!(!path.exists());
 }
@@ -296,7 +296,7 @@ proptest! {
         let own = keyframes(count);
         let frames = sampled(&own);
         for frame in [frame, NerfstudioFrame::default()] {
-            write_nerfstudio(&path, &frames, Some(&own), &frame).unwrap();
+            write_nerfstudio(&path, &path, &frames, Some(&own), &frame).unwrap();
             let again = read_in(&path, &frame).unwrap();
             prop_assert_eq!(again.fps, frames.fps);
             prop_assert_eq!(again.frames.len(), frames.frames.len());

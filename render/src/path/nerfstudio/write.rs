@@ -37,7 +37,8 @@ fn fov_of(camera: &Camera, (width, height): (u32, u32)) -> Result<f64, String> {
     Ok(2.0 * middle.y.atan2(focal).to_degrees())
 }
 
-/// Writes a path as nerfstudio's: its frames, and the keyframes that they were made of, if any.
+/// Writes a path as nerfstudio's: its frames, and the keyframes that they were made of, if any. Where these
+/// are what is wrong, errors name the file that they were `read_from`.
 ///
 /// The file appears complete or not at all. Names and times of frames are lost.
 ///
@@ -46,11 +47,12 @@ fn fov_of(camera: &Camera, (width, height): (u32, u32)) -> Result<f64, String> {
 /// the middle; frames differ in size.
 pub fn write_nerfstudio(
     path: &Path,
+    read_from: &Path,
     camera_path: &CameraPath,
     keyframes: Option<&KeyframeFile>,
     frame: &NerfstudioFrame,
 ) -> Result<(), PathFileError> {
-    let of_path = |e| PathFileError::Path(path.to_owned(), e);
+    let of_path = |e| PathFileError::Path(read_from.to_owned(), e);
     let Some(first) = camera_path.frames.first().map(|f| &f.camera) else {
         return Err(of_path(PathError::Empty));
     };
