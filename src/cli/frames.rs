@@ -114,6 +114,18 @@ impl Asked {
         matches!(self, Self::Derived(_))
     }
 
+    /// Why frames may show nothing, for people; `is_unplaced` where nobody says where nerfstudio's world lies,
+    /// whose path it is.
+    pub(super) fn why_empty(&self, is_unplaced: bool) -> &'static str {
+        match self {
+            Self::Derived(_) => "no proxy lies before their cameras; try another --proxy",
+            Self::Read(..) if is_unplaced => {
+                "does the path lie in this scene's world (see --dataparser-transforms)?"
+            }
+            Self::Read(..) => "does the path lie in this scene's world?",
+        }
+    }
+
     /// The views, and how many a second a film shows: of a derived path so many, `points_in_world` are
     /// the sparse points.
     ///

@@ -64,6 +64,11 @@ impl NerfstudioArgs {
             .unwrap_or_default())
     }
 
+    /// Whether nobody says where that which was read lies, a path of nerfstudio's.
+    pub(super) fn is_unplaced(&self, read: Option<&PathBuf>) -> bool {
+        self.dataparser_transforms.is_none() && read.is_some_and(|path| is_nerfstudio(path))
+    }
+
     /// Says so where the file changes nothing, as what was read, if anything, is no path of nerfstudio's.
     pub(super) fn say_unused(&self, read: Option<&PathBuf>) {
         let is_used = || read.is_some_and(|path| is_nerfstudio(path));

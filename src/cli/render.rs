@@ -79,8 +79,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     chosen.check(asked.is_derived())?;
     let file = args.views.path.as_ref().map(PathBuf::from);
     let file = file.filter(|_| !asked.is_derived());
-    args.nerfstudio
-        .say_unused(args.views.views.as_ref().or(file.as_ref()));
+    let read = args.views.views.as_ref().or(file.as_ref());
+    args.nerfstudio.say_unused(read);
+    let why_empty = asked.why_empty(args.nerfstudio.is_unplaced(read));
     check_folder(&args.output)?;
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
@@ -106,6 +107,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         args.at.time,
     )?;
     session.max_error = args.max_error;
+    session.costs.why_empty = why_empty;
     let points = || session.points();
     let count = chosen.count(FRAMES);
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;

@@ -136,6 +136,8 @@ pub(super) struct Costs {
     alone_empty: usize,
     /// By source view, whether any frame scored it.
     ever_scored: Vec<bool>,
+    /// Why frames may show nothing, for people (see [`super::frames::Asked::why_empty`]).
+    pub(super) why_empty: &'static str,
 }
 
 struct FrameCost {
@@ -239,10 +241,9 @@ impl Costs {
             };
             (empty > 0).then(|| format!("{empty} of {all} {what} show nothing: {why}"))
         };
-        let lost = "does the path lie in this scene's world (see --dataparser-transforms)?";
         let unseen = "the proxy does not reach where those photos look; hold out fewer, or try another \
                       --proxy";
-        of_all(of_path, self.frames.len(), "frames", lost)
+        of_all(of_path, self.frames.len(), "frames", self.why_empty)
             .or_else(|| of_all(alone, self.alone, "pictures", unseen))
     }
 

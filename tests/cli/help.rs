@@ -110,15 +110,17 @@ fn options_that_change_nothing_are_said_to() {
     }
 }
 
+/// A path that lies elsewhere.
+const FAR: &str = r#"{"version": 1, "fps": 30, "frames": [{"name": "far", "camera_from_world":
+    [1, 0, 0, 9000, 0, 1, 0, 9000, 0, 0, 1, 9000, 0, 0, 0, 1],
+    "width": 32, "height": 24, "model": "PINHOLE", "params": [30, 30, 16, 12]}]}"#;
+
 #[test]
 fn frames_that_show_nothing_are_told() {
     let folder = with_wall();
-    let far = r#"{"version": 1, "fps": 30, "frames": [{"name": "far", "camera_from_world":
-        [1, 0, 0, 9000, 0, 1, 0, 9000, 0, 0, 1, 9000, 0, 0, 0, 1],
-        "width": 32, "height": 24, "model": "PINHOLE", "params": [30, 30, 16, 12]}]}"#;
     let but_one: Vec<String> = (0..8).map(|i| format!("\"000{i}.png\"")).collect();
     let split = format!("{{\"test\": [{}]}}", but_one.join(", "));
-    std::fs::write(folder.path().join("far.json"), far).unwrap();
+    std::fs::write(folder.path().join("far.json"), FAR).unwrap();
     std::fs::write(folder.path().join("one.json"), split).unwrap();
     let run = |line: &str| {
         let line = format!("{line} --proxy points --size 32x24 --json");
@@ -133,8 +135,7 @@ fn frames_that_show_nothing_are_told() {
     };
     let render = |options: &str| run(&format!("render wall -o out {options}"));
     let (empty, notes) = render("--path far.json");
-    let lost = "1 of 1 frames show nothing: does the path lie in this scene's world (see \
-                --dataparser-transforms)?";
+    let lost = "1 of 1 frames show nothing: does the path lie in this scene's world?";
     assert_eq!((empty, notes.as_str()), (1, lost));
     let (empty, notes) = render("--path orbit --frames 2 --hold-out one.json");
     assert_eq!(empty, 2);
@@ -147,6 +148,42 @@ fn frames_that_show_nothing_are_told() {
     let alone = "8 of 8 pictures show nothing: one photo alone does not tell where things are";
     assert_eq!((empty, notes.as_str()), (8, alone));
     assert_eq!(run("evaluate wall"), (0, String::new()));
+}
+
+#[test]
+fn why_frames_may_show_nothing_depends_on_where_their_path_is_from() {
+    let folder = with_wall();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("far.json", FAR);
+    let turn = r#"{"transform": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], "scale": 1}"#;
+    write("dp.json", turn);
+    // Behind all cameras.
+    write(
+        "behind.obj",
+        "v -1 -1 -50\nv 1 -1 -50\nv 0 1 -50\nf 1 2 3\n",
+    );
+    let line = "path far.json --format nerfstudio -o theirs.json";
+    lumigraph(folder.path(), line).ok();
+    let lost = "does the path lie in this scene's world";
+    for (options, why) in [
+        (
+            "--path theirs.json",
+            format!("{lost} (see --dataparser-transforms)?"),
+        ),
+        (
+            "--path theirs.json --dataparser-transforms dp.json",
+            format!("{lost}?"),
+        ),
+        (
+            "--path orbit --frames 1",
+            "no proxy lies before their cameras; try another --proxy".to_owned(),
+        ),
+    ] {
+        let line = format!("render wall --proxy behind.obj --size 32x24 {options} -o out");
+        let said = lumigraph(folder.path(), &line).ok().stderr;
+        let note = format!("note: 1 of 1 frames show nothing: {why}\n");
+        assert!(said.contains(&note), "{options}: {said}");
+    }
 }
 
 /// Of portraits, too: the width is their shorter side.
