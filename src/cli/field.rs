@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // What need not be derived is found first: fitting a proxy may take long.
     let known = match asked.transpose()? {
         None => Ok((scene.view(&args.view)?, scene.time_s(&args.view))),
-        Some(Asked::Read(views, _)) => Ok(frame_of(views, &args.view)?),
+        Some(Asked::Read { views, .. }) => Ok(frame_of(views, &args.view)?),
         Some(derived) => Err(derived),
     };
     if args.proxy.is_searched(&scene, &without) {

@@ -50,8 +50,15 @@ pub(super) struct NamedView {
 
 /// The views asked for, read as far as they can be before anything is known of a scene.
 pub(super) enum Asked {
-    /// Those of a file or model, and how many a second a film shows.
-    Read(Vec<NamedView>, f64),
+    /// Those of a file or model.
+    Read {
+        /// In order.
+        views: Vec<NamedView>,
+        /// How many a second a film shows.
+        fps: f64,
+        /// Whether they are a model's images, which may call photos otherwise than the scene does.
+        are_images: bool,
+    },
     /// A path that the photos' places are needed for.
     Derived(Trajectory),
 }
@@ -74,7 +81,11 @@ impl Asked {
             return Err(Usage(message).into());
         }
         match views.is_dir() {
-            true => Ok(Self::Read(of_model(views)?, FPS)),
+            true => Ok(Self::Read {
+                views: of_model(views)?,
+                fps: FPS,
+                are_images: true,
+            }),
             false => of_file(views, frame),
         }
     }
@@ -94,13 +105,25 @@ impl Asked {
         of_file(Path::new(asked), frame)
     }
 
-    /// The same, where views without a time have that of the photo of their name, as those of a COLMAP model
-    /// may.
-    pub(super) fn timed(mut self, scene: &Scene) -> Self {
-        let photos = scene.photos.iter();
-        let times = photos.filter_map(|photo| Some((photo.name.as_str(), photo.time_s?)));
-        let times: BTreeMap<&str, f64> = times.collect();
-        if let Self::Read(views, _) = &mut self {
+    /// The same, where a model's images are called as the scene calls its photos, and views without a time have
+    /// that of the photo of their name, as a model's may.
+    pub(super) fn in_scene(mut self, scene: &Scene) -> Self {
+        let mut times: BTreeMap<&str, f64> = BTreeMap::new();
+        for photo in &scene.photos {
+            let Some(time_s) = photo.time_s else { continue };
+            // Undistorted ones as in the capture, too.
+            times.extend(photo.original.as_deref().map(|name| (name, time_s)));
+            times.insert(&photo.name, time_s);
+        }
+        if let Self::Read {
+            views, are_images, ..
+        } = &mut self
+        {
+            if *are_images {
+                let names = views.iter_mut().map(|view| &mut view.name);
+                scene.name_as_photos(&mut names.collect::<Vec<_>>());
+                views.sort_by(|a, b| a.name.cmp(&b.name));
+            }
             for view in views {
                 let of_photo = times.get(view.name.as_str()).copied();
                 view.time_s = view.time_s.or(of_photo);
@@ -119,10 +142,10 @@ impl Asked {
     pub(super) fn why_empty(&self, is_unplaced: bool) -> &'static str {
         match self {
             Self::Derived(_) => "no proxy lies before their cameras; try another --proxy",
-            Self::Read(..) if is_unplaced => {
+            Self::Read { .. } if is_unplaced => {
                 "does the path lie in this scene's world (see --dataparser-transforms)?"
             }
-            Self::Read(..) => "does the path lie in this scene's world?",
+            Self::Read { .. } => "does the path lie in this scene's world?",
         }
     }
 
@@ -138,7 +161,7 @@ impl Asked {
         points_in_world: impl FnOnce() -> Vec<DVec3>,
     ) -> anyhow::Result<(Vec<NamedView>, f64)> {
         let kind = match self {
-            Self::Read(views, fps) => return Ok((views, fps)),
+            Self::Read { views, fps, .. } => return Ok((views, fps)),
             Self::Derived(kind) => kind,
         };
         let (sources, proxy) = (&lumigraph.sources, &lumigraph.proxy);
@@ -179,7 +202,11 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
 /// The frames of a path file, or the one that a screenshot was taken of.
 fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
     let (views, fps) = named(path::read_in(file, frame)?);
-    Ok(Asked::Read(views, fps))
+    Ok(Asked::Read {
+        views,
+        fps,
+        are_images: false,
+    })
 }
 
 fn named(path: CameraPath) -> (Vec<NamedView>, f64) {

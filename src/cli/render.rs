@@ -86,10 +86,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
     let without = args.hold_out.names(&scene)?;
-    let asked = asked.timed(&scene);
+    let asked = asked.in_scene(&scene);
     // What need not be derived is checked first: fitting a proxy may take long.
     let known: Vec<&NamedView> = match &asked {
-        Asked::Read(frames, _) => chosen.of(frames.iter().collect())?,
+        Asked::Read { views, .. } => chosen.of(views.iter().collect())?,
         Asked::Derived(_) => Vec::new(),
     };
     desired(args, &known)?;

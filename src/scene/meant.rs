@@ -1,8 +1,8 @@
 //! Which photos a calibration means by names that no photo has to the letter.
 
-use super::Warning;
 use super::home::IMAGES;
 use super::import::ENOUGH;
+use super::{Photo, Scene, Warning};
 use calibrate::Reconstruction;
 use capture::{CaptureError, Matched, PhotoFile, PhotoSet, name_key, photo_size, stem_key};
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,8 +34,8 @@ impl Meant {
         home: &Path,
         calibration: &Path,
     ) -> Self {
-        name_directly(whole, found);
-        name_from_within(whole, found);
+        let names = whole.images.values_mut().map(|image| &mut image.name);
+        name_as_found(&mut names.collect::<Vec<_>>(), found);
         // 1. Names without a photo, and photos without a name.
         let sizes = whole.images.values().map(|image| {
             let camera = &whole.cameras[&image.camera_id];
@@ -147,6 +147,44 @@ impl Meant {
     }
 }
 
+impl Scene {
+    /// Gives names that a calibration of this scene's photos has for them those that the import gives them:
+    /// `../images/a.jpg`, which leads to a photo past other folders, and `images/a.jpg`, where all names begin
+    /// so, become `a.jpg`. Names of anything else stay.
+    pub fn name_as_photos(&self, names: &mut [&mut String]) {
+        if let Some(found) = self.as_found() {
+            name_as_found(names, &found);
+        }
+    }
+
+    /// The photos where the capture has them; `None` where that is not known.
+    fn as_found(&self) -> Option<PhotoSet> {
+        if self.settings.undistorted {
+            // These lie elsewhere.
+            return Self::photos_of(self.capture.as_ref()?).ok();
+        }
+        let root_of = |name: &str, path: &Path| {
+            let depth = Path::new(name).components().count();
+            let root = path.ancestors().nth(depth)?;
+            path.ends_with(name).then(|| root.to_owned())
+        };
+        let mut photos = self.photos.iter();
+        let root = photos.find_map(|photo| root_of(&photo.name, &photo.path))?;
+        // A scene's photos are named by the way from its own folder.
+        let root = if self.folder.is_some() {
+            root.canonicalize().unwrap_or(root)
+        } else {
+            root
+        };
+        let file = |photo: &Photo| PhotoFile {
+            name: photo.name.clone(),
+            path: photo.path.clone(),
+        };
+        let photos = self.photos.iter().map(file).collect();
+        Some(PhotoSet { root, photos })
+    }
+}
+
 /// Why a photo is not used that is called nearly as one is that is missing.
 const NOT_ALONE: &str =
     "called nearly so, but others are, too: give the one that is meant that very name";
@@ -209,46 +247,63 @@ fn by_key<T>(
     all
 }
 
-/// Gives images whose names lead to a photo past other folders that photo's own name, unless another has it.
-fn name_directly(whole: &mut Reconstruction, found: &PhotoSet) {
+/// Makes names what the photos are called that they mean without doubt.
+fn name_as_found(names: &mut [&mut String], found: &PhotoSet) {
+    name_directly(names, found);
+    name_from_within(names, found);
+}
+
+/// Makes names that lead to a photo past other folders, or to where one is missing, that photo's own, unless
+/// another has it.
+fn name_directly(names: &mut [&mut String], found: &PhotoSet) {
     let is_detour = |name: &str| name.split('/').any(|part| matches!(part, "" | "." | ".."));
-    if !whole.images.values().any(|image| is_detour(&image.name)) {
+    if !names.iter().any(|name| is_detour(name.as_str())) {
         return;
     }
-    let names = whole.images.values().map(|image| image.name.clone());
-    let mut names: BTreeSet<String> = names.collect();
+    let mut taken: BTreeSet<String> = names.iter().map(|name| (**name).clone()).collect();
     let real = |path: &Path| path.canonicalize().ok();
     let files = found.photos.iter();
     let files = files.filter_map(|photo| Some((real(&photo.path)?, photo.name.as_str())));
     let files: BTreeMap<PathBuf, &str> = files.collect();
-    for image in whole.images.values_mut() {
-        if !is_detour(&image.name) {
+    let root = real(&found.root);
+    for name in names.iter_mut() {
+        if !is_detour(name.as_str()) {
             continue;
         }
-        let file = real(&found.root.join(&image.name));
-        let own = file.and_then(|file| files.get(&file).copied());
-        if let Some(own) = own.filter(|own| names.insert((*own).to_owned())) {
-            image.name = own.to_owned();
+        let path = found.root.join(name.as_str());
+        let file = real(&path);
+        let own = file.and_then(|file| files.get(&file).map(|own| (*own).to_owned()));
+        let own = own.or_else(|| name_in(root.as_deref()?, &path));
+        if let Some(own) = own.filter(|own| taken.insert(own.clone())) {
+            **name = own;
         }
     }
 }
 
+/// What a file is called in a folder that it lies in, or would; `/` between the parts.
+fn name_in(real_folder: &Path, file: &Path) -> Option<String> {
+    let around = file.parent()?.canonicalize().ok()?;
+    let name = around.strip_prefix(real_folder).ok()?;
+    let name = name.join(file.file_name()?);
+    let parts: Option<Vec<&str>> = name.iter().map(|part| part.to_str()).collect();
+    Some(parts?.join("/"))
+}
+
 /// Shortens names that all begin in one of the folders around the photos, where COLMAP was given that: in the
 /// folder `images`, `images/a.jpg` is `a.jpg`.
-fn name_from_within(whole: &mut Reconstruction, found: &PhotoSet) {
-    let Some(start) = start_outside(whole, found) else {
+fn name_from_within(names: &mut [&mut String], found: &PhotoSet) {
+    let Some(start) = start_outside(names, found) else {
         return;
     };
-    for image in whole.images.values_mut() {
-        image.name.drain(..start.len());
+    for name in names {
+        name.drain(..start.len());
     }
 }
 
 /// What all names begin with that leads to the photos' folder from one around it; `None` unless with it none is
 /// found, and without it some are.
-fn start_outside(whole: &Reconstruction, found: &PhotoSet) -> Option<String> {
-    let images = whole.images.values();
-    let names: Vec<&str> = images.map(|image| image.name.as_str()).collect();
+fn start_outside(names: &[&mut String], found: &PhotoSet) -> Option<String> {
+    let names: Vec<&str> = names.iter().map(|name| name.as_str()).collect();
     let is_found = |name: &str| found.find(name).is_some();
     if names.iter().any(|name| is_found(name)) {
         return None;

@@ -143,6 +143,29 @@ fn photos_in_a_folder_of_another_name_are_told_how_to_be_found() {
 }
 
 #[test]
+fn names_may_lead_past_other_folders_to_photos_that_are_missing() {
+    let captures = Captures::new();
+    captures.photos("wall/images", &["a.png", "late/b.png"], SIZE);
+    let ways = ["../images/a.png", "./late/b.png", "../images/late/../c.png"];
+    captures.model("wall/sparse/0", &[ways[0], ways[1], ways[2], "../d.png"]);
+    let (scene, _) = captures.import("wall");
+    assert_eq!(scene.names(), ["a.png", "late/b.png"]);
+    assert_eq!(scene.left_out, ["../d.png", "c.png"]);
+
+    // So it is where something else calls them so.
+    let mut names = [ways[2], ways[0], "../d.png", "x.png"].map(str::to_owned);
+    scene.name_as_photos(&mut names.each_mut());
+    assert_eq!(names, ["c.png", "a.png", "../d.png", "x.png"]);
+    // Undistorted photos lie in their scene.
+    let mut flat = scene;
+    flat.settings.undistorted = true;
+    flat.photos.clear();
+    let mut name = ways[0].to_owned();
+    flat.name_as_photos(&mut [&mut name]);
+    assert_eq!(name, "a.png");
+}
+
+#[test]
 fn photos_that_colmap_undistorted_are_those_of_the_model_beside_them() {
     let captures = Captures::new();
     let names = ["a.png", "b.png"];

@@ -1,6 +1,6 @@
 //! Photos that a calibration calls otherwise than their files, or that lie where it does not say.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use calibrate::colmap;
 use serde_json::Value;
 use std::fs;
@@ -14,14 +14,19 @@ fn at(folder: &TempDir, path: &str) -> PathBuf {
 /// The wall, whose model calls photos otherwise.
 fn called(name: impl Fn(&str) -> String) -> TempDir {
     let folder = with_wall();
-    let model = at(&folder, "wall/sparse/0");
+    call(&folder, name);
+    folder
+}
+
+/// Has the wall's model call photos otherwise than it does.
+fn call(folder: &TempDir, name: impl Fn(&str) -> String) {
+    let model = at(folder, "wall/sparse/0");
     let mut whole = colmap::read_model(&model).unwrap();
     for image in whole.images.values_mut() {
         image.name = name(&image.name);
     }
     fs::remove_dir_all(&model).unwrap();
     colmap::write_text(&whole, &model).unwrap();
-    folder
 }
 
 /// Of its photos, the number `i`.
@@ -130,6 +135,34 @@ fn names_may_lead_past_other_folders() {
     );
     // As the split calls them.
     assert_eq!(ran.json()["photos"][0]["name"], "0000.png");
+}
+
+#[test]
+fn views_of_a_captures_own_model_are_called_as_its_photos() {
+    let folder = with_wall();
+    let times: String = (0..9).map(|i| format!("000{i}.png,{i}\n")).collect();
+    fs::write(at(&folder, "wall/times.csv"), times).unwrap();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    let own = at(&folder, "wall/images").display().to_string();
+    for (i, around) in ["../images", own.as_str(), "images"].iter().enumerate() {
+        call(&folder, |name| {
+            format!("{around}/{}", &name[name.len() - "0000.png".len()..])
+        });
+        for scene in ["wall", "scene"] {
+            let out = format!("{scene}{i}");
+            let line = format!(
+                "render {scene} --proxy plane --views wall/sparse/0 --frames 7..9 --size 32x24 \
+                 --time-window 3 -o {out}"
+            );
+            lumigraph(folder.path(), &line).ok();
+            let written: Vec<PathBuf> = files(&at(&folder, &out)).into_keys().collect();
+            assert_eq!(
+                written,
+                ["0007.png", "0008.png"].map(PathBuf::from),
+                "{around}"
+            );
+        }
+    }
 }
 
 #[test]
