@@ -141,7 +141,14 @@ fn gltf_buffers_may_lie_beside_the_file_but_not_elsewhere() {
     }
     std::fs::write(&path, with_uri("none.bin")).unwrap();
     let error = mesh::read(&path).unwrap_err().to_string();
-    assert!(error.contains("none.bin: "), "{error}");
+    let (file, none) = (path.display(), folder.path().join("none.bin"));
+    let said = format!(
+        "{file}, buffer 0: its bytes cannot be read from {}: ",
+        none.display()
+    );
+    assert!(error.starts_with(&said), "{error}");
+    let remedy = "; put that file there, or export the mesh as .glb";
+    assert!(error.ends_with(remedy), "{error}");
 }
 
 #[test]

@@ -236,7 +236,10 @@ fn what_is_missing_is_a_plain_colour_and_told() {
     let view = small_view(&bytes);
     let elsewhere = changed(&bytes, |t| t.replace(&view, "\"uri\":\"gone.png\""));
     let (plain, warnings) = read(&elsewhere).unwrap();
-    assert!(warnings[0].starts_with("gone.png: "), "{warnings:?}");
+    let said = "image 0: its bytes cannot be read from gone.png: ";
+    assert!(warnings[0].starts_with(said), "{warnings:?}");
+    let remedy = "; put that file there, or export the mesh as .glb: a plain colour instead";
+    assert!(warnings[0].ends_with(remedy), "{warnings:?}");
     assert_eq!(plain.materials[0].texture_idx, None);
     let (_, warnings) = read(&changed(&bytes, |t| {
         t.replace("\"material\":1", "\"material\":7")

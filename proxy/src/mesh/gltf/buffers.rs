@@ -73,12 +73,13 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// The bytes that a uri stands for, and whether they came from a file beside this one.
-pub(super) fn fetch(
+/// The bytes that a uri stands for, and whether they came from a file beside this one; what `failed`
+/// makes of what is wrong with them.
+pub(super) fn fetch<E>(
     path: &Path,
     uri: &str,
-    failed: impl Fn(String) -> MeshFileError,
-) -> Result<(Vec<u8>, bool), MeshFileError> {
+    failed: impl Fn(String) -> E,
+) -> Result<(Vec<u8>, bool), E> {
     if let Some(data) = uri.strip_prefix("data:") {
         let text = data.split_once(";base64,").map(|(_, text)| text);
         let decode = |text: &str| base64::engine::general_purpose::STANDARD.decode(text).ok();
@@ -101,8 +102,13 @@ pub(super) fn fetch(
         true => std::fs::read(&path),
         false => Err(std::io::Error::other("not a file")),
     });
-    let bytes = read.map_err(|e| MeshFileError::Io(path, e))?;
-    Ok((bytes, true))
+    match read {
+        Ok(bytes) => Ok((bytes, true)),
+        Err(e) => Err(failed(format!(
+            "its bytes cannot be read from {}: {e}; put that file there, or export the mesh as .glb",
+            path.display()
+        ))),
+    }
 }
 
 /// All that may lie in files of their own.

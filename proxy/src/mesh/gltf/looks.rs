@@ -372,8 +372,11 @@ impl Looks {
                 }
                 Ok(accessors.view_bytes(view)?.to_vec())
             }
-            (None, Some(uri)) => fetch(accessors.path, uri, failed).map(|(bytes, _)| bytes),
-            (None, None) => Err(failed("it is nowhere".to_owned())),
+            (None, Some(uri)) => {
+                let told = |problem: String| problem;
+                fetch(accessors.path, uri, told).map(|(bytes, _)| bytes)
+            }
+            (None, None) => Err("it is nowhere".to_owned()),
         };
         let idx = match bytes {
             Ok(bytes) => {
@@ -384,9 +387,9 @@ impl Looks {
                 self.pictures.push(picture);
                 Some(self.pictures.len() as u32 - 1)
             }
-            Err(error) => {
+            Err(problem) => {
                 self.warnings
-                    .push(format!("{error}: a plain colour instead"));
+                    .push(format!("image {image}: {problem}: a plain colour instead"));
                 None
             }
         };
