@@ -4,6 +4,7 @@
 
 mod carve;
 mod common;
+mod copies;
 mod depth;
 mod find;
 mod hostile;

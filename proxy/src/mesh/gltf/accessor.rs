@@ -152,18 +152,13 @@ impl Accessors<'_> {
         }
     }
 
-    /// Three numbers each.
-    pub(super) fn positions(
+    /// Three numbers each, as positions are; `what` they are.
+    pub(super) fn triples(
         &mut self,
         number: usize,
+        what: &str,
     ) -> Result<impl Iterator<Item = DVec3>, MeshFileError> {
-        if self
-            .accessors
-            .get(number)
-            .is_some_and(|a| a.kind != Kind::Vec3)
-        {
-            return Err(self.failed(number, "positions must be of type VEC3"));
-        }
+        self.check_kind(number, Kind::Vec3, what)?;
         let elements = self.elements(number)?;
         let accessor = elements.accessor;
         let (kind, is_normalized) = (accessor.component_type, accessor.normalized);
@@ -171,6 +166,27 @@ impl Accessors<'_> {
             let component = |k: usize| real(elements.at(i), kind, is_normalized, k);
             DVec3::new(component(0), component(1), component(2))
         }))
+    }
+
+    /// Four numbers each, as rotations are; `what` they are.
+    pub(super) fn quadruples(
+        &mut self,
+        number: usize,
+        what: &str,
+    ) -> Result<impl Iterator<Item = [f64; 4]>, MeshFileError> {
+        self.check_kind(number, Kind::Vec4, what)?;
+        self.vectors(number)
+    }
+
+    /// Whether an accessor, if it is there, has vectors of a kind.
+    fn check_kind(&self, number: usize, kind: Kind, what: &str) -> Result<(), MeshFileError> {
+        match self.accessors.get(number) {
+            Some(accessor) if accessor.kind != kind => {
+                let problem = format!("{what} must be of type VEC{}", kind.components());
+                Err(self.failed(number, problem))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Two to four numbers each; those that an accessor lacks are 1.

@@ -8,7 +8,7 @@ use super::{Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::{Material, MeshFileError, Model, ModelNode, PORTAL_NODE, Part, Wrap};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 #[derive(Deserialize)]
@@ -117,6 +117,8 @@ struct Looks {
     root: Option<Root>,
     model: Model,
     warnings: Vec<String>,
+    /// Primitives, by mesh, that a warning says lack texture coordinates: they may be there many times.
+    without_uvs: BTreeSet<(usize, usize)>,
     /// Index into the model's nodes of each of the file's.
     node_idxs: BTreeMap<usize, u32>,
     /// The same of materials; `None` is the one of primitives that name none.
@@ -230,7 +232,8 @@ impl Visitor for Looks {
         let is_textured = self.model.materials[material_idx as usize]
             .texture_idx
             .is_some();
-        if is_textured && !has_uvs {
+        let named = (place.mesh, place.primitive);
+        if is_textured && !has_uvs && self.without_uvs.insert(named) {
             self.warnings
                 .push(format!("{here} has a texture but no texture coordinates"));
         }

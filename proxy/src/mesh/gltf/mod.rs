@@ -8,6 +8,7 @@ mod accessor;
 mod buffers;
 mod looks;
 mod materials;
+mod nodes;
 mod pictures;
 
 pub(super) use buffers::files_beside;
@@ -16,7 +17,8 @@ pub(super) use looks::parse_model;
 use super::{Mesh, MeshFileError};
 use accessor::Accessors;
 use buffers::Buffers;
-use glam::{DMat4, DQuat, DVec3};
+use glam::DMat4;
+use nodes::{Node, Scene, world_from_nodes};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
@@ -48,22 +50,6 @@ struct Asset {
 }
 
 #[derive(Deserialize)]
-struct Scene {
-    #[serde(default)]
-    nodes: Vec<usize>,
-}
-
-#[derive(Deserialize)]
-struct Node {
-    children: Option<Box<[usize]>>,
-    mesh: Option<u32>,
-    matrix: Option<Box<[f64; 16]>>,
-    translation: Option<Box<[f64; 3]>>,
-    rotation: Option<Box<[f64; 4]>>,
-    scale: Option<Box<[f64; 3]>>,
-}
-
-#[derive(Deserialize)]
 struct MeshEntry {
     #[serde(default)]
     primitives: Vec<Primitive>,
@@ -84,13 +70,14 @@ struct Attributes {
 }
 
 /// Required extensions that change how a surface looks, not where it is (what of them is not shown is
-/// told with a model), and the one that only allows positions of whole numbers.
-const HARMLESS: [&str; 5] = [
+/// told with a model), the one that only allows positions of whole numbers, and the one that is read.
+const HARMLESS: [&str; 6] = [
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
     "KHR_lights_",
     "KHR_mesh_quantization",
+    nodes::INSTANCING,
 ];
 
 /// Bytes of mesh for each byte of the file, where nodes repeat meshes.
@@ -188,30 +175,35 @@ fn read(
             buffers: Buffers::new(path, &root.buffers, blob),
         },
         mesh: Mesh::default(),
+        copies: 0,
         file_size,
     };
-    for (node, parent, world_from_node) in world_from_nodes(path, root)? {
-        visitor.node(node, parent);
-        if let Some(number) = root.nodes[node].mesh {
-            let record = |problem: String| MeshFileError::Record {
-                path: path.to_owned(),
-                record: format!("node {node}"),
-                problem,
-            };
-            let entry = root.meshes.get(number as usize);
-            let entry = entry.ok_or_else(|| record(format!("there is no mesh {number}")))?;
-            for (i, primitive) in entry.primitives.iter().enumerate() {
-                if visitor.leaves_out(node, number as usize, i) {
-                    let triangles = reader.triangle_count(primitive)?;
-                    visitor.left_out(number as usize, i, triangles);
-                    continue;
-                }
-                let name = format!("mesh {number}, primitive {i}");
+    for (number, parent, world_from_node) in world_from_nodes(path, root)? {
+        visitor.node(number, parent);
+        let node = &root.nodes[number];
+        let Some(mesh) = node.mesh.map(|mesh| mesh as usize) else {
+            continue;
+        };
+        let entry = root.meshes.get(mesh);
+        let entry = entry.ok_or_else(|| MeshFileError::Record {
+            path: path.to_owned(),
+            record: format!("node {number}"),
+            problem: format!("there is no mesh {mesh}"),
+        })?;
+        let world_from_copies = reader.world_from_copies(node, number, world_from_node)?;
+        for (i, primitive) in entry.primitives.iter().enumerate() {
+            if visitor.leaves_out(number, mesh, i) {
+                let triangles = reader.triangle_count(primitive)?;
+                visitor.left_out(mesh, i, triangles * world_from_copies.len());
+                continue;
+            }
+            let name = format!("mesh {mesh}, primitive {i}");
+            for world_from_copy in &world_from_copies {
                 let (corner, triangle) = (reader.mesh.positions.len(), reader.mesh.triangles.len());
-                reader.primitive(primitive, &name, &world_from_node)?;
+                reader.primitive(primitive, &name, world_from_copy)?;
                 let place = Place {
-                    node,
-                    mesh: number as usize,
+                    node: number,
+                    mesh,
                     primitive: i,
                     corners: corner..reader.mesh.positions.len(),
                     triangles: triangle..reader.mesh.triangles.len(),
@@ -262,95 +254,49 @@ fn container(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     Ok((json, chunks[1]))
 }
 
-/// The default scene's nodes in the order of the file's trees, each with its parent and its
-/// transform.
-fn world_from_nodes(
-    path: &Path,
-    root: &Root,
-) -> Result<Vec<(usize, Option<usize>, DMat4)>, MeshFileError> {
-    let record = |record: String, problem: String| MeshFileError::Record {
-        path: path.to_owned(),
-        record,
-        problem,
-    };
-    // Without scenes every tree is meant.
-    let number = root.scene.unwrap_or(0);
-    let roots: Vec<usize> = match root.scenes.get(number) {
-        Some(scene) => scene.nodes.clone(),
-        None if root.scenes.is_empty() => {
-            let children = root.nodes.iter().filter_map(|n| n.children.as_deref());
-            let mut is_root = vec![true; root.nodes.len()];
-            for child in children.flatten() {
-                is_root
-                    .get_mut(*child)
-                    .into_iter()
-                    .for_each(|is| *is = false);
-            }
-            (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
-        }
-        None => {
-            let problem = format!("there is no scene {number}");
-            return Err(MeshFileError::File(path.to_owned(), problem));
-        }
-    };
-    let mut found = Vec::new();
-    let mut is_found = vec![false; root.nodes.len()];
-    let mut open: Vec<(usize, Option<usize>, DMat4)> = Vec::new();
-    open.extend(
-        roots
-            .iter()
-            .rev()
-            .map(|node| (*node, None, DMat4::IDENTITY)),
-    );
-    while let Some((number, parent, world_from_parent)) = open.pop() {
-        let here = || format!("node {number}");
-        let Some(node) = root.nodes.get(number) else {
-            return Err(record(here(), "there is no such node".to_owned()));
-        };
-        if std::mem::replace(&mut is_found[number], true) {
-            let problem = "two nodes have it as their child; nodes must form trees";
-            return Err(record(here(), problem.to_owned()));
-        }
-        let world_from_node = world_from_parent * node.parent_from_node();
-        if !world_from_node.is_finite() {
-            return Err(record(here(), "its transform is not finite".to_owned()));
-        }
-        let children = node.children.as_deref().unwrap_or_default();
-        let below = |child: &usize| (*child, Some(number), world_from_node);
-        open.extend(children.iter().rev().map(below));
-        found.push((number, parent, world_from_node));
-    }
-    Ok(found)
-}
-
-impl Node {
-    fn parent_from_node(&self) -> DMat4 {
-        if let Some(matrix) = &self.matrix {
-            return DMat4::from_cols_array(matrix);
-        }
-        let or = |v: &Option<Box<[f64; 3]>>, other: DVec3| {
-            v.as_ref().map_or(other, |v| DVec3::from_array(**v))
-        };
-        let rotation = self.rotation.as_ref().map(|r| DQuat::from_array(**r));
-        // f32 digits are not quite of length 1.
-        let rotation = rotation.filter(|r| r.length_squared() > 0.0);
-        let rotation = rotation.map_or(DQuat::IDENTITY, DQuat::normalize);
-        let (scale, translation) = (
-            or(&self.scale, DVec3::ONE),
-            or(&self.translation, DVec3::ZERO),
-        );
-        DMat4::from_scale_rotation_translation(scale, rotation, translation)
-    }
-}
-
 /// What is gathered while reading.
 struct Reader<'a> {
     accessors: Accessors<'a>,
     mesh: Mesh,
+    /// How many copies nodes have told of so far.
+    copies: usize,
     file_size: usize,
 }
 
 impl Reader<'_> {
+    /// Where a node's mesh is in the world: once where the node is, or as often as there are copies of it.
+    fn world_from_copies(
+        &mut self,
+        node: &Node,
+        number: usize,
+        world_from_node: DMat4,
+    ) -> Result<Vec<DMat4>, MeshFileError> {
+        let Some(copies) = node.copies() else {
+            return Ok(vec![world_from_node]);
+        };
+        let name = format!("node {number}");
+        let count = copies.count(&mut self.accessors, &name)?;
+        self.copies += count;
+        self.check_size(size_of::<DMat4>() * self.copies, &name)?;
+        copies.transforms(&mut self.accessors, &name, vec![world_from_node; count])
+    }
+
+    /// Whether a file of this size may become so many bytes.
+    fn check_size(&self, bytes: usize, name: &str) -> Result<(), MeshFileError> {
+        let size = self.file_size + self.accessors.buffers.external_size();
+        if bytes <= MAX_GROWTH * size + 65536 {
+            return Ok(());
+        }
+        Err(MeshFileError::Record {
+            path: self.accessors.path.to_owned(),
+            record: name.to_owned(),
+            problem: format!(
+                "nodes repeat meshes until they take {bytes} bytes, {MAX_GROWTH} times the \
+                 file; join and simplify them before exporting"
+            ),
+        })
+    }
+
     /// How many triangles a primitive is made of.
     fn triangle_count(&mut self, primitive: &Primitive) -> Result<usize, MeshFileError> {
         let Some(positions) = primitive.attributes.position else {
@@ -391,17 +337,10 @@ impl Reader<'_> {
         let indices = indices.unwrap_or(corners);
         let bytes =
             24 * (self.mesh.positions.len() + corners) + 12 * (self.mesh.triangles.len() + indices);
-        let allowed =
-            MAX_GROWTH * (self.file_size + self.accessors.buffers.external_size()) + 65536;
-        if bytes > allowed {
-            return Err(failed(format!(
-                "nodes repeat meshes until they take {bytes} bytes, {MAX_GROWTH} times the \
-                 file; join and simplify them before exporting"
-            )));
-        }
+        self.check_size(bytes, name)?;
         // 2. Corners.
         let first = self.mesh.positions.len();
-        let positions = self.accessors.positions(positions)?;
+        let positions = self.accessors.triples(positions, "positions")?;
         for (i, position) in positions.enumerate() {
             let position = world_from_node.transform_point3(position);
             if !position.is_finite() {

@@ -1,0 +1,220 @@
+//! A glTF file's nodes: where they are in the world, and where the copies of their meshes are.
+
+use super::Root;
+use super::accessor::Accessors;
+use crate::mesh::MeshFileError;
+use glam::{DMat4, DQuat, DVec3};
+use serde::Deserialize;
+use std::path::Path;
+
+#[derive(Deserialize)]
+pub(super) struct Scene {
+    #[serde(default)]
+    nodes: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Node {
+    children: Option<Box<[usize]>>,
+    pub(super) mesh: Option<u32>,
+    matrix: Option<Box<[f64; 16]>>,
+    translation: Option<Box<[f64; 3]>>,
+    rotation: Option<Box<[f64; 4]>>,
+    scale: Option<Box<[f64; 3]>>,
+    extensions: Option<Box<Extensions>>,
+}
+
+/// The extension by which a node shows its mesh as often as accessors have transforms.
+pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// What is read of a node's extensions.
+#[derive(Deserialize)]
+struct Extensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    instancing: Option<Instancing>,
+}
+
+#[derive(Deserialize)]
+struct Instancing {
+    #[serde(default)]
+    attributes: Copies,
+}
+
+/// The accessors that have transforms of copies of a mesh, in the node's frame: each is scaled, then rotated,
+/// then translated.
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) struct Copies {
+    translation: Option<usize>,
+    rotation: Option<usize>,
+    scale: Option<usize>,
+}
+
+/// The default scene's nodes in the order of the file's trees, each with its parent and its
+/// transform.
+pub(super) fn world_from_nodes(
+    path: &Path,
+    root: &Root,
+) -> Result<Vec<(usize, Option<usize>, DMat4)>, MeshFileError> {
+    // Without scenes every tree is meant.
+    let number = root.scene.unwrap_or(0);
+    let roots: Vec<usize> = match root.scenes.get(number) {
+        Some(scene) => scene.nodes.clone(),
+        None if root.scenes.is_empty() => {
+            let children = root.nodes.iter().filter_map(|n| n.children.as_deref());
+            let mut is_root = vec![true; root.nodes.len()];
+            for child in children.flatten() {
+                is_root
+                    .get_mut(*child)
+                    .into_iter()
+                    .for_each(|is| *is = false);
+            }
+            (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
+        }
+        None => {
+            let problem = format!("there is no scene {number}");
+            return Err(MeshFileError::File(path.to_owned(), problem));
+        }
+    };
+    let mut found = Vec::new();
+    let mut is_found = vec![false; root.nodes.len()];
+    let mut open: Vec<(usize, Option<usize>, DMat4)> = Vec::new();
+    open.extend(
+        roots
+            .iter()
+            .rev()
+            .map(|node| (*node, None, DMat4::IDENTITY)),
+    );
+    while let Some((number, parent, world_from_parent)) = open.pop() {
+        let here = || format!("node {number}");
+        let Some(node) = root.nodes.get(number) else {
+            return Err(failed(path, &here(), "there is no such node".to_owned()));
+        };
+        if std::mem::replace(&mut is_found[number], true) {
+            let problem = "two nodes have it as their child; nodes must form trees";
+            return Err(failed(path, &here(), problem.to_owned()));
+        }
+        let world_from_node = world_from_parent * node.parent_from_node();
+        if !world_from_node.is_finite() {
+            return Err(failed(
+                path,
+                &here(),
+                "its transform is not finite".to_owned(),
+            ));
+        }
+        let children = node.children.as_deref().unwrap_or_default();
+        let below = |child: &usize| (*child, Some(number), world_from_node);
+        open.extend(children.iter().rev().map(below));
+        found.push((number, parent, world_from_node));
+    }
+    Ok(found)
+}
+
+impl Node {
+    /// The copies of its mesh, if it tells of any.
+    pub(super) fn copies(&self) -> Option<&Copies> {
+        let extensions = self.extensions.as_ref()?;
+        Some(&extensions.instancing.as_ref()?.attributes)
+    }
+
+    fn parent_from_node(&self) -> DMat4 {
+        if let Some(matrix) = &self.matrix {
+            return DMat4::from_cols_array(matrix);
+        }
+        let or = |v: &Option<Box<[f64; 3]>>, other: DVec3| {
+            v.as_ref().map_or(other, |v| DVec3::from_array(**v))
+        };
+        let rotation = self.rotation.as_ref().map(|r| unit(**r));
+        let (scale, rotation, translation) = (
+            or(&self.scale, DVec3::ONE),
+            rotation.unwrap_or(DQuat::IDENTITY),
+            or(&self.translation, DVec3::ZERO),
+        );
+        DMat4::from_scale_rotation_translation(scale, rotation, translation)
+    }
+}
+
+/// A rotation of numbers whose digits make it not quite of length 1; none where they are all 0.
+fn unit(rotation: [f64; 4]) -> DQuat {
+    let rotation = DQuat::from_array(rotation);
+    if rotation.length_squared() == 0.0 {
+        return DQuat::IDENTITY;
+    }
+    rotation.normalize()
+}
+
+impl Copies {
+    /// How many there are.
+    pub(super) fn count(
+        &self,
+        accessors: &mut Accessors<'_>,
+        record: &str,
+    ) -> Result<usize, MeshFileError> {
+        let mut first: Option<(&str, usize)> = None;
+        for (what, accessor) in [
+            ("translations", self.translation),
+            ("rotations", self.rotation),
+            ("scales", self.scale),
+        ] {
+            let Some(accessor) = accessor else {
+                continue;
+            };
+            let count = accessors.count(accessor)?;
+            let (other, expected) = *first.get_or_insert((what, count));
+            if count != expected {
+                return Err(failed(
+                    accessors.path,
+                    record,
+                    format!(
+                        "its copies ({INSTANCING}) have {expected} {other} and {count} {what}; \
+                         export the model again"
+                    ),
+                ));
+            }
+        }
+        // Where nothing tells them apart they are all in one place.
+        Ok(first.map_or(1, |(_, count)| count))
+    }
+
+    /// Where in the world they are; what comes in is their node's transform, once for each.
+    pub(super) fn transforms(
+        &self,
+        accessors: &mut Accessors<'_>,
+        record: &str,
+        mut world_from_copies: Vec<DMat4>,
+    ) -> Result<Vec<DMat4>, MeshFileError> {
+        if let Some(accessor) = self.translation {
+            let translations = accessors.triples(accessor, "translations")?;
+            for (transform, translation) in world_from_copies.iter_mut().zip(translations) {
+                *transform *= DMat4::from_translation(translation);
+            }
+        }
+        if let Some(accessor) = self.rotation {
+            let rotations = accessors.quadruples(accessor, "rotations")?;
+            for (transform, rotation) in world_from_copies.iter_mut().zip(rotations) {
+                *transform *= DMat4::from_quat(unit(rotation));
+            }
+        }
+        if let Some(accessor) = self.scale {
+            let scales = accessors.triples(accessor, "scales")?;
+            for (transform, scale) in world_from_copies.iter_mut().zip(scales) {
+                *transform *= DMat4::from_scale(scale);
+            }
+        }
+        match world_from_copies.iter().position(|m| !m.is_finite()) {
+            None => Ok(world_from_copies),
+            Some(i) => {
+                let problem = format!("the transform of its copy {i} is not finite");
+                Err(failed(accessors.path, record, problem))
+            }
+        }
+    }
+}
+
+fn failed(path: &Path, record: &str, problem: String) -> MeshFileError {
+    MeshFileError::Record {
+        path: path.to_owned(),
+        record: record.to_owned(),
+        problem,
+    }
+}
