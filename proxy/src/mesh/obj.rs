@@ -2,11 +2,13 @@
 
 use super::polygon::{Fan, Fans};
 use super::{Mesh, MeshFileError};
+use capture::without_byte_order_mark;
 use glam::DVec3;
 use std::path::Path;
 
 /// Reads `v` and `f`; all else is for looks and left alone.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    let bytes = without_byte_order_mark(bytes);
     let mut mesh = Mesh::default();
     // The greatest index so far and the line that has it: corners may follow their faces.
     let mut greatest = (0, 0);

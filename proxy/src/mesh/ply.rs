@@ -4,6 +4,7 @@ use super::obj::shown;
 use super::ply_header::{self, Element, Format, Scalar};
 use super::polygon::{Fan, Fans, Strip};
 use super::{Mesh, MeshFileError};
+use capture::without_byte_order_mark;
 use glam::DVec3;
 use std::path::Path;
 
@@ -34,6 +35,7 @@ fn parse_named(
     [corners, faces]: [&str; 2],
     strips: Option<&str>,
 ) -> Result<Option<Mesh>, MeshFileError> {
+    let bytes = without_byte_order_mark(bytes);
     let header = ply_header::parse(bytes).map_err(|(line, problem)| MeshFileError::Line {
         path: path.to_owned(),
         line,

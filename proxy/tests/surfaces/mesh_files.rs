@@ -544,6 +544,36 @@ fn bad_obj_files_say_where() {
     assert!(message("a.stl", "").starts_with("a.stl: meshes are read from"));
 }
 
+#[test]
+fn what_editors_put_before_text_is_passed_over() {
+    // The last corner is no face's: were the first lost, nothing would be said.
+    let corners: [[f32; 3]; 4] = [[0.; 3], [1., 0., 0.], [0., 1., 0.], [9.; 3]];
+    let lines = |start: &str| {
+        corners
+            .map(|[x, y, z]| format!("{start}{x} {y} {z}\n"))
+            .concat()
+    };
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+         {}3 0 1 2\n",
+        lines("")
+    );
+    for (name, text) in [
+        ("a.obj", lines("v ") + "f 1 2 3\n"),
+        ("a.ply", ply),
+        ("a.gltf", gltf(4, Some(&[0, 1, 2]), &corners, ONE_NODE)),
+    ] {
+        let mesh = parse(name, format!("\u{feff}{text}")).unwrap();
+        let expected = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+        assert_eq!(
+            (mesh.positions, mesh.triangles),
+            (expected.to_vec(), vec![[0, 1, 2]]),
+            "{name}"
+        );
+    }
+}
+
 /// A mesh far from the origin, as in UTM metres.
 fn far_mesh() -> Mesh {
     let origin = DVec3::new(500_123.456_789, 5_400_321.987_654, 312.3);

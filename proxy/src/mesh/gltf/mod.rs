@@ -17,6 +17,7 @@ pub(super) use looks::parse_model;
 use super::{Mesh, MeshFileError};
 use accessor::Accessors;
 use buffers::Buffers;
+use capture::without_byte_order_mark;
 use glam::DMat4;
 use nodes::{Node, Scene, world_from_nodes};
 use serde::Deserialize;
@@ -133,7 +134,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
 fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), MeshFileError> {
     match bytes.starts_with(b"glTF") {
         true => container(bytes).map_err(|e| MeshFileError::File(path.to_owned(), e)),
-        false => Ok((bytes, None)),
+        false => Ok((without_byte_order_mark(bytes), None)),
     }
 }
 
