@@ -49,6 +49,13 @@ pub enum MeshFileError {
         path = .0.display(), found = .1
     )]
     NoTriangles(PathBuf, usize),
+    /// A glTF file whose default scene has none.
+    #[error(
+        "{path}: its default scene has no triangle; if another of its scenes is meant, export that one, and \
+         of lines or a cloud of points make a surface first",
+        path = .0.display()
+    )]
+    EmptyScene(PathBuf),
     /// What cannot be written.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Export(PathBuf, ExportError),

@@ -24,7 +24,7 @@ pub fn read(path: &Path) -> Result<Mesh, MeshFileError> {
 /// As for [`read()`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     let mesh = match extension(path).as_str() {
-        "glb" | "gltf" => gltf::parse(path, bytes)?,
+        "glb" | "gltf" => return gltf::parse(path, bytes),
         "ply" => ply::parse(path, bytes)?,
         "obj" => obj::parse(path, bytes)?,
         _ => return Err(MeshFileError::Extension(path.to_owned())),
@@ -57,12 +57,7 @@ pub fn read_model(path: &Path) -> Result<(Model, Vec<String>), MeshFileError> {
 /// # Errors
 /// As for [`read_model`].
 pub fn parse_model(path: &Path, bytes: &[u8]) -> Result<(Model, Vec<String>), MeshFileError> {
-    let (model, warnings) = gltf::parse_model(path, bytes)?;
-    if model.mesh.triangles.is_empty() {
-        let corners = model.mesh.positions.len();
-        return Err(MeshFileError::NoTriangles(path.to_owned(), corners));
-    }
-    Ok((model, warnings))
+    gltf::parse_model(path, bytes)
 }
 
 /// The files beside a .glb or .gltf file that it has buffers and pictures in, by their paths, whether or not

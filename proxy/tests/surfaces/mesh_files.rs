@@ -92,11 +92,25 @@ fn gltf_triangles_strips_and_fans_are_triangles() {
     }
     let strip = parse("a.gltf", gltf(5, None, &SQUARE, ONE_NODE)).unwrap();
     assert_eq!(strip.triangles, [[0, 1, 2], [2, 1, 3]]);
-    let lines = message("a.gltf", gltf(1, None, &SQUARE, ONE_NODE));
-    assert!(
-        lines.starts_with("a.gltf: 0 corners but no triangle"),
-        "{lines}"
-    );
+}
+
+#[test]
+fn a_gltf_scene_without_triangles_is_told() {
+    let said = "a.gltf: its default scene has no triangle; if another of its scenes is meant, export \
+                that one, and of lines or a cloud of points make a surface first";
+    let square = gltf(4, Some(&[0, 1, 2]), &SQUARE, ONE_NODE);
+    let empty = square.replace(r#""scenes": [{"nodes": [0]}]"#, r#""scenes": [{}]"#);
+    assert_ne!(empty, square);
+    for text in [
+        gltf(0, None, &SQUARE, ONE_NODE),
+        gltf(1, None, &SQUARE, ONE_NODE),
+        gltf(4, None, &SQUARE[..2], ONE_NODE),
+        empty,
+    ] {
+        assert_eq!(message("a.gltf", &text), said);
+        let model = mesh::parse_model(Path::new("a.gltf"), text.as_bytes());
+        assert_eq!(model.unwrap_err().to_string(), said);
+    }
 }
 
 #[test]

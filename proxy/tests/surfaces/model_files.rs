@@ -528,7 +528,7 @@ fn what_is_corrupt_is_named() {
     assert!(
         error
             .to_string()
-            .starts_with("e.gltf: 0 corners but no triangle")
+            .starts_with("e.gltf: its default scene has no triangle")
     );
     let error = mesh::read_model(Path::new("e.ply"))
         .unwrap_err()

@@ -67,7 +67,7 @@ struct Sampler {
     wrap_t: u32,
 }
 
-/// Reads a .glb or .gltf file with its looks. What could not be had of them is told beside the
+/// Reads a .glb or .gltf file that has triangles with its looks. What could not be had of them is told beside the
 /// model, and has a plain colour instead; so is what is drawn opaque or left out.
 pub(in crate::mesh) fn parse_model(
     path: &Path,
@@ -84,14 +84,18 @@ pub(in crate::mesh) fn parse_model(
     };
     let mesh = super::read(path, bytes.len(), &root, blob, &mut looks)?;
     let hidden: usize = looks.hidden.values().sum();
-    if mesh.triangles.is_empty() && hidden > 0 {
-        return Err(MeshFileError::File(
-            path.to_owned(),
-            format!(
-                "all its triangles ({hidden}) are invisible, as their materials' alpha is 0 or less \
-                 than the cutoff; export the model again with materials that are opaque"
+    if mesh.triangles.is_empty() {
+        let path = path.to_owned();
+        return Err(match hidden {
+            0 => MeshFileError::EmptyScene(path),
+            _ => MeshFileError::File(
+                path,
+                format!(
+                    "all its triangles ({hidden}) are invisible, as their materials' alpha is 0 or less \
+                     than the cutoff; export the model again with materials that are opaque"
+                ),
             ),
-        ));
+        });
     }
     let decoded = decode(path, &looks.pictures)?;
     let not_shown = looks.not_shown(&decoded);

@@ -124,10 +124,14 @@ struct Place {
 /// To know where the triangles are is enough.
 impl Visitor for () {}
 
-/// Reads a .glb or a .gltf file.
+/// Reads a .glb or a .gltf file that has triangles.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     let (json, blob) = split(path, bytes)?;
-    read(path, bytes.len(), &root(path, json)?, blob, &mut ())
+    let mesh = read(path, bytes.len(), &root(path, json)?, blob, &mut ())?;
+    match mesh.triangles.is_empty() {
+        true => Err(MeshFileError::EmptyScene(path.to_owned())),
+        false => Ok(mesh),
+    }
 }
 
 /// The JSON and the binary chunk of a GLB; of a .gltf file, all of it is JSON.
