@@ -13,7 +13,9 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     // The greatest index so far and the line that has it: corners may follow their faces.
     let mut greatest = (0, 0);
     let mut fans = Fans::default();
-    for (number, line) in bytes.split(|b| *b == b'\n').enumerate() {
+    // Old Macs end lines with a return alone.
+    let line_end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    for (number, line) in bytes.split(|b| *b == line_end).enumerate() {
         let line_number = number + 1;
         let failed = |problem: String| MeshFileError::Line {
             path: path.to_owned(),

@@ -421,6 +421,20 @@ fn obj_faces_take_every_form() {
     );
 }
 
+#[test]
+fn obj_lines_may_end_as_on_any_computer() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let expected = parse("a.obj", text).unwrap();
+    for end in ["\r\n", "\r"] {
+        assert_eq!(parse("a.obj", text.replace('\n', end)).unwrap(), expected);
+        let bad = text.replace("f 1 2 3", "f 1 2 4").replace('\n', end);
+        assert_eq!(
+            message("a.obj", bad),
+            "a.obj, line 4: a face uses corner 4, but the file has 3; is it cut off?"
+        );
+    }
+}
+
 /// An L of area 5, at a slant and far from the origin; and a square with a hole, joined to its outline.
 const CONCAVE: [(&[[f64; 2]], f64); 2] = [
     (
