@@ -111,7 +111,10 @@ impl Corpus {
             "mesh_ply",
             "own",
             &proxy::mesh::to_ply(&square, None, "by hand"),
-        )
+        )?;
+        let comment = "lumigraph proxy carved";
+        let bounded = proxy::mesh::to_ply(&square, Some(&square), comment);
+        self.add("mesh_ply", "own-hull", &bounded)
     }
 
     /// A model's three files, together and each alone.

@@ -6,6 +6,7 @@ pub mod model;
 use calibrate::Reconstruction;
 use calibrate::opencv::{self, FileStorage, Keys};
 use peak_alloc::PeakAlloc;
+use proxy::Proxy;
 use std::path::Path;
 
 #[global_allocator]
@@ -17,6 +18,9 @@ static ALLOCATED: PeakAlloc = PeakAlloc;
 pub const BYTES_PER_BYTE: usize = 256;
 /// Bytes that it may hold besides: tables, messages.
 const BYTES_BESIDES: usize = 1 << 20;
+/// Bytes that making a mesh ready for rays may hold for each of its triangles: several boxes
+/// each, sorted. A byte of a file may be a triangle.
+const BYTES_PER_TRIANGLE: usize = 1 << 10;
 
 /// Runs a parser and panics where it held more than its share of memory; `allowed` is what
 /// it may hold beyond `input` bytes' share, judged by its result.
@@ -141,5 +145,43 @@ pub fn mesh(name: &str, data: &[u8]) {
             assert!(indices.iter().all(|i| (*i as usize) < mesh.positions.len()));
         }
         Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// A proxy's file of that name, read and checked: a mesh, and the hull around it if there is one.
+pub fn solid(name: &str, data: &[u8]) {
+    let parse = || proxy::parse(Path::new(name), data);
+    let read = within_memory(data.len(), parse, |read| match read {
+        Ok(Proxy::Mesh(solid)) => BYTES_PER_TRIANGLE * solid.triangle_count(),
+        _ => 0,
+    });
+    match read {
+        Ok(Proxy::Mesh(solid)) => {
+            assert!(!solid.mesh().triangles.is_empty());
+            for i in 0..solid.triangle_count() {
+                assert!(solid.corners(i).iter().all(|p| p.is_finite()));
+            }
+        }
+        Ok(other) => panic!("a mesh's file is no {}", other.kind()),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proxy::MeshKind;
+
+    #[test]
+    fn the_seed_of_a_proxy_has_all_that_its_file_may() {
+        let seed = include_bytes!("../seeds/mesh_ply/hull");
+        solid("seed.ply", seed);
+        let Ok(Proxy::Mesh(read)) = proxy::parse(Path::new("seed.ply"), seed) else {
+            panic!("a mesh");
+        };
+        assert_eq!((read.kind(), read.occludes()), (MeshKind::Carved, false));
+        let hull = read.within().expect("a hull");
+        assert_eq!((hull.kind(), hull.triangle_count()), (MeshKind::Hull, 4));
+        assert_eq!(read.triangle_count(), 5);
     }
 }

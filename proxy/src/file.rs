@@ -326,9 +326,10 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
         }
         "ply" => {
             let (kind, occludes) = kind_of_ply(bytes);
-            let hull = mesh::ply_hull(path, bytes)?;
+            // Both, before either is made ready for rays.
+            let (own, hull) = (mesh()?, mesh::ply_hull(path, bytes)?);
             let hull = hull.map(|hull| Arc::new(Solid::new(MeshKind::Hull, hull)));
-            Ok(solid(kind, mesh()?, occludes, hull))
+            Ok(solid(kind, own, occludes, hull))
         }
         "gltf" | "obj" => Ok(solid(MeshKind::Mesh, mesh()?, true, None)),
         _ => Err(FileError::Extension(path.to_owned())),
