@@ -486,6 +486,37 @@ fn what_is_not_opaque_is_told_once() {
     );
 }
 
+#[test]
+fn a_texture_is_told_to_be_moved_only_where_it_would_be() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let warnings_of = |name: &str, extension: Value| {
+        let moved = with_materials(&bytes, |materials| {
+            let texture = &mut materials[0]["pbrMetallicRoughness"]["baseColorTexture"];
+            texture["extensions"] = json!({name: extension});
+        });
+        read(&moved).unwrap().1
+    };
+    let name = "KHR_texture_transform";
+    for nothing in [
+        json!({}),
+        json!({"offset": [0, 0], "rotation": 0, "scale": [1, 1], "texCoord": 0}),
+    ] {
+        assert_eq!(warnings_of(name, nothing), [""; 0]);
+    }
+    for something in [
+        json!({"offset": [0, 0.5]}),
+        json!({"rotation": 1}),
+        json!({"scale": [1, -1]}),
+        json!({"texCoord": 1}),
+    ] {
+        let said = "texture 0: KHR_texture_transform is not applied";
+        assert_eq!(warnings_of(name, something), [said]);
+    }
+    // Nobody knows what another does.
+    let said = "texture 0: EXT_other is not applied";
+    assert_eq!(warnings_of("EXT_other", json!({})), [said]);
+}
+
 /// How the file names its picture's bytes.
 fn small_view(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);

@@ -318,7 +318,7 @@ impl Looks {
             (None, None) => {}
         }
         if let Some(used) = self.texture_use(number).cloned() {
-            for extension in used.extensions.keys() {
+            for extension in used.not_applied() {
                 self.warnings.push(format!(
                     "texture {}: {} is not applied",
                     used.index,

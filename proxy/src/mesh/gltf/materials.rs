@@ -3,7 +3,6 @@
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::obj::shown;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
 /// A material of the file.
@@ -58,7 +57,41 @@ pub(super) struct TextureUse {
     #[serde(default)]
     pub(super) tex_coord: u32,
     #[serde(default)]
-    pub(super) extensions: BTreeMap<String, IgnoredAny>,
+    extensions: BTreeMap<String, TextureExtension>,
+}
+
+/// An extension of a texture's use: what [`TRANSFORM`] has, all else passed over.
+#[derive(Clone, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct TextureExtension {
+    offset: Option<[f64; 2]>,
+    rotation: Option<f64>,
+    scale: Option<[f64; 2]>,
+    tex_coord: Option<u32>,
+}
+
+/// The extension that moves, turns and stretches a texture, which some programs write where it does nothing.
+const TRANSFORM: &str = "KHR_texture_transform";
+
+impl TextureUse {
+    /// The extensions that are not applied, but for one that changes nothing.
+    pub(super) fn not_applied(&self) -> impl Iterator<Item = &str> {
+        let tex_coord = self.tex_coord;
+        self.extensions.iter().filter_map(move |(name, extension)| {
+            let is_lost = name != TRANSFORM || extension.moves(tex_coord);
+            is_lost.then_some(name.as_str())
+        })
+    }
+}
+
+impl TextureExtension {
+    /// Whether, as a transform, it changes anything of a texture that has these coordinates without it.
+    fn moves(&self, tex_coord: u32) -> bool {
+        self.offset.unwrap_or([0.0; 2]) != [0.0; 2]
+            || self.rotation.unwrap_or(0.0) != 0.0
+            || self.scale.unwrap_or([1.0; 2]) != [1.0; 2]
+            || self.tex_coord.unwrap_or(tex_coord) != tex_coord
+    }
 }
 
 /// The extension whose diffuse colour stands in place of the base colour.
