@@ -203,7 +203,10 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
             check_there(&args.model)?;
         }
         let found = args.model.display();
-        let text = format!("{found}: interiors are made of .glb models, or of folders of photos");
+        let text = format!(
+            "{found}: interiors are made of .glb models, or of folders of photos; export the model as .glb, \
+             from Blender, say"
+        );
         return Err(Usage(text).into());
     }
     check_there(&args.model)?;

@@ -511,6 +511,10 @@ fn usage_errors_exit_with_2() {
             "interiors are made of .glb models",
         ),
         (
+            "interior house.gltf -o x",
+            "house.gltf: interiors are made of .glb models, or of folders of photos; export the model as .glb",
+        ),
+        (
             "interior house.glb --hold-out split.json -o x",
             "--hold-out is for captures",
         ),
