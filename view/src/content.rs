@@ -7,6 +7,7 @@ use proxy::Proxy;
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
 use render::interior::{Painter, Tour};
+use render::trajectory::{Upright, upright};
 use render::{Lumigraph, Moment, SourceView};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -164,7 +165,8 @@ impl Space {
     /// Of a scene.
     pub fn of_scene(lumigraph: &Lumigraph) -> Self {
         let views: Vec<&View> = lumigraph.sources.iter().map(|s| &s.view).collect();
-        let ups: DVec3 = views.iter().map(|v| v.up()).sum();
+        // Photos taken with the camera turned say no less which way is up.
+        let ups: DVec3 = upright(&views).iter().map(Upright::up).sum();
         let count = views.len().max(1) as f64;
         let middle = views.iter().map(|v| v.center()).sum::<DVec3>() / count;
         let reach = |v: &&View| v.center().distance(middle);
@@ -313,6 +315,9 @@ fn typical_depth(lumigraph: &Lumigraph) -> Option<f64> {
 pub(crate) mod tests {
     use super::*;
     use datasets::house::{HouseOptions, house};
+    use image::RgbaImage;
+    use proxy::Plane;
+    use render::PhotoStore;
 
     /// A small house.
     pub(crate) fn two_rooms() -> Content {
@@ -324,5 +329,34 @@ pub(crate) mod tests {
         let made = house(&options).unwrap();
         let contents = Contents::new(&made.interior, &made.model).unwrap().0;
         Content::Interior(Arc::new(House::new(made.interior, contents, made.model)))
+    }
+
+    #[test]
+    fn up_is_where_most_photos_have_it() {
+        let source = |i: i32| {
+            let center = DVec3::X * f64::from(i);
+            // The third was taken with the camera turned.
+            let up = if i == 2 { DVec3::X } else { DVec3::NEG_Y };
+            SourceView {
+                name: i.to_string(),
+                view: View {
+                    lens: room_lens(),
+                    width: ROOM_SIZE.0,
+                    height: ROOM_SIZE.1,
+                    camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, up),
+                },
+                gain: [1.0; 3],
+                time_s: None,
+            }
+        };
+        let lumigraph = Lumigraph {
+            points: Vec::new(),
+            sources: (0..5).map(source).collect(),
+            photos: PhotoStore::from_images(vec![RgbaImage::new(8, 8); 5]),
+            proxy: Proxy::Plane(Plane::new(4.0 * DVec3::Z, DVec3::Z).unwrap()),
+            visibility: None,
+        };
+        let up = Space::of_scene(&lumigraph).up;
+        assert!(up.distance(DVec3::NEG_Y) < 1e-12, "{up}");
     }
 }

@@ -1,6 +1,6 @@
 //! What a path needs to know of a capture's geometry.
 
-use super::PI;
+use super::{PI, Upright};
 use crate::lumigraph::SourceView;
 use crate::path::mean_rotation;
 use calibrate::Rigid3;
@@ -13,7 +13,7 @@ pub(super) struct Capture {
     /// The reference camera's centre.
     pub(super) origin_in_world: DVec3,
     pub(super) centers: Vec<DVec3>,
-    /// `camera_from_world`.
+    /// `camera_from_world`, as they stand upright.
     rotations: Vec<DQuat>,
     /// The camera nearest to the middle of them all.
     reference_idx: usize,
@@ -38,7 +38,12 @@ const SAME_PLACE: f64 = 1e-4;
 const MANY: usize = 512;
 
 impl Capture {
-    pub(super) fn new(sources: &[SourceView], points_in_world: &[DVec3], proxy: &Proxy) -> Self {
+    pub(super) fn new(
+        sources: &[SourceView],
+        upright: &[Upright],
+        points_in_world: &[DVec3],
+        proxy: &Proxy,
+    ) -> Self {
         // 1. The middle, robustly, and the camera nearest to it.
         let first = sources[0].view.center();
         let centers: Vec<DVec3> = sources.iter().map(|s| s.view.center() - first).collect();
@@ -55,7 +60,7 @@ impl Capture {
             .iter()
             .map(|s| s.view.center() - origin_in_world)
             .collect();
-        let rotation = reference.camera_from_world.rotation;
+        let rotation = upright[reference_idx].rotation;
         let forward = reference.forward();
 
         // 2. Principal axes. Ties are broken in favour of the reference camera's x axis,
@@ -109,10 +114,7 @@ impl Capture {
 
         Self {
             origin_in_world,
-            rotations: sources
-                .iter()
-                .map(|s| s.view.camera_from_world.rotation)
-                .collect(),
+            rotations: upright.iter().map(|one| one.rotation).collect(),
             reference_idx,
             axes,
             half_extents,
@@ -128,7 +130,7 @@ impl Capture {
         self.has_extent
     }
 
-    /// The reference camera's pose, its centre the origin.
+    /// The reference camera's pose as it stands upright, its centre the origin.
     pub(super) fn reference_pose(&self) -> Rigid3 {
         Rigid3::new(self.rotations[self.reference_idx], DVec3::ZERO)
     }

@@ -5,10 +5,13 @@
 //! its paths moved, turned and scaled.
 
 mod capture;
+mod upright;
+
+pub use upright::{Upright, upright};
 
 use crate::lumigraph::SourceView;
 use crate::path::{CameraPath, Curve, Interpolation, PathError, PathFrame, default_name};
-use calibrate::{Camera, ModelKind, Rigid3};
+use calibrate::{Camera, ModelKind, Rigid3, View};
 use capture::{Capture, Ring};
 use glam::DVec3;
 use proxy::Proxy;
@@ -58,7 +61,8 @@ const ORBIT_POINTS: usize = 720;
 /// `points_in_world` are the sparse points, or nothing. All frames have one camera: a
 /// pinhole with the median focal length of the source views, their most common image
 /// size, and the principal point in its centre. A capture of one place, or of one photo,
-/// stands still (orbit, sweep) or moves little (dolly).
+/// stands still (orbit, sweep) or moves little (dolly). Photos that were taken with the camera turned count as if
+/// they stood as most do; see [`upright()`].
 ///
 /// # Errors
 /// No source views, a pose that is not finite, no frames, a frame rate that is not positive.
@@ -78,14 +82,16 @@ pub fn derive(
         return Err(TrajectoryError::NotFinite(source.name.clone()));
     }
 
-    let capture = Capture::new(sources, points_in_world, proxy);
+    let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
+    let upright = upright(&views);
+    let capture = Capture::new(sources, &upright, points_in_world, proxy);
     let poses: Vec<Rigid3> = match kind {
         Trajectory::Orbit => orbit(&capture, frames),
         Trajectory::Dolly => dolly(&capture, frames),
         Trajectory::Sweep => sweep(&capture, frames),
     };
 
-    let camera = typical_camera(sources);
+    let camera = typical_camera(sources, &upright);
     let frame = |(index, pose): (usize, &Rigid3)| {
         // The capture's poses are relative to its reference camera's centre.
         let center = pose.center() + capture.origin_in_world;
@@ -297,14 +303,18 @@ fn orbit_around(ring: &Ring, frames: usize) -> Vec<Rigid3> {
 }
 
 /// A pinhole with the median focal length (relative to the longer side) and the most
-/// common image size; of equally common ones the first.
-fn typical_camera(sources: &[SourceView]) -> Camera {
-    let size = |s: &SourceView| (s.view.width, s.view.height);
+/// common image size, of photos as they stand upright; of equally common ones the first.
+fn typical_camera(sources: &[SourceView], upright: &[Upright]) -> Camera {
     let mut counts: Vec<((u32, u32), usize)> = Vec::new();
-    for source in sources {
-        match counts.iter_mut().find(|c| c.0 == size(source)) {
+    for (source, upright) in sources.iter().zip(upright) {
+        let (width, height) = (source.view.width, source.view.height);
+        let size = match upright.sides_exchanged {
+            true => (height, width),
+            false => (width, height),
+        };
+        match counts.iter_mut().find(|c| c.0 == size) {
             Some(count) => count.1 += 1,
-            None => counts.push((size(source), 1)),
+            None => counts.push((size, 1)),
         }
     }
     let mut common = counts[0];

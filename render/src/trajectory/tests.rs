@@ -1,5 +1,5 @@
 use super::*;
-use calibrate::{Lens, View};
+use calibrate::Lens;
 use glam::{DQuat, DVec2};
 use proxy::Plane;
 
@@ -322,6 +322,77 @@ fn the_camera_is_typical() {
     assert_eq!((camera.width, camera.height), (640, 480));
     assert_eq!(camera.params, [500.0, 500.0, 320.0, 240.0]);
     assert_eq!(path.frames[7].name, "frame_0007");
+}
+
+/// A photo taken with the camera turned by so many quarters: of the same place, and as sharp.
+fn rolled(source: &SourceView, quarters: u8) -> SourceView {
+    let mut rolled = source.clone();
+    for _ in 0..quarters {
+        let view = &mut rolled.view;
+        let turn = Rigid3::new(DQuat::from_rotation_z(PI / 2.0), DVec3::ZERO);
+        view.camera_from_world = turn * view.camera_from_world;
+        let principal = view.lens.principal;
+        view.lens.principal = DVec2::new(f64::from(view.height) - principal.y, principal.x);
+        (view.width, view.height) = (view.height, view.width);
+    }
+    rolled
+}
+
+#[test]
+fn few_photos_that_are_rolled_change_no_path() {
+    let eight = || {
+        let poses = (0..8).map(|i| {
+            let center = DVec3::new(f64::from(i), 0.2 * f64::from(i % 3), 0.0);
+            Rigid3::looking_at(center, center + 8.0 * DVec3::Z, DVec3::NEG_Y)
+        });
+        let points = (0..50).map(|i| DVec3::new(f64::from(i % 9) - 1.0, f64::from(i % 5), 12.0));
+        scene(poses.collect(), points.collect(), DVec3::Z * 12.0)
+    };
+    let mut cases: Vec<(Scene, Vec<usize>)> = (0..8).map(|i| (eight(), vec![i])).collect();
+    for made in [ring(140), ring(360), grid()] {
+        let half = (1..made.sources.len()).step_by(2).collect();
+        cases.push((made, half));
+    }
+    for made in [ring(140), ring(360), walk(), grid()] {
+        cases.push((made, vec![0, 3, 5]));
+    }
+    for (case, (straight, which)) in cases.iter().enumerate() {
+        let quarters = [1, 2, 3][case % 3];
+        let mixed = straight.sources.iter().enumerate().map(|(i, source)| {
+            let turn = if which.contains(&i) { quarters } else { 0 };
+            rolled(source, turn)
+        });
+        let mixed = Scene {
+            sources: mixed.collect(),
+            points: straight.points.clone(),
+            proxy: straight.proxy.clone(),
+        };
+        for kind in ALL {
+            let what = format!("{kind:?}, {case}, {quarters}");
+            let (expected, found) = (path(kind, straight), path(kind, &mixed));
+            for (a, b) in expected.frames.iter().zip(&found.frames) {
+                assert_eq!(a.camera, b.camera, "{what}");
+                let off = a.view.center().distance(b.view.center());
+                assert!(off < 1e-6, "{what}: {off}");
+                let (a, b) = (a.view.camera_from_world, b.view.camera_from_world);
+                let turn = a.rotation.dot(b.rotation).abs();
+                assert!((turn - 1.0).abs() < 1e-9, "{what}: {turn}");
+            }
+        }
+    }
+}
+
+#[test]
+fn photos_that_are_all_rolled_have_paths_that_are() {
+    let mut all = grid();
+    all.sources = all.sources.iter().map(|s| rolled(s, 1)).collect();
+    for kind in ALL {
+        for frame in &path(kind, &all).frames {
+            let up = all.sources[0].view.up();
+            assert!(frame.view.up().dot(up) > 0.95, "{kind:?}");
+            assert_eq!((frame.camera.width, frame.camera.height), (480, 640));
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,389 @@
+//! Photos as they stand upright: as most of a capture do, where some were taken with the camera turned.
+
+use calibrate::View;
+use glam::{DMat3, DQuat, DVec3};
+use std::f64::consts::FRAC_PI_2;
+
+/// A photo's camera, turned about its optical axis by as many quarters as make it stand as most photos do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Upright {
+    /// `camera_from_world`: the photo's own, where it stands so.
+    pub rotation: DQuat,
+    /// Whether it was turned by an odd number of quarters: it is as wide as the photo is high.
+    pub sides_exchanged: bool,
+}
+
+impl Upright {
+    /// Its upward axis (−y of its frame), in the world.
+    pub fn up(&self) -> DVec3 {
+        self.rotation.conjugate() * DVec3::NEG_Y
+    }
+}
+
+/// The tangent of 30°: a photo that leans by more from all four ways of turning it is not turned.
+const MOST_LEAN: f64 = 0.577;
+/// The sine of the angle to the vertical, some 15°, within which a photo looks straight up or down: which way it
+/// stands tells nothing, and it is not turned.
+const STEEP: f64 = 0.25;
+/// How much more it counts that a direction is the vertical of a photo, however that was turned, than that
+/// it is turned as most are.
+const CLEAR: usize = 3;
+/// How much photos' ups count for the vertical, compared with what lies level in them.
+const UPS: f64 = 0.03;
+/// The cosine of an angle, some 20°, within which two guesses are one.
+const SAME_GUESS: f64 = 0.94;
+/// So many guesses are followed.
+const MOST_GUESSES: usize = 64;
+/// Two directions that photos' mean gaze differs from by so much less, as cosines, are told apart by it.
+const DOWNWARD: f64 = 0.05;
+
+/// All photos of a capture as they stand upright, by index.
+///
+/// Most photos decide which way that is. Where they stand alike nothing is turned, whichever way they do; nor
+/// where no way is that of half of them, as from above, heading in all directions. Whether the world's
+/// axes are turned, and in which order photos come, makes no difference; but of two halves that nothing else tells
+/// apart, that of the photo in the middle stands, or of the first of two there.
+pub fn upright(views: &[&View]) -> Vec<Upright> {
+    let vertical = shared_vertical(views);
+    let stand = |view: &&View| {
+        let rotation = view.camera_from_world.rotation;
+        let turn = vertical.and_then(|up| quarters(rotation, up));
+        let turn = turn.unwrap_or(0);
+        Upright {
+            rotation: turned(rotation, turn),
+            sides_exchanged: turn % 2 != 0,
+        }
+    };
+    views.iter().map(stand).collect()
+}
+
+/// By how many quarters a camera is turned about its optical axis to stand upright; `None` where that
+/// is not clear.
+fn quarters(rotation: DQuat, up: DVec3) -> Option<u8> {
+    let up_in_camera = rotation * up;
+    let (above, aside) = (-up_in_camera.y, up_in_camera.x);
+    if above.hypot(aside) < STEEP {
+        None
+    } else if aside.abs() <= MOST_LEAN * above.abs() {
+        Some(if above > 0.0 { 0 } else { 2 })
+    } else if above.abs() <= MOST_LEAN * aside.abs() {
+        Some(if aside > 0.0 { 3 } else { 1 })
+    } else {
+        None
+    }
+}
+
+/// A camera turned about its optical axis, from x towards y.
+fn turned(rotation: DQuat, quarters: u8) -> DQuat {
+    match quarters {
+        0 => rotation,
+        _ => DQuat::from_rotation_z(f64::from(quarters) * FRAC_PI_2) * rotation,
+    }
+}
+
+/// How photos stand if a direction is the vertical.
+struct Vote {
+    up: DVec3,
+    /// How many are upright once turned by so many quarters.
+    by_quarters: [usize; 4],
+}
+
+impl Vote {
+    fn new(rotations: &[DQuat], up: DVec3) -> Self {
+        let mut by_quarters = [0; 4];
+        for turn in rotations.iter().filter_map(|q| quarters(*q, up)) {
+            by_quarters[usize::from(turn)] += 1;
+        }
+        Self { up, by_quarters }
+    }
+
+    /// How many photos stand clearly one way or another.
+    fn clear(&self) -> usize {
+        self.by_quarters.iter().sum()
+    }
+
+    fn most(&self) -> usize {
+        self.by_quarters.iter().fold(0, |most, n| most.max(*n))
+    }
+
+    /// Whether as many stand upright as any other way.
+    fn is_upright(&self) -> bool {
+        self.by_quarters[0] == self.most()
+    }
+
+    /// Whether it says more of the photos than another; of two that say as much photos look down, not
+    /// up, in the better.
+    fn is_better(&self, other: &Self, ahead: DVec3) -> bool {
+        let score = |vote: &Self| (CLEAR * vote.clear() + vote.most(), vote.is_upright());
+        score(self) > score(other)
+            || score(self) == score(other) && ahead.dot(self.up) < ahead.dot(other.up) - DOWNWARD
+    }
+}
+
+/// The vertical that most photos have, upwards as half of them or more are; `None` where there is no such
+/// direction.
+fn shared_vertical(views: &[&View]) -> Option<DVec3> {
+    let rotations: Vec<DQuat> = views
+        .iter()
+        .map(|view| view.camera_from_world.rotation)
+        .collect();
+    let ahead = views.iter().map(|view| view.forward()).sum::<DVec3>();
+    let ahead = ahead / views.len().max(1) as f64;
+    let mut best: Option<Vote> = None;
+    let mut tried: Vec<DVec3> = Vec::new();
+    for guess in guesses(views) {
+        let is_known = |other: &DVec3| other.dot(guess).abs() > SAME_GUESS;
+        if tried.iter().any(is_known) {
+            continue;
+        }
+        tried.push(guess);
+        let up = settled(&rotations, guess);
+        for vote in [up, -up].map(|up| Vote::new(&rotations, up)) {
+            if best
+                .as_ref()
+                .is_none_or(|before| vote.is_better(before, ahead))
+            {
+                best = Some(vote);
+            }
+        }
+        let is_all = |vote: &Vote| vote.by_quarters[0] == views.len();
+        if best.as_ref().is_some_and(is_all) || tried.len() == MOST_GUESSES {
+            break;
+        }
+    }
+    let is_shared = |vote: &Vote| {
+        let clear = vote.clear();
+        vote.is_upright() && 2 * vote.by_quarters[0] >= clear && 2 * clear >= views.len()
+    };
+    best.filter(is_shared).map(|vote| vote.up)
+}
+
+/// Directions that may be the vertical: first that of the mean of all ups; then, from the photos in the middle
+/// outwards, what is level in two of them, and up or aside in one.
+fn guesses(views: &[&View]) -> Vec<DVec3> {
+    let axis = |axis: DVec3| {
+        let axes = views.iter();
+        axes.map(move |view| view.camera_from_world.rotation.conjugate() * axis)
+            .collect::<Vec<DVec3>>()
+    };
+    let (rights, ups) = (axis(DVec3::X), axis(DVec3::NEG_Y));
+
+    let first = views.first().map_or(DVec3::ZERO, |view| view.center());
+    let centers: Vec<DVec3> = views.iter().map(|view| view.center() - first).collect();
+    let middle = centers.iter().sum::<DVec3>() / views.len().max(1) as f64;
+    let distances: Vec<f64> = centers.iter().map(|c| c.distance(middle)).collect();
+    let farthest = distances.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    // Those that are equally near but for rounding stay in their order.
+    let nearness = |i: usize| (1e6 * (distances[i] / farthest)).round();
+    let mut outwards: Vec<usize> = (0..views.len()).collect();
+    outwards.sort_by(|i, j| nearness(*i).total_cmp(&nearness(*j)));
+
+    let direction = |v: DVec3| (v.length() > 1e-9).then(|| v.normalize());
+    let mut guesses = Vec::with_capacity(3 * views.len() + 2);
+    guesses.extend(direction(ups.iter().sum()));
+    guesses.extend(direction(rights.iter().sum()));
+    for (place, &i) in outwards.iter().enumerate() {
+        let next = outwards[(place + 1) % outwards.len()];
+        guesses.extend(direction(rights[i].cross(rights[next])));
+        guesses.extend([ups[i], rights[i]]);
+    }
+    guesses
+}
+
+/// The vertical near a guess.
+fn settled(rotations: &[DQuat], guess: DVec3) -> DVec3 {
+    let mut up = guess;
+    for _ in 0..12 {
+        match fitted(rotations, up) {
+            Some(next) if next.distance(up) > 1e-9 => up = next,
+            _ => break,
+        }
+    }
+    up
+}
+
+/// The direction u that is most nearly upright in photos which are turned by what a guess of it says: it
+/// minimises Σ (rᵢ·u)² + λ|u|² − 2λ Σ uᵢ·u, with their right axes rᵢ and ups uᵢ. Those of a ring from high
+/// above lean towards its middle by as much, so that the mean of ups would be no vertical of a part of it.
+fn fitted(rotations: &[DQuat], guess: DVec3) -> Option<DVec3> {
+    let (mut level, mut ups, mut count) = (DMat3::ZERO, DVec3::ZERO, 0.0);
+    for &rotation in rotations {
+        let Some(turn) = quarters(rotation, guess) else {
+            continue;
+        };
+        let world_from_camera = turned(rotation, turn).conjugate();
+        let right = world_from_camera * DVec3::X;
+        level += DMat3::from_cols(right * right.x, right * right.y, right * right.z);
+        ups += world_from_camera * DVec3::NEG_Y;
+        count += 1.0;
+    }
+    if !(count > 0.0) {
+        return None;
+    }
+    let sum = level + DMat3::IDENTITY * (UPS * count);
+    (sum.inverse() * ups).try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::{Lens, Rigid3};
+    use glam::DVec2;
+    use std::f64::consts::TAU;
+
+    fn view(camera_from_world: Rigid3) -> View {
+        View {
+            lens: Lens::pinhole(DVec2::splat(50.0), DVec2::new(32.0, 24.0)),
+            width: 64,
+            height: 48,
+            camera_from_world,
+        }
+    }
+
+    /// Side by side.
+    fn row(count: usize) -> Vec<View> {
+        let pose = |i: usize| {
+            let center = DVec3::X * i as f64;
+            Rigid3::looking_at(center, center + DVec3::Z, DVec3::NEG_Y)
+        };
+        (0..count).map(|i| view(pose(i))).collect()
+    }
+
+    /// Around the origin, so many radians above the level of y = 0, over a part of a turn.
+    fn ring(count: usize, elevation: f64, turn: f64) -> Vec<View> {
+        let pose = |i: usize| {
+            let azimuth = turn * i as f64 / count as f64;
+            let level = DVec3::new(azimuth.cos(), 0.0, azimuth.sin());
+            let center = 4.0 * (level * elevation.cos() + DVec3::NEG_Y * elevation.sin());
+            Rigid3::looking_at(center, DVec3::ZERO, DVec3::NEG_Y)
+        };
+        (0..count).map(|i| view(pose(i))).collect()
+    }
+
+    fn all(views: &[View]) -> Vec<Upright> {
+        upright(&views.iter().collect::<Vec<_>>())
+    }
+
+    fn roll(views: &mut [View], which: impl IntoIterator<Item = usize>, quarters: u8) {
+        for i in which {
+            let pose = &mut views[i].camera_from_world;
+            let turn = DQuat::from_rotation_z(f64::from(quarters) * FRAC_PI_2);
+            *pose = Rigid3::new(turn, DVec3::ZERO) * *pose;
+        }
+    }
+
+    /// As the photos are.
+    fn unturned(views: &[View]) -> Vec<Upright> {
+        let as_it_is = |view: &View| Upright {
+            rotation: view.camera_from_world.rotation,
+            sides_exchanged: false,
+        };
+        views.iter().map(as_it_is).collect()
+    }
+
+    #[track_caller]
+    fn assert_alike(found: &[Upright], views: &[View], what: &str) {
+        for (i, (found, view)) in found.iter().zip(views).enumerate() {
+            let same = found.rotation.dot(view.camera_from_world.rotation).abs();
+            assert!((same - 1.0).abs() < 1e-12, "{what}: {i}");
+        }
+    }
+
+    #[test]
+    fn few_that_are_rolled_are_turned_back() {
+        let mut captures = vec![row(8), ring(14, 0.2, 2.4)];
+        for elevation in [0.0, 0.5, 1.0] {
+            captures.extend([ring(14, elevation, TAU), ring(14, elevation, 2.4)]);
+        }
+        for (c, straight) in captures.iter().enumerate() {
+            for which in [vec![0], vec![4], vec![7], vec![0, 3, 5]] {
+                for quarters in 1..4 {
+                    let mut views = straight.clone();
+                    roll(&mut views, which.iter().copied(), quarters);
+                    let found = all(&views);
+                    assert_alike(&found, straight, &format!("{c}, {which:?}, {quarters}"));
+                    for (i, one) in found.iter().enumerate() {
+                        let odd = which.contains(&i) && quarters % 2 == 1;
+                        assert_eq!(one.sides_exchanged, odd, "{c}: {i}");
+                    }
+                    // Those that stand as most do stay as they are, to the bit.
+                    let own = unturned(&views);
+                    assert!((0..views.len()).all(|i| which.contains(&i) || found[i] == own[i]));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn where_half_are_rolled_all_stand_one_way() {
+        for straight in [row(14), ring(14, 0.2, TAU), ring(14, 0.2, 2.4)] {
+            for quarters in 1..4 {
+                let mut views = straight.clone();
+                roll(&mut views, (0..14).step_by(2), quarters);
+                let found = all(&views);
+                let mut other = straight.clone();
+                roll(&mut other, 0..14, quarters);
+                let turn = found[0]
+                    .rotation
+                    .dot(other[0].camera_from_world.rotation)
+                    .abs();
+                // Photos side by side do not tell which half is upright; those that look at something do.
+                let is_other = turn > 1.0 - 1e-9;
+                assert!(!is_other || straight == row(14), "{quarters}");
+                assert_alike(&found, if is_other { &other } else { &straight }, "half");
+                // Whichever comes first.
+                views.reverse();
+                let mut back = all(&views);
+                back.reverse();
+                assert!(is_other || straight == row(14) || back == found);
+            }
+        }
+    }
+
+    #[test]
+    fn what_stands_alike_stays_as_it_is() {
+        let mut captures = Vec::new();
+        for quarters in 0..4 {
+            for mut views in [row(8), ring(14, 0.2, TAU), ring(14, 0.9, 2.4)] {
+                let count = views.len();
+                roll(&mut views, 0..count, quarters);
+                captures.push(views);
+            }
+        }
+        // Held loosely.
+        let leaning = row(9).into_iter().enumerate().map(|(i, mut view)| {
+            let lean = DQuat::from_rotation_z(0.09 * (i as f64 - 4.0));
+            view.camera_from_world = Rigid3::new(lean, DVec3::ZERO) * view.camera_from_world;
+            view
+        });
+        captures.push(leaning.collect());
+        captures.push(row(1));
+        captures.push(Vec::new());
+        for (i, views) in captures.iter().enumerate() {
+            assert_eq!(all(views), unturned(views), "{i}");
+        }
+    }
+
+    #[test]
+    fn from_above_headings_are_left_alone() {
+        for count in [3, 4, 8, 14, 40] {
+            let pose = |i: usize, heading: f64| {
+                let center = DVec3::new(i as f64, 0.0, 9.0);
+                let up = DVec3::new(heading.cos(), heading.sin(), 0.0);
+                Rigid3::looking_at(center, center - DVec3::Z, up)
+            };
+            for turn in [0.0, TAU] {
+                let heading = |i: usize| turn * i as f64 / count as f64;
+                let views: Vec<View> = (0..count).map(|i| view(pose(i, heading(i)))).collect();
+                assert_eq!(all(&views), unturned(&views), "{count} {turn}");
+            }
+        }
+        // Those among others that look ahead are left alone, too.
+        let mut views = ring(8, 0.3, TAU);
+        for i in 0..6 {
+            let up = DVec3::new((i as f64).cos(), 0.0, (i as f64).sin());
+            views.push(view(Rigid3::looking_at(DVec3::NEG_Y, DVec3::ZERO, up)));
+        }
+        assert_eq!(all(&views), unturned(&views));
+    }
+}
