@@ -171,6 +171,16 @@ impl Asked {
     }
 }
 
+/// What to say of the frames of a derived path if they are all alike, where there are so many photos.
+pub(super) fn note_of_still(frames: &[NamedView], photos: usize) -> Option<&'static str> {
+    let pose = |frame: &NamedView| frame.view.camera_from_world;
+    let is_still = |pair: &[NamedView]| pose(&pair[0]) == pose(&pair[1]);
+    (frames.len() > 1 && frames.windows(2).all(is_still)).then_some(match photos {
+        1 => "there is one photo alone: the path stands still",
+        _ => "all photos were taken from one place: the path stands still",
+    })
+}
+
 /// Frames a second where no path says. Only a film made of the frames would show it.
 const FPS: f64 = 30.0;
 

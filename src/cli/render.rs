@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::frames::{Asked, NamedView, ViewArgs};
+use super::frames::{Asked, NamedView, ViewArgs, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
@@ -110,10 +110,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     session.costs.why_empty = why_empty;
     let points = || session.points();
     let count = chosen.count(FRAMES);
+    let is_derived = asked.is_derived();
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
     // Of all frames: those of several parts of a path share a folder.
     let names = frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("view", names, &args.output);
+    let photos = session.lumigraph().sources.len();
+    if let Some(note) = note_of_still(&frames, photos).filter(|_| is_derived) {
+        session.note(note);
+    }
     let frames = chosen.of(frames)?;
     let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
     let files = chosen.of(files?)?;

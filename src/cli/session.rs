@@ -262,6 +262,11 @@ impl Session {
         Ok(())
     }
 
+    /// Has something to say, too, before anything is drawn.
+    pub(super) fn note(&mut self, note: &str) {
+        self.notes.push(note.to_owned());
+    }
+
     /// All that was said of what draws, of photos left out and of pictures that show nothing.
     pub(super) fn notes(&self) -> Vec<String> {
         let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();

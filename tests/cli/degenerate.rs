@@ -226,6 +226,20 @@ fn cameras_at_one_place() {
 }
 
 #[test]
+fn paths_of_one_place_stand_still_and_that_is_said() {
+    let said = |cameras: &[DVec3]| {
+        let folder = capture(cameras, &ordinary(60));
+        ["orbit", "dolly", "sweep"].map(|kind| {
+            let line = format!("render c --proxy view-plane --path {kind} --frames 2 -o {kind}");
+            let ran = lumigraph(folder.path(), &line).ok();
+            ran.stderr.contains(": the path stands still\n")
+        })
+    };
+    assert_eq!(said(&[DVec3::new(0.1, 0.0, 0.2); 7]), [true; 3]);
+    assert_eq!(said(&in_a_row(7)), [false; 3]);
+}
+
+#[test]
 fn points_in_the_cameras() {
     let cameras = in_a_row(7);
     only_these_fail(

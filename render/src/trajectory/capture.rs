@@ -21,7 +21,7 @@ pub(super) struct Capture {
     pub(super) axes: [DVec3; 3],
     /// Half of the range of the centres along each.
     pub(super) half_extents: [f64; 3],
-    /// Whether they lie further apart than rounding errors.
+    /// Whether they lie further apart than rounding errors, and than the scene would show.
     has_extent: bool,
     /// Distance to the third-nearest camera, in the median.
     pub(super) spacing: f64,
@@ -34,6 +34,9 @@ pub(super) struct Capture {
 /// Cameras nearer to one another than this, in shares of their distance from the middle one, in the median, are
 /// at one place.
 const SAME_PLACE: f64 = 1e-4;
+/// So are all of them where half of their range is no more than this, in shares of the distance to the scene: in
+/// a picture of 1000 pixels that is a thousandth of one.
+const ONE_PLACE: f64 = 1e-6;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
 
@@ -118,7 +121,7 @@ impl Capture {
             reference_idx,
             axes,
             half_extents,
-            has_extent: half_extents[0] > rounding && farthest > 0.0,
+            has_extent: half_extents[0] > rounding.max(ONE_PLACE * distance) && farthest > 0.0,
             spacing: spacing(&centers),
             focus: forward * distance,
             nearest_scene: to_proxy.map_or(distance, |d| d.min(distance)),

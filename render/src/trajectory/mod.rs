@@ -60,9 +60,8 @@ const ORBIT_POINTS: usize = 720;
 ///
 /// `points_in_world` are the sparse points, or nothing. All frames have one camera: a
 /// pinhole with the median focal length of the source views, their most common image
-/// size, and the principal point in its centre. A capture of one place, or of one photo,
-/// stands still (orbit, sweep) or moves little (dolly). Photos that were taken with the camera turned count as if
-/// they stood as most do; see [`upright()`].
+/// size, and the principal point in its centre. The path of a capture of one place, or of one photo, stands
+/// still. Photos that were taken with the camera turned count as if they stood as most do; see [`upright()`].
 ///
 /// # Errors
 /// No source views, a pose that is not finite, no frames, a frame rate that is not positive.
@@ -142,6 +141,9 @@ fn sweep(capture: &Capture, frames: usize) -> Vec<Rigid3> {
 }
 
 fn dolly(capture: &Capture, frames: usize) -> Vec<Rigid3> {
+    if !capture.has_extent() {
+        return vec![capture.reference_pose(); frames];
+    }
     let reach = (REACH * capture.half_extents[0]).min(REACH_TO_SCENE * capture.nearest_scene);
     let pose = capture.reference_pose();
     let forward = pose.rotation.conjugate() * DVec3::Z;

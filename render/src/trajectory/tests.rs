@@ -277,6 +277,24 @@ fn moving_the_world_moves_the_path() {
     }
 }
 
+#[test]
+fn paths_of_one_place_stand_still() {
+    for apart in [0.0, 1e-9] {
+        let poses = (0..9).map(|i| {
+            let center = DVec3::X * (apart * f64::from(i));
+            let ahead = DQuat::from_rotation_y(0.2 * f64::from(i - 4)) * DVec3::Z;
+            Rigid3::looking_at(center, center + ahead, DVec3::NEG_Y)
+        });
+        let s = scene(poses.collect(), Vec::new(), DVec3::Z * 9.0);
+        for kind in ALL {
+            let frames = path(kind, &s).frames;
+            let pose = frames[0].view.camera_from_world;
+            let is_there = |f: &PathFrame| f.view.camera_from_world == pose;
+            assert!(frames.iter().all(is_there), "{kind:?}: {apart}");
+        }
+    }
+}
+
 /// As cameras of a rig, and exposures of one motif.
 #[test]
 fn photos_of_one_place_count_as_one_place() {
