@@ -222,16 +222,18 @@ impl Session {
         self.prepare()?;
         loop {
             let frame = frame(&self.lumigraph, desired, self.options, moment, self.skips);
-            if moment.is_some() {
-                self.in_window.note(frame.taking_part().count());
-            }
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
             let drawn = engine.render(&frame, self.method);
             say_notes(engine, &mut self.notes_said);
             match drawn {
-                Ok(picture) => return Ok(picture),
+                Ok(picture) => {
+                    if moment.is_some() {
+                        self.in_window.note(frame.taking_part().count());
+                    }
+                    return Ok(picture);
+                }
                 Err(RenderError::Photo(error)) => self.leave_out(&error)?,
                 Err(error) => return Err(error.into()),
             }
@@ -312,9 +314,6 @@ impl Session {
         while let Some((frame, prepared)) = next {
             let chosen = prepared?;
             let prepared = &chosen.prepared;
-            if views[*done].1.is_some() {
-                self.in_window.note(frame.taking_part().count());
-            }
             let mut without = engine.resident(&lumigraph.photos);
             without.extend(prepared.listed());
             let drawn = AtomicBool::new(false);
@@ -349,6 +348,9 @@ impl Session {
             });
             say_notes(engine, &mut self.notes_said);
             let (picture, was_ready) = picture?;
+            if views[*done].1.is_some() {
+                self.in_window.note(frame.taking_part().count());
+            }
             self.costs
                 .note(&frame, &chosen, engine, &was_ready, &picture);
             ledger.time(*done, Stage::Write, || take(*done, picture))?;

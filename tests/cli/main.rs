@@ -3,6 +3,7 @@
 mod bad_input;
 mod bench;
 mod captures;
+mod damaged_photos;
 mod degenerate;
 mod evaluate;
 mod export;
