@@ -1,5 +1,6 @@
 //! An interior opened, with the photos that show its cells.
 
+use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::inputs::{files_of, files_of_mesh};
 use super::interior::open;
@@ -103,6 +104,8 @@ fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Model, Vec<Stri
 /// The scene whose photos show an interior's cells.
 pub(super) struct Photos {
     scene: Scene,
+    held_out: BTreeSet<String>,
+    /// Those, and those found damaged as exposures were matched.
     without: BTreeSet<String>,
     pub(super) exposure: ExposureUsed,
 }
@@ -164,17 +167,25 @@ impl Photos {
             .held_out
             .iter()
             .filter(|name| known.contains(*name));
-        let without: BTreeSet<String> = held_out.cloned().collect();
-        if without.len() < interior.held_out.len() {
-            let gone = interior.held_out.len() - without.len();
+        let held_out: BTreeSet<String> = held_out.cloned().collect();
+        if held_out.len() < interior.held_out.len() {
+            let gone = interior.held_out.len() - held_out.len();
             say!("warning: {gone} of the held-out photos are not in the scene");
         }
-        let exposure = exposure.choose(&mut scene, &without);
+        let exposure = exposure.choose(&mut scene, &held_out);
+        let mut without = held_out.clone();
+        leave_out(&exposure.left_out, &mut without, false)?;
         Ok(Some(Self {
             scene,
+            held_out,
             without,
             exposure,
         }))
+    }
+
+    /// What was said of photos that were found damaged as exposures were matched.
+    pub(super) fn left_out(&self) -> impl Iterator<Item = String> {
+        self.exposure.left_out.iter().map(left_out_text)
     }
 
     /// The scene's files; see [`files_of`].
@@ -182,8 +193,8 @@ impl Photos {
         files_of(&self.scene)
     }
 
-    /// A number that other cameras, sparse points, gains or scales of depth would most likely not have:
-    /// calibrations come in files of many kinds.
+    /// A number that other cameras, sparse points, gains, scales of depth or photos left out would most likely
+    /// not have: calibrations come in files of many kinds.
     pub(super) fn fingerprint(&self) -> String {
         let mut hash = Fnv::new();
         let known = &self.scene.reconstruction;
@@ -197,6 +208,8 @@ impl Photos {
         images.for_each(|image| _ = write!(hash, "{image:?}"));
         photos.for_each(|photo| _ = write!(hash, "{photo:?}"));
         points.for_each(|point| _ = write!(hash, "{point:?}"));
+        let left_out = self.exposure.left_out.keys();
+        left_out.for_each(|name| _ = write!(hash, "{name:?}"));
         format!("{:016x}", hash.0)
     }
 
@@ -238,7 +251,7 @@ impl Photos {
         size: Option<(u32, u32)>,
     ) -> anyhow::Result<Vec<(String, View, Truth)>> {
         let mut found = Vec::new();
-        for name in &self.without {
+        for name in &self.held_out {
             let view = compared(name, self.scene.view(name)?, size)?;
             match self.scene.truth(name, &self.without)? {
                 Ok(truth) => {

@@ -141,8 +141,8 @@ fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
     Ok(names)
 }
 
-/// Renders and scores each of the given photos; where one turns out corrupt it is left out,
-/// unless `--strict`. No picture takes the place of a file that is to be `kept`.
+/// Renders and scores each of the given photos, all of the same others; where one turns out corrupt it is left
+/// out, unless `--strict`. No picture takes the place of a file that is to be `kept`.
 fn score_photos(
     session: &mut Session,
     names: &BTreeSet<String>,
@@ -157,9 +157,34 @@ fn score_photos(
         check_inputs(files, kept)?;
     }
     session.prepare()?;
+    let lines = loop {
+        let drawn_of = session.lumigraph().sources.len();
+        let lines = score_each(session, names, size, output.map(|_| &files[..]))?;
+        // What was drawn before a photo was left out is drawn again.
+        if session.lumigraph().sources.len() == drawn_of {
+            break lines;
+        }
+    };
+    if lines.is_empty() {
+        bail!("none of the held-out photos can be decoded");
+    }
+    if let Some(note) = session.note_of_empty() {
+        say!("note: {note}");
+    }
+    Ok(lines)
+}
+
+/// The same, whatever they are drawn of; pictures are written to `files`, where there are any.
+fn score_each(
+    session: &mut Session,
+    names: &BTreeSet<String>,
+    size: Option<(u32, u32)>,
+    files: Option<&[PathBuf]>,
+) -> anyhow::Result<Vec<Line>> {
+    session.forget();
     let bar = progress(names.len(), "evaluating");
     let mut lines = Vec::new();
-    for (name, file) in names.iter().zip(files) {
+    for (i, name) in names.iter().enumerate() {
         let view = session.scene.view(name)?;
         let Some(truth) = session.truth(name)? else {
             continue;
@@ -168,8 +193,8 @@ fn score_photos(
         let truth = truth.resized(desired.width, desired.height);
         let moment = session.moment(&named(name), session.scene.time_s(name))?;
         let drawn = session.draw_timed(&desired, moment.as_ref())?;
-        if output.is_some() {
-            capture::write_png(&file, &drawn.picture)?;
+        if let Some(files) = files {
+            capture::write_png(&files[i], &drawn.picture)?;
         }
         lines.push(Line {
             name: name.clone(),
@@ -180,12 +205,6 @@ fn score_photos(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if lines.is_empty() {
-        bail!("none of the held-out photos can be decoded");
-    }
-    if let Some(note) = session.note_of_empty() {
-        say!("note: {note}");
-    }
     Ok(lines)
 }
 

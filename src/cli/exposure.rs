@@ -1,12 +1,11 @@
 //! Whether and how photos are brought to one exposure.
 
-use super::output::say;
 use super::session::spinner;
 use calibrate::exposure::{Evidence, Verdict};
 use clap::Args;
 use lumigraph::scene::Scene;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
 /// Whether photos are brought to one exposure.
@@ -23,6 +22,9 @@ pub(super) struct ExposureUsed {
     range: Option<(f64, f64)>,
     how: How,
     seconds: f64,
+    /// Photos that could not be decoded as exposures were matched, by name, with what is wrong with
+    /// each: whoever draws is to leave them out from the first picture on.
+    pub(super) left_out: BTreeMap<String, String>,
 }
 
 enum How {
@@ -44,6 +46,7 @@ impl ExposureArgs {
     /// with some that rest on none of the photos in `without`, else new ones.
     pub(super) fn choose(&self, scene: &mut Scene, without: &BTreeSet<String>) -> ExposureUsed {
         let start = Instant::now();
+        let mut left_out = BTreeMap::new();
         let how = if self.no_exposure {
             scene.forget_exposure();
             How::Off
@@ -53,9 +56,7 @@ impl ExposureArgs {
             let bar = spinner("matching exposures");
             let matched = scene.match_exposure(without);
             bar.finish_and_clear();
-            for warning in &matched.warnings {
-                say!("note: for matching exposures, {warning}");
-            }
+            left_out = matched.left_out;
             How::Matched(matched.verdict)
         };
         let gains = scene.photos.iter().filter_map(|p| p.gain).flatten();
@@ -67,6 +68,7 @@ impl ExposureArgs {
             range,
             how,
             seconds: start.elapsed().as_secs_f64(),
+            left_out,
         }
     }
 }

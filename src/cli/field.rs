@@ -1,6 +1,7 @@
 //! `lumigraph field`
 
 use super::Usage;
+use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
 use super::frames::{Asked, NamedView};
 use super::inputs::files_behind_scene;
@@ -97,7 +98,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     if args.proxy.is_searched(&scene, &without) {
         // Kinds are compared by what is drawn, which is exposed alike.
-        args.exposure.choose(&mut scene, &without);
+        let exposure = args.exposure.choose(&mut scene, &without);
+        leave_out(&exposure.left_out, &mut without, args.scene.strict)?;
     }
     let proxy = args.proxy.choose(&scene, &without, args.scene.strict)?;
     without.extend(proxy.left_out.keys().cloned());

@@ -1,15 +1,17 @@
 //! Films of frames: which of them are made now, what is behind them, and the video.
 
+mod kept;
+
 use super::Usage;
 use super::options::positive;
-use super::output::write_file;
-use super::stamp::{Stamp, changes, in_unicode, stamps};
+use super::output::say;
+use super::stamp::in_unicode;
 use super::targets::check_inputs;
-use anyhow::{Context, bail};
+use anyhow::Context;
 use calibrate::View;
 use image::{Rgba, RgbaImage};
 use render::score::on_black;
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -162,57 +164,6 @@ impl Background {
     }
 }
 
-/// What the frames of a folder were made with.
-#[derive(Serialize, Deserialize)]
-struct Plan {
-    version: String,
-    arguments: Vec<String>,
-    /// None of earlier versions.
-    #[serde(default)]
-    inputs: Vec<Stamp>,
-}
-
-/// Where a run with `--resume` says what it makes.
-const PLAN: &str = "resume.json";
-
-impl Plan {
-    /// This run's, without what decides no pixel.
-    fn own(inputs: &[PathBuf]) -> Self {
-        const ALONE: [&str; 3] = ["--resume", "--json", "--no-ldi-files"];
-        const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
-        let mut arguments = Vec::new();
-        // `--fps=30` is `--fps 30`.
-        let apart = |argument: String| match argument.split_once('=') {
-            Some((name, value)) if name.starts_with("--") => {
-                vec![name.to_owned(), value.to_owned()]
-            }
-            _ => vec![argument],
-        };
-        // What is no Unicode is replaced: paths may be anything.
-        let given = std::env::args_os().skip(1);
-        let given = given.map(|argument| argument.to_string_lossy().into_owned());
-        let mut given = given.flat_map(apart);
-        while let Some(argument) = given.next() {
-            if WITH_VALUE.contains(&argument.as_str()) {
-                // How many frames a derived path has does.
-                let value = given.next();
-                let all = value.filter(|_| argument == "--frames");
-                let all = all.map(|v| v.split_once('/').map_or(v.clone(), |(_, n)| n.to_owned()));
-                arguments.extend(all.filter(|v| !v.contains("..")));
-            } else if !ALONE.contains(&argument.as_str()) {
-                arguments.push(argument);
-            }
-        }
-        let mut inputs = stamps(inputs, in_unicode);
-        inputs.dedup();
-        Self {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            arguments,
-            inputs,
-        }
-    }
-}
-
 impl FilmArgs {
     /// Fails early where a film cannot be made of the frames in a folder: by making a short one.
     pub(super) fn check(&self, frames: &Path) -> anyhow::Result<()> {
@@ -274,50 +225,66 @@ impl FilmArgs {
         }
     }
 
-    /// Which frames are there already. `inputs` are the files that frames are made of, over which none is
-    /// written.
+    /// Which frames of a folder are there already: of `files`, which this run makes. `all` are those of
+    /// the whole film, and `inputs` the files that frames are made of, over which none is written.
     pub(super) fn begin(
         &self,
         folder: &Path,
         files: &[PathBuf],
+        all: &[PathBuf],
         inputs: &[PathBuf],
     ) -> anyhow::Result<Vec<bool>> {
         let video = self.video.iter();
-        check_inputs(files.iter().chain(video).map(PathBuf::as_path), inputs)?;
+        check_inputs(all.iter().chain(video).map(PathBuf::as_path), inputs)?;
         if !self.resume {
             return Ok(vec![false; files.len()]);
         }
-        let file = folder.join(PLAN);
-        let own = Plan::own(inputs);
-        match std::fs::read(&file) {
-            Ok(bytes) => {
-                let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
-                let is_same = |p: &Plan| p.version == own.version && p.arguments == own.arguments;
-                let Some(plan) = plan.filter(is_same) else {
-                    bail!(
-                        "{}: the frames in this folder were made by another command line; choose \
-                         another folder, or remove this one",
-                        file.display()
-                    );
-                };
-                let changes = changes(&plan.inputs, &own.inputs);
-                if !(plan.inputs.is_empty() || changes.is_empty()) {
-                    bail!(
-                        "{}: the frames in this folder were made of other files: {changes}; choose \
-                         another folder, or remove this one",
-                        file.display()
-                    );
-                }
-            }
-            Err(_) if files.iter().any(|f| f.exists()) => bail!(
-                "{}: there are frames here that a run without --resume made; choose another folder, \
-                 or remove this one",
-                folder.display()
-            ),
-            Err(_) => write_file(&file, &serde_json::to_vec_pretty(&own)?)?,
-        }
+        kept::begin(folder, all, inputs)?;
         // A frame appears complete or not at all.
         Ok(files.iter().map(|f| f.exists()).collect())
+    }
+
+    /// The photos without which frames of a folder are made, as a run found them damaged: by name, with what is
+    /// wrong with each. Runs know of each other with `--resume` alone.
+    pub(super) fn left_out(&self, folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
+        match self.resume {
+            true => kept::left_out(folder),
+            false => Ok(BTreeMap::new()),
+        }
+    }
+
+    /// Goes on without photos that were found damaged: with `--resume` frames that were made with them are
+    /// removed, those of other runs too, which is said. The files are those of [`Self::begin`].
+    pub(super) fn leave_out(
+        &self,
+        damaged: &BTreeMap<String, String>,
+        folder: &Path,
+        files: &[PathBuf],
+        all: &[PathBuf],
+    ) -> anyhow::Result<()> {
+        if !self.resume {
+            return Ok(());
+        }
+        let count = |files: &[PathBuf]| files.iter().filter(|file| file.exists()).count();
+        let before = count(all).saturating_sub(count(files));
+        kept::leave_out(damaged, folder, files, all)?;
+        let gone = before.saturating_sub(count(all));
+        if gone > 0 {
+            say!(
+                "note: other runs made frames of this film with that photo: {gone} removed from {}; the same \
+                 command for all frames draws them",
+                folder.display()
+            );
+        }
+        Ok(())
+    }
+
+    /// Removes frames that are to be drawn again, so that none of them is taken for one that is.
+    pub(super) fn remove(&self, files: &[PathBuf]) -> anyhow::Result<()> {
+        match self.resume {
+            true => kept::remove(files),
+            false => Ok(()),
+        }
     }
 
     /// Writes a frame.

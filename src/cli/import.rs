@@ -1,6 +1,7 @@
 //! `lumigraph import`
 
 use super::Usage;
+use super::damaged::left_out_text;
 use super::exposure::ExposureArgs;
 use super::interior::check_no_interior;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
@@ -192,6 +193,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
     }
     let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
+    // The scene keeps them: what is made of it may do without, or of their depth maps alone.
+    for damaged in &exposure.left_out {
+        say!("note: for matching exposures, {}", left_out_text(damaged));
+    }
     say!("exposure: {}", exposure.text());
     if args.turntable.is_some() {
         keep_hull(&mut scene);

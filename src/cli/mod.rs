@@ -3,6 +3,7 @@
 
 mod bench;
 mod captured;
+mod damaged;
 mod demo;
 mod evaluate;
 mod export;

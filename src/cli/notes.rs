@@ -15,6 +15,11 @@ impl Notes {
         }
     }
 
+    /// Keeps what was said before.
+    pub(super) fn keep(&mut self, said: impl Iterator<Item = String>) {
+        self.0.extend(said);
+    }
+
     /// Says what a painter has to say and was not said before.
     pub(super) fn say_new(&mut self, painter: &Painter) {
         for note in painter.notes() {

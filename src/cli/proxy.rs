@@ -1,6 +1,7 @@
 //! `lumigraph proxy`
 
 use super::Usage;
+use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
 use super::inputs::files_behind_scene;
 use super::options::{HoldOutArgs, SceneArgs, triple};
@@ -148,11 +149,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 Kind::Fitted(kind) => Some(kind),
                 Kind::Auto | Kind::Mesh => None,
             };
+            let mut fewer = without.clone();
             if kind.is_none() {
                 // Kinds are compared by what is drawn, which is exposed alike.
-                ExposureArgs::default().choose(&mut scene, &without);
+                let exposure = ExposureArgs::default().choose(&mut scene, &without);
+                leave_out(&exposure.left_out, &mut fewer, args.scene.strict)?;
             }
-            let fitted = fit(&scene, kind, &without, args.scene.strict)?;
+            let fitted = fit(&scene, kind, &fewer, args.scene.strict)?;
             (fitted.proxy, fitted.how, Some(&without))
         }
     };

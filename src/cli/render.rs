@@ -18,6 +18,7 @@ use super::took::Start;
 use calibrate::View;
 use lumigraph::scene::picture_files;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Render novel views
@@ -114,42 +115,59 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
     // Of all frames: those of several parts of a path share a folder.
     let names = frames.iter().map(|f| (f.name.as_str(), true));
-    let files = picture_files("view", names, &args.output);
+    let all_files = picture_files("view", names, &args.output);
     let photos = session.lumigraph().sources.len();
     if let Some(note) = note_of_still(&frames, photos).filter(|_| is_derived) {
         session.note(note);
     }
     let frames = chosen.of(frames)?;
     let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
-    let files = chosen.of(files?)?;
+    let all_files = all_files?;
+    let files = chosen.of(all_files.clone())?;
     // Photos that are left out, too, are nobody's to replace.
     let kept = files_behind_scene(&args.scene.scene, &session.scene);
-    check_inputs(files.iter().map(PathBuf::as_path), &kept)?;
+    check_inputs(all_files.iter().map(PathBuf::as_path), &kept)?;
     let kind_or_file = [&args.views.path, &args.proxy.proxy].into_iter().flatten();
     let named = [&args.views.views, &args.hold_out.hold_out].into_iter();
     let named = named.flatten().chain(args.nerfstudio.file()).cloned();
     let named = named.chain(kind_or_file.map(PathBuf::from));
     let mut inputs = files_behind(named, std::slice::from_ref(&args.scene.scene));
     inputs.extend(files_of(&session.scene));
-    let is_there = args.film.begin(&args.output, &files, &inputs)?;
+    let folder = &args.output;
+    let mut is_there = args.film.begin(folder, &files, &all_files, &inputs)?;
     session.prepare()?;
+    // The path stays as it was derived, whoever found them.
+    session.leave_out_known(&args.film.left_out(folder)?)?;
 
-    let missing: Vec<usize> = (0..files.len()).filter(|i| !is_there[*i]).collect();
-    let bar = progress(missing.len(), "rendering");
     let view = |i: usize| {
         let moment = session.moment(&frames[i].name, frames[i].time_s)?;
         Ok((desired[i].clone(), moment))
     };
-    let views = missing
-        .iter()
-        .map(|&i| view(i))
+    let views = (0..files.len())
+        .map(view)
         .collect::<anyhow::Result<Vec<_>>>()?;
-    session.draw_all(&views, |i, picture| {
-        args.film.write(&files[missing[i]], picture)?;
-        bar.inc(1);
-        Ok(())
-    })?;
-    bar.finish_and_clear();
+    loop {
+        let missing = is_there.iter().filter(|is_there| !**is_there).count();
+        let bar = progress(missing, "rendering");
+        let take = |i: usize, picture| {
+            args.film.write(&files[i], picture)?;
+            bar.inc(1);
+            anyhow::Ok(())
+        };
+        let again = |left_out: &BTreeMap<String, String>| {
+            bar.set_length(files.len() as u64);
+            bar.set_position(0);
+            args.film.leave_out(left_out, folder, &files, &all_files)
+        };
+        session.draw_all(&views, &mut is_there, take, again)?;
+        bar.finish_and_clear();
+        // Another run may have found one damaged meanwhile.
+        if !session.leave_out_known(&args.film.left_out(folder)?)? {
+            break;
+        }
+        args.film.remove(&files)?;
+        is_there.fill(false);
+    }
     args.film.finish(&files, fps)?;
     if let Some(note) = others(&args.output, &files)?.filter(|_| !chosen.is_part()) {
         say!("note: {note}");
@@ -163,10 +181,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             .enumerate()
             .map(|(i, (frame, file))| {
                 // Those that were there cost nothing.
-                let cost = missing
-                    .binary_search(&i)
-                    .ok()
-                    .map(|drawn| session.cost_json(drawn));
+                let cost = (!is_there[i]).then(|| session.cost_json(i));
                 json!({"name": frame.name, "file": in_unicode(file), "cost": cost})
             });
         return print_json(&json!({
@@ -184,7 +199,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         "{}: {} frames{}\n",
         args.output.display(),
         files.len(),
-        match files.len() - missing.len() {
+        match is_there.iter().filter(|is_there| **is_there).count() {
             0 => String::new(),
             there => format!(", {there} of them from before"),
         }

@@ -128,7 +128,8 @@ impl Report {
 /// What the frames that were drawn one after the other have cost, besides time.
 #[derive(Default)]
 pub(super) struct Costs {
-    frames: Vec<FrameCost>,
+    /// By place in the path, in whatever order they are drawn.
+    frames: BTreeMap<usize, FrameCost>,
     /// Views that were drawn each by itself, of photos held out; how many of them the CPU drew, and how many
     /// show nothing.
     alone: usize,
@@ -162,6 +163,7 @@ impl Costs {
     /// Notes a frame that was just drawn.
     pub(super) fn note(
         &mut self,
+        frame_idx: usize,
         frame: &Frame<'_>,
         chosen: &Bounded,
         engine: &Engine,
@@ -186,7 +188,7 @@ impl Costs {
             Some(_) => ready.photos_used(),
             None => Some(frame.lumigraph.photos.last_sampled()),
         };
-        self.frames.push(FrameCost {
+        let cost = FrameCost {
             grid: chosen.cells_across,
             error: chosen.error,
             photos_used,
@@ -203,7 +205,8 @@ impl Costs {
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
             is_empty: is_empty(picture),
-        });
+        };
+        self.frames.insert(frame_idx, cost);
     }
 
     /// Notes a view that was drawn by itself, however often.
@@ -214,21 +217,14 @@ impl Costs {
         self.alone_empty += usize::from(is_empty(picture));
     }
 
-    /// Goes on with one source view less.
-    pub(super) fn leave_out(&mut self, source_idx: usize) {
-        if source_idx < self.ever_scored.len() {
-            self.ever_scored.remove(source_idx);
-        }
-    }
-
     /// How many frames the CPU drew.
     fn by_cpu(&self) -> usize {
-        self.frames.iter().filter(|frame| frame.by_cpu).count()
+        self.frames.values().filter(|cost| cost.by_cpu).count()
     }
 
     /// How many frames show nothing at all.
     fn empty(&self) -> usize {
-        self.frames.iter().filter(|frame| frame.is_empty).count()
+        self.frames.values().filter(|cost| cost.is_empty).count()
     }
 
     /// What to say of pictures that show nothing at all, if there are any, where there are so many photos.
@@ -249,7 +245,7 @@ impl Costs {
 
     /// A frame's, for `--json`.
     pub(super) fn json_of(&self, frame_idx: usize) -> Value {
-        let Some(cost) = self.frames.get(frame_idx) else {
+        let Some(cost) = self.frames.get(&frame_idx) else {
             return json!({});
         };
         json!({
@@ -286,7 +282,7 @@ impl DeviceTime {
     fn of(session: &Session) -> Self {
         let frames = &session.costs.frames;
         let gpu = session.engine().and_then(Engine::gpu);
-        let times = frames.iter().filter_map(|frame| frame.device);
+        let times = frames.values().filter_map(|frame| frame.device);
         let any = times.clone().next().is_some();
         Self {
             device_seconds: any.then(|| times.map(|t| t.as_secs_f64()).sum()),
@@ -315,7 +311,7 @@ struct PhotosUsed {
 
 impl PhotosUsed {
     fn of(costs: &Costs) -> Self {
-        let used = costs.frames.iter().filter_map(|frame| frame.photos_used);
+        let used = costs.frames.values().filter_map(|frame| frame.photos_used);
         let (least, most) = (used.clone().min(), used.max());
         Self {
             photos_used_per_frame: least.zip(most).map(|(least, most)| [least, most]),
@@ -348,14 +344,14 @@ impl MaxError {
         let bound = session.max_error?;
         let frames = &session.costs.frames;
         let mut frames_by_grid = BTreeMap::new();
-        for grid in frames.iter().filter_map(|frame| frame.grid) {
+        for grid in frames.values().filter_map(|frame| frame.grid) {
             *frames_by_grid.entry(grid).or_default() += 1;
         }
         Some(Self {
             bound: bound.is_finite().then_some(bound),
             frames_by_grid,
-            frames_exact: frames.iter().filter(|frame| frame.grid.is_none()).count(),
-            error_at_most: frames.iter().filter_map(|f| f.error).reduce(f64::max),
+            frames_exact: frames.values().filter(|frame| frame.grid.is_none()).count(),
+            error_at_most: frames.values().filter_map(|f| f.error).reduce(f64::max),
         })
     }
 
@@ -426,8 +422,8 @@ impl Skipped {
             photos_never_uploaded: uploaded.map(|never| never.0),
             bytes_never_uploaded: uploaded.map(|never| never.1),
             cameras_never_scored: (!costs.frames.is_empty()).then(|| unscored.count()),
-            scorings_omitted: costs.frames.iter().map(|f| f.scorings_omitted).sum(),
-            scorings: costs.frames.iter().filter_map(|f| f.scorings).sum(),
+            scorings_omitted: costs.frames.values().map(|f| f.scorings_omitted).sum(),
+            scorings: costs.frames.values().filter_map(|f| f.scorings).sum(),
             lens_maths_omitted_photos: lumigraph.sources.iter().filter(pinhole).count(),
             visibility_tests_omitted_photos: match lumigraph.visibility {
                 Some(_) => 0,

@@ -1,7 +1,10 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
+mod in_order;
+
+use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
-use super::ledger::{Ledger, Stage};
+use super::ledger::Ledger;
 use super::options::{DrawArgs, FieldArgs};
 use super::output::say;
 use super::report::Costs;
@@ -15,16 +18,13 @@ use image::RgbaImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
-    Bounded, DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part,
-    PhotoError, RenderError, Residency, Skips, decode_ahead, prepare_within,
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoError,
+    RenderError, Residency, Skips,
 };
 use serde_json::Value;
 use std::borrow::Cow;
-use std::collections::BTreeSet;
-use std::fmt::Display;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::IsTerminal as _;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::ScopedJoinHandle;
 use std::time::Duration;
 
 /// Everything needed to draw.
@@ -48,8 +48,8 @@ pub(super) struct Session {
     notes_said: usize,
     /// Held-out photos, and those found corrupt.
     without: BTreeSet<String>,
-    /// What was said of the latter.
-    left_out: Vec<String>,
+    /// The latter, with what is wrong with each.
+    left_out: BTreeMap<String, String>,
     /// Photos that were brought to the graphics processor before another was left out.
     uploaded: BTreeSet<String>,
     lumigraph: Lumigraph,
@@ -89,14 +89,18 @@ impl Session {
         let (exposure, proxy) = if proxy.is_searched(&scene, &without) {
             // What is drawn to choose a proxy is exposed as all that is drawn later.
             let exposure = exposure.choose(&mut scene, &without);
+            leave_out(&exposure.left_out, &mut without, strict)?;
             (exposure, proxy.choose(&scene, &without, strict)?)
         } else {
             // What cannot be read is said at once.
             let proxy = proxy.choose(&scene, &without, strict)?;
             (exposure.choose(&mut scene, &without), proxy)
         };
+        // Whichever frames ask for them, those that are known to be damaged show in none.
         without.extend(proxy.left_out.keys().cloned());
-        let left_out = proxy.left_out.iter().map(left_out_text).collect();
+        leave_out(&exposure.left_out, &mut without, strict)?;
+        let mut left_out = exposure.left_out.clone();
+        left_out.extend(proxy.left_out.clone());
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
         lumigraph.photos.set_budget(draw.cpu_memory);
         let clock = Clock::of(time, time_s, &lumigraph)?;
@@ -180,13 +184,14 @@ impl Session {
         }
         self.notes.iter().for_each(|note| say!("note: {note}"));
         self.engine = Some(engine);
-        let mut source_idx = 0;
-        while self.decodes_all && source_idx < self.lumigraph.photos.len() {
-            match self.lumigraph.photos.get(source_idx) {
-                Ok(_) => source_idx += 1,
-                Err(error) => {
-                    self.leave_out(&error)?;
-                    source_idx = 0;
+        if self.decodes_all {
+            for source_idx in 0..self.lumigraph.photos.len() {
+                // What cannot be decoded waits for whoever asks for it, as without --no-skip: pictures
+                // are the same.
+                if let Err(error) = self.lumigraph.photos.get(source_idx)
+                    && self.strict
+                {
+                    return self.leave_out(&error);
                 }
             }
         }
@@ -240,23 +245,33 @@ impl Session {
         }
     }
 
-    /// Draws views one after the other and gives each picture to `take`. While one is drawn the
-    /// next is prepared and its photos are decoded. Corrupt photos as in [`Self::draw`].
+    /// Draws those views that are not there, one after the other, and gives each picture to `take`. While
+    /// one is drawn the next is prepared and its photos are decoded.
+    ///
+    /// All are drawn of the same photos. One that turns out corrupt is reported and left out, unless
+    /// `--strict`, and all views are drawn without it, also those that were there: from the one that asked for
+    /// it on, and then those before. What they have cost so far is forgotten, `again` is told of
+    /// all photos that were left out, and `is_there` is false of every view from then on.
     pub(super) fn draw_all(
         &mut self,
         views: &[(View, Option<Moment>)],
+        is_there: &mut [bool],
         mut take: impl FnMut(usize, RgbaImage) -> anyhow::Result<()>,
+        mut again: impl FnMut(&BTreeMap<String, String>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         self.prepare()?;
+        let mut order: Vec<usize> = (0..views.len()).filter(|i| !is_there[*i]).collect();
         let mut done = 0;
-        while done < views.len() {
-            match self.draw_rest(views, &mut done, &mut take) {
-                Err(error) => match error.downcast_ref() {
-                    Some(RenderError::Photo(error)) => self.leave_out(error)?,
-                    _ => return Err(error),
-                },
-                Ok(()) => break,
+        while let Err(error) = self.draw_in_order(views, &order, &mut done, &mut take) {
+            match error.downcast_ref() {
+                Some(RenderError::Photo(error)) => self.leave_out(error)?,
+                _ => return Err(error),
             }
+            again(&self.left_out)?;
+            is_there.fill(false);
+            let asked = order[done];
+            order = (asked..views.len()).chain(0..asked).collect();
+            done = 0;
         }
         if let Some(note) = self.note_of_empty() {
             say!("note: {note}");
@@ -272,96 +287,14 @@ impl Session {
     /// All that was said of what draws, of photos left out and of pictures that show nothing.
     pub(super) fn notes(&self) -> Vec<String> {
         let engine = self.engine.as_ref().map(Engine::notes).unwrap_or_default();
-        let said = self.notes.iter().chain(engine).chain(&self.left_out);
-        said.cloned().chain(self.note_of_empty()).collect()
+        let said = self.notes.iter().chain(engine).cloned();
+        let left_out = self.left_out.iter().map(left_out_text);
+        said.chain(left_out).chain(self.note_of_empty()).collect()
     }
 
     /// What to say of pictures that show nothing, if there are any.
     pub(super) fn note_of_empty(&self) -> Option<String> {
         self.costs.note_of_empty(self.lumigraph.photos.len())
-    }
-
-    /// Draws all views from `done` on, and counts them there.
-    fn draw_rest(
-        &mut self,
-        views: &[(View, Option<Moment>)],
-        done: &mut usize,
-        take: &mut impl FnMut(usize, RgbaImage) -> anyhow::Result<()>,
-    ) -> anyhow::Result<()> {
-        let Some(engine) = &mut self.engine else {
-            bail!("the engine was opened above");
-        };
-        let (lumigraph, options, method) = (&self.lumigraph, self.options, self.method);
-        let (skips, max_error) = (self.skips, self.max_error);
-        let ledger = &self.ledger;
-        let ready = |i: usize| {
-            let (view, moment) = &views[i];
-            let frame = ledger.time(i, Stage::Surface, || {
-                frame(lumigraph, view, options, moment.as_ref(), skips)
-            });
-            let prepared = match (max_error, method) {
-                (None, Method::Exact) => Ok(Bounded::EXACT),
-                (None, method) => {
-                    ledger.time(i, Stage::Field, || Bounded::unmeasured(&frame, method))
-                }
-                (Some(max_error), _) => {
-                    ledger.time(i, Stage::Field, || prepare_within(&frame, max_error))
-                }
-            };
-            (frame, prepared)
-        };
-        let mut next = (*done < views.len()).then(|| ready(*done));
-        while let Some((frame, prepared)) = next {
-            let chosen = prepared?;
-            let prepared = &chosen.prepared;
-            let mut without = engine.resident(&lumigraph.photos);
-            without.extend(prepared.listed());
-            let drawn = AtomicBool::new(false);
-            // A mask that cannot be decoded must be found by the frame that asks for it.
-            // Photos that are measured would take the current frame's room.
-            let samples = max_error.is_some_and(f64::is_finite) && self.cpu_memory.is_some();
-            let ahead = !lumigraph.photos.any_masked() && !samples;
-            let coming = Some(*done + 1).filter(|i| ahead && *i < views.len());
-            let (picture, coming) = std::thread::scope(|scope| {
-                let prepare = |i| {
-                    let (frame, prepared) = ready(i);
-                    if let Ok(chosen) = &prepared {
-                        let listed = chosen.prepared.listed();
-                        ledger.time(i, Stage::Ahead, || {
-                            decode_ahead(&frame, &listed, &without, &drawn);
-                        });
-                    }
-                    (frame, prepared)
-                };
-                // Where there is no thread for it the next frame is prepared in its turn.
-                let thread = std::thread::Builder::new();
-                let coming =
-                    coming.and_then(|i| thread.spawn_scoped(scope, move || prepare(i)).ok());
-                let ready = ledger.time(*done, Stage::Load, || engine.ready(&frame, prepared));
-                let picture = ready.and_then(|ready| {
-                    let draw = || engine.draw_ready(&frame, prepared, &ready);
-                    let picture = ledger.time(*done, Stage::Draw, draw)?;
-                    Ok((picture, ready))
-                });
-                drawn.store(true, Ordering::Relaxed);
-                (picture, coming.map(ScopedJoinHandle::join))
-            });
-            say_notes(engine, &mut self.notes_said);
-            let (picture, was_ready) = picture?;
-            if views[*done].1.is_some() {
-                self.in_window.note(frame.taking_part().count());
-            }
-            self.costs
-                .note(&frame, &chosen, engine, &was_ready, &picture);
-            ledger.time(*done, Stage::Write, || take(*done, picture))?;
-            *done += 1;
-            next = match coming.transpose() {
-                Ok(None) => (*done < views.len()).then(|| ready(*done)),
-                Ok(next) => next,
-                Err(panic) => std::panic::resume_unwind(panic),
-            };
-        }
-        Ok(())
     }
 
     /// How visible seams are in a view: see [`render::seams`].
@@ -412,6 +345,28 @@ impl Session {
         }
     }
 
+    /// Leaves out photos that were found corrupt before, by name with what is wrong with each. Whether there is
+    /// one among them that was not left out yet: what was drawn so far is to be drawn again then.
+    pub(super) fn leave_out_known(
+        &mut self,
+        damaged: &BTreeMap<String, String>,
+    ) -> anyhow::Result<bool> {
+        let before = self.lumigraph.sources.len();
+        for (name, reason) in damaged {
+            let mut sources = self.lumigraph.sources.iter();
+            if let Some(source_idx) = sources.position(|source| source.name == *name) {
+                let message = reason.clone();
+                self.leave_out(&PhotoError {
+                    source_idx,
+                    message,
+                })?;
+            }
+        }
+        Ok(self.lumigraph.sources.len() < before)
+    }
+
+    /// Leaves out a photo. What has been drawn is to be drawn again without it, so what that has cost is
+    /// forgotten.
     fn leave_out(&mut self, error: &PhotoError) -> anyhow::Result<()> {
         let name = self.lumigraph.sources[error.source_idx].name.clone();
         if self.strict {
@@ -429,20 +384,23 @@ impl Session {
         // The report is on the whole run.
         let photos = &mut self.lumigraph.photos;
         photos.go_on_from(before.photos, error.source_idx);
-        self.costs.leave_out(error.source_idx);
+        self.forget();
         Ok(())
     }
 
-    fn say_left_out(&mut self, name: &str, reason: &str) {
-        let text = left_out_text((name, reason));
-        say!("warning: {text}");
-        self.left_out.push(text);
+    /// Forgets what pictures have cost, as they are drawn again.
+    pub(super) fn forget(&mut self) {
+        self.in_window = InWindow::default();
+        self.ledger = Ledger::new();
+        self.costs = Costs::default();
     }
-}
 
-/// What to say of a photo that is left out.
-fn left_out_text((name, reason): (impl Display, impl Display)) -> String {
-    format!("photo {name} is left out: {reason}")
+    fn say_left_out(&mut self, name: &str, reason: &str) {
+        let known = self.left_out.insert(name.to_owned(), reason.to_owned());
+        if known.is_none() {
+            say!("warning: {}", left_out_text((name, reason)));
+        }
+    }
 }
 
 /// Says what the engine has to say, once.

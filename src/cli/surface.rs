@@ -1,12 +1,13 @@
 //! Options that choose a proxy, and what to say of one.
 
 use super::Usage;
+use super::damaged::leave_out;
 use super::output::say;
 use super::session::spinner;
 use anyhow::Context;
 use clap::Args;
 use glam::DVec3;
-use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trials_text};
+use lumigraph::scene::{Fitted, Kind, Scene, SceneProxy, Trial, trials_text};
 use proxy::Proxy;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -48,12 +49,7 @@ pub(super) fn fit(
     };
     busy.finish_and_clear();
     let fitted = fitted.context("no such proxy can be fitted to this scene")?;
-    for (name, reason) in fitted.left_out.clone() {
-        if strict {
-            return Err(SceneError::Strict { name, reason }.into());
-        }
-        say!("warning: photo {name} is left out: {reason}");
-    }
+    leave_out(&fitted.left_out, &mut without.clone(), strict)?;
     if let Some(note) = scene.note_of_unobserved(kind) {
         say!("note: {note}");
     }

@@ -2,6 +2,7 @@
 
 use super::Usage;
 use super::captured::{Opened, Photos};
+use super::damaged::{leave_out, left_out_text};
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
 use super::interior::is_interior;
@@ -16,6 +17,7 @@ use lumigraph::scene::{Kind, Scene};
 use render::DeviceChoice;
 use render::interior::{CAPTURED_REFERENCE_SIZE, LibraryOptions, Painter, PortalFill, WalkOptions};
 use render::path::read_keyframes;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use view::{Content, House, Look, Progress, Teller, ViewOptions, WorkerOptions};
@@ -227,8 +229,8 @@ impl Load {
         let mut scene = self.scene.open()?;
         let without = self.hold_out.names(&scene)?;
         let mut clock = None;
-        let mut show = |scene: &Scene, proxy: proxy::Proxy| -> anyhow::Result<()> {
-            let mut lumigraph = scene.lumigraph(&without, proxy)?;
+        let mut show = |scene: &Scene, without: &BTreeSet<String>, proxy: proxy::Proxy| {
+            let mut lumigraph = scene.lumigraph(without, proxy)?;
             lumigraph.photos.set_budget(self.budget);
             // Looking for a period takes a while.
             let clock = match &clock {
@@ -239,7 +241,7 @@ impl Load {
             let first_s = first_s.min_by(f64::total_cmp);
             let moment = clock.map(|clock| clock.moment("the scene", first_s));
             teller.show_at(Content::Scene(Arc::new(lumigraph)), moment.transpose()?);
-            Ok(())
+            anyhow::Ok(())
         };
         // 1. At once.
         exposure.forget(&mut scene);
@@ -253,21 +255,28 @@ impl Load {
             }
         };
         if let Some(quick) = quick {
-            show(&scene, quick)?;
+            show(&scene, &without, quick)?;
         }
         // 2. Behind.
         teller.doing("matching exposures");
-        exposure.choose(&mut scene, &without);
+        let damaged = exposure.choose(&mut scene, &without).left_out;
+        let mut fewer = without.clone();
+        leave_out(&damaged, &mut fewer, self.scene.strict)?;
+        for photo in &damaged {
+            teller.say(Progress::Note(left_out_text(photo)));
+        }
         let has_gains = scene.photos.iter().any(|photo| photo.gain.is_some());
+        let is_other = has_gains || !damaged.is_empty();
         if !is_ready {
             let text = "choosing the proxy that shows best what photos show: this may take a while";
             teller.doing(text);
-            let chosen = proxy.choose(&scene, &without, self.scene.strict)?;
+            let chosen = proxy.choose(&scene, &fewer, self.scene.strict)?;
+            fewer.extend(chosen.left_out.into_keys());
             let text = proxy_text(&chosen.proxy);
-            show(&scene, chosen.proxy)?;
+            show(&scene, &fewer, chosen.proxy)?;
             teller.say(Progress::Note(format!("proxy: {text}")));
-        } else if let (true, Some(own)) = (has_gains, &scene.proxy) {
-            show(&scene, own.proxy.clone())?;
+        } else if let (true, Some(own)) = (is_other, &scene.proxy) {
+            show(&scene, &fewer, own.proxy.clone())?;
         }
         Ok(())
     }

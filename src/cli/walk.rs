@@ -191,6 +191,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut painter = opened.painter(references.device(), references.cpu_memory)?;
     let mut notes = Notes::default();
+    notes.keep(opened.photos.iter().flat_map(Photos::left_out));
     let ldis = match fills.contains(&PortalFill::Ldi) && !args.no_ldi_files {
         true => ldi_files(&opened, &options, &painter, &mut notes)?,
         false => None,
@@ -255,7 +256,7 @@ fn walk_all(
         };
         let files = way.frames.iter().map(|frame| folder.join(&frame.file));
         let files: Vec<PathBuf> = files.collect();
-        let is_there = args.film.begin(&folder, &files, inputs)?;
+        let is_there = args.film.begin(&folder, &files, &files, inputs)?;
         begun.push((*fill, files, is_there));
     }
     // 2. The path, not before: beside frames that are not of this walk stays theirs.

@@ -1,19 +1,19 @@
 //! The photos' gains.
 
 use super::file::{ExposureEntry, Extra};
-use super::{Photo, Scene, Warning};
+use super::{Photo, Scene};
 use calibrate::exposure::{self, Verdict};
 use capture::{CaptureError, apply_matte};
 use image::RgbaImage;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What matching the exposures of a scene's photos has found.
 #[derive(Clone, Debug)]
 pub struct Matched {
     /// Whether they differ.
     pub verdict: Verdict,
-    /// The photos that could not be decoded, and had no say.
-    pub warnings: Vec<Warning>,
+    /// Photos that could not be decoded, and had no say: by name, with what is wrong with each.
+    pub left_out: BTreeMap<String, String>,
 }
 
 impl Scene {
@@ -33,11 +33,9 @@ impl Scene {
             exposure::sample_all(&patches, |idx| self.what_counts(photos[idx]));
         let matched = exposure::estimate(names.len(), &patches.points_in_world, &observations);
 
-        let warnings = failed.into_iter().map(|(idx, error)| Warning::LeftOut {
-            name: names[idx].to_owned(),
-            reason: error.to_string(),
-        });
-        let warnings = warnings.collect();
+        let failed = failed.into_iter();
+        let left_out = failed.map(|(idx, error)| (names[idx].to_owned(), error.to_string()));
+        let left_out = left_out.collect();
         let differ = matches!(matched.verdict, Verdict::Matched(_));
         let mut gains = matched.gains.into_iter();
         for photo in &mut self.photos {
@@ -52,7 +50,7 @@ impl Scene {
         });
         Matched {
             verdict: matched.verdict,
-            warnings,
+            left_out,
         }
     }
 

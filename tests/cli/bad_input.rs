@@ -156,7 +156,7 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     // Found out only when drawn: reported, left out, and the frame drawn again.
     let ran = lumigraph(
         folder.path(),
-        "render wall --proxy plane --views wall --json -o left",
+        "render wall --proxy plane --no-exposure --views wall --json -o left",
     )
     .ok();
     assert_eq!(
@@ -178,7 +178,7 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     assert_eq!(left.len(), 9);
 
     // Decoding everything at once finds it too, and the frames are the same.
-    let line = "render wall --proxy plane --views wall --no-skip -o all";
+    let line = "render wall --proxy plane --no-exposure --views wall --no-skip -o all";
     let ran = lumigraph(folder.path(), line).ok();
     assert!(
         ran.stderr.contains("0004.png is left out"),
@@ -187,9 +187,11 @@ fn a_photo_with_a_good_header_and_a_corrupt_body() {
     );
     assert!(left == files(&folder.path().join("all")));
 
-    let line = "render wall --proxy plane --views wall --strict -o strict";
-    let error = lumigraph(folder.path(), line).error(1);
-    assert!(error.contains("0004.png"), "{error}");
+    for exposure in ["", " --no-exposure"] {
+        let line = format!("render wall --proxy plane{exposure} --views wall --strict -o strict");
+        let error = lumigraph(folder.path(), &line).error(1);
+        assert!(error.contains("0004.png"), "{error}");
+    }
 }
 
 #[test]

@@ -1,0 +1,159 @@
+//! What `--resume` keeps beside a film's frames: what all of them are made of, and without.
+
+use super::super::output::write_file;
+use super::super::stamp::{Stamp, changes, in_unicode, stamps};
+use anyhow::{Context, bail};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// What the frames of a folder were made with.
+#[derive(Serialize, Deserialize)]
+struct Plan {
+    version: String,
+    arguments: Vec<String>,
+    /// None of earlier versions.
+    #[serde(default)]
+    inputs: Vec<Stamp>,
+    /// Photos among them that were found damaged, with what is wrong with each: frames are made without.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    left_out: BTreeMap<String, String>,
+}
+
+/// Where a run says what it makes.
+fn file_in(folder: &Path) -> PathBuf {
+    folder.join("resume.json")
+}
+
+impl Plan {
+    /// This run's, without what decides no pixel.
+    fn own(inputs: &[PathBuf]) -> Self {
+        const ALONE: [&str; 3] = ["--resume", "--json", "--no-ldi-files"];
+        const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
+        let mut arguments = Vec::new();
+        // `--fps=30` is `--fps 30`.
+        let apart = |argument: String| match argument.split_once('=') {
+            Some((name, value)) if name.starts_with("--") => {
+                vec![name.to_owned(), value.to_owned()]
+            }
+            _ => vec![argument],
+        };
+        // What is no Unicode is replaced: paths may be anything.
+        let given = std::env::args_os().skip(1);
+        let given = given.map(|argument| argument.to_string_lossy().into_owned());
+        let mut given = given.flat_map(apart);
+        while let Some(argument) = given.next() {
+            if WITH_VALUE.contains(&argument.as_str()) {
+                // How many frames a derived path has does.
+                let value = given.next();
+                let all = value.filter(|_| argument == "--frames");
+                let all = all.map(|v| v.split_once('/').map_or(v.clone(), |(_, n)| n.to_owned()));
+                arguments.extend(all.filter(|v| !v.contains("..")));
+            } else if !ALONE.contains(&argument.as_str()) {
+                arguments.push(argument);
+            }
+        }
+        let mut inputs = stamps(inputs, in_unicode);
+        inputs.dedup();
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            arguments,
+            inputs,
+            left_out: BTreeMap::new(),
+        }
+    }
+
+    fn of(folder: &Path) -> anyhow::Result<Self> {
+        let file = file_in(folder);
+        let named = || file.display().to_string();
+        let bytes = std::fs::read(&file).with_context(named)?;
+        serde_json::from_slice(&bytes).with_context(named)
+    }
+
+    fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        write_file(&file_in(folder), &serde_json::to_vec_pretty(self)?)
+    }
+}
+
+/// Begins a film of these frames, made of the files `inputs`, in a folder, or goes on with it.
+///
+/// # Errors
+/// What is there was made by another command line, or of other files.
+pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let file = file_in(folder);
+    let own = Plan::own(inputs);
+    match std::fs::read(&file) {
+        Ok(bytes) => {
+            let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
+            let is_same = |p: &Plan| p.version == own.version && p.arguments == own.arguments;
+            let Some(plan) = plan.filter(is_same) else {
+                bail!(
+                    "{}: the frames in this folder were made by another command line; choose \
+                     another folder, or remove this one",
+                    file.display()
+                );
+            };
+            let changes = changes(&plan.inputs, &own.inputs);
+            if !(plan.inputs.is_empty() || changes.is_empty()) {
+                bail!(
+                    "{}: the frames in this folder were made of other files: {changes}; choose \
+                     another folder, or remove this one",
+                    file.display()
+                );
+            }
+            Ok(())
+        }
+        Err(_) if frames.iter().any(|f| f.exists()) => bail!(
+            "{}: there are frames here that a run without --resume made; choose another folder, \
+             or remove this one",
+            folder.display()
+        ),
+        Err(_) => own.write(folder),
+    }
+}
+
+/// The photos that the frames in a folder are made without, as some run found them damaged: by name, with what is
+/// wrong with each.
+///
+/// # Errors
+/// The file beside the frames cannot be read.
+pub(super) fn left_out(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
+    Ok(Plan::of(folder)?.left_out)
+}
+
+/// Goes on without photos that were found damaged, for all runs that share a folder: where none of them knew,
+/// every frame of the film that is there (`all`) is removed, and else those of this run (`own`).
+///
+/// # Errors
+/// Files cannot be read, written or removed.
+pub(super) fn leave_out(
+    damaged: &BTreeMap<String, String>,
+    folder: &Path,
+    own: &[PathBuf],
+    all: &[PathBuf],
+) -> anyhow::Result<()> {
+    let mut plan = Plan::of(folder)?;
+    let known = plan.left_out.len();
+    plan.left_out.extend(damaged.clone());
+    if plan.left_out.len() == known {
+        return remove(own);
+    }
+    // Before, so that none stays if it ends here; and after, as another run may not have known it.
+    remove(all)?;
+    plan.write(folder)?;
+    remove(all)
+}
+
+/// Removes those frames that are there.
+pub(super) fn remove(frames: &[PathBuf]) -> anyhow::Result<()> {
+    for frame in frames {
+        match std::fs::remove_file(frame) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("{}: cannot remove", frame.display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
