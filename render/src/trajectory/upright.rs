@@ -51,7 +51,7 @@ pub fn upright(views: &[&View]) -> Vec<Upright> {
         let turn = turn.unwrap_or(0);
         Upright {
             rotation: turned(rotation, turn),
-            sides_exchanged: turn % 2 != 0,
+            sides_exchanged: !turn.is_multiple_of(2),
         }
     };
     views.iter().map(stand).collect()
