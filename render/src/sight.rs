@@ -33,7 +33,22 @@ const HALVINGS: u32 = 6;
 
 /// As many times an inverse distance as none is that is tried in its place: one step more.
 fn nearest_tried() -> f64 {
-    STEP.powi(STEPS + 1)
+    factor(STEPS + 1)
+}
+
+/// The factor of so many steps. (`powi` may round otherwise from one place of a program to the next.)
+fn factor(steps: i32) -> f64 {
+    const OF: [f64; STEPS as usize + 2] = {
+        let mut of = [1.0; STEPS as usize + 2];
+        let mut k = 1;
+        while k < of.len() {
+            of[k] = STEP * of[k - 1];
+            k += 1;
+        }
+        of
+    };
+    let of = OF[steps.unsigned_abs() as usize];
+    if steps < 0 { 1.0 / of } else { of }
 }
 
 /// Whether the point at ray / s lies in a source view's image.
@@ -343,12 +358,12 @@ fn has_well_inside<const N: usize>(source: &FrameSource, corners: &[(DVec3, f64)
 /// The inverse distance nearest to `s`, by its ratio, that is seen; `None` if none tried is.
 fn nearest_seen(s: f64, seen: &mut impl FnMut(f64) -> bool) -> Option<f64> {
     let sides = (1..=STEPS).flat_map(|k| [k, -k]);
-    let mut found = sides.into_iter().map(|k| (k, s * STEP.powi(k)));
+    let mut found = sides.into_iter().map(|k| (k, s * factor(k)));
     let Some((k, mut near)) = found.find(|(_, s)| seen(*s)) else {
         return seen(0.0).then_some(0.0);
     };
     // Between it and the one before, so that neighbouring pixels move alike.
-    let mut beyond = s * STEP.powi(k - k.signum());
+    let mut beyond = s * factor(k - k.signum());
     for _ in 0..HALVINGS {
         let middle = (near * beyond).sqrt();
         if seen(middle) {
