@@ -17,6 +17,7 @@ mod known;
 mod list;
 mod overlooked;
 mod patch;
+mod triangle;
 mod vertex;
 
 use crate::blend::{Candidate, Contributor, blend};
