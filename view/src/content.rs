@@ -7,7 +7,7 @@ use proxy::Proxy;
 use proxy::interior::{CellId, Contents, Interior};
 use proxy::mesh::Model;
 use render::interior::{Painter, Tour};
-use render::trajectory::{Upright, upright};
+use render::trajectory::upright;
 use render::{Lumigraph, Moment, SourceView};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -166,7 +166,7 @@ impl Space {
     pub fn of_scene(lumigraph: &Lumigraph) -> Self {
         let views: Vec<&View> = lumigraph.sources.iter().map(|s| &s.view).collect();
         // Photos taken with the camera turned say no less which way is up.
-        let ups: DVec3 = upright(&views).iter().map(Upright::up).sum();
+        let up = upright(&views).up;
         let count = views.len().max(1) as f64;
         let middle = views.iter().map(|v| v.center()).sum::<DVec3>() / count;
         let reach = |v: &&View| v.center().distance(middle);
@@ -174,7 +174,7 @@ impl Space {
         let depth =
             typical_depth(lumigraph).unwrap_or(if extent > 0.0 { 2.0 * extent } else { 1.0 });
         Self {
-            up: ups.try_normalize().unwrap_or(DVec3::NEG_Y),
+            up: up.unwrap_or(DVec3::NEG_Y),
             // What is looked at should be reached in some five seconds, the cameras' region
             // crossed in ten.
             speed: 0.2 * depth.min((2.0 * extent).max(0.2 * depth)),

@@ -1,6 +1,6 @@
 //! What a path needs to know of a capture's geometry.
 
-use super::{PI, Upright};
+use super::{PI, Standing};
 use crate::lumigraph::SourceView;
 use crate::path::mean_rotation;
 use calibrate::Rigid3;
@@ -13,6 +13,8 @@ pub(super) struct Capture {
     /// The reference camera's centre.
     pub(super) origin_in_world: DVec3,
     pub(super) centers: Vec<DVec3>,
+    /// Where most photos have it in the world; see [`Standing`].
+    up: Option<DVec3>,
     /// `camera_from_world`, as they stand upright.
     rotations: Vec<DQuat>,
     /// The camera nearest to the middle of them all.
@@ -43,7 +45,7 @@ const MANY: usize = 512;
 impl Capture {
     pub(super) fn new(
         sources: &[SourceView],
-        upright: &[Upright],
+        standing: &Standing,
         points_in_world: &[DVec3],
         proxy: &Proxy,
     ) -> Self {
@@ -63,7 +65,7 @@ impl Capture {
             .iter()
             .map(|s| s.view.center() - origin_in_world)
             .collect();
-        let rotation = upright[reference_idx].rotation;
+        let rotation = standing.photos[reference_idx].rotation;
         let forward = reference.forward();
 
         // 2. Principal axes. Ties are broken in favour of the reference camera's x axis,
@@ -117,7 +119,8 @@ impl Capture {
 
         Self {
             origin_in_world,
-            rotations: upright.iter().map(|one| one.rotation).collect(),
+            rotations: standing.photos.iter().map(|one| one.rotation).collect(),
+            up: standing.up,
             reference_idx,
             axes,
             half_extents,
@@ -222,13 +225,8 @@ impl Capture {
         }
 
         // 2. Its axis: up as the cameras have it, or else across the ring.
-        let ups = self.rotations.iter().map(|q| q.conjugate() * DVec3::NEG_Y);
-        let up = ups.sum::<DVec3>() / count;
-        let up = if up.length() > 0.3 {
-            up.normalize()
-        } else {
-            self.axes[2] * self.axes[2].dot(self.reference_up()).signum()
-        };
+        let across = || self.axes[2] * self.axes[2].dot(self.reference_up()).signum();
+        let up = self.up.unwrap_or_else(across);
 
         // 3. The cameras in spherical coordinates about it.
         let toward = -focus;

@@ -7,7 +7,7 @@
 mod capture;
 mod upright;
 
-pub use upright::{Upright, upright};
+pub use upright::{Standing, Upright, upright};
 
 use crate::lumigraph::SourceView;
 use crate::path::{CameraPath, Curve, Interpolation, PathError, PathFrame, default_name};
@@ -82,15 +82,15 @@ pub fn derive(
     }
 
     let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
-    let upright = upright(&views);
-    let capture = Capture::new(sources, &upright, points_in_world, proxy);
+    let standing = upright(&views);
+    let capture = Capture::new(sources, &standing, points_in_world, proxy);
     let poses: Vec<Rigid3> = match kind {
         Trajectory::Orbit => orbit(&capture, frames),
         Trajectory::Dolly => dolly(&capture, frames),
         Trajectory::Sweep => sweep(&capture, frames),
     };
 
-    let camera = typical_camera(sources, &upright);
+    let camera = typical_camera(sources, &standing.photos);
     let frame = |(index, pose): (usize, &Rigid3)| {
         // The capture's poses are relative to its reference camera's centre.
         let center = pose.center() + capture.origin_in_world;

@@ -20,6 +20,16 @@ impl Upright {
     }
 }
 
+/// A capture's photos as they stand upright.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// By index.
+    pub photos: Vec<Upright>,
+    /// Up in the world, of unit length: the vertical that most photos share, across what is level in them, or
+    /// where they share none the mean of their ups; `None` where those all but cancel.
+    pub up: Option<DVec3>,
+}
+
 /// The tangent of 30°: a photo that leans by more from all four ways of turning it is not turned.
 const MOST_LEAN: f64 = 0.577;
 /// The sine of the angle to the vertical, some 15°, within which a photo looks straight up or down: which way it
@@ -28,8 +38,11 @@ const STEEP: f64 = 0.25;
 /// How much more it counts that a direction is the vertical of a photo, however that was turned, than that
 /// it is turned as most are.
 const CLEAR: usize = 3;
-/// How much photos' ups count for the vertical, compared with what lies level in them.
-const UPS: f64 = 0.03;
+/// How much photos' ups count for the vertical, compared with what lies level in them: of photos that look down
+/// at something the ups lean towards it, all of them where they were not taken from all around.
+const UPS: f64 = 0.01;
+/// The mean of ups is as long at least, if they tell which way is up.
+const AGREED: f64 = 0.3;
 /// The cosine of an angle, some 20°, within which two guesses are one.
 const SAME_GUESS: f64 = 0.94;
 /// So many guesses are followed.
@@ -43,7 +56,7 @@ const DOWNWARD: f64 = 0.05;
 /// where no way is that of half of them, as from above, heading in all directions. Whether the world's
 /// axes are turned, and in which order photos come, makes no difference; but of two halves that nothing else tells
 /// apart, that of the photo in the middle stands, or of the first of two there.
-pub fn upright(views: &[&View]) -> Vec<Upright> {
+pub fn upright(views: &[&View]) -> Standing {
     let vertical = shared_vertical(views);
     let stand = |view: &&View| {
         let rotation = view.camera_from_world.rotation;
@@ -54,7 +67,15 @@ pub fn upright(views: &[&View]) -> Vec<Upright> {
             sides_exchanged: !turn.is_multiple_of(2),
         }
     };
-    views.iter().map(stand).collect()
+    let photos: Vec<Upright> = views.iter().map(stand).collect();
+    let mean = || {
+        let ups = photos.iter().map(Upright::up).sum::<DVec3>();
+        ups / photos.len().max(1) as f64
+    };
+    let up = vertical
+        .or_else(|| Some(mean()).filter(|mean| mean.length() > AGREED))
+        .and_then(DVec3::try_normalize);
+    Standing { photos, up }
 }
 
 /// By how many quarters a camera is turned about its optical axis to stand upright; `None` where that
@@ -261,7 +282,7 @@ mod tests {
     }
 
     fn all(views: &[View]) -> Vec<Upright> {
-        upright(&views.iter().collect::<Vec<_>>())
+        upright(&views.iter().collect::<Vec<_>>()).photos
     }
 
     fn roll(views: &mut [View], which: impl IntoIterator<Item = usize>, quarters: u8) {
@@ -312,6 +333,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Photos that look down on something from a part of all around it lean to one side together.
+    #[test]
+    fn up_is_across_what_is_level_in_photos() {
+        for turn in [0.3 * TAU, 0.6 * TAU, TAU] {
+            for elevation in [0.1, 0.6, 1.0] {
+                let straight = ring(24, elevation, turn);
+                let mut held = straight.clone();
+                // Not quite level: by up to 4°.
+                for (i, view) in held.iter_mut().enumerate() {
+                    let lean = DQuat::from_rotation_z(0.07 * (2.4 * i as f64).sin());
+                    view.camera_from_world =
+                        Rigid3::new(lean, DVec3::ZERO) * view.camera_from_world;
+                }
+                let off = |views: &[View]| {
+                    let up = upright(&views.iter().collect::<Vec<_>>()).up.unwrap();
+                    up.angle_between(DVec3::NEG_Y).to_degrees()
+                };
+                // The mean of their ups is some 50° off in the worst of these.
+                for views in [&straight, &held] {
+                    assert!(off(views) < 3.5, "{turn} {elevation}: {}", off(views));
+                }
+            }
+        }
+        assert_eq!(upright(&[]).up, None);
     }
 
     #[test]
