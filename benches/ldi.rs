@@ -73,7 +73,7 @@ fn main() {
     let interior = &house.interior;
     let (contents, _) = Contents::new(interior, &house.model).expect("contents");
     let geometry = CellGeometry::new(&house.model, &contents);
-    let places = semicircles(interior, &SemicircleOptions::default());
+    let places = semicircles(interior, &contents, &SemicircleOptions::default());
     let step = (places.len() / 13).div_ceil(args.sides.max(1)).max(1);
     let mut ldis: Vec<(Layered, ClipTree)> = Vec::new();
     let mut looks: Vec<Look> = Vec::new();
@@ -115,7 +115,7 @@ fn main() {
         let tree = ClipTree::new(&ldi);
         ldis.push((ldi, tree));
         looks.extend(
-            before(&house, &side[0])
+            before(&house, &contents, &side[0])
                 .into_iter()
                 .map(|(camera, window)| Look {
                     ldi: ldis.len() - 1,
@@ -317,7 +317,11 @@ fn main() {
 }
 
 /// Cameras at 1.25 radii before a portal that see all of it.
-fn before(house: &house::House, place: &SemicircleView) -> Vec<(Pinhole, Window)> {
+fn before(
+    house: &house::House,
+    contents: &Contents,
+    place: &SemicircleView,
+) -> Vec<(Pinhole, Window)> {
     let mut wide = house.interior.clone();
     for portal in &mut wide.portals {
         portal.radius = Some(1.25 * portal.semicircle_radius(wide.up));
@@ -329,7 +333,7 @@ fn before(house: &house::House, place: &SemicircleView) -> Vec<(Pinhole, Window)
             views: if angle > 0.0 { 3 } else { 1 },
             span: (2.0 * angle).to_radians(),
         };
-        let all = semicircles(&wide, &options);
+        let all = semicircles(&wide, contents, &options);
         let is_meant = |p: &&SemicircleView| {
             (p.portal, p.from) == (place.portal, place.from)
                 && (p.angle.to_degrees() - angle).abs() < 1e-6

@@ -26,7 +26,7 @@ pub fn before_doorways(
         });
         stands && contents.locate(interior, eye) == place.from
     };
-    let mut places = semicircles(&wide, options);
+    let mut places = semicircles(&wide, contents, options);
     places.retain(is_free);
     places
 }

@@ -89,7 +89,8 @@ fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
     Some(path.parent().unwrap_or(Path::new("")).join(name))
 }
 
-fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Model, Vec<String>)> {
+/// That model, and what is odd about it.
+pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Model, Vec<String>)> {
     let Some(file) = model_file(path, interior) else {
         bail!(
             "{}: it names no model, and cells are drawn from one; make it with `lumigraph interior`",

@@ -18,7 +18,7 @@ pub(super) const FOLDER: &str = "ldi";
 /// In it, what they were made of.
 const FILE: &str = "made.json";
 /// Of that file, and of how LDIs are made: raised when either changes, as those of before are not those of now.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// What decides the samples of all LDIs of an interior.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]

@@ -1,12 +1,15 @@
 //! `lumigraph plan`
 
 use super::Usage;
+use super::captured::model_of;
 use super::interior::open;
 use super::output::{print, print_json, say};
+use anyhow::Context;
 use glam::DMat4;
-use proxy::interior::{CellId, Interior, SemicircleOptions, semicircles};
+use proxy::interior::{Cell, CellId, Content, Contents, Interior, SemicircleOptions, semicircles};
+use proxy::mesh::Model;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where to photograph an interior from: cameras on semicircles before its portals
 ///
@@ -59,11 +62,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .into());
     }
     let (path, interior) = open(&args.interior)?;
+    let contents = contents(&path, &interior)?;
     let options = SemicircleOptions {
         views: args.views,
         span: args.span.to_radians(),
     };
-    let poses = poses(&interior, &options);
+    let poses = poses(&interior, &contents, &options);
     let outside = poses.iter().filter(|pose| !pose.inside).count();
     if outside > 0 {
         say!(
@@ -93,9 +97,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     print(&text)
 }
 
-fn poses<'a>(interior: &'a Interior, options: &SemicircleOptions) -> Vec<Pose<'a>> {
+/// Where the cells of an interior are, whose file is `path`. Only that of cells that are nodes is told by the model.
+fn contents(path: &Path, interior: &Interior) -> anyhow::Result<Contents> {
+    let is_nodes = |cell: &Cell| matches!(cell.content, Content::Nodes(_));
+    let model = match interior.cells.iter().any(is_nodes) {
+        true => model_of(path, interior)?.0,
+        false => Model::default(),
+    };
+    let named = || path.display().to_string();
+    let (contents, _) = Contents::new(interior, &model).with_context(named)?;
+    Ok(contents)
+}
+
+fn poses<'a>(
+    interior: &'a Interior,
+    contents: &Contents,
+    options: &SemicircleOptions,
+) -> Vec<Pose<'a>> {
     let name = |id: CellId| interior.cell(id).name.as_str();
-    let views = semicircles(interior, options).into_iter();
+    let views = semicircles(interior, contents, options).into_iter();
     views
         .map(|view| {
             let pose = view.camera_from_world;

@@ -25,6 +25,7 @@ mod masks;
 mod memory;
 mod names;
 mod nerfstudio;
+mod nodes;
 mod opencv;
 mod path;
 mod render;

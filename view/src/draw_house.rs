@@ -109,12 +109,13 @@ mod tests {
         let mut walk = WalkOptions::default();
         walk.library.size = [16; 2];
         // Files that are none, so that one sees whether they are read.
-        let library = Library::new(&made.interior, &walk.library);
+        let library = Library::new(&made.interior, &contents, &walk.library);
         for place in library.ldi_places() {
             let name = library.file_name(place, &made.interior);
             std::fs::write(folder.path().join(name), "nothing").unwrap();
         }
-        let mut places = semicircles(&made.interior, &walk.library.semicircles).into_iter();
+        let mut places =
+            semicircles(&made.interior, &contents, &walk.library.semicircles).into_iter();
         let place = places.find(|p| p.is_inside && p.from.is_some()).unwrap();
         let view = View {
             lens: Lens::pinhole(DVec2::splat(40.0), DVec2::new(20.0, 15.0)),

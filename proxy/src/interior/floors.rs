@@ -6,80 +6,54 @@ use glam::DVec3;
 /// How high a threshold one steps over, in eye heights.
 const STEP: f64 = 0.25;
 
-impl Interior {
-    /// How high the floor is before a portal on the side of a cell (none: the outside), along `up`.
-    ///
-    /// It is the higher of the floors of the portal's two cells, if that is at most a step below its
-    /// sill: a cell of several storeys has its own floor on the lowest. Else, as before a window, it
-    /// is the lowest point of the viewer's cell, or where that has neither a box nor a floor, of the
-    /// portal.
-    pub fn floor_height(&self, from: Option<CellId>, portal: &Portal) -> f64 {
-        let floor_of = |id: CellId| {
-            let cell = self.cells.get(id.0 as usize)?;
-            floor(self, id, cell.content.room())
-        };
-        before(self, from, portal, floor_of)
-    }
-}
-
 impl Contents {
     /// How high a cell's floor is, along `up`: the lowest point of its outline, or where that is not
     /// known, of what bounds it; `None` of a cell whose place is unknown.
     pub fn floor_of(&self, interior: &Interior, id: CellId) -> Option<f64> {
-        let room = self.bounds.get(id.0 as usize).copied().flatten();
-        floor(interior, id, room)
+        let outline = interior.cells.get(id.0 as usize)?.floor.as_ref();
+        let lowest = |corners: &[DVec3]| extent(corners, interior.up)[0];
+        match (outline, self.bounds_of(id)) {
+            (Some(outline), _) => Some(lowest(outline.corners())),
+            (None, Some(room)) => Some(lowest(&room.corners())),
+            (None, None) => None,
+        }
     }
 
-    /// The same as [`Interior::floor_height`], where triangles tell the floors of cells that are
-    /// nodes.
+    /// How high the floor is before a portal on the side of a cell (none: the outside), along `up`.
+    ///
+    /// It is the higher of the floors of the portal's two cells, if that is at most a step below its
+    /// sill: a cell of several storeys has its own floor on the lowest. Else, as before a window, it
+    /// is the lowest point of the viewer's cell, or where the place of that is unknown, of the portal.
     pub fn floor_height(&self, interior: &Interior, from: Option<CellId>, portal: &Portal) -> f64 {
-        let floor_of = |id: CellId| self.floor_of(interior, id);
-        before(interior, from, portal, floor_of)
+        let [sill, head] = extent(portal.polygon.corners(), interior.up);
+        // On a floor that is over the opening nobody looks through it.
+        let threshold = self.threshold(interior, portal);
+        let threshold = threshold.filter(|floor| *floor < head);
+        threshold
+            .or_else(|| self.floor_of(interior, from?))
+            .unwrap_or(sill)
     }
 
     /// Whether one can walk through a portal, and it is no window: a floor of its cells is at most a
     /// step below its sill, or neither is known.
     pub fn is_door(&self, interior: &Interior, portal: &Portal) -> bool {
-        let floor_of = |id: CellId| self.floor_of(interior, id);
         let mut cells = portal.cells.into_iter().flatten();
-        let is_known = cells.any(|id| floor_of(id).is_some());
-        !is_known || threshold(interior, portal, floor_of).is_some()
+        let is_known = cells.any(|id| self.floor_of(interior, id).is_some());
+        !is_known || self.threshold(interior, portal).is_some()
     }
-}
 
-/// See [`Interior::floor_height`].
-fn before(
-    interior: &Interior,
-    from: Option<CellId>,
-    portal: &Portal,
-    floor_of: impl Fn(CellId) -> Option<f64>,
-) -> f64 {
-    let [sill, head] = extent(portal.polygon.corners(), interior.up);
-    // On a floor that is over the opening nobody looks through it.
-    let threshold = threshold(interior, portal, &floor_of).filter(|floor| *floor < head);
-    threshold.or_else(|| floor_of(from?)).unwrap_or(sill)
-}
+    /// The higher floor of a portal's cells, if it is at most a step below the sill.
+    fn threshold(&self, interior: &Interior, portal: &Portal) -> Option<f64> {
+        let [sill, _] = extent(portal.polygon.corners(), interior.up);
+        let cells = portal.cells.into_iter().flatten();
+        let floors = cells.filter_map(|id| self.floor_of(interior, id));
+        let higher = floors.reduce(f64::max)?;
+        (sill - higher <= STEP * interior.eye_height).then_some(higher)
+    }
 
-/// The higher floor of a portal's cells, if it is at most a step below the sill.
-fn threshold(
-    interior: &Interior,
-    portal: &Portal,
-    floor_of: impl Fn(CellId) -> Option<f64>,
-) -> Option<f64> {
-    let [sill, _] = extent(portal.polygon.corners(), interior.up);
-    let floors = portal.cells.into_iter().flatten().filter_map(floor_of);
-    let higher = floors.reduce(f64::max)?;
-    (sill - higher <= STEP * interior.eye_height).then_some(higher)
-}
-
-/// The lowest point of a cell's outline, else of what bounds it.
-fn floor(interior: &Interior, id: CellId, room: Option<RoomBox>) -> Option<f64> {
-    let outline = interior.cells.get(id.0 as usize)?.floor.as_ref();
-    let lowest = |corners: &[DVec3]| extent(corners, interior.up)[0];
-    match (outline, room) {
-        (Some(outline), _) => Some(lowest(outline.corners())),
-        (None, Some(room)) => Some(lowest(&room.corners())),
-        (None, None) => None,
+    /// What bounds a cell, if that is known.
+    pub(super) fn bounds_of(&self, id: CellId) -> Option<RoomBox> {
+        self.bounds.get(id.0 as usize).copied().flatten()
     }
 }
 
@@ -94,7 +68,7 @@ fn extent(points: &[DVec3], up: DVec3) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interior::{SemicircleOptions, parse_rooms, semicircles};
+    use crate::interior::{Content, SemicircleOptions, parse_rooms, semicircles};
     use crate::mesh::Model;
     use std::path::Path;
 
@@ -138,19 +112,47 @@ mod tests {
                 portal.name
             );
             for (from, floor) in sides {
-                let found = interior.floor_height(from, portal);
+                let found = contents.floor_height(&interior, from, portal);
                 assert_eq!(found, floor, "{} from {from:?}", portal.name);
-                assert_eq!(contents.floor_height(&interior, from, portal), found);
             }
         }
         // There cameras are at eye height.
-        for view in semicircles(&interior, &SemicircleOptions::default()) {
+        for view in semicircles(&interior, &contents, &SemicircleOptions::default()) {
             let height = view.camera_from_world.center().y;
             if view.portal.0 < 2 {
                 let floor = [0.0, 2.8][view.portal.0 as usize];
                 assert!((height - floor - 1.6).abs() < 1e-9, "{view:?}");
             }
         }
+    }
+
+    #[test]
+    fn cameras_stand_where_triangles_say_that_rooms_are_as_where_boxes_do() {
+        let (interior, _) = parse_rooms(Path::new("r.json"), STAIRS.as_bytes(), "m.glb").unwrap();
+        let (contents, _) = Contents::new(&interior, &Model::default()).unwrap();
+        let options = SemicircleOptions::default();
+        let of_boxes = semicircles(&interior, &contents, &options);
+        // The same places, which only the triangles of nodes tell.
+        let mut of_nodes = interior.clone();
+        for cell in &mut of_nodes.cells {
+            cell.content = Content::Nodes(vec![format!("cell:{}", cell.name)]);
+        }
+        assert_eq!(semicircles(&of_nodes, &contents, &options), of_boxes);
+        // Before the window they are over the floor, not over the sill, and those too far off are not
+        // in the room.
+        let lower = Some(CellId(1));
+        for portal in &mut of_nodes.portals {
+            portal.cells = portal.cells.map(|side| side.or(Some(CellId(3))));
+        }
+        of_nodes.portals[3].radius = Some(4.5);
+        let views = semicircles(&of_nodes, &contents, &options);
+        let views = views.iter().filter(|v| v.portal.0 == 3 && v.from == lower);
+        let mut is_inside = Vec::new();
+        for view in views {
+            assert!((view.camera_from_world.center().y - 1.6).abs() < 1e-9);
+            is_inside.push(view.is_inside);
+        }
+        assert!(is_inside.len() == 13 && !is_inside[6], "{is_inside:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Rafferty et al. 1998, "Images for accelerating architectural walkthroughs", §2.2 and 4.1 and
 //! Figure 2: reference images from a semicircle before each portal at eye height.
 
-use super::{CellId, Interior, Portal, PortalId};
+use super::{CellId, Contents, Interior, Portal, PortalId};
 use calibrate::Rigid3;
 use glam::DVec3;
 
@@ -50,9 +50,13 @@ pub struct SemicircleView {
 /// the portals' order, from left to right.
 ///
 /// They stand on the viewer's side at eye height over the floor that is before the portal there; see
-/// [`Interior::floor_height`]. Before a portal that lies flat (a hatch), they stand on a semicircle
-/// across it whatever the floor.
-pub fn semicircles(interior: &Interior, options: &SemicircleOptions) -> Vec<SemicircleView> {
+/// [`Contents::floor_height`]. Before a portal that lies flat (a hatch), they stand on a semicircle
+/// across it whatever the floor. Of cells that `contents` does not have, nothing is known but outlines.
+pub fn semicircles(
+    interior: &Interior,
+    contents: &Contents,
+    options: &SemicircleOptions,
+) -> Vec<SemicircleView> {
     let ids = (0..).map(PortalId);
     let portals = ids.zip(&interior.portals);
     let sides = portals.flat_map(|(id, portal)| {
@@ -61,16 +65,16 @@ pub fn semicircles(interior: &Interior, options: &SemicircleOptions) -> Vec<Semi
     });
     sides
         .filter_map(|(id, portal, from, into)| Some((id, portal, from, into?)))
-        .flat_map(|(id, portal, from, into)| before(interior, id, portal, from, into, options))
+        .flat_map(|(id, portal, from, into)| {
+            before(interior, contents, id, portal, from, into, options)
+        })
         .collect()
 }
 
 /// How a semicircle lies before a portal.
 struct Axes {
-    /// The portal's centre.
-    target: DVec3,
-    /// The same at eye height.
-    center: DVec3,
+    /// Whether it is level; across a portal that lies flat it stands.
+    is_level: bool,
     /// Towards the viewer.
     ahead: DVec3,
     /// To the right of who looks at the portal.
@@ -78,25 +82,18 @@ struct Axes {
 }
 
 impl Axes {
-    fn before(interior: &Interior, portal: &Portal, from: Option<CellId>) -> Self {
-        let up = interior.up;
-        let target = portal.polygon.center();
+    fn before(up: DVec3, portal: &Portal, from: Option<CellId>) -> Self {
         let normal = portal.normal_into(from);
         // Whoever looks against `ahead` has `right` on the right.
         let level = normal - up * normal.dot(up);
-        let (center, ahead) = if level.length() > 1e-3 {
-            let height = interior.floor_height(from, portal) + interior.eye_height;
-            (target + up * (height - target.dot(up)), level.normalize())
-        } else {
-            (target, normal)
-        };
+        let is_level = level.length() > 1e-3;
+        let ahead = if is_level { level.normalize() } else { normal };
         let right = match up.cross(ahead).try_normalize() {
-            Some(right) if level.length() > 1e-3 => right,
+            Some(right) if is_level => right,
             _ => ahead.any_orthonormal_vector(),
         };
         Self {
-            target,
-            center,
+            is_level,
             ahead,
             right,
         }
@@ -106,14 +103,15 @@ impl Axes {
 /// The angle at which an eye stands before a portal, as [`SemicircleView::angle`] has it: 0 in the
 /// middle, positive to the right of who looks at the portal, beyond ±π/2 behind it.
 pub fn angle_before(interior: &Interior, portal: &Portal, from: Option<CellId>, eye: DVec3) -> f64 {
-    let axes = Axes::before(interior, portal, from);
-    let offset = eye - axes.center;
+    let axes = Axes::before(interior.up, portal, from);
+    let offset = eye - portal.polygon.center();
     let angle = offset.dot(axes.right).atan2(offset.dot(axes.ahead));
     if angle.is_nan() { 0.0 } else { angle }
 }
 
 fn before(
     interior: &Interior,
+    contents: &Contents,
     id: PortalId,
     portal: &Portal,
     from: Option<CellId>,
@@ -121,12 +119,19 @@ fn before(
     options: &SemicircleOptions,
 ) -> Vec<SemicircleView> {
     let up = interior.up;
+    let target = portal.polygon.center();
     let Axes {
-        target,
-        center,
+        is_level,
         ahead,
         right,
-    } = Axes::before(interior, portal, from);
+    } = Axes::before(up, portal, from);
+    let center = if is_level {
+        let floor = contents.floor_height(interior, from, portal);
+        let height = floor + interior.eye_height;
+        target + up * (height - target.dot(up))
+    } else {
+        target
+    };
     let radius = portal.semicircle_radius(up);
     // The cameras.
     let each_side = (options.views / 2) as i64;
@@ -146,21 +151,20 @@ fn before(
             from,
             into,
             angle,
-            is_inside: is_inside(interior, from, place),
+            is_inside: is_inside(interior, contents, from, place),
             camera_from_world: Rigid3::looking_at(place, target, up),
         }
     };
     (-each_side..=each_side).map(camera).collect()
 }
 
-fn is_inside(interior: &Interior, cell: Option<CellId>, place: DVec3) -> bool {
-    let Some(cell) = cell.and_then(|id| interior.cells.get(id.0 as usize)) else {
+fn is_inside(interior: &Interior, contents: &Contents, cell: Option<CellId>, place: DVec3) -> bool {
+    let Some(id) = cell else {
         return true;
     };
-    let room = cell.content.room();
+    let room = contents.bounds_of(id);
+    let floor = interior.cells.get(id.0 as usize);
+    let floor = floor.and_then(|cell| cell.floor.as_ref());
     room.is_none_or(|room| room.contains(place))
-        && cell
-            .floor
-            .as_ref()
-            .is_none_or(|floor| floor.covers(place, 0.0))
+        && floor.is_none_or(|floor| floor.covers(place, 0.0))
 }

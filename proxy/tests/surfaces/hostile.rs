@@ -129,11 +129,13 @@ fn use_interior(interior: &Interior) {
         views: 3,
         ..SemicircleOptions::default()
     };
-    // Overflowing sums make places of no use, and no panic.
-    semicircles(interior, &options);
-    if let Ok((contents, _)) = Contents::new(interior, model()) {
+    let contents = Contents::new(interior, model());
+    if let Ok((contents, _)) = &contents {
         contents.locate(interior, DVec3::new(1.0, 1.0, 1.0));
     }
+    // Overflowing sums make places of no use, and no panic.
+    let (contents, _) = contents.unwrap_or_default();
+    semicircles(interior, &contents, &options);
 }
 
 fn model() -> &'static Model {

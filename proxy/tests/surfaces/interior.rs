@@ -629,7 +629,8 @@ fn viewers_are_in_the_room_that_they_see_where_bounds_interlock() {
 #[test]
 fn cameras_stand_on_semicircles_before_portals() {
     let interior = two_rooms();
-    let views = semicircles(&interior, &SemicircleOptions::default());
+    let (contents, _) = Contents::new(&interior, &Model::default()).unwrap();
+    let views = semicircles(&interior, &contents, &SemicircleOptions::default());
     // Two sides of the door; the window from outside alone.
     assert_eq!(views.len(), 3 * 13);
     let sides: Vec<_> = views.chunks(13).map(|v| (v[0].from, v[0].into)).collect();
@@ -670,10 +671,10 @@ fn cameras_stand_on_semicircles_before_portals() {
         views: 1,
         span: 1.0,
     };
-    assert_eq!(semicircles(&interior, &few).len(), 3);
+    assert_eq!(semicircles(&interior, &contents, &few).len(), 3);
     let mut large = interior.clone();
     large.portals[0].radius = Some(5.0);
-    let views = semicircles(&large, &few);
+    let views = semicircles(&large, &contents, &few);
     let inside: Vec<bool> = views.iter().map(|v| v.is_inside).collect();
     assert_eq!(inside, [false, false, true]);
 }
@@ -694,7 +695,7 @@ fn the_captured_house_has_three_cells() {
     assert!(counts.iter().all(|n| *n > 1000), "{counts:?}");
     assert!(contents.elsewhere.len() < count / 50, "{warnings:?}");
     assert_eq!(
-        semicircles(&interior, &SemicircleOptions::default()).len(),
+        semicircles(&interior, &contents, &SemicircleOptions::default()).len(),
         4 * 13
     );
 }
@@ -712,7 +713,8 @@ proptest! {
             }
             if let Ok((interior, _)) = parse_rooms(Path::new("r.json"), &bytes, "m.glb") {
                 prop_assert!(interior.check().is_ok());
-                let views = semicircles(&interior, &SemicircleOptions::default());
+                let (contents, _) = Contents::new(&interior, &Model::default()).unwrap();
+                let views = semicircles(&interior, &contents, &SemicircleOptions::default());
                 prop_assert!(views.iter().all(|v| v.camera_from_world.is_finite()));
             }
             if let Err(error) = parse_interior(Path::new("i.json"), &bytes) {

@@ -9,7 +9,9 @@ use crate::RenderError;
 use crate::ldi::{ClipTree, Layered, construct_of_photos};
 use crate::residency::Residency;
 use glam::DVec3;
-use proxy::interior::{CellId, Interior, PortalId, SemicircleView, angle_before, semicircles};
+use proxy::interior::{
+    CellId, Contents, Interior, PortalId, SemicircleView, angle_before, semicircles,
+};
 use proxy::mesh::Model;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -74,8 +76,8 @@ pub struct Library {
 
 impl Library {
     /// Places of an interior; no image is made.
-    pub fn new(interior: &Interior, options: &LibraryOptions) -> Self {
-        let places = semicircles(interior, &options.semicircles);
+    pub fn new(interior: &Interior, contents: &Contents, options: &LibraryOptions) -> Self {
+        let places = semicircles(interior, contents, &options.semicircles);
         let side = |place: &SemicircleView| (place.portal, place.from, place.into);
         let mut sides = Vec::new();
         let mut first = 0;

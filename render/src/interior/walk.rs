@@ -195,7 +195,7 @@ impl<'a> Walk<'a> {
     ) -> Self {
         let captured = painter.captured();
         options.library = options.library.with_photos(captured);
-        let library = Library::new(interior, &options.library);
+        let library = Library::new(interior, contents, &options.library);
         Self {
             interior,
             contents,

@@ -174,10 +174,10 @@ fn a_file_of_something_else_is_an_error_that_says_what_to_do() {
 
 #[test]
 fn every_side_has_a_name_of_its_own_that_any_file_system_takes() {
-    let (mut house, _) = small_house(4, 3);
+    let (mut house, contents) = small_house(4, 3);
     let interior = &mut house.interior;
     let names = |interior: &Interior, of| {
-        let library = Library::new(interior, &options(of).library);
+        let library = Library::new(interior, &contents, &options(of).library);
         let places = library.ldi_places();
         let names = places
             .iter()

@@ -38,7 +38,9 @@ impl Side {
         let has_room = |side: &Side| {
             let mut angles = [-1.05, -0.5, 0.0, 0.5, 1.05].into_iter();
             angles.all(|angle| {
-                let eye = side.view(interior, angle, radii, [8, 8]).center();
+                let eye = side
+                    .view((interior, contents), angle, radii, [8, 8])
+                    .center();
                 contents.locate(interior, eye) == Some(side.from)
             })
         };
@@ -46,14 +48,21 @@ impl Side {
     }
 
     /// From an angle before the portal, looking at it.
-    fn view(&self, interior: &Interior, angle: f64, radii: f64, size: [u32; 2]) -> View {
+    fn view(
+        &self,
+        (interior, contents): (&Interior, &Contents),
+        angle: f64,
+        radii: f64,
+        size: [u32; 2],
+    ) -> View {
         let portal = interior.portal(self.portal);
         let center = portal.polygon.center();
         let ahead = portal.normal_into(Some(self.from));
         let right = interior.up.cross(ahead).normalize();
         let off = angle.cos() * ahead + angle.sin() * right;
         let up = interior.up;
-        let height = interior.floor_height(Some(self.from), portal) + interior.eye_height;
+        let floor = contents.floor_height(interior, Some(self.from), portal);
+        let height = floor + interior.eye_height;
         let middle = center + up * (height - center.dot(up));
         let eye = middle + radii * portal.semicircle_radius(up) * off;
         view(eye, center, size)
@@ -153,7 +162,7 @@ fn ldis_of_the_nearest_views_show_no_less_than_those_of_all() {
             let signed = ANGLES.iter().enumerate();
             for (k, angle) in signed.flat_map(|(k, angle)| [(k, *angle), (k, -angle)]) {
                 let size = [width, width * 4 / 5];
-                let view = side.view(interior, angle.to_radians(), *radii, size);
+                let view = side.view((interior, &contents), angle.to_radians(), *radii, size);
                 if contents.locate(interior, view.center()) != Some(side.from) {
                     continue;
                 }
@@ -197,7 +206,7 @@ fn nothing_pops_between_neighbourhoods() {
     // Where geometry is mixed in, too.
     for radii in [1.25, 0.85] {
         let draw = |walk: &mut Walk<'_>, angle: f64| {
-            let view = side.view(interior, angle, radii, SIZE);
+            let view = side.view((interior, &contents), angle, radii, SIZE);
             let cost = walk.draw(&view, PortalFill::Ldi).unwrap();
             assert!(cost.filled > 0);
             walk.picture().clone()
@@ -305,7 +314,7 @@ fn what_is_ahead_is_there_when_one_comes() {
             walk.make_ahead(scope).unwrap();
             let (mut made, mut ahead) = (0, 0);
             for i in -10..=10 {
-                let view = sides[0].view(interior, 0.1 * f64::from(i), 1.25, [32, 24]);
+                let view = sides[0].view((interior, &contents), 0.1 * f64::from(i), 1.25, [32, 24]);
                 // Until nothing comes any more.
                 let mut quiet = 0;
                 while quiet < 20 {

@@ -37,7 +37,7 @@ struct Taken {
 fn taken(deviation: f64, bend: f64) -> Taken {
     let (mut house, contents) = small_house(2, 2);
     let geometry = CellGeometry::new(&house.model, &contents);
-    let places = proxy::interior::semicircles(&house.interior, &semicircles());
+    let places = proxy::interior::semicircles(&house.interior, &contents, &semicircles());
     let sides: Vec<&[SemicircleView]> = places.chunks(VIEWS).collect();
     let free: Vec<usize> = (0..sides.len())
         .filter(|i| sides[*i].iter().all(|p| p.is_inside && p.from.is_some()))
@@ -187,7 +187,7 @@ impl Taken {
             ..LibraryOptions::default()
         };
         let (interior, model) = (&self.house.interior, &self.house.model);
-        let mut library = Library::new(interior, &options);
+        let mut library = Library::new(interior, &self.contents, &options);
         let middles: Vec<usize> = self
             .free
             .iter()

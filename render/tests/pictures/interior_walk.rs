@@ -30,7 +30,7 @@ fn set() -> Set {
         views: 5,
         ..SemicircleOptions::default()
     };
-    let places = semicircles(&house.interior, &options);
+    let places = semicircles(&house.interior, &contents, &options);
     let make =
         |p: &SemicircleView| Reference::new(&house.interior, &house.model, &geometry, p, [96, 96]);
     let references = places.iter().step_by(3).take(12).map(make).collect();
@@ -210,7 +210,13 @@ fn walk_of<'a>(house: &'a datasets::house::House, contents: &'a Contents) -> Wal
 }
 
 /// Before a portal, at an angle, two widths off, looking at it.
-fn before(interior: &Interior, place: &SemicircleView, angle: f64, size: [u32; 2]) -> View {
+fn before(
+    interior: &Interior,
+    contents: &Contents,
+    place: &SemicircleView,
+    angle: f64,
+    size: [u32; 2],
+) -> View {
     let portal = interior.portal(place.portal);
     let center = portal.polygon.center();
     let options = SemicircleOptions {
@@ -219,7 +225,7 @@ fn before(interior: &Interior, place: &SemicircleView, angle: f64, size: [u32; 2
     };
     let mut wide = interior.clone();
     wide.portals[place.portal.0 as usize].radius = Some(2.0 * portal.width(interior.up));
-    let all = semicircles(&wide, &options);
+    let all = semicircles(&wide, contents, &options);
     let is_meant = |s: &&SemicircleView| {
         (s.portal, s.from) == (place.portal, place.from) && (s.angle - angle).abs() < 1e-2
     };
@@ -233,6 +239,7 @@ fn what_images_show_is_close_to_what_is_there() {
     let mut walk = walk_of(&house, &contents);
     let places = semicircles(
         &house.interior,
+        &contents,
         &SemicircleOptions {
             views: 1,
             span: 1.0,
@@ -242,7 +249,7 @@ fn what_images_show_is_close_to_what_is_there() {
     let mut count = 0.0;
     for place in places.iter().filter(|p| p.is_inside).take(6) {
         for angle in [0.0, 0.1, 0.6] {
-            let desired = before(&house.interior, place, angle, [160, 128]);
+            let desired = before(&house.interior, &contents, place, angle, [160, 128]);
             let Some(cell) = contents.locate(&house.interior, desired.center()) else {
                 continue;
             };
@@ -507,6 +514,7 @@ fn a_texture_is_right_where_it_was_made() {
     let geometry = CellGeometry::new(&house.model, &contents);
     let places = semicircles(
         &house.interior,
+        &contents,
         &SemicircleOptions {
             views: 1,
             span: 1.0,

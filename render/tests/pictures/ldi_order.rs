@@ -17,7 +17,7 @@ use render::ldi::{
 fn ldis() -> Vec<Layered> {
     let (house, contents) = small_house(3, 4);
     let geometry = CellGeometry::new(&house.model, &contents);
-    let places = semicircles(&house.interior, &SemicircleOptions::default());
+    let places = semicircles(&house.interior, &contents, &SemicircleOptions::default());
     let make = |side: &[_]| {
         let one = |p| Reference::new(&house.interior, &house.model, &geometry, p, [64, 64]);
         let images: Vec<Reference> = side.iter().map(one).collect();

@@ -40,7 +40,7 @@ fn set(rooms: usize, seed: u32, size: u32, views: usize, step: usize) -> Set {
         views,
         ..SemicircleOptions::default()
     };
-    let places = semicircles(&house.interior, &options);
+    let places = semicircles(&house.interior, &contents, &options);
     let make =
         |p: &SemicircleView| Reference::new(&house.interior, &house.model, &geometry, p, [size; 2]);
     let side = |side: &[SemicircleView]| side.iter().map(make).collect();

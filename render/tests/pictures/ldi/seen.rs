@@ -70,7 +70,7 @@ fn what_one_sees_through_doorways_is_there() {
                 views: if angle > 0.0 { 3 } else { 1 },
                 span: (2.0 * angle).to_radians(),
             };
-            let all = semicircles(&wide, &options);
+            let all = semicircles(&wide, &set.contents, &options);
             let is_meant = |p: &&SemicircleView| {
                 let eye = p.camera_from_world.center();
                 let bounds = p.from.and_then(|id| set.contents.bounds[id.0 as usize]);

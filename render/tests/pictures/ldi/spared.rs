@@ -11,6 +11,7 @@ pub(super) fn viewers(set: &Set, side: usize, count: u64, size: [u32; 2]) -> Vec
     let radius = portal.semicircle_radius(interior.up);
     let middle = semicircles(
         interior,
+        &set.contents,
         &SemicircleOptions {
             views: 1,
             span: 1.0,
