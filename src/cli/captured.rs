@@ -42,7 +42,7 @@ impl Opened {
         let (file, interior) = open(given)?;
         let (model, warnings) = model_of(&file, &interior)?;
         warnings.into_iter().for_each(&warn);
-        let named = || given.display().to_string();
+        let named = || file.display().to_string();
         let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
         warnings
             .iter()
@@ -97,7 +97,15 @@ pub(super) fn model_of(path: &Path, interior: &Interior) -> anyhow::Result<(Mode
             path.display()
         );
     };
-    let (model, warnings) = read_model(&file)?;
+    if !file.is_file() {
+        bail!(
+            "{}: there is no file {}, which its `model` names; put the model there, or correct `model`",
+            path.display(),
+            file.display()
+        );
+    }
+    let of_interior = || format!("{}: its `model`", path.display());
+    let (model, warnings) = read_model(&file).with_context(of_interior)?;
     let named = |warning| format!("{}: {warning}", file.display());
     Ok((model, warnings.into_iter().map(named).collect()))
 }

@@ -43,3 +43,41 @@ fn cameras_are_planned_over_the_floors_of_rooms_that_are_nodes() {
         assert!((height - 1.6).abs() < 1e-9, "{pose}");
     }
 }
+
+#[test]
+fn what_of_the_model_is_missing_is_said_with_the_interiors_file() {
+    let folder = with_nodes();
+    let here = folder.path();
+    let failed = |said: &str| {
+        for line in ["plan house", "walk house --frames 1 -o out", "ldis house"] {
+            let error = lumigraph(here, line).error(1);
+            let begin = format!("house/interior.json: {said}");
+            assert!(error.starts_with(&begin), "{error}");
+        }
+    };
+    // 1. A node.
+    let mut name = String::new();
+    change(here, |interior| {
+        name.clone_from(&interior.cells[0].name);
+        interior.cells[0].content = Content::Nodes(vec!["attic".to_owned()]);
+    });
+    failed(&format!(
+        "cell `{name}` shows the node `attic`, which the model does not have; correct its `nodes`; there are: "
+    ));
+    // 2. The file: it was renamed, is a folder, nothing, or of another kind.
+    for (model, said) in [
+        (
+            "nope.glb",
+            "there is no file house/nope.glb, which its `model` names; put the model there",
+        ),
+        (".", "there is no file house/., which its `model` names"),
+        ("", "there is no file house/, which its `model` names"),
+        (
+            "interior.json",
+            "its `model`: house/interior.json: textured models are read from .glb and .gltf",
+        ),
+    ] {
+        change(here, |interior| interior.model = Some(model.to_owned()));
+        failed(said);
+    }
+}

@@ -1,6 +1,7 @@
 //! What of the model each cell has.
 
 use super::locate::is_loose;
+use super::rooms::CELL_NODE;
 use super::seen::Seen;
 use super::{
     CellId, Content, Interior, InteriorError, InteriorWarning, RoomBox, triangle_touches_box,
@@ -93,6 +94,7 @@ impl Contents {
                         return Err(InteriorError::UnknownNode {
                             cell: cell.name.clone(),
                             node: node.clone(),
+                            known: nodes_for_cells(model),
                         });
                     }
                     let mut triangles = below(model, |name| names.iter().any(|n| n == name));
@@ -131,6 +133,25 @@ impl Contents {
             let mut others = cells[..i].iter();
             others.any(|(is_other_loose, b)| (*is_loose || *is_other_loose) && a.overlaps(b))
         })
+    }
+}
+
+/// For messages: the nodes of a model that are named as cells are, or where none is, all that have a name; the
+/// first few.
+fn nodes_for_cells(model: &Model) -> String {
+    const FEW: usize = 20;
+    let named = model.nodes.iter().map(|node| node.name.as_str());
+    let named: BTreeSet<&str> = named.filter(|name| !name.is_empty()).collect();
+    let cells = named.iter().filter(|name| name.starts_with(CELL_NODE));
+    let mut found: Vec<&str> = cells.copied().collect();
+    if found.is_empty() {
+        found.extend(named);
+    }
+    let listed = found[..found.len().min(FEW)].join(", ");
+    match found.len() {
+        0 => "none with a name".to_owned(),
+        count if count > FEW => format!("{listed}, and {} more", count - FEW),
+        _ => listed,
     }
 }
 

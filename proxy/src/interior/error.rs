@@ -53,12 +53,16 @@ pub enum InteriorError {
     #[error("cell `{0}` shows a part of a model, but no `model` is named")]
     NoModel(String),
     /// A node that is not in the model.
-    #[error("cell `{cell}` shows the node `{node}`, which the model does not have")]
+    #[error(
+        "cell `{cell}` shows the node `{node}`, which the model does not have; correct its `nodes`; there are: {known}"
+    )]
     UnknownNode {
         /// The cell.
         cell: String,
         /// The node's name.
         node: String,
+        /// The names of nodes that it may be.
+        known: String,
     },
     /// Nothing in a model says where its cells are.
     #[error(

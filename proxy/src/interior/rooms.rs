@@ -163,7 +163,7 @@ fn turn(portals: &mut [Portal], turned: &[bool]) {
 }
 
 /// What the names of nodes begin with that hold a cell.
-const CELL_NODE: &str = "cell:";
+pub(super) const CELL_NODE: &str = "cell:";
 
 /// Cells and portals by the names of a model's nodes; `file` is the model's, beside the
 /// `interior.json` to be, and `meter` a metre in world units: that is how high eyes are told. Up is

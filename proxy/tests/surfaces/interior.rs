@@ -387,8 +387,23 @@ fn nodes_name_cells_and_portals() {
     let error = Contents::new(&unknown, &model).unwrap_err().to_string();
     assert_eq!(
         error,
-        "cell `a` shows the node `moon`, which the model does not have"
+        "cell `a` shows the node `moon`, which the model does not have; correct its `nodes`; there are: cell:a, cell:b"
     );
+    // Of many, some.
+    let node = |i: usize| ModelNode {
+        name: format!("part {i:02}"),
+        parent_idx: None,
+    };
+    let parts = Model {
+        nodes: (0..30).map(node).collect(),
+        ..Model::default()
+    };
+    let error = Contents::new(&unknown, &parts).unwrap_err().to_string();
+    assert!(error.contains("there are: part 00, part 01, "), "{error}");
+    assert!(error.ends_with(", part 19, and 10 more"), "{error}");
+    let error = Contents::new(&unknown, &Model::default()).unwrap_err();
+    let error = error.to_string();
+    assert!(error.ends_with("there are: none with a name"), "{error}");
     model.nodes[2].name = "portal:a|c".to_owned();
     let error = interior_from_nodes(&model, "m.glb", 1.0)
         .unwrap_err()
