@@ -24,6 +24,13 @@ impl Interior {
     /// # Errors
     /// The first contradiction found.
     pub fn check(&self) -> Result<Vec<InteriorWarning>, InteriorError> {
+        self.check_cells()?;
+        self.check_portals()?;
+        Ok(self.oddities())
+    }
+
+    /// The part of [`Self::check`] that is not about portals, which are told by cells' names.
+    pub(super) fn check_cells(&self) -> Result<(), InteriorError> {
         if !(self.eye_height > 0.0 && self.eye_height.is_finite()) {
             let what = "`eye_height`".to_owned();
             return Err(InteriorError::Length(what, self.eye_height));
@@ -35,8 +42,6 @@ impl Interior {
             return Err(InteriorError::NoCells);
         }
         unique("cell", "cells", self.cells.iter().map(|c| c.name.as_str()))?;
-        let names = self.portals.iter().map(|p| p.name.as_str());
-        unique("portal", "portals", names)?;
         for cell in &self.cells {
             if let Some(RoomBox { min, max }) = cell.content.room()
                 && !(min.cmplt(max).all() && min.is_finite() && max.is_finite())
@@ -47,6 +52,12 @@ impl Interior {
                 return Err(InteriorError::NoModel(cell.name.clone()));
             }
         }
+        Ok(())
+    }
+
+    fn check_portals(&self) -> Result<(), InteriorError> {
+        let names = self.portals.iter().map(|p| p.name.as_str());
+        unique("portal", "portals", names)?;
         for portal in &self.portals {
             if let Some(radius) = portal.radius
                 && !(radius > 0.0 && radius.is_finite())
@@ -68,7 +79,7 @@ impl Interior {
                 });
             }
         }
-        Ok(self.oddities())
+        Ok(())
     }
 
     /// For messages.

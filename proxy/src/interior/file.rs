@@ -169,6 +169,7 @@ impl Stored {
         }
     }
 
+    /// The interior, whose cells are checked; see [`Interior::check`].
     pub(super) fn interior(self) -> Result<Interior, InteriorError> {
         let mut cells = Vec::with_capacity(self.cells.len());
         for cell in self.cells {
@@ -193,12 +194,22 @@ impl Stored {
                 other: cell.other,
             });
         }
-        let names = cells.iter().map(|c| c.name.as_str());
+        let mut interior = Interior {
+            model: self.model,
+            up: direction(self.up)?,
+            eye_height: self.eye_height,
+            cells,
+            portals: Vec::with_capacity(self.portals.len()),
+            held_out: self.held_out,
+            other: self.other,
+        };
+        // Portals tell cells by their names.
+        interior.check_cells()?;
+        let names = interior.cells.iter().map(|c| c.name.as_str());
         let ids: BTreeMap<&str, CellId> = names.zip((0..).map(CellId)).collect();
-        let mut portals = Vec::with_capacity(self.portals.len());
         for portal in self.portals {
             let outline = polygon(&portal.polygon);
-            portals.push(Portal {
+            interior.portals.push(Portal {
                 cells: sides(&portal.name, &portal.cells, &ids)?,
                 polygon: outline.map_err(|e| InteriorError::Portal(portal.name.clone(), e))?,
                 name: portal.name,
@@ -206,15 +217,7 @@ impl Stored {
                 other: portal.other,
             });
         }
-        Ok(Interior {
-            model: self.model,
-            up: direction(self.up)?,
-            eye_height: self.eye_height,
-            cells,
-            portals,
-            held_out: self.held_out,
-            other: self.other,
-        })
+        Ok(interior)
     }
 }
 

@@ -200,7 +200,7 @@ pub fn interior_from_nodes(
         held_out: Vec::new(),
         other: Extra::new(),
     };
-    interior.check()?;
+    interior.check_cells()?;
     // 2. Portals.
     let ids = interior.cells.iter().map(|c| c.name.as_str());
     let ids: BTreeMap<&str, CellId> = ids.zip((0..).map(CellId)).collect();

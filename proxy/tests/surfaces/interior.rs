@@ -163,6 +163,21 @@ fn what_is_wrong_is_said() {
             &with(r#", {"name": "a", "nodes": ["x"]}"#, ""),
             "two cells are called `a`",
         ),
+        // Before what portals make of them.
+        (
+            &with(r#", {"name": "a", "nodes": ["x"]}"#, TWO_PORTALS)
+                .replace(r#"[null, "a"]"#, r#"[null, "b"]"#),
+            "two cells are called `a`",
+        ),
+        (
+            &with("", TWO_PORTALS).replace(r#"{"name": "a", "box""#, r#"{"name": "", "box""#),
+            "a cell has no name",
+        ),
+        (
+            r#"{"version": 1, "up": [0, 1, 0], "eye_height": 1, "cells": [], "portals": [
+                {"name": "p", "cells": ["a", null], "polygon": [[1, 0, 0], [1, 1, 0], [1, 1, 1]]}]}"#,
+            "there are no cells",
+        ),
         (
             &with(r#", {"name": "", "nodes": ["x"]}"#, ""),
             "a cell has no name",
