@@ -24,7 +24,8 @@
 //!
 //! In a model, the node `cell:NAME` and all below it are a cell, and the node `portal:A|B`, a
 //! flat mesh, is the opening between two of them; `portal:A|` leads outside. What follows
-//! another `|` tells openings between the same cells apart.
+//! another `|` tells openings between the same cells apart, and so does a number that an editor put
+//! after the name of a copy (`portal:A|B.001`). A face may be there twice, once from each side.
 
 use super::contents::below;
 use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
@@ -210,8 +211,8 @@ pub fn interior_from_nodes(
         };
         let mut parts = between.splitn(3, '|');
         let mut side = || {
-            let part = parts.next().filter(|part| !part.is_empty());
-            part.map(str::to_owned)
+            let part = parts.next().map(|part| without_number(part, &ids));
+            part.filter(|part| !part.is_empty()).map(str::to_owned)
         };
         let between_cells = [side(), side()];
         let failed = |problem: String| InteriorError::PortalNode(name.to_owned(), problem);
@@ -240,20 +241,57 @@ pub fn interior_from_nodes(
     Ok((interior, warnings))
 }
 
-/// The one loop of sides that only one triangle has.
-fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
-    // Corners are the same where their positions are.
-    let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
-    let mut sides: BTreeMap<_, DVec3> = BTreeMap::new();
+/// What a portal's node calls a cell, without the number that tells copies of the node apart (`.001`): of
+/// a name that no cell has but for that.
+fn without_number<'a>(name: &'a str, ids: &BTreeMap<&str, CellId>) -> &'a str {
+    let Some((whole, number)) = name.rsplit_once('.') else {
+        return name;
+    };
+    let is_number = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
+    let is_copy = !ids.contains_key(name) && (whole.is_empty() || ids.contains_key(whole));
+    if is_number && is_copy { whole } else { name }
+}
+
+/// A corner, the same where its position is.
+type Place = [u64; 3];
+
+fn place(p: DVec3) -> Place {
+    p.to_array().map(|x| (x + 0.0).to_bits())
+}
+
+/// The sides that only one of some triangles has, by where they begin and end; their ends.
+fn lone_sides(model: &Model, triangles: &[u32]) -> BTreeMap<(Place, Place), DVec3> {
+    let mut sides = BTreeMap::new();
     for i in triangles {
         let corners = model.mesh.corners(*i as usize);
         for k in 0..3 {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            if sides.remove(&(key(b), key(a))).is_none() {
-                sides.insert((key(a), key(b)), b);
+            if sides.remove(&(place(b), place(a))).is_none() {
+                sides.insert((place(a), place(b)), b);
             }
         }
     }
+    sides
+}
+
+/// The one loop of sides that only one triangle has.
+fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
+    // 1. The sides; of a face that is there twice, once for who looks from each side, those of one.
+    let normal = |i: &u32| {
+        let [a, b, c] = model.mesh.corners(*i as usize);
+        (b - a).cross(c - a)
+    };
+    let first = triangles.first().map_or(DVec3::ZERO, normal);
+    let faces_as_first = |i: &u32| normal(i).dot(first) >= 0.0;
+    let (front, back): (Vec<u32>, Vec<u32>) = triangles.iter().copied().partition(faces_as_first);
+    let (front, back) = (lone_sides(model, &front), lone_sides(model, &back));
+    let is_twice =
+        front.len() == back.len() && front.keys().all(|(a, b)| back.contains_key(&(*b, *a)));
+    let sides = match is_twice {
+        true => front,
+        false => lone_sides(model, triangles),
+    };
+    // 2. One after the other.
     let next: BTreeMap<_, DVec3> = sides.iter().map(|((a, _), b)| (*a, *b)).collect();
     if next.len() != sides.len() {
         return Err("its outline is no simple loop".to_owned());
@@ -263,8 +301,8 @@ fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
     };
     let mut corners = vec![first];
     while corners.len() < next.len() {
-        match next.get(&key(corners[corners.len() - 1])) {
-            Some(corner) if key(*corner) != key(first) => corners.push(*corner),
+        match next.get(&place(corners[corners.len() - 1])) {
+            Some(corner) if place(*corner) != place(first) => corners.push(*corner),
             _ => return Err("its outline is more than one loop".to_owned()),
         }
     }

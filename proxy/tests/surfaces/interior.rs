@@ -519,6 +519,46 @@ fn wall([x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> [[f64; 3]; 4] {
 }
 
 #[test]
+fn openings_may_be_copies_and_have_faces_on_both_sides() {
+    let door = wall([3.0, 0.5], [3.0, 1.5]);
+    let [a, b, c, d] = door;
+    let mut quads = vec![
+        ("cell:a", level([0.0, 3.0], [0.0, 4.0], 0.0)),
+        ("cell:b.007", level([3.0, 6.0], [0.0, 4.0], 0.0)),
+        ("portal:a|b.007", door),
+        ("portal:a|b.007.001", wall([3.0, 2.5], [3.0, 3.5])),
+        ("portal:a|.002", wall([0.0, 1.0], [0.0, 2.0])),
+    ];
+    // Split into triangles as the front is, and the other way.
+    for back in [[a, d, c, b], [d, c, b, a]] {
+        quads.insert(3, ("portal:a|b.007", back));
+        let model = nodes_of_quads(&quads);
+        let (interior, warnings) = interior_from_nodes(&model, "m.glb", 1.0).unwrap();
+        assert_eq!(warnings, []);
+        let [a, b] = [Some(CellId(0)), Some(CellId(1))];
+        let cells: Vec<_> = interior.portals.iter().map(|p| p.cells).collect();
+        assert_eq!(cells, [[a, b], [a, b], [a, None]]);
+        let names: Vec<&str> = interior.portals.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, ["a|b.007", "a|b.007.001", "a|.002"]);
+        let corners = interior.portals[0].polygon.corners();
+        let is_there = |p: &[f64; 3]| corners.contains(&DVec3::from_array(*p));
+        assert!(corners.len() == 4 && door.iter().all(is_there));
+        quads.remove(3);
+    }
+    // A number that is none, and what is no copy.
+    for name in ["portal:a|b.1", "portal:a|b.x01", "portal:a|c.001"] {
+        let mut quads = quads.clone();
+        quads.push((name, door));
+        let error = interior_from_nodes(&nodes_of_quads(&quads), "m.glb", 1.0).unwrap_err();
+        let said = format!(
+            "leads to the cell `{}`",
+            name.trim_start_matches("portal:a|")
+        );
+        assert!(error.to_string().contains(&said), "{error}");
+    }
+}
+
+#[test]
 fn nodes_of_a_door_have_their_sides_where_a_room_goes_around_the_next() {
     let mut quads = Vec::new();
     for y in [0.0, 2.5] {
