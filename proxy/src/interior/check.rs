@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 const ROUNDING: f64 = 1e-6;
 /// Overlaps that are told: of many boxes in one place, there would be their number squared.
 const MAX_OVERLAPS: usize = 64;
+/// Of floors whose normal is farther from up than 60° nobody takes one for a ramp: the cosine.
+const STEEP: f64 = 0.5;
 
 impl RoomBox {
     /// Whether two share more than a side.
@@ -111,8 +113,16 @@ impl Interior {
             }
         }
         for cell in &self.cells {
-            let floor = cell.floor.as_ref().zip(cell.content.room());
-            if let Some(distance) = floor.and_then(|(floor, room)| self.floor_away(floor, &room)) {
+            let Some(floor) = &cell.floor else {
+                continue;
+            };
+            if !(floor.normal().dot(self.up).abs() >= STEEP) {
+                // Whether it is over the box is another question.
+                found.push(InteriorWarning::FloorSteep(cell.name.clone()));
+                continue;
+            }
+            let room = cell.content.room();
+            if let Some(distance) = room.and_then(|room| self.floor_away(floor, &room)) {
                 found.push(InteriorWarning::FloorAway {
                     cell: cell.name.clone(),
                     distance,

@@ -113,8 +113,9 @@ pub enum InteriorWarning {
     },
     /// A floor is not in its cell's box.
     #[error(
-        "the floor of cell `{cell}` is outside the cell's box, {distance} away: eyes are placed over it, on tours and \
-         before portals; correct its `floor`, or its `box`"
+        "the floor of cell `{cell}` is outside the cell's box, {}: eyes are placed over it, on tours and \
+         before portals; correct its `floor`, or its `box`",
+        how_far(.distance)
     )]
     FloorAway {
         /// The cell.
@@ -122,6 +123,12 @@ pub enum InteriorWarning {
         /// In world units; zero where they touch.
         distance: f64,
     },
+    /// A floor that nobody stands on.
+    #[error(
+        "the floor of cell `{0}` is as steep as a wall: eyes are placed over it, on tours and before portals; give \
+         the outline of what one stands on, as seen from above"
+    )]
+    FloorSteep(String),
     /// A portal's outline goes the other way round.
     #[error(
         "portal `{0}` seems to be turned round: its corners are to be counter-clockwise as seen \
@@ -163,4 +170,12 @@ pub enum InteriorWarning {
     /// Triangles that no cell has.
     #[error("{0} triangles are in no cell; they are drawn whatever is visible")]
     Elsewhere(usize),
+}
+
+/// For messages: how far away something is, in world units.
+fn how_far(distance: &f64) -> String {
+    match *distance > 0.0 {
+        true => format!("{distance} away"),
+        false => "which it only touches".to_owned(),
+    }
 }

@@ -24,6 +24,7 @@
 //! in the box beside it; those that `held_out` names are not drawn from. Keys that this version does
 //! not know are kept when the file is written again.
 
+use super::arrays::{exactly, points, points_or_none};
 use super::{
     Cell, CellId, Content, Extra, Interior, InteriorError, InteriorFileError, InteriorWarning,
     Polygon, PolygonError, Portal, RoomBox,
@@ -41,6 +42,7 @@ pub(super) struct Stored {
     pub version: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
+    #[serde(deserialize_with = "exactly")]
     pub up: [f64; 3],
     pub eye_height: f64,
     pub cells: Vec<StoredCell>,
@@ -60,7 +62,11 @@ pub(super) struct StoredCell {
     pub nodes: Option<Vec<String>>,
     #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
     pub room: Option<StoredBox>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "points_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub floor: Option<Vec<[f64; 3]>>,
     #[serde(flatten)]
     pub other: Extra,
@@ -68,14 +74,18 @@ pub(super) struct StoredCell {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct StoredBox {
+    #[serde(deserialize_with = "exactly")]
     pub min: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
     pub max: [f64; 3],
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct StoredPortal {
     pub name: String,
+    #[serde(deserialize_with = "points")]
     pub polygon: Vec<[f64; 3]>,
+    #[serde(deserialize_with = "exactly")]
     pub cells: [Option<String>; 2],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,

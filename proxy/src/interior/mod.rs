@@ -5,6 +5,7 @@
 //! portal stands wherever a line of sight may leave its cell: where it does not, something of
 //! the cell's content ends it.
 
+mod arrays;
 mod check;
 mod compare;
 mod contents;

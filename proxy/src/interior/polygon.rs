@@ -21,7 +21,7 @@ pub enum PolygonError {
     #[error("corner {0} is not finite")]
     NotFinite(usize),
     /// It encloses nothing.
-    #[error("its corners lie on a line; give the outline of the opening")]
+    #[error("its corners lie on a line; give an outline that encloses something")]
     Flat,
     /// A corner lies off the plane of the others.
     #[error(
@@ -339,7 +339,7 @@ mod tests {
             message(&[[0.0; 3], [1.0; 3], [0.0, f64::NAN, 0.0]]),
             "corner 2 is not finite"
         );
-        let line = "its corners lie on a line; give the outline of the opening";
+        let line = "its corners lie on a line; give an outline that encloses something";
         assert_eq!(message(&[[0.0; 3], [1.0; 3], [2.0; 3]]), line);
         assert_eq!(message(&[[1.0; 3], [1.0; 3], [1.0; 3]]), line);
         let bent = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.3], [0.0, 1.0, 0.0]];

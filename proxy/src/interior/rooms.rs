@@ -27,6 +27,7 @@
 //! another `|` tells openings between the same cells apart, and so does a number that an editor put
 //! after the name of a copy (`portal:A|B.001`). A face may be there twice, once from each side.
 
+use super::arrays::{exactly, points, points_or_none};
 use super::contents::below;
 use super::file::{Stored, StoredBox, StoredCell, StoredPortal, parse_version_1, sides};
 use super::seen::Seen;
@@ -45,7 +46,7 @@ const EYE_HEIGHT: f64 = 1.6;
 
 #[derive(Deserialize)]
 struct Rooms {
-    #[serde(default = "y")]
+    #[serde(default = "y", deserialize_with = "exactly")]
     up: [f64; 3],
     #[serde(default = "eye_height")]
     eye_height: f64,
@@ -57,15 +58,20 @@ struct Rooms {
 #[derive(Deserialize)]
 struct Room {
     name: String,
+    #[serde(deserialize_with = "exactly")]
     min: [f64; 3],
+    #[serde(deserialize_with = "exactly")]
     max: [f64; 3],
+    #[serde(default, deserialize_with = "points_or_none")]
     floor: Option<Vec<[f64; 3]>>,
 }
 
 #[derive(Deserialize)]
 struct Opening {
     name: String,
+    #[serde(deserialize_with = "exactly")]
     between: [Option<String>; 2],
+    #[serde(deserialize_with = "points")]
     polygon: Vec<[f64; 3]>,
     radius: Option<f64>,
 }

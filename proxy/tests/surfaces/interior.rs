@@ -150,6 +150,22 @@ fn what_is_wrong_is_said() {
             "portal `p` leads to the cell `b`; there are: a",
         ),
         (&portal(square, r#"["a", "a"]"#), "leads from `a` to `a`"),
+        (
+            &portal(square, r#"["a", null, "b"]"#),
+            "not an interior: invalid length 3, expected an array of length 2",
+        ),
+        (
+            &portal("[[0, 0, 0], [0, 1, 0, 0], [0, 1, 1]]", r#"["a", null]"#),
+            "invalid length 4, expected an array of length 3",
+        ),
+        (
+            &with("", "").replace("[0, 1, 0]", "[0, 1, 0, 0]"),
+            "invalid length 4, expected an array of length 3",
+        ),
+        (
+            &with("", "").replace("[0, 1, 0]", "[0, 1]"),
+            "invalid length 2, expected an array of length 3",
+        ),
         (&portal(square, "[null, null]"), "leads from null to null"),
         (
             &portal("[[0, 0, NaN], [0, 1, 0], [0, 1, 1]]", r#"["a", null]"#),
@@ -200,6 +216,20 @@ fn what_is_wrong_is_said() {
         (
             &with(r#", {"name": "b", "scene": "s", "floor": [[0, 0, 0]]}"#, ""),
             "the floor of cell `b`: it has 1 corners",
+        ),
+        (
+            &with(
+                r#", {"name": "b", "scene": "s", "floor": [[0, 0, 0], [0, 0, 1], [0, 0, 2]]}"#,
+                "",
+            ),
+            "the floor of cell `b`: its corners lie on a line; give an outline that encloses something",
+        ),
+        (
+            &with(
+                r#", {"name": "b", "scene": "s", "floor": [[0, 0, 0], [0, 0, 1], [1, 0, 2, 3]]}"#,
+                "",
+            ),
+            "invalid length 4",
         ),
         (
             r#"{"version": 1, "up": [0, 0, 0], "eye_height": 1, "cells": [], "portals": []}"#,
@@ -294,6 +324,25 @@ fn floors_outside_their_boxes_are_told() {
         });
         let warnings = with_floor(x, y).check().unwrap();
         assert_eq!(warnings, Vec::from_iter(told), "{x:?} {y}");
+    }
+    let said = |interior: &Interior| interior.check().unwrap()[0].to_string();
+    let at = with_floor([20.0, 24.0], 0.0);
+    assert!(said(&at).contains("outside the cell's box, 16 away: eyes"));
+    let at = with_floor([4.0, 8.0], 0.0);
+    assert!(said(&at).contains("outside the cell's box, which it only touches: eyes"));
+    // On a wall of it, or anywhere, as walls are: what is said is how it stands.
+    for x in [0.0, 2.0, 4.0, 50.0] {
+        let mut interior = two_rooms();
+        let corners = [[x, 0.0, 0.0], [x, 0.0, 4.0], [x, 3.0, 4.0]];
+        let wall = Polygon::new(corners.map(DVec3::from_array).to_vec()).unwrap();
+        interior.cells[0].floor = Some(wall);
+        let steep = InteriorWarning::FloorSteep("west".to_owned());
+        assert_eq!(interior.check().unwrap(), [steep]);
+        let said = said(&interior);
+        assert!(
+            said.starts_with("the floor of cell `west` is as steep as a wall: "),
+            "{said}"
+        );
     }
     // Whichever way is up.
     for (y, is_told) in [(0.0, false), (50.0, true)] {
