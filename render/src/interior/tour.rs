@@ -1,12 +1,17 @@
 //! A tour through all rooms of an interior.
 
+mod heading;
+mod way;
+
 use super::floor_map::FloorMap;
 use crate::path::{CameraPath, PathError, PathFrame};
 use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
+use heading::Headings;
 use proxy::interior::{CellId, Contents, Interior, PortalId};
 use proxy::mesh::Model;
 use std::collections::{BTreeSet, VecDeque};
+use way::Way;
 
 /// Why there is no tour.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -22,8 +27,6 @@ pub enum TourError {
 /// Lengths in eye heights, which is what tells a doll's house from a palace.
 const BEFORE_DOOR: f64 = 0.3;
 const SMOOTH: f64 = 0.22;
-const LOOK_AHEAD: f64 = 0.8;
-const TURN: f64 = 0.6;
 /// Room enough on both sides of who goes through an opening.
 const ENOUGH: f64 = 0.16;
 /// Heights that are nearer to one another are of one storey, likewise.
@@ -88,27 +91,15 @@ fn path(
     let length = way.length();
     let count = frames.max(1);
     let level = up.any_orthonormal_vector();
-    let mut heading = level;
+    let headings = Headings::new(&way, up, unit, SMOOTH * unit);
     let frame = |i: usize| {
         let share = i as f64 / (count.max(2) - 1) as f64;
         let along = share * length;
         let center = way.smoothed(along, reach);
-        if length > 0.0 {
-            // The mean of where one will look a little before and after.
-            let ahead = |s: f64| {
-                let d = way.smoothed(s + LOOK_AHEAD * unit, SMOOTH * unit)
-                    - way.smoothed(s, SMOOTH * unit);
-                (d - up * d.dot(up)).normalize_or_zero()
-            };
-            let mean: DVec3 = (-4..=4)
-                .map(|k| ahead((along + f64::from(k) / 4.0 * TURN * unit).clamp(0.0, length)))
-                .sum();
-            if mean.length() > 0.05 {
-                heading = mean.normalize();
-            }
-        } else {
-            heading = DQuat::from_axis_angle(up, std::f64::consts::TAU * share) * level;
-        }
+        let heading = match length > 0.0 {
+            true => headings.at(along),
+            false => DQuat::from_axis_angle(up, std::f64::consts::TAU * share) * level,
+        };
         let pose = Rigid3::looking_at(center, center + heading * unit, up);
         let name = format!("frame_{i:04}");
         let time_s = Some(i as f64 / fps);
@@ -370,51 +361,4 @@ fn route(
         None
     };
     search(true).or_else(|| search(false))
-}
-
-/// A line from stop to stop.
-struct Way {
-    stops: Vec<DVec3>,
-    /// How far along each is.
-    along: Vec<f64>,
-}
-
-impl Way {
-    fn new(stops: Vec<DVec3>) -> Self {
-        let mut along = vec![0.0];
-        for pair in stops.windows(2) {
-            along.push(along[along.len() - 1] + pair[0].distance(pair[1]));
-        }
-        Self { stops, along }
-    }
-
-    fn length(&self) -> f64 {
-        self.along[self.along.len() - 1]
-    }
-
-    fn at(&self, along: f64) -> DVec3 {
-        let along = along.clamp(0.0, self.length());
-        let after = self.along.partition_point(|a| *a < along).max(1);
-        let Some(&q) = self.stops.get(after) else {
-            return self.stops[self.stops.len() - 1];
-        };
-        let (from, to) = (self.along[after - 1], self.along[after]);
-        let share = if to > from {
-            (along - from) / (to - from)
-        } else {
-            0.0
-        };
-        self.stops[after - 1].lerp(q, share)
-    }
-
-    /// The mean over some way before and after, less the farther.
-    fn smoothed(&self, along: f64, reach: f64) -> DVec3 {
-        let weight = |k: i32| f64::from(9 - k.abs());
-        let steps = -8..=8;
-        let sum: DVec3 = steps
-            .clone()
-            .map(|k| weight(k) * self.at(along + 2.0 * reach * f64::from(k) / 8.0))
-            .sum();
-        sum / steps.map(weight).sum::<f64>()
-    }
 }

@@ -2,7 +2,7 @@
 
 use crate::house;
 
-use calibrate::{Camera, Lens};
+use calibrate::{Camera, Lens, View};
 use glam::{DVec2, DVec3};
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{
@@ -177,6 +177,29 @@ fn tours_go_around_walls_and_furniture() {
     };
     let found = find_interior(&evidence, "house.glb", &FindOptions::default()).unwrap();
     assert_eq!(crossings(&found.interior, &model), (0, 3));
+}
+
+#[test]
+fn tours_turn_by_and_by_where_they_turn_back() {
+    let lens = Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0));
+    let camera = Camera::of(&lens, 64, 64);
+    for (rooms, seed) in [(3, 0), (7, 7), (9, 6), (13, 1)] {
+        let (house, contents) = house::small_house(rooms, seed);
+        let (interior, model) = (&house.interior, &house.model);
+        let tour = Tour::new(interior, &contents, model, &camera, 2000, 15.0).unwrap();
+        let views: Vec<&View> = tour.path.frames.iter().map(|f| &f.view).collect();
+        let ahead = |view: &View| view.camera_from_world.rotation.conjugate() * DVec3::Z;
+        let steps = views.windows(2).map(|pair| {
+            let turn = ahead(pair[0]).angle_between(ahead(pair[1]));
+            (turn, pair[0].center().distance(pair[1].center()))
+        });
+        let [turn, step] = steps.fold([0.0, 0.0], |[turn, step]: [f64; 2], (t, s)| {
+            [turn.max(t), step.max(s)]
+        });
+        // Half a turn takes 1.2 eye heights of the way.
+        let most = std::f64::consts::PI * step / (1.2 * interior.eye_height);
+        assert!(turn <= 1.5 * most, "{rooms} rooms, {seed}: {turn} {most}");
+    }
 }
 
 #[test]
