@@ -235,7 +235,7 @@ impl Costs {
                 0 | 1 => "one photo alone does not tell where things are",
                 _ => otherwise,
             };
-            (empty > 0).then(|| format!("{empty} of {all} {what} show nothing: {why}"))
+            note_of_empty(empty, all, what, why)
         };
         let unseen = "the proxy does not reach where those photos look; hold out fewer, or try another \
                       --proxy";
@@ -263,8 +263,13 @@ impl Costs {
     }
 }
 
+/// What to say of pictures, called so, of which some show nothing at all; nothing if there are none.
+pub(super) fn note_of_empty(empty: usize, all: usize, what: &str, why: &str) -> Option<String> {
+    (empty > 0).then(|| format!("{empty} of {all} {what} show nothing: {why}"))
+}
+
 /// Whether no pixel is covered, not even in part.
-fn is_empty(picture: &RgbaImage) -> bool {
+pub(super) fn is_empty(picture: &RgbaImage) -> bool {
     // Of most pictures the first pixels tell.
     picture.pixels().all(|pixel| pixel.0[3] == 0)
 }

@@ -1,5 +1,6 @@
 //! `lumigraph walk`
 
+mod empty;
 mod report;
 mod tour;
 
@@ -13,6 +14,7 @@ use super::options::{cut, size};
 use super::output::{print, print_json, say, write_file};
 use super::path::NerfstudioArgs;
 use super::references::{ReferenceArgs, before_ldis};
+use super::report::is_empty;
 use super::session::progress;
 use super::targets::check_folder;
 use super::took::Start;
@@ -218,7 +220,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             args.film.finish(&walked.files, way.fps)?;
         }
         notes.say_new(walk.painter());
-        let whole = Report::new(&walk, notes.into_all(), &start);
+        if let Some(note) = empty::note(args, &walks) {
+            notes.say(note);
+        }
+        let frames_empty = empty::count(&walks);
+        let whole = Report::new(&walk, notes.into_all(), frames_empty, &start);
         report(args, &opened, &walk, &walks, &way.frames, &whole)
     })
 }
@@ -494,7 +500,9 @@ fn draw(
             let score = truth.score(&walk.picture().picture())?;
             scored = Some(Scored { score, cpu_ms });
         }
-        film.write(file, walk.picture().picture())?;
+        let picture = walk.picture().picture();
+        let is_empty = is_empty(&picture);
+        film.write(file, picture)?;
         bar.suspend(|| notes.say_new(walk.painter()));
         drawn.push(Drawn {
             index: frame.index,
@@ -502,6 +510,7 @@ fn draw(
             file: file.clone(),
             cost,
             scored,
+            is_empty,
         });
         bar.inc(1);
     }

@@ -165,6 +165,33 @@ fn a_walk_ends_with_a_report() {
 }
 
 #[test]
+fn frames_that_show_nothing_are_told() {
+    let folder = with_house();
+    let here = folder.path();
+    let ran = lumigraph(here, "walk house --frames 3 --size 16x12 --json -o out").ok();
+    assert_eq!(ran.json()["report"]["frames_empty"], 0);
+    // A path of another world, in part: far above the house.
+    let mut path = render::path::read(&here.join("out/path.json")).unwrap();
+    for frame in &mut path.frames[1..] {
+        let pose = &mut frame.view.camera_from_world;
+        pose.translation -= pose.rotation * glam::DVec3::new(0.0, 500.0, 0.0);
+    }
+    render::path::write(&here.join("far.json"), &path).unwrap();
+    let walk = "walk house --path far.json --size 16x12 --portals geometry,whole --json -o far";
+    let ran = lumigraph(here, walk).ok();
+    let said = "4 of 6 frames show nothing: their eyes are in no cell; does the path lie in this \
+                interior's world?";
+    assert!(
+        ran.stderr.contains(&format!("note: {said}\n")),
+        "{}",
+        ran.stderr
+    );
+    let report = &ran.json()["report"];
+    assert_eq!(report["frames_empty"], 4);
+    assert_eq!(report["notes"].as_array().unwrap()[..], [said]);
+}
+
+#[test]
 fn a_walk_becomes_a_film() {
     let folder = with_house();
     let here = folder.path();

@@ -36,6 +36,8 @@ pub(super) struct Drawn {
     pub(super) file: PathBuf,
     pub(super) cost: FrameCost,
     pub(super) scored: Option<Scored>,
+    /// No pixel is covered, not even in part.
+    pub(super) is_empty: bool,
 }
 
 /// What a held-out photo's picture scores.
@@ -104,6 +106,8 @@ pub(super) struct Report {
     /// Of images that were made to fill portals.
     references_memory: Memory,
     notes: Vec<String>,
+    /// Those that show nothing at all, whatever portals show.
+    frames_empty: usize,
     #[serde(flatten)]
     took: Took,
 }
@@ -117,7 +121,12 @@ struct PhotosReport {
 
 impl Report {
     /// Of a walk that is over; `notes` is all that was said of it.
-    pub(super) fn new(walk: &Walk<'_>, notes: Vec<String>, start: &Start) -> Self {
+    pub(super) fn new(
+        walk: &Walk<'_>,
+        notes: Vec<String>,
+        frames_empty: usize,
+        start: &Start,
+    ) -> Self {
         let captured = walk.painter().captured();
         let photos = captured.map(|captured| &captured.lumigraph().photos);
         Self {
@@ -129,6 +138,7 @@ impl Report {
             }),
             references_memory: Memory(walk.library().residency()),
             notes,
+            frames_empty,
             took: start.took(),
         }
     }
@@ -346,6 +356,7 @@ mod tests {
                 ..FrameCost::default()
             },
             scored: None,
+            is_empty: false,
         };
         let frames: Vec<Drawn> = frames.iter().enumerate().map(drawn).collect();
         Walked {
