@@ -70,9 +70,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let poses = poses(&interior, &contents, &options);
     let outside = poses.iter().filter(|pose| !pose.inside).count();
     if outside > 0 {
+        // From as high a smaller semicircle would be outside, too.
+        let remedy = match interior.odd_eye_height() {
+            Some(_) => "correct `eye_height`",
+            None => "give portals a smaller `radius`",
+        };
         say!(
-            "warning: {outside} of {} cameras stand outside their cell; give portals a smaller \
-             `radius` in {}",
+            "warning: {outside} of {} cameras stand outside their cell; {remedy} in {}",
             poses.len(),
             path.display()
         );

@@ -17,6 +17,7 @@ mod help;
 mod hull;
 mod interior;
 mod interior_damaged;
+mod interior_eyes;
 mod interior_folder;
 mod kinds;
 mod ldis;

@@ -10,6 +10,9 @@ const ROUNDING: f64 = 1e-6;
 const MAX_OVERLAPS: usize = 64;
 /// Of floors whose normal is farther from up than 60° nobody takes one for a ramp: the cosine.
 const STEEP: f64 = 0.5;
+/// Eyes that are lower than this over a floor, in heights of the lowest cell, are told. In a church they are not; of
+/// units taken for others, metres for inches are nearest to it (0.016).
+const LOW_EYES: f64 = 0.05;
 
 impl RoomBox {
     /// Whether two share more than a side.
@@ -90,8 +93,39 @@ impl Interior {
         names.join(", ")
     }
 
+    /// What is odd about the eyes' height, as far as cells have boxes: they are over all of them, or next to the
+    /// floor.
+    pub fn odd_eye_height(&self) -> Option<InteriorWarning> {
+        self.odd_eyes_in(self.cells.iter().filter_map(|cell| cell.content.room()))
+    }
+
+    /// The same of cells that these bound.
+    pub(super) fn odd_eyes_in(
+        &self,
+        rooms: impl Iterator<Item = RoomBox>,
+    ) -> Option<InteriorWarning> {
+        let eye_height = self.eye_height;
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        let height = |room: RoomBox| {
+            let corners = room.corners().map(|p| p.dot(self.up));
+            let span = corners
+                .into_iter()
+                .fold(none, |(l, h), x| (l.min(x), h.max(x)));
+            span.1 - span.0
+        };
+        // What is flat has no ceiling.
+        let heights = rooms.map(height).filter(|height| *height > 0.0);
+        let (least, most) = heights.fold(none, |(l, h), x| (l.min(x), h.max(x)));
+        let is_odd = least <= most && (eye_height > most || eye_height < LOW_EYES * least);
+        is_odd.then_some(InteriorWarning::EyeHeight {
+            eye_height,
+            least,
+            most,
+        })
+    }
+
     fn oddities(&self) -> Vec<InteriorWarning> {
-        let mut found = Vec::new();
+        let mut found = Vec::from_iter(self.odd_eye_height());
         let boxes: Vec<(&str, RoomBox)> = self
             .cells
             .iter()

@@ -118,6 +118,11 @@ impl Contents {
                 odd.push(InteriorWarning::Empty(cell.name.clone()));
             }
         }
+        if !interior.cells.iter().any(|c| c.content.room().is_some()) {
+            // Where boxes tell, reading them did.
+            let bounds = contents.bounds.iter().flatten().copied();
+            odd.extend(interior.odd_eyes_in(bounds));
+        }
         if !contents.elsewhere.is_empty() {
             odd.push(InteriorWarning::Elsewhere(contents.elsewhere.len()));
         }

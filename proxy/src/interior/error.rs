@@ -98,6 +98,19 @@ pub enum InteriorWarning {
     /// Two boxes share space.
     #[error("the boxes of cells `{0}` and `{1}` overlap: what is in both is drawn for either")]
     Overlap(String, String),
+    /// Eyes are over all ceilings, or as good as on the floor.
+    #[error(
+        "`eye_height` is {eye_height}, and the cells are {least} to {most} high: eyes see nothing of them, or little; \
+         it is in world units as boxes are: correct it"
+    )]
+    EyeHeight {
+        /// In world units.
+        eye_height: f64,
+        /// How high the lowest cell is, likewise.
+        least: f64,
+        /// How high the highest is.
+        most: f64,
+    },
     /// A cell that nobody sees from elsewhere.
     #[error("cell `{0}` has no portal: it cannot be seen from elsewhere")]
     NoPortal(String),

@@ -295,6 +295,47 @@ fn what_is_odd_is_told() {
 }
 
 #[test]
+fn eyes_over_all_ceilings_or_on_the_floor_are_told() {
+    // Both rooms are 3 high.
+    for (eye_height, is_told) in [
+        (1600.0, true),
+        (160.0, true),
+        (3.1, true),
+        (2.9, false),
+        (0.2, false),
+        (0.0016, true),
+    ] {
+        let text = format!(r#"{{"version": 1, "eye_height": {eye_height},"#);
+        let text = TWO_ROOMS.replacen("{\n  \"version\": 1,", &text, 1);
+        let (interior, warnings) = rooms(&text).unwrap();
+        assert_eq!(interior.eye_height, eye_height);
+        let told = is_told.then_some(InteriorWarning::EyeHeight {
+            eye_height,
+            least: 3.0,
+            most: 3.0,
+        });
+        assert_eq!(warnings, Vec::from_iter(told), "{eye_height}");
+        // Of cells that are nodes, what they span tells.
+        let model = nodes_of_quads(&[
+            ("cell:a", wall([0.0, 0.0], [4.0, 0.0])),
+            ("cell:b", wall([4.0, 0.0], [8.0, 0.0])),
+        ]);
+        let (interior, _) = interior_from_nodes(&model, "m.glb", eye_height / 1.6).unwrap();
+        let (_, warnings) = Contents::new(&interior, &model).unwrap();
+        let is_of_eyes = |w: &InteriorWarning| matches!(w, InteriorWarning::EyeHeight { .. });
+        let is_over = is_told || eye_height > 2.5;
+        assert_eq!(warnings.iter().any(is_of_eyes), is_over, "{eye_height}");
+    }
+    let mut interior = two_rooms();
+    interior.eye_height = 160.0;
+    assert_eq!(
+        interior.odd_eye_height().unwrap().to_string(),
+        "`eye_height` is 160, and the cells are 3 to 3 high: eyes see nothing of them, or little; it is in \
+         world units as boxes are: correct it"
+    );
+}
+
+#[test]
 fn floors_outside_their_boxes_are_told() {
     // The west room is 4 × 3 × 4.
     let with_floor = |[x, to_x]: [f64; 2], y: f64| {
