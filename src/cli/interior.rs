@@ -57,13 +57,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true,
         conflicts_with = "rooms")]
     up: Option<DVec3>,
-    /// How many world units a metre is
-    #[arg(
-        long,
-        value_name = "UNITS",
-        default_value_t = 1.0,
-        conflicts_with = "rooms"
-    )]
+    /// How many world units a metre is; with --rooms, eyes are 1.6 of it over the floor where FILE has no
+    /// "eye_height"
+    #[arg(long, value_name = "UNITS", default_value_t = 1.0)]
     meter: f64,
     /// Print how what was found compares with rooms and openings that are known: a file as --rooms has
     /// them, or another interior's folder; portals count within 0.3 m

@@ -519,7 +519,7 @@ fn usage_errors_exit_with_2() {
             "--hold-out is for captures",
         ),
         (
-            "interior house.glb --rooms rooms.json --meter 2 -o x",
+            "interior house.glb --rooms rooms.json --up 0,1,0 -o x",
             "cannot be used with",
         ),
         ("plan house --views 4", "an odd number"),

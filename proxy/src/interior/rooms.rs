@@ -17,7 +17,7 @@
 //! }
 //! ```
 //!
-//! `up` is y and `eye_height` 1.6 where they are not given; `floor` and `radius` need not be. An
+//! `up` is y and `eye_height` 1.6 metres where they are not given; `floor` and `radius` need not be. An
 //! outline may go either way round; where boxes do not tell its sides (both are all around it), it
 //! is counter-clockwise as the first of its rooms sees it. Boxes should meet in the plane of the
 //! opening between them: triangles between boxes are in no cell, and drawn always.
@@ -48,8 +48,7 @@ const EYE_HEIGHT: f64 = 1.6;
 struct Rooms {
     #[serde(default = "y", deserialize_with = "exactly")]
     up: [f64; 3],
-    #[serde(default = "eye_height")]
-    eye_height: f64,
+    eye_height: Option<f64>,
     rooms: Vec<Room>,
     #[serde(default)]
     openings: Vec<Opening>,
@@ -80,23 +79,21 @@ fn y() -> [f64; 3] {
     DVec3::Y.to_array()
 }
 
-fn eye_height() -> f64 {
-    EYE_HEIGHT
-}
-
-/// Reads rooms and openings; `model` is the model's file, beside the `interior.json` to be.
+/// Reads rooms and openings; `model` is the model's file, beside the `interior.json` to be, and `meter` a
+/// metre in world units: that is how high eyes are told where the file does not say.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn read_rooms(
     path: &Path,
     model: &str,
+    meter: f64,
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
     let bytes = std::fs::read(path).map_err(|e| InteriorFileError::Io(path.to_owned(), e))?;
-    parse_rooms(path, &bytes, model)
+    rooms_of(path, &bytes, model, meter)
 }
 
-/// Reads the content of a file as [`read_rooms`] does.
+/// Reads the content of a file as [`read_rooms`] does, of a world in metres.
 ///
 /// # Errors
 /// As for [`read_rooms`].
@@ -105,15 +102,24 @@ pub fn parse_rooms(
     bytes: &[u8],
     model: &str,
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+    rooms_of(path, bytes, model, 1.0)
+}
+
+fn rooms_of(
+    path: &Path,
+    bytes: &[u8],
+    model: &str,
+    meter: f64,
+) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
     let rooms: Rooms = parse_version_1(path, "a list of rooms", bytes)?;
     let failed = |e| InteriorFileError::Interior(path.to_owned(), e);
-    let interior = rooms.stored(model).interior().map_err(failed)?;
+    let interior = rooms.stored(model, meter).interior().map_err(failed)?;
     interior_from_rooms(interior).map_err(failed)
 }
 
 impl Rooms {
     /// The same as an interior's file has it.
-    fn stored(self, model: &str) -> Stored {
+    fn stored(self, model: &str, meter: f64) -> Stored {
         let cell = |room: Room| StoredCell {
             name: room.name,
             scene: None,
@@ -136,7 +142,7 @@ impl Rooms {
             version: 1,
             model: Some(model.to_owned()),
             up: self.up,
-            eye_height: self.eye_height,
+            eye_height: self.eye_height.unwrap_or(EYE_HEIGHT * meter),
             cells: self.rooms.into_iter().map(cell).collect(),
             portals: self.openings.into_iter().map(portal).collect(),
             held_out: Vec::new(),

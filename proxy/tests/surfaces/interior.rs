@@ -845,7 +845,7 @@ fn the_captured_house_has_three_cells() {
         return;
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/interior-house-rooms.json");
-    let (interior, warnings) = read_rooms(&path, "house.glb").unwrap();
+    let (interior, warnings) = read_rooms(&path, "house.glb", 1.0).unwrap();
     assert_eq!(warnings, []);
     let (model, _) = mesh::read_model(&folder.join("house.glb")).unwrap();
     let (contents, warnings) = Contents::new(&interior, &model).unwrap();

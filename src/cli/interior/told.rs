@@ -26,13 +26,13 @@ impl Told {
         let rooms = args.rooms.as_ref().map(|file| {
             let expected =
                 "expected a file of rooms and openings: `lumigraph interior --help` has its form";
-            rooms_of("--rooms", file, &model, expected)
+            rooms_of("--rooms", file, &model, args.meter, expected)
         });
         let known = args.compare.as_ref().map(|given| match given.is_dir() {
             true => anyhow::Ok(open(given).context("--compare")?.1),
             false => {
                 let expected = "expected such a file as --rooms has, or an interior's folder";
-                Ok(rooms_of("--compare", given, &model, expected)?.0)
+                Ok(rooms_of("--compare", given, &model, args.meter, expected)?.0)
             }
         });
         Ok(Self {
@@ -56,9 +56,10 @@ fn rooms_of(
     option: &str,
     file: &Path,
     model: &str,
+    meter: f64,
     expected: &str,
 ) -> anyhow::Result<(Interior, Vec<InteriorWarning>)> {
-    read_rooms(file, model).map_err(|error| match error {
+    read_rooms(file, model, meter).map_err(|error| match error {
         InteriorFileError::Io(file, error) => {
             let found = match error.kind() {
                 ErrorKind::NotFound => "there is no such file".to_owned(),
