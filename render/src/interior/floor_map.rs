@@ -1,7 +1,7 @@
 //! Where one can walk in a room: what stands at eye height, on a grid.
 
 use glam::{DVec2, DVec3};
-use proxy::interior::{CellId, Contents, Interior, RoomBox};
+use proxy::interior::{CellId, Contents, Interior, Portal, RoomBox};
 use proxy::mesh::Model;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,6 +16,16 @@ const CLEAR: [f64; 4] = [0.16, 0.1, 0.05, 0.0];
 
 /// How far inside of a room's openings one is surely in it, in eye heights.
 const INSIDE: [f64; 3] = [0.1, 0.2, 0.3];
+
+/// An opening lies flat where its normal has no more of a level direction.
+const FLAT: f64 = 1e-3;
+
+/// Which way an opening leads into one of its cells, level and of unit length; nothing of a hatch, which lies flat.
+pub(super) fn level_into(portal: &Portal, cell: CellId, up: DVec3) -> Option<DVec3> {
+    let normal = portal.normal_into(Some(cell));
+    let level = normal - up * normal.dot(up);
+    (level.length() > FLAT).then(|| level.normalize())
+}
 
 /// A room's floor with what stands at eye height over it.
 pub(super) struct FloorMap {
@@ -93,10 +103,15 @@ impl FloorMap {
                 is_near && outline.is_none_or(|floor| floor.covers(at, 0.0))
             })
             .collect();
-        // 1. Openings are shut, and what is just inside of them is where to begin.
+        // 1. Openings are shut, and what is just inside of them is where to begin; what is over or under a
+        //    hatch is of the room.
         let mut is_shut = vec![false; count];
         let mut queue = Vec::new();
         for (_, portal) in interior.portals_of(Some(id)) {
+            if level_into(portal, id, interior.up).is_none() {
+                queue.extend(self.square(self.flat(portal.polygon.center())));
+                continue;
+            }
             let corners = portal.polygon.corners();
             for (k, from) in corners.iter().enumerate() {
                 let to = corners[(k + 1) % corners.len()];

@@ -1,9 +1,10 @@
 //! A tour through all rooms of an interior.
 
 mod heading;
+mod steep;
 mod way;
 
-use super::floor_map::FloorMap;
+use super::floor_map::{FloorMap, level_into};
 use crate::path::{CameraPath, PathError, PathFrame};
 use calibrate::{Camera, Rigid3};
 use glam::{DQuat, DVec3};
@@ -39,7 +40,8 @@ pub struct Tour {
     pub path: CameraPath,
     /// Rooms that it does not come to, as no opening leads to them from where it begins.
     pub left_out: Vec<CellId>,
-    /// Rooms in which no way around what stands there was found: it goes straight through that.
+    /// Rooms in which no way around what stands there was found, or between storeys something is in the way:
+    /// it goes straight through that.
     pub blocked: Vec<CellId>,
     /// Openings with something in them wherever one might pass, which it does all the same.
     pub shut: Vec<PortalId>,
@@ -91,6 +93,9 @@ fn path(
     let length = way.length();
     let count = frames.max(1);
     let level = up.any_orthonormal_vector();
+    let (interior, contents, model) = (rooms.interior, rooms.contents, rooms.model);
+    let passed = steep::passed(&way, reach, interior, contents, model);
+    rooms.blocked.extend(passed);
     let headings = Headings::new(&way, up, unit, SMOOTH * unit);
     let frame = |i: usize| {
         let share = i as f64 / (count.max(2) - 1) as f64;
@@ -238,11 +243,13 @@ impl<'a> Rooms<'a> {
         let (interior, contents, unit) = (self.interior, self.contents, self.unit());
         let portal = interior.portal(id);
         let up = interior.up;
+        let Some(level) = level_into(portal, from, up) else {
+            return self.climb(id, from, into);
+        };
         let center = portal.polygon.center();
         let height = contents.floor_height(interior, Some(from), portal) + unit;
         let center = center + up * (height - center.dot(up));
         let normal = portal.normal_into(Some(from));
-        let level = (normal - up * normal.dot(up)).normalize_or_zero();
         let off = BEFORE_DOOR * unit * level;
         let aside = up.cross(level) * 0.5 * portal.width(up);
         let mut best: Option<(f64, [DVec3; 3])> = None;
@@ -275,6 +282,30 @@ impl<'a> Rooms<'a> {
             self.shut.insert(id);
         }
         best.map_or([center + off, center, center - off], |(_, points)| points)
+    }
+
+    /// Straight up or down through an opening that lies flat: at eye height over the floor of one room, in it, and
+    /// over that of the other.
+    fn climb(&mut self, id: PortalId, from: CellId, into: CellId) -> [DVec3; 3] {
+        let (interior, contents, unit) = (self.interior, self.contents, self.unit());
+        let portal = interior.portal(id);
+        let (up, center) = (interior.up, portal.polygon.center());
+        let over = |cell: CellId| {
+            let floor = contents.floor_of(interior, cell);
+            let height =
+                floor.unwrap_or_else(|| contents.floor_height(interior, Some(cell), portal)) + unit;
+            center + up * (height - center.dot(up))
+        };
+        let [before, after] = [from, into].map(over);
+        for (cell, eye) in [(from, before), (into, after)] {
+            if self
+                .map(cell, eye)
+                .is_some_and(|map| map.clearance(eye) <= 0.0)
+            {
+                self.shut.insert(id);
+            }
+        }
+        [before, center, after]
     }
 
     /// Over how far the way may be smoothed without coming nearer to what stands than it must: the

@@ -384,3 +384,58 @@ fn doors_of_an_upper_storey_are_passed_at_eye_height_over_its_floor() {
         assert!(off[0].min(off[1]) < 1e-9, "{eye}");
     }
 }
+
+/// A hall, a room over it that a hatch leads to, and one behind a door; and in the hatch a lid.
+fn storeys(has_lid: bool) -> (Interior, Model) {
+    let mut mesh = Mesh::default();
+    // The ceiling around the hatch, from (x, z) to (x, z).
+    let around = [
+        [[0.0, 0.0], [1.0, 4.0]],
+        [[2.0, 0.0], [6.0, 4.0]],
+        [[1.0, 0.0], [2.0, 1.0]],
+        [[1.0, 2.0], [2.0, 4.0]],
+    ];
+    let lid = [[0.9, 1.0], [2.0, 2.1]];
+    for [[x, z], [end, far]] in around.into_iter().chain(has_lid.then_some(lid)) {
+        let first = mesh.positions.len() as u32;
+        let corners = [[x, z], [end, z], [end, far], [x, far]];
+        let corners = corners.map(|[x, z]| DVec3::new(x, 2.6, z));
+        mesh.positions.extend(corners);
+        let halves = [[0, 1, 2], [0, 2, 3]].map(|half| half.map(|i| first + i));
+        mesh.triangles.extend(halves);
+    }
+    let mut model = Model::default();
+    model.append(&mesh, "ceiling");
+    let text = r#"{"version": 1, "rooms": [
+        {"name": "hall", "min": [0, 0, 0], "max": [6, 2.6, 4]},
+        {"name": "upstairs", "min": [0, 2.6, 0], "max": [6, 5.2, 4]},
+        {"name": "shed", "min": [6, 0, 0], "max": [10, 2.6, 4]}],
+        "openings": [
+        {"name": "hatch", "between": ["hall", "upstairs"],
+            "polygon": [[1, 2.6, 1], [1, 2.6, 2], [2, 2.6, 2], [2, 2.6, 1]]},
+        {"name": "door", "between": ["hall", "shed"],
+            "polygon": [[6, 0, 1], [6, 0, 2], [6, 2, 2], [6, 2, 1]]}]}"#;
+    let read = parse_rooms(Path::new("r.json"), text.as_bytes(), "m.glb");
+    (read.unwrap().0, model)
+}
+
+#[test]
+fn tours_go_straight_through_hatches_and_say_where_one_is_closed() {
+    let (interior, model) = storeys(false);
+    // Up, and down again to the door.
+    assert_eq!(crossings(&interior, &model), (0, 3));
+    assert_eq!(amiss(&interior, &model), (vec![], vec![], vec![]));
+    let (contents, _) = Contents::new(&interior, &model).unwrap();
+    let lens = Lens::pinhole(DVec2::splat(50.0), DVec2::splat(32.0));
+    let camera = Camera::of(&lens, 64, 64);
+    let tour = Tour::new(&interior, &contents, &model, &camera, 400, 15.0).unwrap();
+    let eyes: Vec<DVec3> = tour.path.frames.iter().map(|f| f.view.center()).collect();
+    let is_upstairs = |eye: &&DVec3| (eye.y - 4.2).abs() < 1e-9;
+    let farthest = eyes.iter().filter(is_upstairs).map(|eye| eye.x);
+    assert!(farthest.fold(0.0, f64::max) > 2.5);
+    // Through a lid.
+    let (interior, model) = storeys(true);
+    assert!(crossings(&interior, &model).0 > 0);
+    let (_, blocked, _) = amiss(&interior, &model);
+    assert!(blocked.contains(&CellId(0)), "{blocked:?}");
+}
