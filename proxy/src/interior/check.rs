@@ -6,6 +6,9 @@ use std::collections::BTreeSet;
 
 /// What may be due to rounding, in shares of a box's or polygon's size.
 const ROUNDING: f64 = 1e-6;
+/// The largest number that a length or a place may have: squares and cubes of larger ones, and what is counted in
+/// eye heights, leave what numbers can hold.
+const MOST: f64 = 1e12;
 /// Overlaps that are told: of many boxes in one place, there would be their number squared.
 const MAX_OVERLAPS: usize = 64;
 /// Of floors whose normal is farther from up than 60° nobody takes one for a ramp: the cosine.
@@ -40,6 +43,7 @@ impl Interior {
             let what = "`eye_height`".to_owned();
             return Err(InteriorError::Length(what, self.eye_height));
         }
+        no_more("`eye_height`", &[self.eye_height])?;
         if !((self.up.length() - 1.0).abs() < 1e-6) {
             return Err(InteriorError::Up(self.up.to_array()));
         }
@@ -52,6 +56,14 @@ impl Interior {
                 && !(min.cmplt(max).all() && min.is_finite() && max.is_finite())
             {
                 return Err(InteriorError::Box(cell.name.clone()));
+            }
+            if let Some(RoomBox { min, max }) = cell.content.room() {
+                let what = format!("the box of cell `{}`", cell.name);
+                no_more(&what, &[min.to_array(), max.to_array()].concat())?;
+            }
+            if let Some(floor) = &cell.floor {
+                let what = format!("the floor of cell `{}`", cell.name);
+                near(&what, floor)?;
             }
             if self.model.is_none() && !matches!(cell.content, Content::Scene { .. }) {
                 return Err(InteriorError::NoModel(cell.name.clone()));
@@ -70,6 +82,10 @@ impl Interior {
                 let what = format!("the radius of portal `{}`", portal.name);
                 return Err(InteriorError::Length(what, radius));
             }
+            let radius = portal.radius.as_slice();
+            no_more(&format!("the radius of portal `{}`", portal.name), radius)?;
+            let outline = format!("the outline of portal `{}`", portal.name);
+            near(&outline, &portal.polygon)?;
             if portal.cells[0] == portal.cells[1] {
                 let side = portal.cells[0].and_then(|id| self.cells.get(id.0 as usize));
                 let side = side.map_or("null".to_owned(), |cell| format!("`{}`", cell.name));
@@ -204,6 +220,20 @@ impl Interior {
         let is_outside = apart(eyes).cmpgt(-ROUNDING * (high - low)).any();
         is_outside.then(|| apart(DVec3::ZERO).max(DVec3::ZERO).length())
     }
+}
+
+/// Fails where a record of numbers has one that is too large.
+fn no_more(record: &str, numbers: &[f64]) -> Result<(), InteriorError> {
+    match numbers.iter().find(|x| x.abs() > MOST) {
+        Some(found) => Err(InteriorError::Huge(record.to_owned(), *found)),
+        None => Ok(()),
+    }
+}
+
+/// The same of a polygon's corners.
+fn near(record: &str, polygon: &Polygon) -> Result<(), InteriorError> {
+    let mut corners = polygon.corners().iter();
+    corners.try_for_each(|corner| no_more(record, &corner.to_array()))
 }
 
 fn unique<'a>(

@@ -43,6 +43,11 @@ pub enum InteriorError {
     /// A length that is none.
     #[error("{0} is {1}; expected a positive number")]
     Length(String, f64),
+    /// A number of which nothing can be computed.
+    #[error(
+        "{0}: {1:e} is too large; expected no more than 1e12 world units: correct it, or scale the model"
+    )]
+    Huge(String, f64),
     /// No direction.
     #[error("`up` is {0:?}; expected a direction such as [0, 1, 0]")]
     Up([f64; 3]),

@@ -267,6 +267,53 @@ fn what_is_wrong_is_said() {
 }
 
 #[test]
+fn numbers_of_which_nothing_can_be_computed_are_refused() {
+    let huge = |change: &dyn Fn(&mut Interior)| {
+        let mut interior = two_rooms();
+        change(&mut interior);
+        interior.check().unwrap_err().to_string()
+    };
+    let square = |x: f64| {
+        let corners = [[0.0, 0.0, 0.0], [x, 0.0, 0.0], [x, 0.0, x], [0.0, 0.0, x]];
+        Polygon::new(corners.map(DVec3::from_array).to_vec()).unwrap()
+    };
+    let room = RoomBox {
+        min: DVec3::ZERO,
+        max: DVec3::new(4.0, 3.0, 1e300),
+    };
+    for (found, said) in [
+        (huge(&|i| i.eye_height = 1e308), "`eye_height`: 1e308"),
+        (
+            huge(&|i| i.cells[1].content = Content::Box(room)),
+            "the box of cell `east`: 1e300",
+        ),
+        (
+            huge(&|i| i.cells[0].floor = Some(square(2e12))),
+            "the floor of cell `west`: 2e12",
+        ),
+        (
+            huge(&|i| i.portals[1].radius = Some(1e200)),
+            "the radius of portal `window`: 1e200",
+        ),
+        (
+            huge(&|i| i.portals[0].polygon = square(3e20)),
+            "the outline of portal `door`: 3e20",
+        ),
+    ] {
+        let expected = format!(
+            "{said} is too large; expected no more than 1e12 world units: correct it, or scale the model"
+        );
+        assert_eq!(found, expected);
+    }
+    // Of a file as well, which is named.
+    let text = with("", TWO_PORTALS).replace("1.6", "1e308");
+    let said = "i.json: `eye_height`: 1e308 is too large";
+    assert!(message(&text).starts_with(said), "{}", message(&text));
+    let far = TWO_ROOMS.replace("[8, 3, 4]", "[8, 3, 1e300]");
+    assert!(rooms(&far).is_err());
+}
+
+#[test]
 fn what_is_odd_is_told() {
     let odd = |text: &str| {
         let (_, warnings) = rooms(text).unwrap();
