@@ -381,10 +381,7 @@ const REMEDY: &str = "`lumigraph interior CAPTURE_OR_GLB -o DIR` makes one";
 /// Opens an interior, its folder or its file, says what is odd, and where the file is.
 pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
     check_there(given)?;
-    let path = match given.is_dir() {
-        true => given.join(INTERIOR),
-        false => given.to_owned(),
-    };
+    let path = file_of(given);
     if !path.exists() {
         bail!(
             "{}: no interior, as it holds no {INTERIOR}; {REMEDY}",
@@ -401,6 +398,20 @@ pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
         say!("warning: {warning}");
     }
     Ok((path, interior))
+}
+
+/// The file of an interior that is given by its folder or its file.
+fn file_of(given: &Path) -> PathBuf {
+    match given.is_dir() {
+        true => given.join(INTERIOR),
+        false => given.to_owned(),
+    }
+}
+
+/// Whether an interior, given by its folder or its file, can be read and has no photos to be drawn from.
+pub(super) fn is_without_photos(given: &Path) -> bool {
+    let read = read_interior(&file_of(given));
+    read.is_ok_and(|(interior, _)| interior.cells.iter().all(|c| c.content.scene().is_none()))
 }
 
 /// Fails where there is nothing at a path.

@@ -1,6 +1,6 @@
 //! Options that are given for nothing.
 
-use super::interior::is_interior;
+use super::interior::{is_interior, is_without_photos};
 use super::options::Renderer;
 use super::output::say;
 use clap::ArgMatches;
@@ -27,12 +27,31 @@ pub(super) fn say_unused(command: &str, given: &ArgMatches) {
     if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {
         say!("note: --grid changes nothing: --renderer exact has no grid");
     }
+    let portals = given.try_get_many::<String>("portals");
+    let portals = portals.ok().flatten().unwrap_or_default();
+    let portals: Vec<&str> = portals.map(String::as_str).collect();
     if command == "walk" {
-        let portals = given.try_get_many::<String>("portals");
-        let portals = portals.ok().flatten().unwrap_or_default();
-        say_unused_of_walk(&portals.map(String::as_str).collect::<Vec<_>>(), is_given);
+        // Of what may be left out, columns are all that is of LDIs alone.
+        let kept = given.try_get_raw("no_skip").ok().flatten();
+        let are_columns = kept.is_some_and(|mut kept| kept.all(|what| what == "columns"));
+        let is_given = |id: &str| match id {
+            COLUMNS => is_given("no_skip") && are_columns,
+            id => is_given(id),
+        };
+        say_unused_of_walk(&portals, is_given);
+    }
+    if (command == "walk" || command == "ldis")
+        && let Ok(Some(interior)) = given.try_get_one::<PathBuf>("interior")
+    {
+        // Of a walk without LDIs that was said already.
+        let makes_ldis = command == "ldis" || portals.iter().any(|p| *p == "all" || *p == "ldi");
+        let is_given = |id: &str| is_given(id) && (id != "ldi_from" || makes_ldis);
+        say_unused_of_model(interior, is_given);
     }
 }
+
+/// Of `--no-skip`, for columns alone.
+const COLUMNS: &str = "no_skip=columns";
 
 /// Says of those of some options that are given that they change nothing, and why.
 fn say_idle(ids: &[&str], is_given: impl Fn(&str) -> bool, why: &str) {
@@ -54,7 +73,7 @@ fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
     let is_warped: Holds = |fill| matches!(fill, PortalFill::Warp1 | PortalFill::Warp2);
     let is_image: Holds = |fill| *fill == PortalFill::Ldi || fill.references() > 0;
     let of_images = ["near", "persist", "reference_size", "reference_views"];
-    let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files"];
+    let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files", COLUMNS];
     for (is_meant, ids, why) in [
         (is_image, &of_images[..], "portals show no images"),
         (is_warped, &["splat"], "no image is warped"),
@@ -66,6 +85,15 @@ fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
             let why = format!("{why} (--portals {} or all)", kinds.join(", "));
             say_idle(ids, &is_given, &why);
         }
+    }
+}
+
+/// Of what draws interiors, where one has no photos.
+fn say_unused_of_model(interior: &Path, is_given: impl Fn(&str) -> bool) {
+    let of_photos = ["no_photos", "no_exposure", "ldi_from"];
+    if of_photos.iter().any(|id| is_given(id)) && is_without_photos(interior) {
+        let why = format!("{} is of a model, not of photos", interior.display());
+        say_idle(&of_photos, is_given, &why);
     }
 }
 

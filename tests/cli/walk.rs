@@ -32,6 +32,31 @@ fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
         assert_eq!(found, expected, "{portals}");
     }
     assert_eq!(said("--portals ldi --near 0.5"), Vec::<String>::new());
+    // Columns are of LDIs, cells of all.
+    let columns =
+        "note: --no-skip=columns changes nothing: portals show no LDIs (--portals ldi or all)";
+    assert_eq!(said("--no-skip=columns"), [columns]);
+    for all in [
+        "--no-skip",
+        "--no-skip=cells,columns",
+        "--portals ldi --no-skip=columns",
+    ] {
+        assert_eq!(said(all), [""; 0], "{all}");
+    }
+    // Of a model there are no photos.
+    let of_photos = "--no-photos --no-exposure --portals ldi --ldi-from views";
+    let why = "nothing: house is of a model, not of photos";
+    let all = format!("note: --no-photos, --no-exposure and --ldi-from change {why}");
+    assert_eq!(said(of_photos), [all]);
+    let one = format!("note: --no-photos changes {why}");
+    assert_eq!(said("--no-photos"), [one]);
+    let ran = lumigraph(
+        folder.path(),
+        "ldis house --reference-size 8x8 --ldi-from views",
+    )
+    .ok();
+    let of_ldis = format!("note: --ldi-from changes {why}\n");
+    assert!(ran.stderr.contains(&of_ldis), "{}", ran.stderr);
     assert_eq!(said("--persist"), [format!("note: {images}")]);
 }
 
