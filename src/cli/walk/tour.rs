@@ -15,6 +15,10 @@ use std::path::Path;
 /// The tour's own size, that of Rafferty et al. 1998.
 const SIZE: (u32, u32) = (640, 512);
 const FRAMES: u32 = 520;
+/// Eye heights a second of who walks: 1.4 m, where eyes are 1.6 m high.
+const WALK: f64 = 0.875;
+/// Times as fast as that, from which on it is told.
+const FAST: f64 = 1.5;
 /// Of a tour's camera, over the picture's width.
 const FOCAL: f64 = 0.7;
 /// The file that keeps it, in the folder for the frames.
@@ -35,7 +39,12 @@ pub(super) fn plan(args: &Args, opened: &Opened) -> anyhow::Result<CameraPath> {
     let count = args.chosen().count(FRAMES) as usize;
     let planned = Tour::new(interior, contents, model, &camera, count, FPS)
         .with_context(|| args.interior.display().to_string())?;
-    for note in notes_of(&planned, interior) {
+    let speed = match count == FRAMES as usize {
+        true => note_of_speed(length(&planned.path) / interior.eye_height),
+        // Who chose another number may have meant it.
+        false => None,
+    };
+    for note in notes_of(&planned, interior).into_iter().chain(speed) {
         say!("note: {note}");
     }
     // Before what may take long.
@@ -83,6 +92,29 @@ fn mark(path: &CameraPath) -> Result<String, PathFileError> {
     Ok(hash_of(&path::text(path)?))
 }
 
+/// How long a path is, in world units.
+fn length(path: &CameraPath) -> f64 {
+    let steps = path.frames.windows(2);
+    steps
+        .map(|pair| pair[0].view.center().distance(pair[1].view.center()))
+        .sum()
+}
+
+/// What to say of a tour so many eye heights long, in as many frames as tours have, if it goes much faster than
+/// people walk.
+fn note_of_speed(length: f64) -> Option<String> {
+    let frames = length / WALK * FPS;
+    let faster = frames / f64::from(FRAMES);
+    // To whole seconds.
+    let enough = (frames / FPS).ceil() * FPS;
+    (faster > FAST).then(|| {
+        format!(
+            "the tour is long: in {FRAMES} frames it goes {faster:.1} times as fast as people walk; --frames \
+             {enough:.0} is a walk"
+        )
+    })
+}
+
 /// What is not as one would walk, a line each.
 fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
     let cells =
@@ -103,4 +135,21 @@ fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
         ));
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tours_that_go_much_faster_than_people_walk_are_told() {
+        // 520 frames are 34.7 s, in which one walks 30 eye heights.
+        for length in [0.0, 10.0, 45.0] {
+            assert_eq!(note_of_speed(length), None, "{length}");
+        }
+        let said = note_of_speed(257.5).unwrap();
+        let expected = "the tour is long: in 520 frames it goes 8.5 times as fast as people walk; --frames 4425 is \
+                        a walk";
+        assert_eq!(said, expected);
+    }
 }
