@@ -442,6 +442,18 @@ pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Fails where a folder for something else holds an interior, which could not be replaced beside that.
+pub(super) fn check_holds_none(folder: &Path) -> anyhow::Result<()> {
+    if folder.join(INTERIOR).is_file() {
+        bail!(
+            "{}: this folder holds an interior, and what else lies there keeps it from being replaced; choose \
+             another -o",
+            folder.display()
+        );
+    }
+    Ok(())
+}
+
 /// Whether an interior is given to what opens others, too: a folder that holds one, or its file.
 pub(super) fn is_interior(given: &Path) -> bool {
     given.join(INTERIOR).is_file() || given.file_name().is_some_and(|name| name == INTERIOR)

@@ -8,6 +8,7 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
+use super::interior::check_holds_none;
 use super::made::{self, Made};
 use super::notes::Notes;
 use super::options::{cut, size};
@@ -156,6 +157,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         ..defaults
     };
     check_folder(&args.output)?;
+    check_holds_none(&args.output)?;
     args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");

@@ -455,6 +455,23 @@ fn a_tour_is_written_over_no_path_but_a_tour() {
 }
 
 #[test]
+fn no_frames_are_drawn_into_an_interiors_folder() {
+    let folder = with_house();
+    let here = folder.path();
+    let before = files(&here.join("house"));
+    for (from, line) in [
+        ("", "walk house --frames 1 --size 16x12 -o house"),
+        ("house", "walk interior.json --frames 1 --size 16x12 -o ."),
+    ] {
+        let error = lumigraph(&here.join(from), line).error(1);
+        let said = ": this folder holds an interior, and what else lies there keeps it from being \
+                    replaced; choose another -o";
+        assert!(error.contains(said), "{error}");
+    }
+    assert!(files(&here.join("house")) == before);
+}
+
+#[test]
 fn a_walk_that_is_refused_leaves_the_tour_of_the_frames_that_are_there() {
     let folder = with_house();
     let here = folder.path();
