@@ -169,9 +169,9 @@ pub enum InteriorWarning {
     },
     /// Portals hide what is seen.
     #[error(
-        "{hidden} of {tried} lines of sight through and past portals meet what portals hide, such as the one from \
-         {eye} in cell `{cell}` to {seen}: frames may lack it there; let the portal that it passes, or the \
-         cell's box, reach farther"
+        "{hidden} of {tried} lines of sight meet what portals hide, such as the one from {eye} in cell `{cell}` to \
+         {seen}: frames may lack it there; let the portal that it passes, or the cell's box, reach farther, or add \
+         the opening that it passes"
     )]
     Hidden {
         /// Lines of sight.

@@ -63,7 +63,7 @@ impl Contents {
     }
 
     /// Something that grows with a cell's size, if the point is in it.
-    fn room_around(&self, interior: &Interior, id: CellId, point: DVec3) -> Option<f64> {
+    pub(super) fn room_around(&self, interior: &Interior, id: CellId, point: DVec3) -> Option<f64> {
         let bounds = self.bounds.get(id.0 as usize).copied().flatten();
         let floor = interior.cell(id).floor.as_ref();
         if bounds.is_some_and(|room| !room.contains(point)) {

@@ -2,7 +2,10 @@
 //!
 //! Culling by portals draws what the whole model would if there are none. Where rooms are found, cells are boxes
 //! and portals rectangles on a grid, and a leaf that stands open beside a doorway is in one room, but seen
-//! from the other past the doorway's outline: [`fit_to_sight`] lets boxes and outlines reach as far as is seen.
+//! from the other past the doorway's outline; a closed door beyond the middle of its wall is in the box of the room
+//! behind it alone. [`fit_to_sight`] lets boxes and outlines reach as far as is seen.
+
+mod within;
 
 use super::seen::Seen;
 use super::visibility::all_around;
@@ -14,6 +17,7 @@ use crate::mesh::Model;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use within::within;
 
 /// A line of sight from a cell to a triangle that its portals hide.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +37,7 @@ pub struct Stray {
 pub struct Strays {
     /// How many met a triangle.
     pub tried: usize,
-    /// In the order of portals, and of their sides.
+    /// In the order of portals, and of their sides; then in that of cells.
     pub found: Vec<Stray>,
 }
 
@@ -70,7 +74,8 @@ const NEXT_3: [f64; 3] = [
     0.549_700_477_901_970_2,
 ];
 
-/// Looks through and past every portal from many places before it, and finds what portals hide though it is seen.
+/// Looks through and past every portal from many places before it, and all around from places in every cell, and
+/// finds what portals hide though it is seen.
 ///
 /// The same for any number of threads.
 ///
@@ -205,7 +210,10 @@ fn look(interior: &Interior, contents: &Contents, seen: &Seen) -> Strays {
     });
     let sides: Vec<(&Portal, CellId)> = sides.collect();
     let before = |(portal, from): (&Portal, CellId)| before(interior, contents, seen, portal, from);
-    let found: Vec<Strays> = sides.into_par_iter().map(before).collect();
+    let mut found: Vec<Strays> = sides.into_par_iter().map(before).collect();
+    let ids = (0..interior.cells.len() as u32).into_par_iter().map(CellId);
+    let within = ids.map(|id| within(interior, contents, seen, id).unwrap_or_default());
+    found.extend(within.collect::<Vec<Strays>>());
     found.into_iter().fold(Strays::default(), |mut all, some| {
         all.tried += some.tried;
         all.found.extend(some.found);
@@ -303,14 +311,32 @@ fn hidden(
 
 /// A point of a cell's bounds, if it is in the cell: over the cell's floor, if it has one, at an eye's height.
 fn stand(interior: &Interior, contents: &Contents, from: CellId, point: DVec3) -> Option<DVec3> {
-    let mut eye = point;
-    if let Some(floor) = &interior.cell(from).floor {
-        let height = floor.height(point) * floor.normal().dot(interior.up).signum();
-        let [low, high] = HEIGHTS;
-        let share = low + (height / interior.eye_height).rem_euclid(high - low);
-        eye += (share * interior.eye_height - height) * interior.up;
-    }
+    let eye = match &interior.cell(from).floor {
+        Some(floor) => {
+            let height = height_over(interior, floor, point);
+            at_heights(interior, point, height, HEIGHTS).0
+        }
+        None => point,
+    };
     (contents.locate(interior, eye) == Some(from)).then_some(eye)
+}
+
+/// How far a point is over a floor, which may face either way.
+fn height_over(interior: &Interior, floor: &Polygon, point: DVec3) -> f64 {
+    floor.height(point) * floor.normal().dot(interior.up).signum()
+}
+
+/// A point that is so high over a floor at a height between two, in eyes' heights, that goes with it; and how high
+/// it is then.
+fn at_heights(
+    interior: &Interior,
+    point: DVec3,
+    height: f64,
+    [low, high]: [f64; 2],
+) -> (DVec3, f64) {
+    let share = low + (height / interior.eye_height).rem_euclid(high - low);
+    let there = share * interior.eye_height;
+    (point + (there - height) * interior.up, there)
 }
 
 /// Axes in a polygon's plane.

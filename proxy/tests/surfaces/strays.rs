@@ -11,17 +11,26 @@ use proxy::interior::{
     Contents, Interior, InteriorWarning, Polygon, compare, fit_to_sight, strays, visible,
 };
 use proxy::mesh::Model;
-use proxy::{MeshKind, Solid};
+use proxy::{Mesh, MeshKind, Solid};
 
 /// How far walls' boxes and openings may be moved here, in metres.
 const REACH: f64 = 0.35;
 
 /// How many pixels of views from random places in an interior see what portals hide.
 fn hidden_pixels(interior: &Interior, model: &Model, views: u64) -> usize {
+    let from = (0..views).map(|seed| viewpoint(interior, seed));
+    hidden_from(interior, model, from)
+}
+
+/// The same of views from one place to another.
+fn hidden_from(
+    interior: &Interior,
+    model: &Model,
+    views: impl Iterator<Item = (DVec3, DVec3)>,
+) -> usize {
     let (contents, _) = Contents::new(interior, model).unwrap();
     let solid = Solid::new(MeshKind::Mesh, model.mesh.clone());
-    let hidden = |seed: u64| {
-        let (eye, target) = viewpoint(interior, seed);
+    let hidden = |(eye, target): (DVec3, DVec3)| {
         let Some(cell) = contents.locate(interior, eye) else {
             return 0;
         };
@@ -45,7 +54,7 @@ fn hidden_pixels(interior: &Interior, model: &Model, views: u64) -> usize {
         };
         house::rays(&view).iter().filter(is_hidden).count()
     };
-    (0..views).map(hidden).sum()
+    views.map(hidden).sum()
 }
 
 #[test]
@@ -140,5 +149,90 @@ fn past_folded_leaves_a_modelled_house_is_seen_through_wider_openings() {
         let x = portal.polygon.center().x;
         let is_there = |p: &DVec3| p.z > -1.5 && p.z < 3.8;
         assert!((x + 2.5).abs() > 0.2 || portal.polygon.corners().iter().all(is_there));
+    }
+}
+
+/// A block from one corner to the other.
+fn block(mesh: &mut Mesh, min: [f64; 3], max: [f64; 3]) {
+    let first = mesh.positions.len() as u32;
+    let corner = |i: usize| DVec3::from_array([0, 1, 2].map(|k| [min, max][i >> k & 1][k]));
+    mesh.positions.extend((0..8).map(corner));
+    for [a, b, c, d] in [
+        [0, 1, 3, 2],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 3, 7, 5],
+    ] {
+        let triangles = [[a, b, c], [a, c, d]];
+        mesh.triangles
+            .extend(triangles.map(|t| t.map(|i| first + i)));
+    }
+}
+
+/// Two rooms of 5 × 5 m, and in the wall of 0.15 m between them a doorway, which may be walled up, and a closed
+/// door whose leaf lies so along x; the middle of the wall is at 5.
+fn rooms_with_leaf([from, to]: [f64; 2], is_open: bool) -> Model {
+    let mut mesh = Mesh::default();
+    for (min, max) in [
+        ([-0.1, -0.1, -0.1], [10.1, 0.0, 5.1]),
+        ([-0.1, 2.5, -0.1], [10.1, 2.6, 5.1]),
+        ([-0.1, 0.0, -0.1], [0.0, 2.5, 5.1]),
+        ([10.0, 0.0, -0.1], [10.1, 2.5, 5.1]),
+        ([0.0, 0.0, -0.1], [10.0, 2.5, 0.0]),
+        ([0.0, 0.0, 5.0], [10.0, 2.5, 5.1]),
+        ([4.925, 0.0, 0.0], [5.075, 2.5, 0.5]),
+        ([4.925, 2.0, 0.5], [5.075, 2.5, 1.4]),
+        ([4.925, 0.0, 1.4], [5.075, 2.5, 3.2]),
+        ([4.925, 2.0, 3.2], [5.075, 2.5, 4.1]),
+        ([4.925, 0.0, 4.1], [5.075, 2.5, 5.0]),
+        ([from, 0.0, 3.2], [to, 2.0, 4.1]),
+    ] {
+        block(&mut mesh, min, max);
+    }
+    if !is_open {
+        block(&mut mesh, [4.925, 0.0, 0.5], [5.075, 2.0, 1.4]);
+    }
+    Model {
+        mesh,
+        ..Model::default()
+    }
+}
+
+#[test]
+fn closed_doors_beyond_the_middle_of_their_walls_are_seen_from_both_rooms() {
+    for (leaf, is_open, is_past) in [
+        ([5.035, 5.075], true, true),
+        ([5.01, 5.05], true, true),
+        ([4.925, 4.965], true, true),
+        ([4.98, 5.02], true, false),
+        ([5.035, 5.075], false, true),
+    ] {
+        let model = rooms_with_leaf(leaf, is_open);
+        let found = find(&model.mesh, &FindOptions::default()).unwrap().interior;
+        assert_eq!(found.cells.len(), 2);
+        assert_eq!(found.portals.len(), usize::from(is_open));
+        let mut fitted = found.clone();
+        let left = fit_to_sight(&mut fitted, &model, REACH).unwrap();
+        assert_eq!(left.found, []);
+        assert_eq!(left, strays(&fitted, &model).unwrap());
+        // From anywhere between the walls.
+        let views = || {
+            (0..150).map(|seed| {
+                let mut random = house::random(seed);
+                let west = DVec3::new(0.05, 0.05, 0.05);
+                let size = DVec3::new(4.8, 2.4, 4.9);
+                let eye = west + size * DVec3::new(random(), random(), random());
+                let across = if random() < 0.5 { 0.0 } else { 5.1 };
+                let eye = eye + across * DVec3::X;
+                let way = DVec3::new(random() - 0.5, 0.6 * (random() - 0.5), random() - 0.5);
+                (eye, eye + way)
+            })
+        };
+        let [before, after] = [&found, &fitted].map(|i| hidden_from(i, &model, views()));
+        eprintln!("{leaf:?}: {before} pixels of 150 views were hidden, {after} are");
+        assert!(!is_past || before > 100, "{before}");
+        assert!(100 * after <= before, "{before} {after}");
     }
 }
