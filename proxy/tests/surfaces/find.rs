@@ -563,3 +563,55 @@ fn what_no_surface_is_in_is_no_room() {
     let error = found(&[own, beside, [14.0, 17.0, 2.0, 5.0]]).unwrap_err();
     assert_eq!(error, FindError::NoRooms(1.5, 1.0));
 }
+
+/// Two rooms of 4 × 6 m with a door between them, under a roof that slopes from a ridge at 3.2 m down to both
+/// sides at a height.
+fn attic(eaves: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+        let [min, max] = [min, max].map(DVec3::from_array);
+        mesh.append(&open_box(min, max, faces));
+    };
+    add([0.0, 0.0, 0.0], [8.0, 3.2, 6.0], &[0, 1, 2, 4, 5]);
+    add([3.9, 0.0, 0.0], [4.1, 3.2, 2.5], &[0, 1, 5]);
+    add([3.9, 2.0, 2.5], [4.1, 3.2, 3.5], &[0, 1, 2]);
+    add([3.9, 0.0, 3.5], [4.1, 3.2, 6.0], &[0, 1, 4]);
+    for side in [0.0, 6.0] {
+        let first = mesh.positions.len() as u32;
+        let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        mesh.positions.extend([
+            corner(0.0, eaves, side),
+            corner(8.0, eaves, side),
+            corner(8.0, 3.2, 3.0),
+            corner(0.0, 3.2, 3.0),
+        ]);
+        let triangles = [[0, 1, 2], [0, 2, 3]];
+        mesh.triangles
+            .extend(triangles.map(|t| t.map(|i| first + i)));
+    }
+    mesh
+}
+
+#[test]
+fn rooms_under_sloped_ceilings_are_found() {
+    for eaves in [1.0, 1.5, 1.9] {
+        let found = find(&attic(eaves), &FindOptions::default()).unwrap();
+        look_at(&found, &format!("attic-{eaves}"));
+        assert_eq!(found.interior.cells.len(), 2, "{eaves}");
+        assert_eq!(found.interior.portals.len(), 1, "{eaves}");
+        let door = found.interior.portals[0].polygon.center();
+        assert!(door.with_y(0.0).distance(DVec3::new(4.0, 0.0, 3.0)) < 0.2);
+        // As far as one can crouch: where the roof is 1.3 m high.
+        let reach = 3.0 * ((1.3 - eaves) / (3.2 - eaves)).max(0.0);
+        for i in 0..2 {
+            let RoomBox { min, max } = bounds(&found, i);
+            let off = [min.z - reach, max.z - 6.0 + reach];
+            assert!(off.iter().all(|o| o.abs() < 0.2), "{eaves}: {min} {max}");
+        }
+    }
+    // A roof over a floor, without walls, encloses nothing.
+    let size = DVec3::new(8.0, 2.6, 6.0);
+    let shelter = open_box(DVec3::ZERO, size, &[2, 3]);
+    let error = find(&shelter, &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
+}

@@ -20,6 +20,10 @@ const LINTEL: f64 = 2.15;
 const BELOW_CEILING: [f64; 2] = [0.6, 0.12];
 /// Ceilings are this high or higher.
 const LEAST_CEILING: f64 = 2.05;
+/// A ceiling between these is too low to stand under, and the room's all the same, as below a sloped roof; metres.
+const LOW_CEILING: [f64; 2] = [1.3, LEAST_CEILING];
+/// So many bins of a column are of a slope at most, and not of something upright.
+const SLOPE: u32 = 4;
 /// Things at eye height that are joined to no wall and smaller than this do not divide a room.
 const LOOSE: f64 = 1.5;
 /// What is taken all the way up here is wall or screen; metres over the floor.
@@ -79,6 +83,8 @@ pub(super) struct Columns {
     /// In metres over the floor.
     pub(super) ceiling: Option<f64>,
     state: Vec<State>,
+    /// Whether there is floor, and a ceiling too low to stand under; nowhere of a capture.
+    is_low: Vec<bool>,
 }
 
 impl Columns {
@@ -103,6 +109,7 @@ impl Columns {
             seen: None,
             ceiling: None,
             state: Vec::new(),
+            is_low: Vec::new(),
         };
         // 2. What is where.
         for triangle in &evidence.mesh.triangles {
@@ -130,6 +137,11 @@ impl Columns {
 
     pub(super) fn is_free(&self, i: usize) -> bool {
         self.state[i] == State::Free
+    }
+
+    /// Whether there is floor there with a ceiling so low that nobody stands below it.
+    pub(super) fn is_low(&self, i: usize) -> bool {
+        self.is_low[i] && self.state[i] == State::Unknown
     }
 
     /// The squares that share a side with one.
@@ -321,8 +333,11 @@ impl Columns {
         let mut is_wall: Vec<bool> = self.taken.iter().map(|t| has_eye(*t)).collect();
         self.drop_loose(&mut is_wall, |t| top != 0 && has_top(t));
         // 2. Where one may be.
-        let inside = match &self.seen {
-            Some(seen) => self.closed(UNSEEN, |i| (seen[i] & eye).count_ones() >= 2),
+        let (inside, is_low) = match &self.seen {
+            Some(seen) => {
+                let inside = self.closed(UNSEEN, |i| (seen[i] & eye).count_ones() >= 2);
+                (inside, vec![false; self.count()])
+            }
             None => self.floored(),
         };
         let [width, height] = self.size;
@@ -344,6 +359,7 @@ impl Columns {
             }
         };
         self.state = (0..self.count()).map(state).collect();
+        self.is_low = is_low;
         stubs::close(self);
     }
 
@@ -392,20 +408,29 @@ impl Columns {
         }
     }
 
-    /// Where there is floor, holes filled, and ceiling, if most of the floor has one.
-    fn floored(&self) -> Vec<bool> {
+    /// Where there is floor, holes filled, and ceiling, if most of the floor has one; and where there is floor
+    /// below a low ceiling.
+    fn floored(&self) -> (Vec<bool>, Vec<bool>) {
         let floor = band([-0.2, 0.2]);
         let over = band([LEAST_CEILING, f64::INFINITY]);
+        let (below, low) = (band([0.3, LOW_CEILING[0]]), band(LOW_CEILING));
         let is_floor = |i: usize| self.taken[i] & floor != 0;
         let has_ceiling = |i: usize| self.taken[i] & over != 0;
+        let has_low = |i: usize| {
+            let taken = self.taken[i];
+            let is_slope = (1..=SLOPE).contains(&(taken & low).count_ones());
+            is_slope && taken & (over | below) == 0
+        };
         let floors = (0..self.count()).filter(|i| is_floor(*i));
-        let (all, ceiled) =
-            floors.fold((0, 0), |(a, c), i| (a + 1, c + usize::from(has_ceiling(i))));
+        let (all, ceiled) = floors.fold((0, 0), |(a, c), i| {
+            (a + 1, c + usize::from(has_ceiling(i) || has_low(i)))
+        });
         let need_ceiling = ceiled as f64 > CEILED * f64::from(all);
         let closed = self.closed(HIDDEN, is_floor);
-        (0..self.count())
-            .map(|i| closed[i] && (!need_ceiling || has_ceiling(i)))
-            .collect()
+        let inside = |i: usize| closed[i] && (!need_ceiling || has_ceiling(i));
+        let is_low = |i: usize| closed[i] && has_low(i);
+        let all = 0..self.count();
+        (all.clone().map(inside).collect(), all.map(is_low).collect())
     }
 
     /// A set with its gaps narrower than twice a radius (metres) filled.

@@ -131,24 +131,49 @@ impl Basins {
     }
 }
 
-/// Regions that nothing encloses: gardens, and floor around a house.
+/// What is around a region, in squares' sides.
+#[derive(Default)]
+struct Outline {
+    /// Nothing known.
+    open: usize,
+    /// Floor below what is too low to stand under.
+    low: usize,
+    all: usize,
+}
+
+/// Drops regions that nothing encloses: gardens, and floor around a house. Those that sloped ceilings
+/// enclose reach as far below these as there is floor.
 fn drop_outside(columns: &Columns, found: &mut Labels) {
-    let mut sides: BTreeMap<u32, (usize, usize)> = BTreeMap::new();
+    let mut outlines: BTreeMap<u32, Outline> = BTreeMap::new();
     for i in (0..columns.count()).filter(|i| found.labels[*i] != 0) {
-        let (open, all) = sides.entry(found.labels[i]).or_default();
+        let outline = outlines.entry(found.labels[i]).or_default();
         for j in columns.beside(i).filter(|j| !columns.is_free(*j)) {
-            *all += 1;
-            *open += usize::from(!columns.is_wall(j) && !columns.is_lintel(j));
+            let is_low = columns.is_low(j);
+            outline.all += 1;
+            outline.low += usize::from(is_low);
+            outline.open += usize::from(!is_low && !columns.is_wall(j) && !columns.is_lintel(j));
         }
     }
-    let is_outside = |label: &u32| {
-        let of = sides.get(label);
-        of.is_some_and(|(open, all)| *open as f64 > OPEN_OUTLINE * *all as f64)
-    };
-    let outside: Vec<u32> = sides.keys().copied().filter(is_outside).collect();
+    let is_much = |part: usize, outline: &Outline| part as f64 > OPEN_OUTLINE * outline.all as f64;
+    let of = |label: &u32| outlines.get(label);
+    let is_outside = |label: &u32| of(label).is_some_and(|o| is_much(o.open, o));
+    let is_sloped = |label: &u32| of(label).is_some_and(|o| is_much(o.open + o.low, o));
     for label in &mut found.labels {
-        if outside.binary_search(label).is_ok() {
+        if is_outside(label) {
             *label = 0;
+        }
+    }
+    let mut reached: Vec<usize> = (0..columns.count())
+        .filter(|i| is_sloped(&found.labels[*i]))
+        .collect();
+    let mut next = 0;
+    while let Some(i) = reached.get(next).copied() {
+        next += 1;
+        for j in columns.beside(i) {
+            if found.labels[j] == 0 && columns.is_low(j) {
+                found.labels[j] = found.labels[i];
+                reached.push(j);
+            }
         }
     }
 }
