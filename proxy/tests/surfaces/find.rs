@@ -615,3 +615,32 @@ fn rooms_under_sloped_ceilings_are_found() {
     let error = find(&shelter, &FindOptions::default()).unwrap_err();
     assert_eq!(error, FindError::NoRooms(1.5, 1.0));
 }
+
+#[test]
+fn doorways_in_thick_walls_are_found_and_hollows_are_no_rooms() {
+    for thick in [0.3, 0.5, 0.6, 0.8, 1.0] {
+        let mut mesh = Mesh::default();
+        let [from, to] = [4.0 - 0.5 * thick, 4.0 + 0.5 * thick];
+        let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+            let [min, max] = [min, max].map(DVec3::from_array);
+            mesh.append(&open_box(min, max, faces));
+        };
+        add([0.0, 0.0, 0.0], [8.0, 2.5, 5.0], &[0, 1, 2, 3, 4, 5]);
+        add([from, 0.0, 0.0], [to, 2.5, 1.0], &[0, 1, 5]);
+        add([from, 2.0, 1.0], [to, 2.5, 1.9], &[0, 1, 2]);
+        add([from, 0.0, 1.9], [to, 2.5, 5.0], &[0, 1, 4]);
+        let found = find(&mesh, &FindOptions::default()).unwrap();
+        look_at(&found, &format!("thick-{thick}"));
+        assert_eq!(found.warnings, [], "{thick}");
+        assert_eq!(found.interior.cells.len(), 2, "{thick}");
+        assert_eq!(found.interior.portals.len(), 1, "{thick}");
+        let door = &found.interior.portals[0];
+        let off = door.polygon.center() - DVec3::new(4.0, 1.0, 1.45);
+        assert!(off.abs().max_element() < 0.1, "{thick}: {off}");
+        assert!((door.width(DVec3::Y) - 0.9).abs() < 0.15, "{thick}");
+        // Both rooms reach to it.
+        let x = door.polygon.center().x;
+        assert!(bounds(&found, 0).max.x > x - 0.03, "{thick}");
+        assert!(bounds(&found, 1).min.x < x + 0.03, "{thick}");
+    }
+}

@@ -4,6 +4,7 @@ use super::FindOptions;
 use super::columns::Columns;
 use super::openings::{Opening, meet, open_pairs, openings};
 use super::regions::{Grown, Labels, grown, renumber};
+use super::thick::drop_hollows;
 use std::collections::BTreeMap;
 
 /// Rooms up to the middle of their walls, and the openings between them, out of regions: no two with
@@ -38,7 +39,9 @@ fn rooms_by(
         let pairs = open_pairs(columns, &sides, at_once);
         if !pairs.is_empty() {
             join(&mut labels, &pairs);
-        } else if !drop_small(columns, &mut labels, &grown, options, at_once) {
+        } else if !drop_small(columns, &mut labels, &grown, options, at_once)
+            && !drop_hollows(columns, &mut labels, &grown)
+        {
             let openings = sides.into_iter().flat_map(|side| side.openings);
             let mut openings: Vec<Opening> = openings.collect();
             meet(columns, &mut openings);

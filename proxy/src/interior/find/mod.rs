@@ -21,6 +21,7 @@ mod picture;
 mod regions;
 mod sights;
 mod stubs;
+mod thick;
 
 pub use level::Level;
 pub use sights::sights;
@@ -273,6 +274,11 @@ fn interior(
             level.to_world(to, opening.head),
             level.to_world(from, opening.head),
         ];
+        if opening.is_deep {
+            for id in rooms.into_iter().flatten() {
+                reach(&mut cells[id.0 as usize], &corners);
+            }
+        }
         let kind = match opening.sill > 0.0 {
             true => "window",
             false => "doorway",
@@ -307,6 +313,16 @@ fn interior(
         other: Extra::new(),
     };
     Ok((interior, ids))
+}
+
+/// Lets a cell's box reach as far as some points.
+fn reach(cell: &mut Cell, points: &[DVec3]) {
+    if let Content::Box(room) = &mut cell.content {
+        for point in points {
+            room.min = room.min.min(*point);
+            room.max = room.max.max(*point);
+        }
+    }
 }
 
 /// Whether any of a mesh's triangles is in a box.

@@ -2,6 +2,7 @@
 
 use super::columns::{Columns, band, bin_at, height_of};
 use super::regions::Grown;
+use super::thick::THICKEST;
 use glam::DVec2;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,6 +20,8 @@ pub(super) struct Opening {
     pub(super) to: f64,
     pub(super) sill: f64,
     pub(super) head: f64,
+    /// Whether it is in the middle of a thick wall, to which rooms' outlines do not reach.
+    pub(super) is_deep: bool,
 }
 
 impl Opening {
@@ -154,7 +157,7 @@ pub(super) fn openings(columns: &Columns, grown: &Grown) -> Vec<Side> {
                 .into_iter()
                 .partition(|(at, _)| at.abs_diff(best) <= reach);
             left = rest;
-            sides.push(side(columns, &grown.labels, rooms, axis, near));
+            sides.push(side(columns, grown, rooms, axis, near));
         }
     }
     // 3. Without the bends of lines that go straight on.
@@ -248,11 +251,12 @@ pub(super) fn open_pairs(columns: &Columns, sides: &[Side], at_once: usize) -> V
 
 fn side(
     columns: &Columns,
-    labels: &[u32],
+    grown: &Grown,
     rooms: [u32; 2],
     axis: usize,
     edges: Vec<Edge>,
 ) -> (Side, Place) {
+    let labels = &grown.labels;
     let index = |at: usize, along: usize| match axis {
         0 => along * columns.size[0] + at,
         _ => at * columns.size[0] + along,
@@ -287,7 +291,16 @@ fn side(
     }
     alongs.sort_unstable();
     // 1. How thick the wall is, and where its middle is.
-    let reach = columns.squares(REACH).round() as usize;
+    let in_doorway = edges
+        .iter()
+        .filter(|(at, along)| grown.is_doorway[index(*at, *along)]);
+    let is_deep = 2 * in_doorway.count() > edges.len();
+    let reach = if is_deep {
+        0.5 * THICKEST + columns.step_m
+    } else {
+        REACH
+    };
+    let reach = columns.squares(reach).round() as usize;
     let around = middle.saturating_sub(reach)..(middle + reach).min(most);
     let is_wall = |at: usize, along: usize| {
         let i = index(at, along);
@@ -365,6 +378,7 @@ fn side(
                 sill * columns.meter
             },
             head: head.min(highest) * columns.meter,
+            is_deep,
         }
     };
     let holes = holes(&open, columns.step_m);

@@ -5,6 +5,7 @@ use super::columns::Columns;
 use super::complete::complete;
 use super::corridors;
 use super::distance::squared_distances;
+use super::thick;
 use std::collections::BTreeMap;
 
 /// Walls thinner than twice this lie between two rooms; metres.
@@ -28,6 +29,8 @@ pub(super) struct Labels {
 pub(super) struct Grown {
     pub(super) labels: Vec<u32>,
     pub(super) count: u32,
+    /// What is of a doorway in a thick wall.
+    pub(super) is_doorway: Vec<bool>,
 }
 
 /// The basins of the distance to walls, those joined that no bottleneck parts (watershed by
@@ -218,8 +221,20 @@ pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
         true => known[nearest[i] as usize],
         false => 0,
     };
+    let mut labels: Vec<u32> = (0..columns.count()).map(label).collect();
+    // 3. Below the lintels of thick walls: there they meet in the middle, too.
+    let doorways = match columns.seen {
+        None => thick::doorways(columns, &known, &labels),
+        Some(_) => vec![0; labels.len()],
+    };
+    for (label, doorway) in labels.iter_mut().zip(&doorways) {
+        if *doorway != 0 {
+            *label = *doorway;
+        }
+    }
     Grown {
-        labels: (0..columns.count()).map(label).collect(),
+        labels,
         count: found.count,
+        is_doorway: doorways.iter().map(|doorway| *doorway != 0).collect(),
     }
 }
