@@ -9,7 +9,9 @@ use proxy::Mesh;
 use proxy::interior::find::{
     Evidence, FindError, FindOptions, FoundInterior, Place, find_interior, sights,
 };
-use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
+use proxy::interior::{
+    CellId, Content, Contents, Interior, InteriorWarning, RoomBox, compare, parse_rooms,
+};
 use proxy::mesh::Model;
 
 pub(crate) fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
@@ -642,5 +644,25 @@ fn doorways_in_thick_walls_are_found_and_hollows_are_no_rooms() {
         let x = door.polygon.center().x;
         assert!(bounds(&found, 0).max.x > x - 0.03, "{thick}");
         assert!(bounds(&found, 1).min.x < x + 0.03, "{thick}");
+    }
+}
+
+#[test]
+fn another_storey_is_told() {
+    let size = DVec3::new(6.0, 2.5, 4.0);
+    let lower = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let up = 2.7 * DVec3::Y;
+    for (width, is_told) in [(5.0, true), (0.8, false)] {
+        let mut both = lower.clone();
+        let size = size.with_x(width);
+        both.append(&open_box(up, up + size, &[0, 1, 2, 3, 4, 5]));
+        let found = find(&both, &FindOptions::default()).unwrap();
+        assert_eq!(found.interior.cells.len(), 1);
+        let is_right = |warning: &InteriorWarning| match warning {
+            InteriorWarning::Storey(height) => (height - 2.7).abs() < 0.1,
+            _ => false,
+        };
+        assert_eq!(found.warnings.len(), usize::from(is_told));
+        assert!(found.warnings.iter().all(is_right), "{:?}", found.warnings);
     }
 }

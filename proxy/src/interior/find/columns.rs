@@ -19,7 +19,7 @@ pub(super) const EYE_BAND: [f64; 2] = [1.3, 1.9];
 const LINTEL: f64 = 2.15;
 const BELOW_CEILING: [f64; 2] = [0.6, 0.12];
 /// Ceilings are this high or higher.
-const LEAST_CEILING: f64 = 2.05;
+pub(super) const LEAST_CEILING: f64 = 2.05;
 /// A ceiling between these is too low to stand under, and the room's all the same, as below a sloped roof; metres.
 const LOW_CEILING: [f64; 2] = [1.3, LEAST_CEILING];
 /// So many bins of a column are of a slope at most, and not of something upright.

@@ -20,6 +20,7 @@ mod outline;
 mod picture;
 mod regions;
 mod sights;
+mod storeys;
 mod stubs;
 mod thick;
 
@@ -185,6 +186,11 @@ pub fn find_interior(
             found: columns.step_m,
             asked: options.cell_size,
         });
+    }
+    if columns.seen.is_none()
+        && let Some(height) = storeys::floor_above(&columns)
+    {
+        warnings.push(InteriorWarning::Storey(height));
     }
     let place = |i: usize| match grown.labels[i] {
         _ if columns.is_wall(i) => Place::Wall,
