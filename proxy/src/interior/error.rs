@@ -167,6 +167,12 @@ pub enum InteriorWarning {
         /// What it was to be.
         asked: f64,
     },
+    /// Up may be another direction.
+    #[error(
+        "up is taken to be y, as glTF has it, though more floor or wall lies across {0:.2}: if the house lies on its \
+         side, say --up with that, or with its opposite"
+    )]
+    OnItsSide(DVec3),
     /// Rooms were looked for on one storey, and there is another.
     #[error(
         "another storey's floor is {0:.1} m over that of the rooms that were found: it has no rooms; give them by hand, \

@@ -666,3 +666,19 @@ fn another_storey_is_told() {
         assert!(found.warnings.iter().all(is_right), "{:?}", found.warnings);
     }
 }
+
+#[test]
+fn a_house_that_may_lie_on_its_side_is_told() {
+    // Z is up, as it is to some programs.
+    let room = open_box(DVec3::ZERO, DVec3::new(10.0, 4.0, 2.5), &[0, 1, 2, 3, 4, 5]);
+    let told = InteriorWarning::OnItsSide(DVec3::Z);
+    let found = find(&room, &FindOptions::default()).unwrap();
+    assert!(found.warnings.contains(&told), "{:?}", found.warnings);
+    let said = "though more floor or wall lies across [0.00, 0.00, 1.00]: if";
+    assert!(told.to_string().contains(said), "{told}");
+    let options = FindOptions {
+        up: Some(DVec3::Z),
+        ..FindOptions::default()
+    };
+    assert_eq!(find(&room, &options).unwrap().warnings, []);
+}

@@ -52,6 +52,8 @@ const NEAR: f64 = 8.0;
 /// A direction that a file format or cameras say is right if this much lies across it,
 /// compared with the best.
 const TRUST: f64 = 0.4;
+/// Where the best has so many times as much, it is told.
+const DOUBT: f64 = 1.3;
 
 /// Directions this near to an axis of the world are that axis; radians.
 const SAME_AXIS: f64 = 0.003;
@@ -64,7 +66,14 @@ fn as_world_axis(direction: DVec3) -> DVec3 {
     near.unwrap_or(direction)
 }
 
-pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Level, FindError> {
+/// A storey's frame, and what speaks against it.
+pub(super) struct Estimate {
+    pub(super) level: Level,
+    /// A direction that far more lies across, where up is taken to be y for no other reason than habit.
+    pub(super) rival: Option<DVec3>,
+}
+
+pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Estimate, FindError> {
     let mesh = evidence.mesh;
     let finite = mesh.positions.iter().filter(|p| p.is_finite());
     let base = finite
@@ -85,7 +94,8 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Lev
     if facets.is_empty() {
         return Err(FindError::NoSurface);
     }
-    let up = as_world_axis(up(&facets, evidence, options));
+    let (up, rival) = up(&facets, evidence, options);
+    let up = as_world_axis(up);
     let (height, has_floor) = floor(&facets, up, base, evidence, options);
     if !has_floor {
         return Err(FindError::NoFloor);
@@ -93,9 +103,13 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Lev
     let along = as_world_axis(wall_direction(&facets, up));
     let along = along.reject_from_normalized(up).normalize();
     let axes = DMat3::from_cols(along, up.cross(along), up);
-    Ok(Level {
+    let level = Level {
         origin: base + height * up,
         world_from_level: axes,
+    };
+    Ok(Estimate {
+        level,
+        rival: rival.map(as_world_axis),
     })
 }
 
@@ -152,14 +166,14 @@ fn heights(facets: &[Facet], direction: DVec3, bin: f64) -> (f64, Vec<f64>) {
 }
 
 /// Up: given, as cameras had it, or the direction that most floor lies across; y, if that is
-/// about as good.
-fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> DVec3 {
+/// about as good, and then the best one, if that is far better.
+fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, Option<DVec3>) {
     let bin = 0.1 * options.meter;
     if let Some(up) = options.up.and_then(DVec3::try_normalize) {
         return match refined(facets, up) {
             // What was said is meant, but nobody says it to the last digit.
-            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => near,
-            _ => up,
+            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => (near, None),
+            _ => (up, None),
         };
     }
     // 1. The best direction: of normals of large areas, each tried once.
@@ -187,15 +201,17 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> DVec3 {
         None => DVec3::Y,
     };
     let near = refined(facets, hint);
-    let is_near = near.dot(hint) > 0.9 && level_area(facets, near, bin) >= TRUST * best.1;
-    if is_near {
-        return near;
+    let area = level_area(facets, near, bin);
+    if near.dot(hint) > 0.9 && area >= TRUST * best.1 {
+        let is_doubtful = evidence.cameras.is_empty() && best.1 > DOUBT * area;
+        return (near, is_doubtful.then_some(best.0));
     }
     if agreed && !evidence.cameras.is_empty() {
-        return match best.0.dot(hint) {
+        let up = match best.0.dot(hint) {
             cos if cos.abs() > 0.7 => best.0 * cos.signum(),
             _ => hint,
         };
+        return (up, None);
     }
     // 3. Things stand on the floor: more is below the middle than above.
     let direction = best.0;
@@ -212,7 +228,7 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> DVec3 {
     });
     let (area, moment) = between.fold((0.0, 0.0), |(s, m), (a, at)| (s + a, m + a * at));
     let is_down = area > 0.0 && moment / area > 0.5 * (low + high);
-    if is_down { -direction } else { direction }
+    (if is_down { -direction } else { direction }, None)
 }
 
 /// The floor's height over the base: the fullest level surface, under the cameras or in the

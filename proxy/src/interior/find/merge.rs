@@ -200,7 +200,7 @@ mod tests {
             sights: &[],
         };
         let options = FindOptions::default();
-        let level = level::estimate(&evidence, &options).unwrap();
+        let level = level::estimate(&evidence, &options).unwrap().level;
         let columns = Columns::new(&evidence, &level, &options).unwrap();
         let labels = || regions::regions(&columns, &options);
         let all = labels().count;

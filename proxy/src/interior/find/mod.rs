@@ -170,7 +170,7 @@ pub fn find_interior(
         return Err(FindError::Option(name, *value));
     }
     // 1. Where the floor is.
-    let level = level::estimate(evidence, options)?;
+    let level::Estimate { level, rival } = level::estimate(evidence, options)?;
     // 2. What is free over it.
     let columns = Columns::new(evidence, &level, options)?;
     // 3. Rooms, and the holes between them.
@@ -186,6 +186,11 @@ pub fn find_interior(
             found: columns.step_m,
             asked: options.cell_size,
         });
+    }
+    if let Some(rival) = rival {
+        // Either way round; no zeros below 0.
+        let rival = rival.dot(DVec3::ONE).signum() * rival + DVec3::ZERO;
+        warnings.push(InteriorWarning::OnItsSide(rival));
     }
     if columns.seen.is_none()
         && let Some(height) = storeys::floor_above(&columns)
