@@ -173,6 +173,12 @@ pub enum InteriorWarning {
          side, say --up with that, or with its opposite"
     )]
     OnItsSide(DVec3),
+    /// There is no ceiling as far up as is looked, and walls go on: units may be no metres.
+    #[error(
+        "walls are {0} m high or more, and no ceiling is lower: is the scale right? --meter says how many world units \
+         a metre is"
+    )]
+    TallWalls(f64),
     /// Rooms were looked for on one storey, and there is another.
     #[error(
         "another storey's floor is {0:.1} m over that of the rooms that were found: it has no rooms; give them by hand, \

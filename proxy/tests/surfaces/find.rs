@@ -682,3 +682,25 @@ fn a_house_that_may_lie_on_its_side_is_told() {
     };
     assert_eq!(find(&room, &options).unwrap().warnings, []);
 }
+
+#[test]
+fn units_that_are_no_metres_are_told() {
+    // Half a metre, in inches.
+    let room = open_box(
+        DVec3::ZERO,
+        DVec3::new(20.0, 98.0, 16.0),
+        &[0, 1, 2, 3, 4, 5],
+    );
+    let options = FindOptions {
+        up: Some(DVec3::Y),
+        ..FindOptions::default()
+    };
+    let found = find(&room, &options).unwrap();
+    assert_eq!(found.warnings, [InteriorWarning::TallWalls(6.0)]);
+    let hall = open_box(
+        DVec3::ZERO,
+        DVec3::new(20.0, 5.0, 16.0),
+        &[0, 1, 2, 3, 4, 5],
+    );
+    assert_eq!(find(&hall, &options).unwrap().warnings, []);
+}

@@ -192,6 +192,10 @@ pub fn find_interior(
         let rival = rival.dot(DVec3::ONE).signum() * rival + DVec3::ZERO;
         warnings.push(InteriorWarning::OnItsSide(rival));
     }
+    let is_beyond = |height: &f64| *height >= columns::REACH[1] - columns::BIN;
+    if let Some(height) = columns.ceiling.filter(is_beyond) {
+        warnings.push(InteriorWarning::TallWalls(height.round()));
+    }
     if columns.seen.is_none()
         && let Some(height) = storeys::floor_above(&columns)
     {
