@@ -181,8 +181,8 @@ pub enum InteriorWarning {
     TallWalls(f64),
     /// Rooms were looked for on one storey, and there is another.
     #[error(
-        "another storey's floor is {0:.1} m over that of the rooms that were found: it has no rooms; give them by hand, \
-         or name the rooms' nodes, if one is to walk there"
+        "another storey's floor is {0:.1} m over that of the rooms that were found: it has no rooms; give them by \
+         hand, or name the rooms' nodes, if one is to walk there"
     )]
     Storey(f64),
     /// Portals hide what is seen.

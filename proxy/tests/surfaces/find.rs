@@ -9,9 +9,7 @@ use proxy::Mesh;
 use proxy::interior::find::{
     Evidence, FindError, FindOptions, FoundInterior, Place, find_interior, sights,
 };
-use proxy::interior::{
-    CellId, Content, Contents, Interior, InteriorWarning, RoomBox, compare, parse_rooms,
-};
+use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
 use proxy::mesh::Model;
 
 pub(crate) fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
@@ -23,7 +21,7 @@ pub(crate) fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, 
     find_interior(&evidence, "model.glb", options)
 }
 
-fn bounds(found: &FoundInterior, cell: usize) -> RoomBox {
+pub(crate) fn bounds(found: &FoundInterior, cell: usize) -> RoomBox {
     match found.interior.cells[cell].content {
         Content::Box(room) => room,
         _ => panic!("found cells are boxes"),
@@ -31,7 +29,7 @@ fn bounds(found: &FoundInterior, cell: usize) -> RoomBox {
 }
 
 /// For looking at, where a folder is named.
-fn look_at(found: &FoundInterior, name: &str) {
+pub(crate) fn look_at(found: &FoundInterior, name: &str) {
     if let Ok(folder) = std::env::var("FLOOR_PLANS") {
         let path = format!("{folder}/{name}.png");
         found.picture().save(path).unwrap();
@@ -103,7 +101,7 @@ fn turning_and_shifting_the_world_turns_and_shifts_the_rooms() {
 }
 
 /// A room without ceiling or floor, as may be, from faces of a box.
-fn open_box(min: DVec3, max: DVec3, faces: &[usize]) -> Mesh {
+pub(crate) fn open_box(min: DVec3, max: DVec3, faces: &[usize]) -> Mesh {
     let mut mesh = Mesh::default();
     for face in faces {
         let (axis, side) = (face / 2, face % 2);
@@ -564,143 +562,4 @@ fn what_no_surface_is_in_is_no_room() {
     // Over more such places than rooms.
     let error = found(&[own, beside, [14.0, 17.0, 2.0, 5.0]]).unwrap_err();
     assert_eq!(error, FindError::NoRooms(1.5, 1.0));
-}
-
-/// Two rooms of 4 × 6 m with a door between them, under a roof that slopes from a ridge at 3.2 m down to both
-/// sides at a height.
-fn attic(eaves: f64) -> Mesh {
-    let mut mesh = Mesh::default();
-    let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
-        let [min, max] = [min, max].map(DVec3::from_array);
-        mesh.append(&open_box(min, max, faces));
-    };
-    add([0.0, 0.0, 0.0], [8.0, 3.2, 6.0], &[0, 1, 2, 4, 5]);
-    add([3.9, 0.0, 0.0], [4.1, 3.2, 2.5], &[0, 1, 5]);
-    add([3.9, 2.0, 2.5], [4.1, 3.2, 3.5], &[0, 1, 2]);
-    add([3.9, 0.0, 3.5], [4.1, 3.2, 6.0], &[0, 1, 4]);
-    for side in [0.0, 6.0] {
-        let first = mesh.positions.len() as u32;
-        let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-        mesh.positions.extend([
-            corner(0.0, eaves, side),
-            corner(8.0, eaves, side),
-            corner(8.0, 3.2, 3.0),
-            corner(0.0, 3.2, 3.0),
-        ]);
-        let triangles = [[0, 1, 2], [0, 2, 3]];
-        mesh.triangles
-            .extend(triangles.map(|t| t.map(|i| first + i)));
-    }
-    mesh
-}
-
-#[test]
-fn rooms_under_sloped_ceilings_are_found() {
-    for eaves in [1.0, 1.5, 1.9] {
-        let found = find(&attic(eaves), &FindOptions::default()).unwrap();
-        look_at(&found, &format!("attic-{eaves}"));
-        assert_eq!(found.interior.cells.len(), 2, "{eaves}");
-        assert_eq!(found.interior.portals.len(), 1, "{eaves}");
-        let door = found.interior.portals[0].polygon.center();
-        assert!(door.with_y(0.0).distance(DVec3::new(4.0, 0.0, 3.0)) < 0.2);
-        // As far as one can crouch: where the roof is 1.3 m high.
-        let reach = 3.0 * ((1.3 - eaves) / (3.2 - eaves)).max(0.0);
-        for i in 0..2 {
-            let RoomBox { min, max } = bounds(&found, i);
-            let off = [min.z - reach, max.z - 6.0 + reach];
-            assert!(off.iter().all(|o| o.abs() < 0.2), "{eaves}: {min} {max}");
-        }
-    }
-    // A roof over a floor, without walls, encloses nothing.
-    let size = DVec3::new(8.0, 2.6, 6.0);
-    let shelter = open_box(DVec3::ZERO, size, &[2, 3]);
-    let error = find(&shelter, &FindOptions::default()).unwrap_err();
-    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
-}
-
-#[test]
-fn doorways_in_thick_walls_are_found_and_hollows_are_no_rooms() {
-    for thick in [0.3, 0.5, 0.6, 0.8, 1.0] {
-        let mut mesh = Mesh::default();
-        let [from, to] = [4.0 - 0.5 * thick, 4.0 + 0.5 * thick];
-        let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
-            let [min, max] = [min, max].map(DVec3::from_array);
-            mesh.append(&open_box(min, max, faces));
-        };
-        add([0.0, 0.0, 0.0], [8.0, 2.5, 5.0], &[0, 1, 2, 3, 4, 5]);
-        add([from, 0.0, 0.0], [to, 2.5, 1.0], &[0, 1, 5]);
-        add([from, 2.0, 1.0], [to, 2.5, 1.9], &[0, 1, 2]);
-        add([from, 0.0, 1.9], [to, 2.5, 5.0], &[0, 1, 4]);
-        let found = find(&mesh, &FindOptions::default()).unwrap();
-        look_at(&found, &format!("thick-{thick}"));
-        assert_eq!(found.warnings, [], "{thick}");
-        assert_eq!(found.interior.cells.len(), 2, "{thick}");
-        assert_eq!(found.interior.portals.len(), 1, "{thick}");
-        let door = &found.interior.portals[0];
-        let off = door.polygon.center() - DVec3::new(4.0, 1.0, 1.45);
-        assert!(off.abs().max_element() < 0.1, "{thick}: {off}");
-        assert!((door.width(DVec3::Y) - 0.9).abs() < 0.15, "{thick}");
-        // Both rooms reach to it.
-        let x = door.polygon.center().x;
-        assert!(bounds(&found, 0).max.x > x - 0.03, "{thick}");
-        assert!(bounds(&found, 1).min.x < x + 0.03, "{thick}");
-    }
-}
-
-#[test]
-fn another_storey_is_told() {
-    let size = DVec3::new(6.0, 2.5, 4.0);
-    let lower = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
-    let up = 2.7 * DVec3::Y;
-    for (width, is_told) in [(5.0, true), (0.8, false)] {
-        let mut both = lower.clone();
-        let size = size.with_x(width);
-        both.append(&open_box(up, up + size, &[0, 1, 2, 3, 4, 5]));
-        let found = find(&both, &FindOptions::default()).unwrap();
-        assert_eq!(found.interior.cells.len(), 1);
-        let is_right = |warning: &InteriorWarning| match warning {
-            InteriorWarning::Storey(height) => (height - 2.7).abs() < 0.1,
-            _ => false,
-        };
-        assert_eq!(found.warnings.len(), usize::from(is_told));
-        assert!(found.warnings.iter().all(is_right), "{:?}", found.warnings);
-    }
-}
-
-#[test]
-fn a_house_that_may_lie_on_its_side_is_told() {
-    // Z is up, as it is to some programs.
-    let room = open_box(DVec3::ZERO, DVec3::new(10.0, 4.0, 2.5), &[0, 1, 2, 3, 4, 5]);
-    let told = InteriorWarning::OnItsSide(DVec3::Z);
-    let found = find(&room, &FindOptions::default()).unwrap();
-    assert!(found.warnings.contains(&told), "{:?}", found.warnings);
-    let said = "though more floor or wall lies across [0.00, 0.00, 1.00]: if";
-    assert!(told.to_string().contains(said), "{told}");
-    let options = FindOptions {
-        up: Some(DVec3::Z),
-        ..FindOptions::default()
-    };
-    assert_eq!(find(&room, &options).unwrap().warnings, []);
-}
-
-#[test]
-fn units_that_are_no_metres_are_told() {
-    // Half a metre, in inches.
-    let room = open_box(
-        DVec3::ZERO,
-        DVec3::new(20.0, 98.0, 16.0),
-        &[0, 1, 2, 3, 4, 5],
-    );
-    let options = FindOptions {
-        up: Some(DVec3::Y),
-        ..FindOptions::default()
-    };
-    let found = find(&room, &options).unwrap();
-    assert_eq!(found.warnings, [InteriorWarning::TallWalls(6.0)]);
-    let hall = open_box(
-        DVec3::ZERO,
-        DVec3::new(20.0, 5.0, 16.0),
-        &[0, 1, 2, 3, 4, 5],
-    );
-    assert_eq!(find(&hall, &options).unwrap().warnings, []);
 }

@@ -7,6 +7,7 @@ mod common;
 mod copies;
 mod depth;
 mod find;
+mod find_odd;
 mod hostile;
 mod house;
 mod hull;
