@@ -35,10 +35,10 @@ fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
     // Columns are of LDIs, cells of all.
     let columns =
         "note: --no-skip=columns changes nothing: portals show no LDIs (--portals ldi or all)";
-    assert_eq!(said("--no-skip=columns"), [columns]);
+    assert_eq!(said("--portals texture --no-skip=columns"), [columns]);
     for all in [
-        "--no-skip",
-        "--no-skip=cells,columns",
+        "--portals texture --no-skip",
+        "--portals texture --no-skip=cells,columns",
         "--portals ldi --no-skip=columns",
     ] {
         assert_eq!(said(all), [""; 0], "{all}");
@@ -49,7 +49,7 @@ fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
     let all = format!("note: --no-photos, --no-exposure and --ldi-from change {why}");
     assert_eq!(said(of_photos), [all]);
     let one = format!("note: --no-photos changes {why}");
-    assert_eq!(said("--no-photos"), [one]);
+    assert_eq!(said("--portals texture --no-photos"), [one]);
     let ran = lumigraph(
         folder.path(),
         "ldis house --reference-size 8x8 --ldi-from views",
