@@ -272,6 +272,10 @@ impl<'a> Comparison<'a> {
 }
 
 /// A neighbour's costs along a row.
+///
+/// Noise is one more part of both windows that they have in common, so nothing fits better than the window itself. (Added to
+/// their variances alone, it let windows of more contrast fit better where there was little: depths of soft texture were off by
+/// more than a step.) What a window shows by itself, beside noise, is how much its fit tells.
 #[inline(always)]
 fn correlate(
     [grays, squares, products, seen]: [&[f32]; 4],
@@ -288,7 +292,9 @@ fn correlate(
         let mean = grays[x] * share;
         let variance = (squares[x] * share - mean * mean).max(0.0) + NOISE;
         let covariance = products[x] * share - mean * means[x];
-        let correlation = covariance * sharpness[x] / variance.sqrt();
+        let sharp = sharpness[x];
+        let told = 1.0 - NOISE * sharp * sharp;
+        let correlation = told * (covariance + NOISE) * sharp / variance.sqrt();
         let enough = seen[x] * share >= LEAST_SEEN;
         costs[x] = if enough {
             0.5 * (1.0 - correlation)

@@ -43,6 +43,11 @@ fn gray(p: DVec3) -> f64 {
 }
 
 fn photo(solid: &Solid, view: &View) -> RgbaImage {
+    photo_of(solid, view, gray)
+}
+
+/// Of surfaces of other grays.
+fn photo_of(solid: &Solid, view: &View, gray: impl Fn(DVec3) -> f64) -> RgbaImage {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     RgbaImage::from_fn(view.width, view.height, |x, y| {
         let mut sum = 0.0;
@@ -354,6 +359,24 @@ fn errors(solid: &Solid, points: &[SparsePoint]) -> Vec<f64> {
         (hit.along - 1.0).abs()
     };
     points.iter().map(error).collect()
+}
+
+/// Where there is little contrast a window that is beside the right one has more.
+#[test]
+fn soft_texture_has_the_depths_that_it_has() {
+    let (solid, views, sparse) = seen_by_nine();
+    let soft = |p: DVec3| {
+        let wave = |a: f64, b: f64, c: f64| (a * p.x + b * p.y + c).sin();
+        128.0 + 12.0 * (wave(2.4, 0.9, p.z) + wave(-1.1, 2.3, 1.0) + wave(1.9, -2.0, 2.0))
+    };
+    let photo = |i: usize| Some(photo_of(&solid, &views[i], soft));
+    let options = DenseOptions::default();
+    let points = densify(&views, &sparse, photo, |_| None, &options);
+    let mut errors = errors(&solid, &points[sparse.len()..]);
+    assert!(errors.len() > 500, "{}", errors.len());
+    errors.sort_by(f64::total_cmp);
+    let [half, most] = [0.5, 0.9].map(|share| errors[(share * errors.len() as f64) as usize]);
+    assert!(half < 0.01 && most < 0.04, "{half} {most}");
 }
 
 #[test]
