@@ -118,7 +118,8 @@ fn premultiplied(mut photo: RgbaImage) -> (RgbaImage, bool) {
 }
 
 /// Averages 2 × 2 texels by the weights of their indices, alike where all are zero; an odd
-/// last row or column pairs with itself.
+/// last row or column pairs with itself. Ties are rounded to even numbers: upwards, each level would be an eighth of
+/// a step brighter than the one before.
 pub(crate) fn halve<P: Pixel<Subpixel = u8>>(
     image: &ImageBuffer<P, Vec<u8>>,
     weight: impl Fn(usize) -> u32,
@@ -143,7 +144,8 @@ pub(crate) fn halve<P: Pixel<Subpixel = u8>>(
             for c in 0..channels {
                 let value = |k: usize| weights[k] * u32::from(texels[four[k] * channels + c]);
                 let sum: u32 = (0..4).map(value).sum();
-                half.push(((sum + total / 2) / total) as u8);
+                let (whole, twice_rest) = (sum / total, 2 * (sum % total));
+                half.push((whole + u32::from(twice_rest + (whole & 1) > total)) as u8);
             }
         }
     }
@@ -174,6 +176,25 @@ mod tests {
         assert_eq!(sizes, [(3, 2), (2, 1), (1, 1)]);
         assert_eq!(pyramid.levels[1].get_pixel(0, 0).0, [55, 0, 0, 255]);
         assert_eq!(pyramid.levels[1].get_pixel(1, 0).0, [70, 0, 0, 255]);
+    }
+
+    #[test]
+    fn levels_are_as_bright_as_the_photo() {
+        let mut state = 5_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        let photo = RgbaImage::from_fn(256, 256, |_, _| Rgba([random(), random(), random(), 255]));
+        let pyramid = Pyramid::new(photo);
+        let mean = |level: &RgbaImage| {
+            let colors = level.pixels().flat_map(|p| p.0.into_iter().take(3));
+            colors.map(f64::from).sum::<f64>() / (3.0 * f64::from(level.width() * level.height()))
+        };
+        for level in &pyramid.levels[1..5] {
+            let off = mean(level) - mean(&pyramid.levels[0]);
+            assert!(off.abs() < 0.05, "{off}");
+        }
     }
 
     #[test]
