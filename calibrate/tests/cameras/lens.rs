@@ -249,7 +249,8 @@ fn grid() -> impl Iterator<Item = Pixel> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(CASES) })]
 
-    /// Unprojection answers truly or not at all.
+    /// Unprojection answers truly or not at all. At a lens' fold, where a ray's rounding moves its pixel by the square
+    /// root of that, as truly as can be.
     #[test]
     fn a_ray_falls_on_the_pixel_it_came_from(lens in any_lens()) {
         for pixel in grid() {
@@ -258,7 +259,10 @@ proptest! {
             let Some(again) = lens.project(ray) else {
                 return Err(TestCaseError::fail(format!("{pixel:?} → {ray} → nothing")));
             };
-            prop_assert!(again.distance(pixel) < 1e-9, "{:?} → {} → {:?}", pixel, ray, again);
+            let aside = ray.truncate().length();
+            let from_axis = if on_plane(&lens) { aside / ray.z } else { aside.atan2(ray.z) };
+            let most = if lens.limit() - from_axis < 1e-8 { 1e-6 } else { 1e-9 };
+            prop_assert!(again.distance(pixel) < most, "{:?} → {} → {:?}", pixel, ray, again);
         }
     }
 
