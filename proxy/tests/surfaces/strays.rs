@@ -2,7 +2,7 @@
 //! as is seen.
 
 use crate::common;
-use crate::find::find;
+use crate::find::{find, open_box};
 use crate::house::{self, small_house, view, viewpoint};
 
 use glam::DVec3;
@@ -152,29 +152,14 @@ fn past_folded_leaves_a_modelled_house_is_seen_through_wider_openings() {
     }
 }
 
-/// A block from one corner to the other.
-fn block(mesh: &mut Mesh, min: [f64; 3], max: [f64; 3]) {
-    let first = mesh.positions.len() as u32;
-    let corner = |i: usize| DVec3::from_array([0, 1, 2].map(|k| [min, max][i >> k & 1][k]));
-    mesh.positions.extend((0..8).map(corner));
-    for [a, b, c, d] in [
-        [0, 1, 3, 2],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 3, 7, 5],
-    ] {
-        let triangles = [[a, b, c], [a, c, d]];
-        mesh.triangles
-            .extend(triangles.map(|t| t.map(|i| first + i)));
-    }
-}
-
 /// Two rooms of 5 × 5 m, and in the wall of 0.15 m between them a doorway, which may be walled up, and a closed
 /// door whose leaf lies so along x; the middle of the wall is at 5.
 fn rooms_with_leaf([from, to]: [f64; 2], is_open: bool) -> Model {
     let mut mesh = Mesh::default();
+    let mut block = |min: [f64; 3], max: [f64; 3]| {
+        let [min, max] = [min, max].map(DVec3::from_array);
+        mesh.append(&open_box(min, max, &[0, 1, 2, 3, 4, 5]));
+    };
     for (min, max) in [
         ([-0.1, -0.1, -0.1], [10.1, 0.0, 5.1]),
         ([-0.1, 2.5, -0.1], [10.1, 2.6, 5.1]),
@@ -189,10 +174,10 @@ fn rooms_with_leaf([from, to]: [f64; 2], is_open: bool) -> Model {
         ([4.925, 0.0, 4.1], [5.075, 2.5, 5.0]),
         ([from, 0.0, 3.2], [to, 2.0, 4.1]),
     ] {
-        block(&mut mesh, min, max);
+        block(min, max);
     }
     if !is_open {
-        block(&mut mesh, [4.925, 0.0, 0.5], [5.075, 2.0, 1.4]);
+        block([4.925, 0.0, 0.5], [5.075, 2.0, 1.4]);
     }
     Model {
         mesh,

@@ -322,6 +322,13 @@ fn tours_say_where_something_is_in_the_way() {
     assert_eq!(amiss(&interior, &model), (vec![], vec![CellId(1)], vec![]));
 }
 
+fn quad(mesh: &mut Mesh, corners: [DVec3; 4]) {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(corners);
+    let halves = [[0, 1, 2], [0, 2, 3]].map(|half| half.map(|i| first + i));
+    mesh.triangles.extend(halves);
+}
+
 /// A stairwell of two storeys, and in its wall at x = 4 m a door to a room beside each of them.
 fn stairwell() -> (Interior, Model) {
     let mut mesh = Mesh::default();
@@ -334,12 +341,8 @@ fn stairwell() -> (Interior, Model) {
         [[4.8, 2.5], [5.4, 3.5]],
         [[2.8, 3.5], [5.4, 4.0]],
     ] {
-        let first = mesh.positions.len() as u32;
         let corners = [[y, z], [top, z], [top, end], [y, end]];
-        let corners = corners.map(|[y, z]| DVec3::new(4.0, y, z));
-        mesh.positions.extend(corners);
-        let halves = [[0, 1, 2], [0, 2, 3]].map(|half| half.map(|i| first + i));
-        mesh.triangles.extend(halves);
+        quad(&mut mesh, corners.map(|[y, z]| DVec3::new(4.0, y, z)));
     }
     let mut model = Model::default();
     model.append(&mesh, "wall");
@@ -397,12 +400,8 @@ fn storeys(has_lid: bool) -> (Interior, Model) {
     ];
     let lid = [[0.9, 1.0], [2.0, 2.1]];
     for [[x, z], [end, far]] in around.into_iter().chain(has_lid.then_some(lid)) {
-        let first = mesh.positions.len() as u32;
         let corners = [[x, z], [end, z], [end, far], [x, far]];
-        let corners = corners.map(|[x, z]| DVec3::new(x, 2.6, z));
-        mesh.positions.extend(corners);
-        let halves = [[0, 1, 2], [0, 2, 3]].map(|half| half.map(|i| first + i));
-        mesh.triangles.extend(halves);
+        quad(&mut mesh, corners.map(|[x, z]| DVec3::new(x, 2.6, z)));
     }
     let mut model = Model::default();
     model.append(&mesh, "ceiling");
