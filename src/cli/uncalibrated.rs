@@ -132,8 +132,8 @@ impl Bars {
             Event::PhotosAreClose => {
                 self.end();
                 say!(
-                    "note: COLMAP could begin with no two photos that see the scene at the angle \
-                     it asks for; it tries closer ones"
+                    "note: COLMAP places few photos or none from two that see the scene at the angle \
+                     it asks for; it tries closer ones to begin with"
                 );
             }
             Event::Progress { step, done, total } => {

@@ -13,18 +13,22 @@ use tempfile::TempDir;
 
 /// Writes down each call; says what lies in `help-COMMAND` and `say-COMMAND`, fails where
 /// there is `fail-COMMAND` (unless told an angle), and makes of the mapper's output a copy of `models`.
+/// Told an angle it takes `say-close-COMMAND`, `fail-close-COMMAND` and `close-models` where they are.
 const SCRIPT: &str = r#"#!/bin/sh
 here=$(dirname "$0")
 if [ "$1" = help ]; then echo 'COLMAP 3.8 -- a script'; exit; fi
 if [ "$2" = -h ]; then cat "$here/help-$1" 2>/dev/null; exit; fi
 echo "$*" >>"$here/calls"
-cat "$here/say-$1" 2>/dev/null
-case "$*" in *tri_angle*) rm -f "$here/fail-$1" ;; esac
-if [ -e "$here/fail-$1" ]; then echo 'no luck' >&2; exit 1; fi
+close=
+case "$*" in *tri_angle*) close=close- ;; esac
+cat "$here/say-$close$1" 2>/dev/null
+if [ -e "$here/fail-$close$1" ]; then echo 'no luck' >&2; exit 1; fi
 if [ "$1" = feature_extractor ]; then echo features >"$3"; fi
 if [ "$1" = mapper ]; then
     while [ "$1" != --output_path ]; do shift; done
-    cp -r "$here/models/." "$2"
+    models=$here/${close}models
+    if [ ! -e "$models" ]; then models=$here/models; fi
+    cp -r "$models/." "$2"
 fi
 "#;
 
@@ -366,6 +370,57 @@ fn photos_that_lie_close_are_placed_at_the_second_try() {
         bench.run().unwrap_err();
         assert_eq!(bench.calls().len(), 3);
     }
+}
+
+#[test]
+fn of_two_models_of_few_photos_the_larger_is_kept() {
+    let four = [(1, "f3.jpg"), (2, "f1.jpg"), (3, "f2.jpg"), (5, "f6.jpg")];
+    // The second try places four photos, then none, where the first placed three of eight.
+    for placed in [&four[..], &[]] {
+        let mut bench = Bench::new();
+        bench.write("help-mapper", "--Mapper.init_min_tri_angle arg (=16)");
+        if placed.is_empty() {
+            bench.write("fail-close-mapper", "");
+        } else {
+            fs::create_dir(bench.at("close-models")).unwrap();
+            bench.model("../close-models/0", placed);
+        }
+        bench.write(
+            "say-close-mapper",
+            "Initializing with image pair #1 and #5\n",
+        );
+        let made = bench.run().unwrap();
+        let calls = bench.calls();
+        assert_eq!(calls.len(), 4, "{calls:?}");
+        assert!(calls[3].ends_with("--Mapper.init_min_tri_angle 4"));
+        assert!(bench.events.contains(&Event::PhotosAreClose));
+
+        // What the kept try said is why photos have no place.
+        let kept = made.reconstruction.images.len();
+        assert_eq!(kept, placed.len().max(3));
+        let why = |name: &str| made.unplaced.iter().find(|p| p.name == name).unwrap();
+        let is_second = !placed.is_empty();
+        let expected = if is_second {
+            Why::FewMatches
+        } else {
+            Why::NoPlace
+        };
+        assert_eq!(why("f7.jpg").why, expected);
+        let left = ["sparse.second", "sparse.partial", "mapping.second.log"];
+        assert!(
+            left.iter()
+                .all(|name| !bench.at("work").join(name).exists())
+        );
+        bench.run().unwrap();
+        assert_eq!(bench.commands(), [""; 0]);
+    }
+
+    // More than half are not few.
+    let mut bench = Bench::new();
+    bench.write("help-mapper", "--Mapper.init_min_tri_angle arg (=16)");
+    bench.model("1", &four);
+    bench.run().unwrap();
+    assert_eq!(bench.calls().len(), 3);
 }
 
 #[test]

@@ -70,8 +70,8 @@ pub enum Event {
     StartingOver,
     /// An earlier run finished this step.
     Finished(Step),
-    /// No two photos that lie far enough apart by COLMAP's measure did to begin with: photos are
-    /// placed once more, from a pair that may be closer.
+    /// No two photos that lie far enough apart by COLMAP's measure did to begin with, or few of the
+    /// others could be placed from them: photos are placed once more, from a pair that may be closer.
     PhotosAreClose,
     /// A step is so far.
     Progress {

@@ -5,6 +5,7 @@ use super::{RunError, Step};
 use crate::Reconstruction;
 use crate::colmap::read_model;
 use capture::PhotoSet;
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
@@ -69,28 +70,11 @@ impl fmt::Display for Why {
 /// Reads the models and the logs of a finished run.
 pub(super) fn read(photos: &PhotoSet, work: &Path) -> Result<Outcome, RunError> {
     let folder = work.join(MODELS);
-    let mut folders = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(io_error(&folder, "list the folder"))? {
-        let path = entry.map_err(io_error(&folder, "list the folder"))?.path();
-        if path.is_dir() {
-            folders.push(path);
-        }
-    }
-    folders.sort();
-    let mut models = Vec::new();
-    for path in folders {
-        models.push((read_model(&path)?, path));
-    }
-    // The last of equal ones would be taken.
-    models.reverse();
-    let largest = models
-        .iter()
-        .enumerate()
-        .max_by_key(|(_, (model, _))| (model.images.len(), model.points.len()));
-    let Some(largest_idx) = largest.map(|(i, _)| i) else {
+    let mut models = models(&folder)?;
+    if models.is_empty() {
         return Err(RunError::NoModel { folder });
-    };
-    let (reconstruction, model) = models.swap_remove(largest_idx);
+    }
+    let (reconstruction, model) = models.remove(0);
     let rest: Vec<Reconstruction> = models.into_iter().map(|(model, _)| model).collect();
 
     let said = |step: Step| fs::read_to_string(work.join(step.log())).unwrap_or_default();
@@ -106,6 +90,33 @@ pub(super) fn read(photos: &PhotoSet, work: &Path) -> Result<Outcome, RunError> 
         model,
         reconstruction,
     })
+}
+
+/// The models in a folder, each in one of its own: the largest first, of equal ones by name.
+fn models(folder: &Path) -> Result<Vec<(Reconstruction, PathBuf)>, RunError> {
+    let mut folders = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io_error(folder, "list the folder"))? {
+        let path = entry.map_err(io_error(folder, "list the folder"))?.path();
+        if path.is_dir() {
+            folders.push(path);
+        }
+    }
+    folders.sort();
+    let mut models = Vec::new();
+    for path in folders {
+        models.push((read_model(&path)?, path));
+    }
+    models.sort_by_key(|(model, _)| Reverse(size_of(model)));
+    Ok(models)
+}
+
+/// Photos and points of the largest model in a folder; none where there is none.
+pub(super) fn size(folder: &Path) -> Result<(usize, usize), RunError> {
+    Ok(models(folder)?.first().map_or((0, 0), |(m, _)| size_of(m)))
+}
+
+fn size_of(model: &Reconstruction) -> (usize, usize) {
+    (model.images.len(), model.points.len())
 }
 
 /// What the logs say.

@@ -1,7 +1,7 @@
 //! COLMAP's programs and their options, old and new.
 
 use super::error::{OVERLAP, io_error};
-use super::{Event, Matching, Options, RunError, Step, log};
+use super::{Event, Matching, Options, RunError, Step, log, outcome};
 use capture::{PhotoSet, Tool, ToolError};
 use std::ffi::OsString;
 use std::fs;
@@ -14,6 +14,13 @@ pub(super) const DATABASE: &str = "database.db";
 pub(super) const MODELS: &str = "sparse";
 /// And until then.
 pub(super) const PARTIAL_MODELS: &str = "sparse.partial";
+/// Where the mapper has its models and what it says at a second try, until it is known which
+/// try is kept.
+pub(super) const SECOND_MODELS: &str = "sparse.second";
+pub(super) const SECOND_LOG: &str = "mapping.second.log";
+
+/// Models of fewer photos COLMAP itself takes for failures.
+const USUAL_MODEL: usize = 10;
 
 /// Photos that make a model: COLMAP would throw away further ones of less than ten, and
 /// nobody would learn why their photos are in none.
@@ -23,6 +30,7 @@ const SMALLEST_MODEL: &str = "3";
 /// reaches COLMAP's own 16: it goes down to half of it by itself, so to 2. Photos taken side
 /// by side for a lumigraph are often that close.
 const CLOSE_PAIR: &str = "4";
+const CLOSER: &[&str] = &["--Mapper.init_min_tri_angle"];
 
 /// COLMAP, about to be run on a photo set.
 pub(super) struct Program<'a> {
@@ -95,18 +103,22 @@ impl<'a> Program<'a> {
         let left: &[&str] = match step {
             Step::Features => &[DATABASE, "database.db-shm", "database.db-wal"],
             Step::Matching => return Ok(()),
-            Step::Mapping => &[MODELS, PARTIAL_MODELS],
+            Step::Mapping => &[MODELS, PARTIAL_MODELS, SECOND_MODELS, SECOND_LOG],
         };
         for name in left.iter().chain([&step.log()]) {
-            let path = self.work.join(name);
-            let removed = match path.is_dir() {
-                true => fs::remove_dir_all(&path),
-                false if path.exists() => fs::remove_file(&path),
-                false => Ok(()),
-            };
-            removed.map_err(io_error(&path, "remove what an interrupted run left"))?;
+            self.remove(name)?;
         }
         Ok(())
+    }
+
+    fn remove(&self, name: &str) -> Result<(), RunError> {
+        let path = self.work.join(name);
+        let removed = match path.is_dir() {
+            true => fs::remove_dir_all(&path),
+            false if path.exists() => fs::remove_file(&path),
+            false => Ok(()),
+        };
+        removed.map_err(io_error(&path, "remove what an earlier try left"))
     }
 
     /// Runs a step to its end.
@@ -118,68 +130,100 @@ impl<'a> Program<'a> {
             (Step::Mapping, _) => "mapper",
         };
         let help = self.colmap.text(&[command, "-h"])?;
-        let models = self.work.join(MODELS);
-        let partial = self.work.join(PARTIAL_MODELS);
         self.remove_unfinished(step)?;
         if step == Step::Mapping {
-            fs::create_dir(&partial).map_err(io_error(&partial, "make the folder"))?;
+            return self.place(command, &help, report);
         }
-
-        // 1. What the program is told.
         let mut arguments = Arguments::new(command, &help);
         arguments.give("--database_path", self.work.join(DATABASE));
-        match step {
-            Step::Features => {
-                arguments.give("--image_path", &self.photos.root);
-                arguments.give("--image_list_path", self.work.join(LIST));
-                arguments.give("--ImageReader.camera_model", self.options.lens.name());
-                if self.options.shared_camera {
-                    arguments.give("--ImageReader.single_camera", "1");
-                }
-                let names = ["--SiftExtraction.use_gpu", "--FeatureExtraction.use_gpu"];
-                arguments.give_known(&names, "0");
+        if step == Step::Features {
+            arguments.give("--image_path", &self.photos.root);
+            arguments.give("--image_list_path", self.work.join(LIST));
+            arguments.give("--ImageReader.camera_model", self.options.lens.name());
+            if self.options.shared_camera {
+                arguments.give("--ImageReader.single_camera", "1");
             }
-            Step::Matching => {
-                let names = ["--SiftMatching.use_gpu", "--FeatureMatching.use_gpu"];
-                arguments.give_known(&names, "0");
-                // Smaller blocks than usual, as progress is told a block at a time.
-                arguments.give_known(&["--ExhaustiveMatching.block_size"], "10");
-            }
-            Step::Mapping => {
-                arguments.give("--image_path", &self.photos.root);
-                arguments.give("--output_path", &partial);
-                arguments.give_known(&["--Mapper.min_model_size"], SMALLEST_MODEL);
-            }
+            let names = ["--SiftExtraction.use_gpu", "--FeatureExtraction.use_gpu"];
+            arguments.give_known(&names, "0");
+        } else {
+            let names = ["--SiftMatching.use_gpu", "--FeatureMatching.use_gpu"];
+            arguments.give_known(&names, "0");
+            // Smaller blocks than usual, as progress is told a block at a time.
+            arguments.give_known(&["--ExhaustiveMatching.block_size"], "10");
         }
+        self.run_once(step, &arguments.words, step.log(), report)
+            .map_err(failed(step))
+    }
 
-        // 2. It runs; the mapper a second time where it placed none and had no more photos far enough apart
-        // to begin with: closer ones may do. (It has been seen to give up its first pair of photos that it
-        // places mostly.)
-        let mut ran = self.run_once(step, &arguments.words, report);
-        if let (Step::Mapping, Err(ToolError::Failed { .. })) = (step, &ran)
+    /// Has the mapper place photos: a second time where the first placed none, for want of two
+    /// photos far enough apart to begin with, or few. (It has been seen to give up, or to place three of,
+    /// ten photos all of which it places mostly.)
+    fn place(
+        &self,
+        command: &str,
+        help: &str,
+        report: &mut dyn FnMut(Event),
+    ) -> Result<(), RunError> {
+        let step = Step::Mapping;
+        let told = |folder: &Path| -> Result<Arguments<'_>, RunError> {
+            fs::create_dir(folder).map_err(io_error(folder, "make the folder"))?;
+            let mut arguments = Arguments::new(command, help);
+            arguments.give("--database_path", self.work.join(DATABASE));
+            arguments.give("--image_path", &self.photos.root);
+            arguments.give("--output_path", folder);
+            arguments.give_known(&["--Mapper.min_model_size"], SMALLEST_MODEL);
+            Ok(arguments)
+        };
+        let can_be_closer = known(help, CLOSER).is_some();
+
+        // 1. As COLMAP is used to, or from closer photos where it finds none to begin with.
+        let partial = self.work.join(PARTIAL_MODELS);
+        let mut arguments = told(&partial)?;
+        let mut ran = self.run_once(step, &arguments.words, step.log(), report);
+        let is_first = ran.is_ok();
+        if let Err(ToolError::Failed { .. }) = ran
+            && can_be_closer
             && self.found_no_pair()?
-            && arguments.give_known(&["--Mapper.init_min_tri_angle"], CLOSE_PAIR)
         {
             report(Event::PhotosAreClose);
-            ran = self.run_once(step, &arguments.words, report);
+            arguments.give_known(CLOSER, CLOSE_PAIR);
+            ran = self.run_once(step, &arguments.words, step.log(), report);
         }
-        ran.map_err(|source| match source {
-            ToolError::Failed { .. } => RunError::Failed {
-                source,
-                remedy: step.remedy(),
-            },
-            other => other.into(),
-        })?;
-        if step == Step::Mapping {
-            fs::rename(&partial, &models).map_err(io_error(models, "rename a folder to this"))?;
+        ran.map_err(failed(step))?;
+
+        // 2. Where it placed few, once more from closer photos: the larger model is kept.
+        let placed = outcome::size(&partial)?;
+        let is_few = placed.0 < USUAL_MODEL && 2 * placed.0 < self.photos.photos.len();
+        if is_first && is_few && can_be_closer {
+            report(Event::PhotosAreClose);
+            let second = self.work.join(SECOND_MODELS);
+            let mut arguments = told(&second)?;
+            arguments.give_known(CLOSER, CLOSE_PAIR);
+            match self.run_once(step, &arguments.words, SECOND_LOG, report) {
+                Ok(()) if outcome::size(&second)? > placed => {
+                    self.remove(PARTIAL_MODELS)?;
+                    self.rename(SECOND_MODELS, PARTIAL_MODELS)?;
+                    self.rename(SECOND_LOG, step.log())?;
+                }
+                Ok(()) | Err(ToolError::Failed { .. }) => {}
+                Err(source) => return Err(source.into()),
+            }
+            self.remove(SECOND_MODELS)?;
+            self.remove(SECOND_LOG)?;
         }
-        Ok(())
+        self.rename(PARTIAL_MODELS, MODELS)
+    }
+
+    fn rename(&self, from: &str, to: &str) -> Result<(), RunError> {
+        let to = self.work.join(to);
+        fs::rename(self.work.join(from), &to).map_err(io_error(to, "rename what was made to this"))
     }
 
     fn run_once(
         &self,
         step: Step,
         words: &[OsString],
+        log: &str,
         report: &mut dyn FnMut(Event),
     ) -> Result<(), ToolError> {
         let photos = self.photos.photos.len() as u64;
@@ -193,8 +237,7 @@ impl<'a> Program<'a> {
                 report(Event::Progress { step, done, total });
             }
         };
-        self.colmap
-            .run(words, &self.work.join(step.log()), &mut on_line)
+        self.colmap.run(words, &self.work.join(log), &mut on_line)
     }
 
     /// Whether the mapper gave up as no two photos, or no two more, suit it to begin with.
@@ -202,6 +245,17 @@ impl<'a> Program<'a> {
         let path = self.work.join(Step::Mapping.log());
         let said = fs::read(&path).map_err(io_error(path, "read"))?;
         Ok(log::found_no_pair(&String::from_utf8_lossy(&said)))
+    }
+}
+
+/// What a step's error becomes.
+fn failed(step: Step) -> impl FnOnce(ToolError) -> RunError {
+    move |source| match source {
+        ToolError::Failed { .. } => RunError::Failed {
+            source,
+            remedy: step.remedy(),
+        },
+        other => other.into(),
     }
 }
 
@@ -224,15 +278,18 @@ impl<'a> Arguments<'a> {
     }
 
     /// Gives an option that has had several names by the one that this COLMAP's help
-    /// knows; not at all where it knows none. Returns whether it was given.
-    fn give_known(&mut self, names: &[&str], value: &str) -> bool {
-        let is_known = |name: &&&str| self.help.split_whitespace().any(|word| word == **name);
-        let known = names.iter().find(is_known);
-        if let Some(name) = known {
+    /// knows; not at all where it knows none.
+    fn give_known(&mut self, names: &[&str], value: &str) {
+        if let Some(name) = known(self.help, names) {
             self.give(name, value);
         }
-        known.is_some()
     }
+}
+
+/// The first of an option's names that a help knows.
+fn known<'n>(help: &str, names: &[&'n str]) -> Option<&'n str> {
+    let is_known = |name: &&str| help.split_whitespace().any(|word| word == *name);
+    names.iter().copied().find(is_known)
 }
 
 #[cfg(test)]

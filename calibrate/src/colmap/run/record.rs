@@ -1,7 +1,7 @@
 //! `run.json`: what a work folder is of, and how far it is.
 
 use super::error::io_error;
-use super::program::{DATABASE, LIST, MODELS, PARTIAL_MODELS};
+use super::program::{DATABASE, LIST, MODELS, PARTIAL_MODELS, SECOND_LOG, SECOND_MODELS};
 use super::{Event, Options, RunError, Step};
 use capture::{PhotoSet, fingerprint};
 use serde::{Deserialize, Serialize};
@@ -55,11 +55,13 @@ pub(super) fn is_kept_in(folder: &Path) -> bool {
 /// Whether all that a folder holds is called as what runs leave there.
 fn holds_only_a_runs(work: &Path) -> io::Result<bool> {
     let logs = Step::ALL.map(Step::log);
-    let own = [FILE, TEMPORARY, LIST, MODELS, PARTIAL_MODELS];
+    let own = [FILE, TEMPORARY, LIST, MODELS];
+    let own_while_placing = [PARTIAL_MODELS, SECOND_MODELS, SECOND_LOG];
     let is_own = |name: &OsStr| {
         let name = name.to_str().unwrap_or_default();
         let of_database = name.strip_prefix(DATABASE);
         own.contains(&name)
+            || own_while_placing.contains(&name)
             || logs.contains(&name)
             || of_database.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
     };
