@@ -212,7 +212,10 @@ fn a_command_that_is_stopped_leaves_whole_files_and_can_be_run_again() {
         ),
         // At once: it has hardly begun.
         ("generate shelf --size 320x240 -o shelf", "."),
-        ("bench wall --device cpu --long-side 64 -o bench", "bench"),
+        (
+            "bench wall house --device cpu --long-side 64 -o bench",
+            "bench",
+        ),
     ] {
         let mut child = start(folder.path(), line);
         wait_for(&mut child, &folder.path().join(first));
