@@ -226,7 +226,8 @@ impl FilmArgs {
     }
 
     /// Which frames of a folder are there already: of `files`, which this run makes. `all` are those of
-    /// the whole film, and `inputs` the files that frames are made of, over which none is written.
+    /// the whole film, and `inputs` the files that frames are made of, over which none is written. Without
+    /// `--resume` none counts as there, and no run goes on with frames in that folder any more.
     pub(super) fn begin(
         &self,
         folder: &Path,
@@ -237,6 +238,7 @@ impl FilmArgs {
         let video = self.video.iter();
         check_inputs(all.iter().chain(video).map(PathBuf::as_path), inputs)?;
         if !self.resume {
+            kept::forget(folder)?;
             return Ok(vec![false; files.len()]);
         }
         kept::begin(folder, all, inputs)?;

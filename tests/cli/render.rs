@@ -307,6 +307,27 @@ fn a_film_is_shared_resumed_and_made() {
 }
 
 #[test]
+fn frames_that_a_run_without_resume_made_are_not_taken_for_those_of_before() {
+    let folder = with_wall();
+    let here = folder.path();
+    let resume = here.join("out/resume.json");
+    let render = "render wall --proxy plane --path sweep --size 48x36 --frames 2 -o out";
+    lumigraph(here, &format!("{render} --resume")).ok();
+    assert!(resume.exists());
+    lumigraph(here, &format!("{render} --k 2")).ok();
+    let frames = files(&here.join("out"));
+    assert_eq!(frames.len(), 2);
+    let error = lumigraph(here, &format!("{render} --resume")).error(1);
+    let said = "out: there are frames here that a run without --resume made";
+    assert!(error.contains(said), "{error}");
+    assert!(files(&here.join("out")) == frames);
+    // A file that only has that name stays.
+    fs::write(&resume, r#"{"work": []}"#).unwrap();
+    lumigraph(here, render).ok();
+    assert_eq!(fs::read(&resume).unwrap(), br#"{"work": []}"#);
+}
+
+#[test]
 fn frames_made_of_other_files_are_not_mixed_in() {
     let folder = with_wall();
     let here = folder.path();
