@@ -62,6 +62,9 @@ impl Scene {
         // 2. Each kind, judged by photos spread over the rest, each drawn without itself.
         let mut trials: Vec<Trial> = Vec::new();
         let mut bench = Trials::new(self, without, JUDGES.min(rest.len()))?;
+        if rest.len() <= MOST_COMPARED {
+            bench.find_damaged()?;
+        }
         let mut leader: Option<Scores> = None;
         let mut best: Option<(Kind, bool)> = None;
         for &kind in &candidates {

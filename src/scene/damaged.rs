@@ -133,6 +133,33 @@ mod tests {
     }
 
     #[test]
+    fn photos_are_compared_without_those_that_cannot_be_decoded() {
+        let (folder, mut scene) = with("wall", (64, 48), None);
+        let damaged = named(&["0003.png", "0006.png"]);
+        for name in &damaged {
+            damage(&folder.path().join("made/images").join(name));
+        }
+        for kind in [Kind::Dense, Kind::CarvedDense] {
+            let fitted = scene.fit(kind, &BTreeSet::new()).unwrap();
+            assert_eq!(left_out(&fitted), damaged, "{}", kind.name());
+            let without = scene.fit(kind, &damaged).unwrap();
+            assert!(without.left_out.is_empty());
+            assert_eq!(fitted.how, without.how);
+        }
+        // All of them are found at once, whether or not points tell which go together.
+        for with_points in [true, false] {
+            if !with_points {
+                scene.reconstruction.points.clear();
+                for image in scene.reconstruction.images.values_mut() {
+                    image.keypoints.clear();
+                }
+            }
+            let found = scene.matching(&BTreeSet::new()).map(|_| ()).unwrap_err();
+            assert!(matches!(found, SceneError::Damaged(all) if all.len() == 2));
+        }
+    }
+
+    #[test]
     fn photos_that_nothing_can_be_judged_by_leave_it_at_the_usual_kind() {
         // SSIM needs more pixels.
         let (_folder, scene) = with("wall", (10, 8), None);

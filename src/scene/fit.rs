@@ -327,16 +327,33 @@ impl Scene {
 
     /// The photos but those of the given names, ready to be compared, with what sensors measured of
     /// them; and what is to be said of depth maps that cannot be used.
+    ///
+    /// # Errors
+    /// Nothing tells between which depths to compare them; [`SceneError::Damaged`] of all photos that
+    /// cannot be decoded, before any are compared.
     pub(super) fn matching(
         &self,
         without: &BTreeSet<String>,
     ) -> Result<(Matching, Option<String>), SceneError> {
         let sources = self.sources(without)?;
         let (views, sparse) = self.observed(without)?;
-        // One that cannot be decoded is left out; drawing will report it.
+        let ranges = match sparse.len() < FEWEST_POINTS {
+            true => Some(self.supposed_ranges(without)?),
+            false => None,
+        };
+        // 1. Photos and depth maps, each decoded once.
+        let damaged: Mutex<BTreeMap<String, String>> = Mutex::default();
         let photo = |i: usize| {
-            let size = (views[i].width, views[i].height);
-            sources[i].0.decode_usable(size).ok()
+            let (photo, size) = (sources[i].0, (views[i].width, views[i].height));
+            match photo.decode_usable(size) {
+                Ok(pixels) => Some(pixels),
+                Err(error) => {
+                    if let Ok(mut all) = damaged.lock() {
+                        all.insert(photo.name.clone(), error.to_string());
+                    }
+                    None
+                }
+            }
         };
         let maps = self.depth_maps(without)?;
         let noise = maps.noise(|i| views[i].clone());
@@ -349,14 +366,19 @@ impl Scene {
             let note = |error| unusable.lock().map(|mut all| all.insert(i, error));
             believed.map_err(note).ok()
         };
-        let options = DenseOptions::default();
-        let matching = match sparse.len() < FEWEST_POINTS {
-            true => {
-                let ranges = self.supposed_ranges(without)?;
-                Matching::without_points(&views, &ranges, photo, depth, &options)
-            }
-            false => Matching::new(&views, &sparse, photo, depth, &options),
+        let known: &[SparsePoint] = match &ranges {
+            Some(_) => &[],
+            None => &sparse,
         };
+        let mut matching = Matching::new(&views, known, photo, depth, &DenseOptions::default());
+        let damaged = damaged.into_inner().unwrap_or_default();
+        if !damaged.is_empty() {
+            return Err(SceneError::Damaged(damaged));
+        }
+        // 2. Where no points tell which of them go together, comparing them does.
+        if let Some(ranges) = ranges {
+            matching.suppose(&views, &ranges);
+        }
         let unusable = unusable.into_inner().unwrap_or_default();
         let note = unusable
             .first_key_value()

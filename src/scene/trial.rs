@@ -125,6 +125,20 @@ impl<'a> Trials<'a> {
         })
     }
 
+    /// Makes all photos ready to be compared, as some kinds ask for: so those that cannot be decoded are found at
+    /// once, before any kind was tried with them.
+    ///
+    /// # Errors
+    /// [`SceneError::Damaged`] of these. What else may be wrong is said of the kinds that ask for it.
+    pub(super) fn find_damaged(&mut self) -> Result<(), SceneError> {
+        match self.take_matching() {
+            Ok(matching) => self.matching = Some(matching),
+            Err(damaged @ SceneError::Damaged(_)) => return Err(damaged),
+            Err(_) => {}
+        }
+        Ok(())
+    }
+
     /// How well a kind of proxy does, made without the photos it is judged by; given up where
     /// the `leader` is too far ahead. Of a mesh, both as it is and as if it hid nothing from
     /// anyone, where that makes a difference.

@@ -230,6 +230,28 @@ fn all_photos_are_scored_by_pictures_of_the_same_others() {
 }
 
 #[test]
+fn what_is_found_damaged_as_photos_are_compared_is_told_and_shows_in_no_frame() {
+    let folder = with_wall();
+    let here = folder.path();
+    damage(&here.join("wall/images/0003.png"));
+    for line in [
+        "proxy wall dense -o dense.json",
+        "render wall --proxy dense --no-exposure --path sweep --frames 0..1/2 --json -o out",
+        "evaluate wall --proxy dense --no-exposure --every 8 --json",
+    ] {
+        let ran = lumigraph(here, line).ok();
+        let said = "warning: photo 0003.png is left out: ";
+        assert_eq!(ran.stderr.matches(said).count(), 1, "{}", ran.stderr);
+        if line.contains("--json") {
+            let held_out = if line.contains("--every") { 2 } else { 0 };
+            assert_eq!(ran.json()["report"]["photos_total"], 8 - held_out, "{line}");
+        }
+        let error = lumigraph(here, &format!("{line} --strict")).error(1);
+        assert!(error.starts_with("photo 0003.png: "), "{error}");
+    }
+}
+
+#[test]
 fn what_is_found_damaged_as_exposures_are_matched_shows_in_no_frame() {
     let folder = with_wall();
     let here = folder.path();

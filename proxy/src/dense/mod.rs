@@ -142,32 +142,24 @@ impl Matching {
         }
     }
 
-    /// The same where there are no sparse points: which photos go together, and the depths to try, are
-    /// found by comparing them once between two inverse depths (1/z, world units; the lesser first) each.
+    /// Finds which photos go together, and the depths to try, where no sparse points tell: by comparing them
+    /// once between two inverse depths (1/z, world units; the lesser first) each. The views are those
+    /// of [`Self::new`].
     ///
     /// # Panics
-    /// As [`densify`]; there are not as many ranges as views.
-    pub fn without_points(
-        views: &[View],
-        ranges: &[[f64; 2]],
-        photo: impl Fn(usize) -> Option<RgbaImage> + Sync,
-        depth: impl Fn(usize) -> Option<Vec<f32>> + Sync,
-        options: &DenseOptions,
-    ) -> Self {
+    /// There are not as many ranges as views.
+    pub fn suppose(&mut self, views: &[View], ranges: &[[f64; 2]]) {
         assert_eq!(views.len(), ranges.len(), "a range for each view");
-        // 1. Ready to be compared: photos are looked at once.
-        let mut matching = Self::new(views, &[], photo, depth, options);
-        // 2. As if all were seen that lies in the ranges.
-        let supposed = supposed::points(&matching.photos, ranges);
-        matching.go_together(views, &supposed);
-        let tried = matching.photos.iter().zip(ranges);
-        matching.ranges = tried.map(|(p, range)| p.as_ref().map(|_| *range)).collect();
-        // 3. By what they agree on.
-        matching.compare(&[]);
-        let found = matching.points(&[], None);
-        matching.go_together(views, &found);
-        matching.maps.iter_mut().for_each(Vec::clear);
-        matching
+        // 1. As if all were seen that lies in the ranges.
+        let supposed = supposed::points(&self.photos, ranges);
+        self.go_together(views, &supposed);
+        let tried = self.photos.iter().zip(ranges);
+        self.ranges = tried.map(|(p, range)| p.as_ref().map(|_| *range)).collect();
+        // 2. By what they agree on.
+        self.compare(&[]);
+        let found = self.points(&[], None);
+        self.go_together(views, &found);
+        self.maps.iter_mut().for_each(Vec::clear);
     }
 
     /// Which photos are to be compared, and between which depths, by points that they show.

@@ -168,7 +168,8 @@ fn photos_tell_where_things_are_without_sparse_points() {
     let points = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.unwrap().install(|| {
-            let mut matching = Matching::without_points(&views, &ranges, photo, |_| None, &options);
+            let mut matching = Matching::new(&views, &[], photo, |_| None, &options);
+            matching.suppose(&views, &ranges);
             matching.compare(&[]);
             matching.points(&[], None)
         })
@@ -239,12 +240,14 @@ fn many_photos_suppose_no_more_places_than_some_that_lie_among_all() {
 fn where_photos_show_nothing_in_common_there_are_no_points() {
     let (solid, views, _) = seen_by_nine();
     let clear = |_: usize| Some(RgbaImage::new(192, 144));
-    let mut matching = Matching::without_points(&views, &[[0.01, 0.6]; 9], clear, |_| None, &SMALL);
+    let mut matching = Matching::new(&views, &[], clear, |_| None, &SMALL);
+    matching.suppose(&views, &[[0.01, 0.6]; 9]);
     matching.compare(&[]);
     assert_eq!(matching.points(&[], None), []);
     // One alone has nobody to compare with.
     let one = |i: usize| (i == 4).then(|| photo(&solid, &views[i]));
-    let mut matching = Matching::without_points(&views, &[[0.01, 0.6]; 9], one, |_| None, &SMALL);
+    let mut matching = Matching::new(&views, &[], one, |_| None, &SMALL);
+    matching.suppose(&views, &[[0.01, 0.6]; 9]);
     matching.compare(&[]);
     assert_eq!(matching.points(&[], None), []);
 }
