@@ -108,7 +108,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         args.at.time,
     )?;
     session.max_error = args.max_error;
-    session.costs.why_empty = why_empty;
+    session.why_empty = why_empty;
     let points = || session.points();
     let count = chosen.count(FRAMES);
     let is_derived = asked.is_derived();

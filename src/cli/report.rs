@@ -137,8 +137,6 @@ pub(super) struct Costs {
     alone_empty: usize,
     /// By source view, whether any frame scored it.
     ever_scored: Vec<bool>,
-    /// Why frames may show nothing, for people (see [`super::frames::Asked::why_empty`]).
-    pub(super) why_empty: &'static str,
 }
 
 struct FrameCost {
@@ -227,8 +225,9 @@ impl Costs {
         self.frames.values().filter(|cost| cost.is_empty).count()
     }
 
-    /// What to say of pictures that show nothing at all, if there are any, where there are so many photos.
-    pub(super) fn note_of_empty(&self, photos: usize) -> Option<String> {
+    /// What to say of pictures that show nothing at all, if there are any, where there are so many photos;
+    /// `why_empty` is why frames of a path may.
+    pub(super) fn note_of_empty(&self, photos: usize, why_empty: &str) -> Option<String> {
         let (of_path, alone) = (self.empty(), self.alone_empty);
         let of_all = |empty: usize, all: usize, what: &str, otherwise: &str| {
             let why = match photos {
@@ -239,7 +238,7 @@ impl Costs {
         };
         let unseen = "the proxy does not reach where those photos look; hold out fewer, or try another \
                       --proxy";
-        of_all(of_path, self.frames.len(), "frames", self.why_empty)
+        of_all(of_path, self.frames.len(), "frames", why_empty)
             .or_else(|| of_all(alone, self.alone, "pictures", unseen))
     }
 

@@ -42,6 +42,8 @@ pub(super) struct Session {
     /// Of the frames that were drawn one after the other.
     pub(super) ledger: Ledger,
     pub(super) costs: Costs,
+    /// Why frames of a path may show nothing, for people (see [`super::frames::Asked::why_empty`]).
+    pub(super) why_empty: &'static str,
     /// What was said of what draws, before anything was drawn.
     notes: Vec<String>,
     /// How much of what the engine has to say was said.
@@ -110,6 +112,7 @@ impl Session {
             in_window: InWindow::default(),
             ledger: Ledger::new(),
             costs: Costs::default(),
+            why_empty: "",
             notes: Vec::new(),
             notes_said: 0,
             proxy,
@@ -294,7 +297,8 @@ impl Session {
 
     /// What to say of pictures that show nothing, if there are any.
     pub(super) fn note_of_empty(&self) -> Option<String> {
-        self.costs.note_of_empty(self.lumigraph.photos.len())
+        let photos = self.lumigraph.photos.len();
+        self.costs.note_of_empty(photos, self.why_empty)
     }
 
     /// How visible seams are in a view: see [`render::seams`].

@@ -139,7 +139,7 @@ fn all_frames_are_drawn_of_the_same_photos() {
         assert!(whole == expected, "{way}");
         assert_eq!(told(&ran), 1, "{way}: {}", ran.stderr);
         // What is told is of the frames that stay.
-        let said = "note: 1 of 3 frames show nothing";
+        let said = "note: 1 of 3 frames show nothing: does the path lie in this scene's world?\n";
         assert!(ran.stderr.contains(said), "{way}: {}", ran.stderr);
         let json = ran.json();
         assert_eq!(json["report"]["photos_total"], 5, "{way}");
