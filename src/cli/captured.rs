@@ -183,7 +183,7 @@ impl Photos {
         }
         let exposure = exposure.choose(&mut scene, &held_out);
         let mut without = held_out.clone();
-        leave_out(&exposure.left_out, &mut without, false)?;
+        leave_out(&scene, &exposure.left_out, &mut without, false)?;
         Ok(Some(Self {
             scene,
             held_out,

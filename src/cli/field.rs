@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.proxy.is_searched(&scene, &without) {
         // Kinds are compared by what is drawn, which is exposed alike.
         let exposure = args.exposure.choose(&mut scene, &without);
-        leave_out(&exposure.left_out, &mut without, args.scene.strict)?;
+        leave_out(&scene, &exposure.left_out, &mut without, args.scene.strict)?;
     }
     let proxy = args.proxy.choose(&scene, &without, args.scene.strict)?;
     without.extend(proxy.left_out.keys().cloned());

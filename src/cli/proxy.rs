@@ -153,7 +153,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             if kind.is_none() {
                 // Kinds are compared by what is drawn, which is exposed alike.
                 let exposure = ExposureArgs::default().choose(&mut scene, &without);
-                leave_out(&exposure.left_out, &mut fewer, args.scene.strict)?;
+                leave_out(&scene, &exposure.left_out, &mut fewer, args.scene.strict)?;
             }
             let fitted = fit(&scene, kind, &fewer, args.scene.strict)?;
             (fitted.proxy, fitted.how, Some(&without))

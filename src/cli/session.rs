@@ -91,7 +91,7 @@ impl Session {
         let (exposure, proxy) = if proxy.is_searched(&scene, &without) {
             // What is drawn to choose a proxy is exposed as all that is drawn later.
             let exposure = exposure.choose(&mut scene, &without);
-            leave_out(&exposure.left_out, &mut without, strict)?;
+            leave_out(&scene, &exposure.left_out, &mut without, strict)?;
             (exposure, proxy.choose(&scene, &without, strict)?)
         } else {
             // What cannot be read is said at once.
@@ -100,7 +100,7 @@ impl Session {
         };
         // Whichever frames ask for them, those that are known to be damaged show in none.
         without.extend(proxy.left_out.keys().cloned());
-        leave_out(&exposure.left_out, &mut without, strict)?;
+        leave_out(&scene, &exposure.left_out, &mut without, strict)?;
         let mut left_out = exposure.left_out.clone();
         left_out.extend(proxy.left_out.clone());
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
@@ -369,8 +369,8 @@ impl Session {
         Ok(self.lumigraph.sources.len() < before)
     }
 
-    /// Leaves out a photo. What has been drawn is to be drawn again without it, so what that has cost is
-    /// forgotten.
+    /// Leaves out a photo, as long as enough others remain. What has been drawn is to be drawn again without
+    /// it, so what that has cost is forgotten.
     fn leave_out(&mut self, error: &PhotoError) -> anyhow::Result<()> {
         let name = self.lumigraph.sources[error.source_idx].name.clone();
         if self.strict {
@@ -378,6 +378,7 @@ impl Session {
         }
         self.say_left_out(&name, &error.message);
         self.without.insert(name);
+        self.scene.check_enough(&self.without, &self.left_out)?;
         let count = self.lumigraph.sources.len();
         let uploaded = (0..count).filter(|i| self.was_uploaded(*i));
         let uploaded = uploaded.map(|i| self.lumigraph.sources[i].name.clone());

@@ -7,7 +7,7 @@ use super::session::spinner;
 use anyhow::Context;
 use clap::Args;
 use glam::DVec3;
-use lumigraph::scene::{Fitted, Kind, Scene, SceneProxy, Trial, trials_text};
+use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trials_text};
 use proxy::Proxy;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -48,8 +48,11 @@ pub(super) fn fit(
         None => scene.fit_best(without),
     };
     busy.finish_and_clear();
+    if let Err(SceneError::Damaged(damaged)) = &fitted {
+        scene.check_enough(without, damaged)?;
+    }
     let fitted = fitted.context("no such proxy can be fitted to this scene")?;
-    leave_out(&fitted.left_out, &mut without.clone(), strict)?;
+    leave_out(scene, &fitted.left_out, &mut without.clone(), strict)?;
     if let Some(note) = scene.note_of_unobserved(kind) {
         say!("note: {note}");
     }

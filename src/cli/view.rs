@@ -261,7 +261,7 @@ impl Load {
         teller.doing("matching exposures");
         let damaged = exposure.choose(&mut scene, &without).left_out;
         let mut fewer = without.clone();
-        leave_out(&damaged, &mut fewer, self.scene.strict)?;
+        leave_out(&scene, &damaged, &mut fewer, self.scene.strict)?;
         for photo in &damaged {
             teller.say(Progress::Note(left_out_text(photo)));
         }

@@ -6,8 +6,37 @@ use super::{Fitted, Photo, Scene, SceneError};
 use calibrate::View;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 impl Scene {
+    /// Checks that enough photos remain without those of the given names, nor those that were found `damaged`, by
+    /// name with what is wrong with each. Where none was, those that remain are as few as somebody chose.
+    ///
+    /// # Errors
+    /// [`SceneError::TooFew`].
+    pub fn check_enough(
+        &self,
+        without: &BTreeSet<String>,
+        damaged: &BTreeMap<String, String>,
+    ) -> Result<(), SceneError> {
+        let is_damaged = |photo: &&Photo| damaged.contains_key(&photo.name);
+        let (gone, others): (Vec<&Photo>, Vec<&Photo>) = self.photos.iter().partition(is_damaged);
+        let rest = others.iter().filter(|p| !without.contains(&p.name)).count();
+        match gone.first() {
+            Some(first) if rest < ENOUGH => Err(SceneError::TooFew {
+                left_out: gone.len(),
+                total: gone.len() + rest,
+                name: first.name.clone(),
+                reason: damaged[&first.name].clone(),
+                remedy: format!(
+                    "copy such photos (in {}), or such masks, again from where they came from",
+                    first.path.parent().unwrap_or(Path::new("")).display()
+                ),
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// What `fit` makes without the photos of the given names, nor those that it finds damaged,
     /// as long as enough others remain.
     ///
@@ -84,7 +113,6 @@ mod tests {
     use super::*;
     use crate::scene::Kind;
     use datasets::Options;
-    use std::path::Path;
     use tempfile::TempDir;
 
     /// A scene of made photos, which are in `made/images` of the folder.

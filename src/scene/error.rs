@@ -143,7 +143,7 @@ pub enum SceneError {
         /// What is wrong with it.
         reason: String,
         /// What to do.
-        remedy: &'static str,
+        remedy: String,
     },
     /// A file or folder cannot be read or written.
     #[error("{}: cannot {doing}: {source}", path.display())]

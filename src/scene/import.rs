@@ -283,10 +283,11 @@ impl Scene {
         if self.photos.len() - unusable.len() < ENOUGH {
             let is_gone = |photo: &Photo| photo.name == name && !photo.path.exists();
             let was_moved = self.folder.is_some() && self.photos.iter().any(is_gone);
+            let remedy = if was_moved { MOVED } else { OTHERS };
             return Err(SceneError::TooFew {
                 left_out: unusable.len(),
                 total: self.photos.len(),
-                remedy: if was_moved { MOVED } else { OTHERS },
+                remedy: remedy.to_owned(),
                 name,
                 reason,
             });

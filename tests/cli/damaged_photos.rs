@@ -230,6 +230,45 @@ fn all_photos_are_scored_by_pictures_of_the_same_others() {
 }
 
 #[test]
+fn photos_are_left_out_as_long_as_two_others_remain() {
+    let folder = with_wall();
+    let here = folder.path();
+    let photo = |i: u32| here.join(format!("wall/images/{i:04}.png"));
+    let frames = "render wall --proxy plane --no-exposure --path sweep --frames 2 --size 48x36";
+    let check = |line: &str, count: &str| {
+        let error = lumigraph(here, line).error(1);
+        let said = format!(
+            "{count} calibrated photos cannot be used, and too few remain (at least 2 are needed): "
+        );
+        assert!(error.starts_with(&said), "{line}: {error}");
+        let said =
+            "; copy such photos (in wall/images), or such masks, again from where they came from";
+        assert!(error.ends_with(said), "{line}: {error}");
+    };
+    // 1. Two remain, of which none may be held out.
+    (1..8).for_each(|i| damage(&photo(i)));
+    let exposed = frames.replace(" --no-exposure", "");
+    let ran = lumigraph(here, &format!("{exposed} --json -o two")).ok();
+    assert_eq!(ran.json()["report"]["photos_total"], 2, "{}", ran.stderr);
+    let evaluate = "evaluate wall --proxy plane --no-exposure --every 8 --size 48x36";
+    check(evaluate, "6 of 7");
+    // 2. None is whole: frames find one after the other.
+    [0, 8].into_iter().for_each(|i| damage(&photo(i)));
+    check(&format!("{frames} -o none"), "8 of 9");
+    // What is found before any frame is, is found at once.
+    let exposed = format!("{exposed} -o none");
+    for line in [
+        exposed.as_str(),
+        "render wall --proxy dense --no-exposure --path sweep --frames 2 -o none",
+        "proxy wall auto -o proxy.json",
+        "proxy wall dense -o proxy.json",
+        "field wall --view 0000.png -o field.png",
+    ] {
+        check(line, "9 of 9");
+    }
+}
+
+#[test]
 fn what_is_found_damaged_as_photos_are_compared_is_told_and_shows_in_no_frame() {
     let folder = with_wall();
     let here = folder.path();
