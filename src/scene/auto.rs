@@ -133,9 +133,16 @@ impl Scene {
         why: String,
     ) -> Result<Fitted, SceneError> {
         let takes_long = |kind: Kind| kind == Kind::Dense && photos > MOST_COMPARED;
+        // Of one photo of several none is left, as nobody else saw them.
+        let points = self.observed(without)?.1.len();
         let mut said = vec![why];
         for kind in [Kind::Points, Kind::Hull, Kind::Dense] {
             if !candidates.contains(&kind) || takes_long(kind) {
+                continue;
+            }
+            if kind == Kind::Points && points < FEWEST_POINTS {
+                let few = format!("no points ({points} sparse points are too few for a surface)");
+                said.push(few);
                 continue;
             }
             match self.fit_to_all(kind, without) {
@@ -200,9 +207,10 @@ pub fn trials_text(trials: &[Trial]) -> String {
 mod tests {
     use super::*;
     use datasets::Options;
+    use tempfile::TempDir;
 
-    #[test]
-    fn few_photos_without_points_are_compared_before_a_plane_is_taken() {
+    /// A scene of five photos of a wall, without depth maps.
+    fn wall() -> (TempDir, Scene) {
         let options = Options {
             size: Some((64, 48)),
             views: Some(5),
@@ -213,12 +221,37 @@ mod tests {
         let made = datasets::by_name("wall", &options).unwrap();
         datasets::write(&made, &capture).unwrap();
         let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        for photo in &mut scene.photos {
+            photo.depth_map = None;
+        }
+        (folder, scene)
+    }
+
+    #[test]
+    fn points_that_nobody_else_saw_are_not_taken() {
+        let (_folder, mut scene) = wall();
+        let all_but =
+            |count: usize| -> BTreeSet<String> { scene.names().into_iter().skip(count).collect() };
+        let (others, but_two) = (all_but(1), all_but(2));
+        let fitted = scene.fit_best(&but_two).unwrap();
+        assert_eq!(fitted.proxy.kind(), "points");
+        // Of those that the photo left saw with others nothing is known without these.
+        let error = scene.fit_best(&others).unwrap_err().to_string();
+        assert!(error.contains("give the plane by hand"), "{error}");
+        scene.photos[0].depth_bounds = Some([2.0, 6.0]);
+        let fitted = scene.fit_best(&others).unwrap();
+        assert_eq!(fitted.proxy.kind(), "plane");
+        let note = fitted.note.unwrap();
+        let said = "; no points (0 sparse points are too few for a surface); no dense (";
+        assert!(note.contains(said), "{note}");
+    }
+
+    #[test]
+    fn few_photos_without_points_are_compared_before_a_plane_is_taken() {
+        let (_folder, mut scene) = wall();
         scene.reconstruction.points.clear();
         for image in scene.reconstruction.images.values_mut() {
             image.keypoints.clear();
-        }
-        for photo in &mut scene.photos {
-            photo.depth_map = None;
         }
 
         // 1. Photos that overlap.
