@@ -2,6 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::inputs::files_behind_scene;
+use super::interior::check_outside;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, compared};
 use super::output::say;
 use super::output::{print, print_json};
@@ -77,6 +78,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
     let output = args.output.as_deref();
     output.map_or(Ok(()), check_folder)?;
+    output.map_or(Ok(()), check_outside)?;
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
     // What cannot be compared is said at once: fitting a proxy may take long.

@@ -5,6 +5,7 @@ use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
 use super::frames::{Asked, NamedView};
 use super::inputs::files_behind_scene;
+use super::interior::check_outside;
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
 use super::output::{make_parent, print, write_file};
@@ -80,9 +81,10 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_extensions(args)?;
-    let mut scene = args.scene.open()?;
     let others = [&args.weights, &args.triangulation].into_iter().flatten();
-    let files = others.chain([&args.output]).map(PathBuf::as_path);
+    let files: Vec<&Path> = others.chain([&args.output]).map(PathBuf::as_path).collect();
+    files.iter().try_for_each(|file| check_outside(file))?;
+    let mut scene = args.scene.open()?;
     check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
     let mut without = args.hold_out.names(&scene)?;
     if args.without_view {

@@ -454,6 +454,26 @@ pub(super) fn check_holds_none(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Fails where something else, a file or a folder of files, is to be written into the folder of an interior that
+/// could be replaced, however far below: it could not be any more.
+pub(super) fn check_outside(path: &Path) -> anyhow::Result<()> {
+    let whole = std::path::absolute(path).ok();
+    // What is to be made, `house/film` or `../film`, lies in what is there.
+    let there = whole.and_then(|whole| whole.ancestors().find_map(|p| p.canonicalize().ok()));
+    let holder = there.and_then(|there| {
+        let holder = there.ancestors().find(|folder| is_ours(folder));
+        holder.map(Path::to_owned)
+    });
+    if let Some(holder) = holder {
+        bail!(
+            "{}: {} holds an interior, and what else lies there keeps it from being replaced; choose another -o",
+            path.display(),
+            holder.display()
+        );
+    }
+    Ok(())
+}
+
 /// Whether an interior is given to what opens others, too: a folder that holds one, or its file.
 pub(super) fn is_interior(given: &Path) -> bool {
     given.join(INTERIOR).is_file() || given.file_name().is_some_and(|name| name == INTERIOR)

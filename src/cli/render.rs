@@ -4,6 +4,7 @@ use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{Asked, NamedView, ViewArgs, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
+use super::interior::check_outside;
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
@@ -84,6 +85,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     args.nerfstudio.say_unused(read);
     let why_empty = asked.why_empty(args.nerfstudio.is_unplaced(read));
     check_folder(&args.output)?;
+    check_outside(&args.output)?;
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
     let without = args.hold_out.names(&scene)?;

@@ -5,7 +5,7 @@ use super::captured::{Opened, Photos};
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::ExposureArgs;
 use super::film::{Background, background};
-use super::interior::is_interior;
+use super::interior::{check_holds_none, is_interior};
 use super::made::{self, Made};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
@@ -82,6 +82,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--portals: unknown {:?}; expected {known}", args.portals);
         return Err(Usage(text).into());
     };
+    check_holds_none(&args.output)?;
     let given = &args.scene.scene;
     if args.hold_out.hold_out.is_some() && is_interior(given) {
         let text = "--hold-out: photos are held out of an interior when it is made; `lumigraph interior CAPTURE \

@@ -8,7 +8,7 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
-use super::interior::check_holds_none;
+use super::interior::{check_holds_none, check_outside};
 use super::made::{self, Made};
 use super::notes::Notes;
 use super::options::{cut, size};
@@ -158,6 +158,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     check_folder(&args.output)?;
     check_holds_none(&args.output)?;
+    check_outside(&args.output)?;
     args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");

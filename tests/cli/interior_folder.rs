@@ -1,7 +1,7 @@
 //! The folders that interiors are written into, however they are spelt.
 
 use crate::interior::{ROOMS, names, with_house};
-use crate::run::{files, lumigraph};
+use crate::run::{files, lumigraph, with_wall};
 use image::{Rgba, RgbaImage};
 use proxy::mesh::read_model;
 
@@ -66,6 +66,42 @@ fn a_generated_house_is_replaced_with_what_it_says_of_itself_and_nothing_of_ones
         "interior.json",
     ];
     assert_eq!(names(&house), expected);
+}
+
+#[test]
+fn nothing_else_is_written_into_an_interiors_folder() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "generate house --rooms 2 --triangles 1 -o house").ok();
+    let house = here.join("house");
+    let before = files(&house);
+    let render = "--proxy plane --path sweep --frames 1 --size 16x12";
+    let evaluate = "evaluate wall --proxy plane --size 16x12";
+    let field = "field wall --view 0000.png --proxy plane";
+    let walk = "--frames 1 --size 16x12";
+    for (from, line) in [
+        ("", format!("render wall {render} -o house")),
+        ("", format!("render wall {render} -o house/new/er")),
+        ("house", format!("render ../wall {render} -o .")),
+        ("", format!("{evaluate} -o house")),
+        ("", format!("{field} -o house/field.png")),
+        (
+            "",
+            format!("{field} -o field.png --weights house/field.npz"),
+        ),
+        ("", format!("walk house {walk} -o house/walk")),
+        ("house", format!("walk . {walk} -o ldi")),
+    ] {
+        let error = lumigraph(&here.join(from), &line).error(1);
+        let said = "house holds an interior, and what else lies there keeps it from being replaced; \
+                    choose another -o";
+        assert!(error.contains(said), "{line}: {error}");
+        assert!(files(&house) == before, "{line}");
+    }
+    // Beside it is room, also as seen from within.
+    lumigraph(&house, &format!("walk . {walk} -o ../walk")).ok();
+    assert!(files(&house) == before);
+    assert!(here.join("walk/frame_0000.png").exists());
 }
 
 #[cfg(unix)]
