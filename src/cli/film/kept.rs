@@ -1,12 +1,14 @@
 //! What `--resume` keeps beside a film's frames: what all of them are made of, and without.
 
-use super::super::output::write_file;
+use super::super::output::{make_parent, write_file};
 use super::super::stamp::{Stamp, changes, in_unicode, stamps};
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What the frames of a folder were made with.
 #[derive(Serialize, Deserialize)]
@@ -24,6 +26,26 @@ struct Plan {
 /// Where a run says what it makes.
 fn file_in(folder: &Path) -> PathBuf {
     folder.join("resume.json")
+}
+
+/// How often, and how far apart, a run tries to hold a folder: ten seconds together. Others hold it for as long as
+/// writing the plan and removing a film's frames takes.
+const TRIES: u32 = 1000;
+const BETWEEN: Duration = Duration::from_millis(10);
+
+/// Holds a folder, until what comes back is dropped or the process ends, against other runs that change its plan.
+/// `None` where that cannot be: systems and disks that lock no folders; another run that was stopped meanwhile. Then a
+/// change that another run makes at the same moment may be lost.
+fn hold(folder: &Path) -> Option<File> {
+    let folder = File::open(folder).ok()?;
+    for _ in 0..TRIES {
+        match folder.try_lock() {
+            Ok(()) => return Some(folder),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(BETWEEN),
+            Err(TryLockError::Error(_)) => return None,
+        }
+    }
+    None
 }
 
 impl Plan {
@@ -83,6 +105,8 @@ impl Plan {
 pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> anyhow::Result<()> {
     let file = file_in(folder);
     let own = Plan::own(inputs);
+    make_parent(&file)?;
+    let _held = hold(folder);
     match std::fs::read(&file) {
         Ok(bytes) => {
             let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
@@ -145,6 +169,7 @@ pub(super) fn leave_out(
     own: &[PathBuf],
     all: &[PathBuf],
 ) -> anyhow::Result<()> {
+    let _held = hold(folder);
     let mut plan = Plan::of(folder)?;
     let known = plan.left_out.len();
     plan.left_out.extend(damaged.clone());
@@ -168,4 +193,29 @@ pub(super) fn remove(frames: &[PathBuf]) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+
+    #[test]
+    fn what_several_runs_find_at_once_is_all_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        begin(folder.path(), &[], &[]).unwrap();
+        let names: Vec<String> = (0..8).map(|i| format!("{i}.png")).collect();
+        let start = Barrier::new(names.len());
+        std::thread::scope(|scope| {
+            for name in &names {
+                let (start, folder) = (&start, folder.path());
+                scope.spawn(move || {
+                    let damaged = BTreeMap::from([(name.clone(), "cut short".to_owned())]);
+                    start.wait();
+                    leave_out(&damaged, folder, &[], &[]).unwrap();
+                });
+            }
+        });
+        assert!(left_out(folder.path()).unwrap().keys().eq(&names));
+    }
 }
