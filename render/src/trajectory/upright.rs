@@ -37,7 +37,11 @@ const MOST_LEAN: f64 = 0.577;
 const STEEP: f64 = 0.25;
 /// How much more it counts that a direction is the vertical of a photo, however that was turned, than that
 /// it is turned as most are.
-const CLEAR: usize = 3;
+const CLEAR: f64 = 3.0;
+/// Where photos that stand look so many ways, those that look straight down count with them. It is 0 of what looks
+/// along one line and 1/2 of what looks all around; this of an arc of some 105°. Of level photos ahead and
+/// aside those ahead would else be taken to look down, and those aside to be turned.
+const MANY_WAYS: f64 = 0.35;
 /// How much photos' ups count for the vertical, compared with what lies level in them: of photos that look down
 /// at something the ups lean towards it, all of them where they were not taken from all around.
 const UPS: f64 = 0.01;
@@ -55,7 +59,8 @@ const DOWNWARD: f64 = 0.05;
 /// Most photos decide which way that is. Where they stand alike nothing is turned, whichever way they do; nor
 /// where no way is that of half of them, as from above, heading in all directions. Whether the world's
 /// axes are turned, and in which order photos come, makes no difference; but of two halves that nothing else tells
-/// apart, that of the photo in the middle stands, or of the first of two there.
+/// apart, that of the photo in the middle stands, or of the first of two there. Beside photos from all around that
+/// share a vertical those that look straight down change nothing, however many they are.
 pub fn upright(views: &[&View]) -> Standing {
     let vertical = shared_vertical(views);
     let stand = |view: &&View| {
@@ -83,7 +88,7 @@ pub fn upright(views: &[&View]) -> Standing {
 fn quarters(rotation: DQuat, up: DVec3) -> Option<u8> {
     let up_in_camera = rotation * up;
     let (above, aside) = (-up_in_camera.y, up_in_camera.x);
-    if above.hypot(aside) < STEEP {
+    if is_steep(up_in_camera) {
         None
     } else if aside.abs() <= MOST_LEAN * above.abs() {
         Some(if above > 0.0 { 0 } else { 2 })
@@ -92,6 +97,23 @@ fn quarters(rotation: DQuat, up: DVec3) -> Option<u8> {
     } else {
         None
     }
+}
+
+/// Whether a photo with up there in its camera's frame looks straight up or down.
+fn is_steep(up_in_camera: DVec3) -> bool {
+    up_in_camera.x.hypot(up_in_camera.y) < STEEP
+}
+
+fn looks_down(rotation: DQuat, up: DVec3) -> bool {
+    let up_in_camera = rotation * up;
+    is_steep(up_in_camera) && up_in_camera.z < 0.0
+}
+
+/// The sum of r rᵀ over right axes of photos.
+fn squares(rights: impl Iterator<Item = DVec3>) -> DMat3 {
+    rights.fold(DMat3::ZERO, |sum, r| {
+        sum + DMat3::from_cols(r * r.x, r * r.y, r * r.z)
+    })
 }
 
 /// A camera turned about its optical axis, from x towards y.
@@ -107,15 +129,33 @@ struct Vote {
     up: DVec3,
     /// How many are upright once turned by so many quarters.
     by_quarters: [usize; 4],
+    /// How many look straight down; none where those that stand do not look [`MANY_WAYS`].
+    down: usize,
 }
 
 impl Vote {
     fn new(rotations: &[DQuat], up: DVec3) -> Self {
         let mut by_quarters = [0; 4];
-        for turn in rotations.iter().filter_map(|q| quarters(*q, up)) {
-            by_quarters[usize::from(turn)] += 1;
+        let mut rights = Vec::with_capacity(rotations.len());
+        for &rotation in rotations {
+            if let Some(turn) = quarters(rotation, up) {
+                by_quarters[usize::from(turn)] += 1;
+                rights.push(turned(rotation, turn).conjugate() * DVec3::X);
+            }
         }
-        Self { up, by_quarters }
+        // One less what its eigenvalues' squares sum to: of unit length, the axes have 1 in all.
+        let count = rights.len() as f64;
+        let shares = squares(rights.into_iter())
+            .to_cols_array()
+            .map(|x| x / count);
+        let ways = 1.0 - shares.iter().map(|x| x * x).sum::<f64>();
+        let down = rotations.iter().filter(|q| looks_down(**q, up)).count();
+        Self {
+            up,
+            by_quarters,
+            // Not a number without any that stand.
+            down: if ways >= MANY_WAYS { down } else { 0 },
+        }
     }
 
     /// How many photos stand clearly one way or another.
@@ -123,8 +163,20 @@ impl Vote {
         self.by_quarters.iter().sum()
     }
 
+    /// How many it is the vertical of.
+    fn explained(&self) -> usize {
+        self.clear() + self.down
+    }
+
     fn most(&self) -> usize {
         self.by_quarters.iter().fold(0, |most, n| most.max(*n))
+    }
+
+    /// How much it says of the photos. Of those that look down as large a part is taken to stand as most do
+    /// as of the others.
+    fn score(&self) -> f64 {
+        let explained = self.explained() as f64;
+        CLEAR * explained + explained * self.most() as f64 / self.clear().max(1) as f64
     }
 
     /// Whether as many stand upright as any other way.
@@ -135,7 +187,7 @@ impl Vote {
     /// Whether it says more of the photos than another; of two that say as much photos look down, not
     /// up, in the better.
     fn is_better(&self, other: &Self, ahead: DVec3) -> bool {
-        let score = |vote: &Self| (CLEAR * vote.clear() + vote.most(), vote.is_upright());
+        let score = |vote: &Self| (vote.score(), vote.is_upright());
         score(self) > score(other)
             || score(self) == score(other) && ahead.dot(self.up) < ahead.dot(other.up) - DOWNWARD
     }
@@ -173,8 +225,9 @@ fn shared_vertical(views: &[&View]) -> Option<DVec3> {
         }
     }
     let is_shared = |vote: &Vote| {
-        let clear = vote.clear();
-        vote.is_upright() && 2 * vote.by_quarters[0] >= clear && 2 * clear >= views.len()
+        vote.is_upright()
+            && 2 * vote.by_quarters[0] >= vote.clear()
+            && 2 * vote.explained() >= views.len()
     };
     best.filter(is_shared).map(|vote| vote.up)
 }
@@ -227,21 +280,20 @@ fn settled(rotations: &[DQuat], guess: DVec3) -> DVec3 {
 /// minimises Σ (rᵢ·u)² + λ|u|² − 2λ Σ uᵢ·u, with their right axes rᵢ and ups uᵢ. Those of a ring from high
 /// above lean towards its middle by as much, so that the mean of ups would be no vertical of a part of it.
 fn fitted(rotations: &[DQuat], guess: DVec3) -> Option<DVec3> {
-    let (mut level, mut ups, mut count) = (DMat3::ZERO, DVec3::ZERO, 0.0);
+    let (mut rights, mut ups) = (Vec::with_capacity(rotations.len()), DVec3::ZERO);
     for &rotation in rotations {
         let Some(turn) = quarters(rotation, guess) else {
             continue;
         };
         let world_from_camera = turned(rotation, turn).conjugate();
-        let right = world_from_camera * DVec3::X;
-        level += DMat3::from_cols(right * right.x, right * right.y, right * right.z);
+        rights.push(world_from_camera * DVec3::X);
         ups += world_from_camera * DVec3::NEG_Y;
-        count += 1.0;
     }
-    if !(count > 0.0) {
+    if rights.is_empty() {
         return None;
     }
-    let sum = level + DMat3::IDENTITY * (UPS * count);
+    let count = rights.len() as f64;
+    let sum = squares(rights.into_iter()) + DMat3::IDENTITY * (UPS * count);
     (sum.inverse() * ups).try_normalize()
 }
 
@@ -432,5 +484,57 @@ mod tests {
             views.push(view(Rigid3::looking_at(DVec3::NEG_Y, DVec3::ZERO, up)));
         }
         assert_eq!(all(&views), unturned(&views));
+    }
+
+    /// Straight down, in so many headings by turns, not quite held.
+    fn straight_down(count: usize, headings: usize) -> Vec<View> {
+        let pose = |i: usize| {
+            let center = DVec3::new((i % 6) as f64 - 2.5, -5.0, (i / 6) as f64 - 2.5);
+            let heading = TAU * (i % headings) as f64 / headings as f64;
+            let heading = heading + 0.05 * (7.0 * i as f64).sin();
+            let up = DVec3::new(heading.cos(), 0.0, heading.sin());
+            Rigid3::looking_at(center, center - DVec3::NEG_Y, up)
+        };
+        (0..count).map(|i| view(pose(i))).collect()
+    }
+
+    #[test]
+    fn photos_straight_down_overrule_no_vertical() {
+        for elevation in [0.2, 0.5, 1.0] {
+            for count in [6, 24, 36] {
+                for headings in [1, 2, 4] {
+                    let mut straight = ring(24, elevation, TAU);
+                    straight.extend(straight_down(count, headings));
+                    let mut rolled = straight.clone();
+                    roll(&mut rolled, (0..24).step_by(5), 1);
+                    for views in [&straight, &rolled] {
+                        let found = upright(&views.iter().collect::<Vec<_>>());
+                        let what = format!("{elevation} {count} {headings}");
+                        let off = found.up.unwrap().angle_between(DVec3::NEG_Y);
+                        assert!(off.to_degrees() < 0.1, "{what}: {off}");
+                        assert_alike(&found.photos, &straight, &what);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Ahead, and more than half as many to the side with the camera turned: those ahead look straight down as far
+    /// as these tell.
+    #[test]
+    fn what_looks_one_way_is_not_taken_to_look_down() {
+        for (ahead, aside) in [(8, 7), (6, 4)] {
+            let pose = |i: usize| {
+                let center = DVec3::Z * i as f64;
+                Rigid3::looking_at(center, center + DVec3::X, DVec3::NEG_Y)
+            };
+            let mut straight = row(ahead);
+            straight.extend((0..aside).map(|i| view(pose(i))));
+            for quarters in [1, 3] {
+                let mut views = straight.clone();
+                roll(&mut views, ahead..ahead + aside, quarters);
+                assert_alike(&all(&views), &straight, &format!("{ahead} {quarters}"));
+            }
+        }
     }
 }
