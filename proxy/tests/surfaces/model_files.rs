@@ -517,6 +517,44 @@ fn a_texture_is_told_to_be_moved_only_where_it_would_be() {
     assert_eq!(warnings_of("EXT_other", json!({})), [said]);
 }
 
+#[test]
+fn extensions_that_are_not_known_may_hold_anything() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let anything = [
+        json!(true),
+        json!(null),
+        json!([1]),
+        json!({"offset": 1, "rotation": [0, 0, 0, 1], "scale": 2.0, "texCoord": "second"}),
+        json!({"diffuseFactor": 1, "diffuseTexture": "a.png", "emissiveStrength": [1]}),
+    ];
+    for extension in anything {
+        let warnings_of = |change: fn(&mut Value, Value)| {
+            let changed = with_materials(&bytes, |materials| {
+                change(&mut materials[0], extension.clone());
+            });
+            read(&changed).unwrap().1
+        };
+        let of_texture = warnings_of(|material, extension| {
+            let texture = &mut material["pbrMetallicRoughness"]["baseColorTexture"];
+            texture["extensions"] = json!({"EXT_other": extension});
+        });
+        assert_eq!(of_texture, ["texture 0: EXT_other is not applied"]);
+        let of_material = warnings_of(|material, extension| {
+            material["extensions"] = json!({"EXT_other": extension});
+        });
+        assert_eq!(of_material.len(), 1, "{of_material:?}");
+        assert!(of_material[0].starts_with("EXT_other is not applied (1 material: "));
+        // Told, too, where it is not what was expected; one without anything of a transform moves nothing.
+        let of_transform = warnings_of(|material, extension| {
+            let texture = &mut material["pbrMetallicRoughness"]["baseColorTexture"];
+            texture["extensions"] = json!({"KHR_texture_transform": extension});
+        });
+        let said = "texture 0: KHR_texture_transform is not applied";
+        let moves_nothing = extension.get("diffuseFactor").is_some();
+        assert_eq!(of_transform.iter().any(|w| w == said), !moves_nothing);
+    }
+}
+
 /// How the file names its picture's bytes.
 fn small_view(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);

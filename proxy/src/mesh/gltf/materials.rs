@@ -3,6 +3,8 @@
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::obj::shown;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// A material of the file.
@@ -20,7 +22,7 @@ pub(super) struct MaterialEntry {
     emissive_factor: [f64; 3],
     emissive_texture: Option<TextureUse>,
     #[serde(default)]
-    extensions: BTreeMap<String, Extension>,
+    extensions: Extensions,
 }
 
 #[derive(Default, Deserialize)]
@@ -40,12 +42,30 @@ enum AlphaMode {
     Opaque,
 }
 
-/// An extension of a material: what [`GLOSSINESS`] and [`STRENGTH`] have for looks, all else passed over.
+/// The extensions of a material.
+#[derive(Default, Deserialize)]
+struct Extensions {
+    /// Its diffuse colour stands in place of the base colour.
+    #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
+    glossiness: Option<Glossiness>,
+    /// Multiplies what shines.
+    #[serde(rename = "KHR_materials_emissive_strength")]
+    strength: Option<Strength>,
+    /// All others, by name, whatever they hold.
+    #[serde(flatten)]
+    other: BTreeMap<String, IgnoredAny>,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Extension {
+struct Glossiness {
     diffuse_factor: Option<[f64; 4]>,
     diffuse_texture: Option<TextureUse>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Strength {
     emissive_strength: Option<f64>,
 }
 
@@ -56,14 +76,15 @@ pub(super) struct TextureUse {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: u32,
+    /// By name, whatever they hold.
     #[serde(default)]
-    extensions: BTreeMap<String, TextureExtension>,
+    extensions: BTreeMap<String, Value>,
 }
 
-/// An extension of a texture's use: what [`TRANSFORM`] has, all else passed over.
-#[derive(Clone, Deserialize)]
+/// What [`TRANSFORM`] holds.
+#[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct TextureExtension {
+struct Transform {
     offset: Option<[f64; 2]>,
     rotation: Option<f64>,
     scale: Option<[f64; 2]>,
@@ -78,14 +99,16 @@ impl TextureUse {
     pub(super) fn not_applied(&self) -> impl Iterator<Item = &str> {
         let tex_coord = self.tex_coord;
         self.extensions.iter().filter_map(move |(name, extension)| {
-            let is_lost = name != TRANSFORM || extension.moves(tex_coord);
+            let transform = Transform::deserialize(extension);
+            let is_still = transform.is_ok_and(|transform| !transform.moves(tex_coord));
+            let is_lost = name != TRANSFORM || !is_still;
             is_lost.then_some(name.as_str())
         })
     }
 }
 
-impl TextureExtension {
-    /// Whether, as a transform, it changes anything of a texture that has these coordinates without it.
+impl Transform {
+    /// Whether it changes anything of a texture that has these coordinates without it.
     fn moves(&self, tex_coord: u32) -> bool {
         self.offset.unwrap_or([0.0; 2]) != [0.0; 2]
             || self.rotation.unwrap_or(0.0) != 0.0
@@ -94,22 +117,14 @@ impl TextureExtension {
     }
 }
 
-/// The extension whose diffuse colour stands in place of the base colour.
-const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
-
-/// The extension that multiplies what shines.
-const STRENGTH: &str = "KHR_materials_emissive_strength";
-
 /// The extension of what has its base colour in any light, and shines with nothing else.
 const UNLIT: &str = "KHR_materials_unlit";
 
-/// Extensions that leave colour and opacity without light as they are, and what is read.
-const NO_LOSS: [&str; 12] = [
-    GLOSSINESS,
+/// Other extensions that leave colour and opacity without light as they are.
+const NO_LOSS: [&str; 10] = [
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
-    STRENGTH,
     "KHR_materials_ior",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
@@ -124,8 +139,8 @@ const NO_LOSS: [&str; 12] = [
 const LEAST_ALPHA: f64 = 0.5 / 255.0;
 
 impl MaterialEntry {
-    fn glossiness(&self) -> Option<&Extension> {
-        self.extensions.get(GLOSSINESS)
+    fn glossiness(&self) -> Option<&Glossiness> {
+        self.extensions.glossiness.as_ref()
     }
 
     fn base_factor(&self) -> Option<[f64; 4]> {
@@ -137,7 +152,7 @@ impl MaterialEntry {
 
     /// What it shines with by itself, linear; no part is more than 1, but the hue is the file's.
     fn emission(&self) -> [f64; 3] {
-        let strength = self.extensions.get(STRENGTH);
+        let strength = self.extensions.strength.as_ref();
         let strength = strength.and_then(|s| s.emissive_strength).unwrap_or(1.0);
         let light = self
             .emissive_factor
@@ -147,7 +162,7 @@ impl MaterialEntry {
     }
 
     fn shines(&self) -> bool {
-        !is_black(self.emission()) && !self.extensions.contains_key(UNLIT)
+        !is_black(self.emission()) && !self.extensions.other.contains_key(UNLIT)
     }
 
     /// Whether what it shines with stands in place of its base colour, which is black.
@@ -245,7 +260,7 @@ pub(super) fn not_shown(
         if material.shines() && !material.shows_emission() {
             shining.push(*number);
         }
-        let names = material.extensions.keys().map(String::as_str);
+        let names = material.extensions.other.keys().map(String::as_str);
         for name in names.filter(|name| !NO_LOSS.contains(name)) {
             extended.entry(name).or_default().push(*number);
         }
