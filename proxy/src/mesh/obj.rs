@@ -13,9 +13,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     // The greatest index so far and the line that has it: corners may follow their faces.
     let mut greatest = (0, 0);
     let mut fans = Fans::default();
-    // Old Macs end lines with a return alone.
-    let line_end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-    for (number, line) in bytes.split(|b| *b == line_end).enumerate() {
+    for (number, line) in lines(bytes).enumerate() {
         let line_number = number + 1;
         let failed = |problem: String| MeshFileError::Line {
             path: path.to_owned(),
@@ -84,6 +82,13 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     }
     fans.mend(&mut mesh);
     Ok(mesh)
+}
+
+/// Lines that end in a new line, in a return and a new line, or, as old Macs write them, in a return alone.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let lines = bytes.split(|b| *b == b'\n');
+    let lines = lines.map(|line| line.strip_suffix(b"\r").unwrap_or(line));
+    lines.flat_map(|line| line.split(|b| *b == b'\r'))
 }
 
 /// The corner that `7`, `7/1`, `7//3`, `7/1/3` or `-1` names, from 0.

@@ -433,6 +433,26 @@ fn obj_lines_may_end_as_on_any_computer() {
             "a.obj, line 4: a face uses corner 4, but the file has 3; is it cut off?"
         );
     }
+    // One way and another in one file.
+    let old = text.replace('\n', "\r");
+    for mixed in [
+        format!("# made\n{old}"),
+        format!("# made\r\n{old}\r\n"),
+        format!("{old}\n"),
+        text.replacen('\n', "\r", 2),
+        text.replacen('\n', "\r\n", 2),
+    ] {
+        assert_eq!(
+            parse("a.obj", mixed.clone()).unwrap(),
+            expected,
+            "{mixed:?}"
+        );
+    }
+    let bad = format!("# made\n{}\r\n", old.replace("f 1 2 3", "f 1 2 4"));
+    assert_eq!(
+        message("a.obj", bad),
+        "a.obj, line 5: a face uses corner 4, but the file has 3; is it cut off?"
+    );
 }
 
 /// An L of area 5, at a slant and far from the origin; and a square with a hole, joined to its outline.
