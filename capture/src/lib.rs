@@ -7,6 +7,7 @@
 //! follow by the ratio of the sizes alone.
 
 mod alike;
+mod argument;
 mod beside;
 mod decode;
 mod error;
@@ -24,6 +25,7 @@ mod warp;
 mod write;
 
 pub use alike::{name_key, stem_key};
+pub use argument::as_argument;
 pub use beside::{
     Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_depth_steps,
     decode_mask, is_black_and_white, is_in_alpha, match_by_name, match_jpegs_by_name,

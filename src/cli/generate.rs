@@ -6,6 +6,7 @@ use super::options::size;
 use super::output::{print, say};
 use super::session::spinner;
 use anyhow::Context;
+use capture::as_argument;
 use datasets::house::{self, HouseOptions};
 use datasets::{DEPTH_STEPS_PER_UNIT, DatasetError, Options, Written};
 use std::path::{Path, PathBuf};
@@ -99,7 +100,7 @@ fn survey(args: &Args, interior: &Path, options: &Options) -> anyhow::Result<Wri
     let (written, depth_steps) = written.with_context(named)?;
     let written = written?;
     if depth_steps != DEPTH_STEPS_PER_UNIT {
-        let (step, folder) = (1.0 / depth_steps, args.output.display());
+        let (step, folder) = (1.0 / depth_steps, as_argument(&args.output));
         say!(
             "note: a step of its depth maps is {step} world units, as eyes are {} over the floor: \
              `lumigraph import {folder} --depth-scale {step}` reads them",

@@ -9,6 +9,7 @@ use super::output::{print, say};
 use super::session::spinner;
 use anyhow::{Context, bail};
 use calibrate::colmap;
+use capture::as_argument;
 use datasets::in_new_folder;
 use glam::DVec3;
 use image::ImageFormat;
@@ -434,9 +435,10 @@ pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
         is_capture || Scene::is_scene(given)
     };
     if is_file || (given.join(INTERIOR).is_file() && !holds_photos()) {
+        let argument = as_argument(given);
         let given = given.display();
         bail!(
-            "{given}: this is an interior, not photos; `lumigraph walk {given} -o FRAMES` is for it"
+            "{given}: this is an interior, not photos; `lumigraph walk {argument} -o FRAMES` is for it"
         );
     }
     Ok(())

@@ -5,6 +5,7 @@ use super::damaged::leave_out;
 use super::output::say;
 use super::session::spinner;
 use anyhow::Context;
+use capture::as_argument;
 use clap::Args;
 use glam::DVec3;
 use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trials_text};
@@ -107,7 +108,8 @@ impl ProxyArgs {
             Some("auto") => fitted(None),
             Some(name) if let Some(kind) = Kind::from_name(name) => fitted(Some(kind)),
             Some(file) if is_proxy_file(file) && !Path::new(file).exists() => Err(Usage(format!(
-                "--proxy {file}: there is no such file; `lumigraph proxy SCENE KIND -o {file}` makes one"
+                "--proxy {file}: there is no such file; `lumigraph proxy SCENE KIND -o {}` makes one",
+                as_argument(Path::new(file))
             ))
             .into()),
             Some(file) if is_proxy_file(file) => {

@@ -1,4 +1,5 @@
 use super::damaged::damaged_text;
+use capture::as_argument;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
@@ -12,7 +13,7 @@ pub enum SceneError {
     /// There is no calibration at all.
     #[error(
         "{source}; or have the photos calibrated: `lumigraph import {} -o SCENE` runs COLMAP",
-        folder.display()
+        as_argument(folder)
     )]
     Uncalibrated {
         /// The capture.

@@ -3,6 +3,7 @@
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::calibration::Source;
 use super::{Scene, Warning};
+use capture::as_argument;
 use std::path::{Path, PathBuf};
 
 /// Photos beside a model's folder.
@@ -44,7 +45,7 @@ pub(super) fn note_of_home(source: &Source, capture: &Path, home: &Path) -> Opti
             "{} lies beside photos in {}, and may be of those: `lumigraph import {}` takes them",
             source.text(),
             own.join(IMAGES).display(),
-            own.display()
+            as_argument(own)
         ))
     })
 }

@@ -2,6 +2,7 @@
 
 use super::beside::{MASKS_FOLDER, MASKS_JUDGED, USED};
 use super::{Photo, Scene, Warning};
+use capture::as_argument;
 use image::GrayImage;
 use std::path::{Path, PathBuf};
 
@@ -39,11 +40,12 @@ impl Scene {
                 return;
             }
             let folder = self.masks_folder();
+            let argument = as_argument(&folder);
             let folder = folder.display();
             format!(
                 "the masks in {folder} keep less than half of each photo, as an object's \
-                 silhouettes do, and serve the hull only; --mattes {folder} cuts the photos \
-                 out along them, --masks {folder} ignores all else"
+                 silhouettes do, and serve the hull only; --mattes {argument} cuts the photos \
+                 out along them, --masks {argument} ignores all else"
             )
         };
         warnings.push(Warning::Note(note));

@@ -4,7 +4,9 @@ use super::home::IMAGES;
 use super::import::ENOUGH;
 use super::{Photo, Scene, Warning};
 use calibrate::Reconstruction;
-use capture::{CaptureError, Matched, PhotoFile, PhotoSet, name_key, photo_size, stem_key};
+use capture::{
+    CaptureError, Matched, PhotoFile, PhotoSet, as_argument, name_key, photo_size, stem_key,
+};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -217,17 +219,18 @@ fn way_there(
     calibration: &Path,
 ) -> String {
     let folder = found.root.join(folder);
-    let folder = folder.display();
-    let calibration = calibration.display();
     // What lies beside the photos is found again only where they are called so.
     let rename = if found.root == home {
-        format!("rename {folder} to {}, or ", home.join(IMAGES).display())
+        let images = home.join(IMAGES);
+        format!("rename {} to {}, or ", folder.display(), images.display())
     } else {
         String::new()
     };
     format!(
-        "called so in another folder, as {count} of {total} are: {rename}`lumigraph import {folder} \
-         --calibration {calibration} -o SCENE`"
+        "called so in another folder, as {count} of {total} are: {rename}`lumigraph import {} \
+         --calibration {} -o SCENE`",
+        as_argument(&folder),
+        as_argument(calibration)
     )
 }
 

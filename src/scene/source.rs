@@ -4,6 +4,7 @@ use super::{ImportOptions, SceneError, Warning};
 use calibrate::colmap::{self, ColmapError, SubModel};
 use calibrate::formats::{self, Format, FormatError};
 use calibrate::opencv::{self, Keys};
+use capture::as_argument;
 use std::path::{Path, PathBuf};
 
 /// Where a calibration is, and whose.
@@ -208,7 +209,10 @@ fn others_text(source: &Source, others: &[Source]) -> Option<String> {
     let paths: Vec<String> = paths.collect();
     let change = match &paths[..] {
         [] => return None,
-        [other] => format!("for that in {other} say --calibration {other}"),
+        [path] => {
+            let argument = as_argument(others[0].path());
+            format!("for that in {path} say --calibration {argument}")
+        }
         _ => format!("--calibration takes another: {}", some_of(paths)),
     };
     let lacks_points = matches!(

@@ -135,6 +135,14 @@ fn photos_in_a_folder_of_another_name_are_told_how_to_be_found() {
     fs::rename(captures.at("wall/all"), captures.at("wall/images/all")).unwrap();
     let said = "as 2 of 3 are: `lumigraph import wall/images/all --calibration";
     assert!(error().contains(said), "{}", error());
+    // As a shell takes it.
+    fs::rename(
+        captures.at("wall/images/all"),
+        captures.at("wall/images/cam 1"),
+    )
+    .unwrap();
+    let said = "`lumigraph import 'wall/images/cam 1' --calibration wall/sparse/0 -o SCENE`";
+    assert!(error().contains(said), "{}", error());
 
     // Of two folders nobody knows which is meant.
     captures.photos("wall/images/small", &names[..2], SIZE);

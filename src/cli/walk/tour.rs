@@ -5,6 +5,7 @@ use super::super::output::{make_parent, say};
 use super::{Args, FPS};
 use anyhow::{Context, bail};
 use calibrate::{Camera, Lens};
+use capture::as_argument;
 use glam::DVec2;
 use proxy::interior::{CellId, Interior};
 use render::CameraPath;
@@ -56,10 +57,11 @@ pub(super) fn plan(args: &Args, opened: &Opened) -> anyhow::Result<CameraPath> {
 /// a file.
 fn check(file: &Path, tour: &CameraPath) -> anyhow::Result<()> {
     if file.exists() && !may_be_replaced(file, tour) {
+        let argument = as_argument(file);
         let file = file.display();
         bail!(
             "{file}: this is no tour that a walk wrote, and the tour would take its place; walk \
-             it with --path {file}, or choose another -o"
+             it with --path {argument}, or choose another -o"
         );
     }
     Ok(())
