@@ -112,6 +112,43 @@ fn another_storey_is_told() {
     }
 }
 
+/// A room of 10 × 8 m under a flat ceiling, and so high a loft over that.
+fn under_a_roof(ridge: f64) -> Mesh {
+    let size = DVec3::new(10.0, 2.5, 8.0);
+    let mut mesh = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    for eaves in [0.0, 8.0] {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([
+            DVec3::new(0.0, 2.6, eaves),
+            DVec3::new(10.0, 2.6, eaves),
+            DVec3::new(10.0, 2.6 + ridge, 4.0),
+            DVec3::new(0.0, 2.6 + ridge, 4.0),
+        ]);
+        let triangles = [[0, 1, 2], [0, 2, 3]];
+        mesh.triangles
+            .extend(triangles.map(|t| t.map(|i| first + i)));
+    }
+    mesh
+}
+
+#[test]
+fn a_closed_loft_is_no_storey() {
+    for ridge in [2.2, 2.6, 3.2] {
+        let found = find(&under_a_roof(ridge), &FindOptions::default()).unwrap();
+        assert_eq!(found.warnings, [], "{ridge}");
+        assert_eq!(found.interior.cells.len(), 1, "{ridge}");
+    }
+    // With a ceiling below the ridge it is one.
+    let mut mesh = under_a_roof(3.2);
+    let [min, max] = [DVec3::new(0.0, 2.6, 2.5), DVec3::new(10.0, 4.6, 5.5)];
+    mesh.append(&open_box(min, max, &[3]));
+    let found = find(&mesh, &FindOptions::default()).unwrap();
+    let [InteriorWarning::Storey(height)] = found.warnings[..] else {
+        panic!("{:?}", found.warnings);
+    };
+    assert!((height - 2.5).abs() < 0.1, "{height}");
+}
+
 #[test]
 fn a_house_that_may_lie_on_its_side_is_told() {
     // Z is up, as it is to some programs.

@@ -6,14 +6,26 @@ use std::collections::BTreeMap;
 /// A storey has so much room over its floor, on this area at least, at about the same heights; metres, square metres.
 const HEADROOM: f64 = 1.9;
 const LEAST_AREA: f64 = 4.0;
+/// And on so much of what has that floor and anything over it. A loft has ceilings at all heights: of a pitched
+/// roof one of 0.05 to 0.13 is at about the same.
+const LEAST_SHARE: f64 = 0.2;
 
 /// How high over the floor the next storey's is, in metres, if there is one with a ceiling within reach.
 pub(super) fn floor_above(columns: &Columns) -> Option<f64> {
-    // 1. Surfaces over this storey with nothing between them, by bins, and how many squares have them.
+    // 1. Surfaces over this storey with nothing between them, by bins, and how many squares have them; and how many
+    //    have anything over surface at a bin, or the next.
     let over = band([LEAST_CEILING, f64::INFINITY]);
     let apart = (HEADROOM / BIN).round() as u32;
     let mut counts: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+    let mut covered = [0_usize; u128::BITS as usize];
     for taken in &columns.taken {
+        let mut about = (taken | taken << 1 | taken >> 1) & over;
+        while about != 0 {
+            let floor = about.trailing_zeros();
+            about &= about - 1;
+            let above = taken.checked_shr(floor + 2).unwrap_or(0);
+            covered[floor as usize] += usize::from(above != 0);
+        }
         let mut left = taken & over;
         while left != 0 {
             let floor = left.trailing_zeros();
@@ -30,9 +42,12 @@ pub(super) fn floor_above(columns: &Columns) -> Option<f64> {
         let counts = counts.iter().filter(|(bins, _)| near(bins));
         counts.map(|(_, count)| count).sum()
     };
-    let best = counts.iter().max_by_key(|(bins, n)| (around(**bins), **n));
-    let area = |bins: [u32; 2]| around(bins) as f64 * columns.step_m * columns.step_m;
-    let ([floor, ceiling], _) = best?;
-    let is_there = area([*floor, *ceiling]) >= LEAST_AREA;
-    is_there.then(|| height_of(*floor as usize) + 0.5 * BIN)
+    let is_there = |bins: [u32; 2]| {
+        let count = around(bins) as f64;
+        let area = count * columns.step_m * columns.step_m;
+        area >= LEAST_AREA && count >= LEAST_SHARE * covered[bins[0] as usize] as f64
+    };
+    let there = counts.iter().filter(|(bins, _)| is_there(**bins));
+    let best = there.max_by_key(|(bins, n)| (around(**bins), **n));
+    best.map(|([floor, _], _)| height_of(*floor as usize) + 0.5 * BIN)
 }
