@@ -163,6 +163,33 @@ fn a_house_that_may_lie_on_its_side_is_told() {
         ..FindOptions::default()
     };
     assert_eq!(find(&room, &options).unwrap().warnings, []);
+    // With a wall in the middle, which would be as high as a ceiling.
+    let size = DVec3::new(12.0, 6.0, 2.5);
+    let mut rooms = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let [min, max] = [size.with_y(2.9).with_x(0.0).with_z(0.0), size.with_y(3.1)];
+    rooms.append(&open_box(min, max, &[2, 3]));
+    let found = find(&rooms, &FindOptions::default()).unwrap();
+    assert!(found.warnings.contains(&told), "{:?}", found.warnings);
+}
+
+#[test]
+fn corridors_and_narrow_houses_are_not_said_to_lie_on_their_side() {
+    for size in [[2.0, 3.0, 20.0], [2.4, 3.2, 20.0]] {
+        let size = DVec3::from_array(size);
+        let corridor = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+        let found = find(&corridor, &FindOptions::default()).unwrap();
+        assert_eq!(found.warnings, [], "{size}");
+    }
+    // Between two others, of three storeys.
+    let size = DVec3::new(5.0, 8.1, 12.0);
+    let mut house = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    for floor in [2.7, 5.4] {
+        let min = DVec3::new(0.0, floor - 0.2, 0.0);
+        house.append(&open_box(min, size.with_y(floor), &[2, 3]));
+    }
+    let found = find(&house, &FindOptions::default()).unwrap();
+    let is_side = |warning: &InteriorWarning| matches!(warning, InteriorWarning::OnItsSide(_));
+    assert!(!found.warnings.iter().any(is_side), "{:?}", found.warnings);
 }
 
 #[test]

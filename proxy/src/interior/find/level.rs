@@ -1,5 +1,6 @@
 //! Which way is up, how high the floor is, and which way walls run.
 
+use super::columns::LEAST_CEILING;
 use super::{Evidence, FindError, FindOptions};
 use glam::{DMat3, DVec2, DVec3};
 
@@ -52,8 +53,16 @@ const NEAR: f64 = 8.0;
 /// A direction that a file format or cameras say is right if this much lies across it,
 /// compared with the best.
 const TRUST: f64 = 0.4;
-/// Where the best has so many times as much, it is told.
+/// Where the best has so many times as much, it is told, if rooms would not be as high as most; if they would
+/// be either way, from so much on. Corridors and narrow houses have more wall than floor, too.
 const DOUBT: f64 = 1.3;
+const FAR_BETTER: f64 = 2.0;
+/// Most rooms are no higher; metres.
+const USUAL: f64 = 3.65;
+/// Planes with so much of what the fullest bin has may be a floor and a ceiling.
+const FULL: f64 = 0.25;
+/// Heights of planes that are compared are kept in bins of this; metres.
+const BIN: f64 = 0.1;
 
 /// Directions this near to an axis of the world are that axis; radians.
 const SAME_AXIS: f64 = 0.003;
@@ -69,7 +78,8 @@ fn as_world_axis(direction: DVec3) -> DVec3 {
 /// A storey's frame, and what speaks against it.
 pub(super) struct Estimate {
     pub(super) level: Level,
-    /// A direction that far more lies across, where up is taken to be y for no other reason than habit.
+    /// A direction that far more lies across, where up is taken to be y for no other reason than habit, and rooms
+    /// would not be as high as most or far more may be floor.
     pub(super) rival: Option<DVec3>,
 }
 
@@ -131,7 +141,7 @@ fn refined(facets: &[Facet], direction: DVec3) -> DVec3 {
 /// The area of the two fullest planes across a direction: floors and ceilings are few and
 /// large, while walls are on many planes.
 fn level_area(facets: &[Facet], direction: DVec3, bin: f64) -> f64 {
-    let (_, bins) = heights(facets, direction, bin);
+    let (_, _, bins) = heights(facets, direction, bin);
     let mut sums: Vec<f64> = (0..bins.len())
         .map(|i| bins[i] + bins.get(i + 1).copied().unwrap_or(0.0))
         .collect();
@@ -147,8 +157,9 @@ fn level_area(facets: &[Facet], direction: DVec3, bin: f64) -> f64 {
 
 const MOST_BINS: usize = 1 << 16;
 
-/// The area of surfaces across a direction, by height; and the height of the first bin.
-fn heights(facets: &[Facet], direction: DVec3, bin: f64) -> (f64, Vec<f64>) {
+/// The area of surfaces across a direction, by height; before it the height of the first bin, and how high bins
+/// are: as asked, unless that makes too many.
+fn heights(facets: &[Facet], direction: DVec3, bin: f64) -> (f64, f64, Vec<f64>) {
     let all = facets.iter().map(|f| f.middle.dot(direction));
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
         (l.min(x), h.max(x))
@@ -162,13 +173,53 @@ fn heights(facets: &[Facet], direction: DVec3, bin: f64) -> (f64, Vec<f64>) {
     {
         bins[((f.middle.dot(direction) - low) / bin) as usize] += f.area;
     }
-    (low, bins)
+    (low, bin, bins)
+}
+
+/// How high rooms are if a direction is up: how far apart full planes across it are.
+struct RoomHeights {
+    /// Of the two that are farthest apart; metres.
+    most: f64,
+    /// Whether any two are as most floors and ceilings.
+    is_usual: bool,
+}
+
+impl RoomHeights {
+    fn new(facets: &[Facet], up: DVec3, meter: f64) -> Self {
+        let (_, bin, bins) = heights(facets, up, BIN * meter);
+        let step = bin / meter;
+        let fullest = bins.iter().copied().fold(0.0, f64::max);
+        let is_full = |i: usize| bins.get(i).is_some_and(|area| *area >= FULL * fullest);
+        let full: Vec<usize> = (0..bins.len()).filter(|i| is_full(*i)).collect();
+        let [first, last] = [full.first(), full.last()].map(|i| i.copied().unwrap_or(0));
+        let [low, high] = [(LEAST_CEILING / step).ceil(), (USUAL / step).floor()];
+        let has_ceiling = |i: &usize| (i + low as usize..=i + high as usize).any(is_full);
+        Self {
+            most: step * (last - first) as f64,
+            is_usual: full.iter().any(has_ceiling),
+        }
+    }
+}
+
+/// Whether rooms may lie on their side with a direction up that less lies across than another, and how much.
+fn is_doubtful(
+    facets: &[Facet],
+    (up, area): (DVec3, f64),
+    (rival, most): (DVec3, f64),
+    meter: f64,
+) -> bool {
+    if most <= DOUBT * area {
+        return false;
+    }
+    let [own, other] = [up, rival].map(|up| RoomHeights::new(facets, up, meter));
+    let is_far_better = other.is_usual && most > FAR_BETTER * area;
+    other.most >= LEAST_CEILING && (!own.is_usual || is_far_better)
 }
 
 /// Up: given, as cameras had it, or the direction that most floor lies across; y, if that is
 /// about as good, and then the best one, if that is far better.
 fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, Option<DVec3>) {
-    let bin = 0.1 * options.meter;
+    let bin = BIN * options.meter;
     if let Some(up) = options.up.and_then(DVec3::try_normalize) {
         return match refined(facets, up) {
             // What was said is meant, but nobody says it to the last digit.
@@ -203,7 +254,8 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, O
     let near = refined(facets, hint);
     let area = level_area(facets, near, bin);
     if near.dot(hint) > 0.9 && area >= TRUST * best.1 {
-        let is_doubtful = evidence.cameras.is_empty() && best.1 > DOUBT * area;
+        let is_doubtful =
+            evidence.cameras.is_empty() && is_doubtful(facets, (near, area), best, options.meter);
         return (near, is_doubtful.then_some(best.0));
     }
     if agreed && !evidence.cameras.is_empty() {
@@ -241,9 +293,8 @@ fn floor(
     options: &FindOptions,
 ) -> (f64, bool) {
     let bin = 0.02 * options.meter;
-    let (low, bins) = heights(facets, up, bin);
+    let (low, bin, bins) = heights(facets, up, bin);
     let high = facets.iter().map(|f| f.middle.dot(up)).fold(low, f64::max);
-    let bin = bin.max((high - low) / MOST_BINS as f64);
     let mut eyes: Vec<f64> = evidence
         .cameras
         .iter()
