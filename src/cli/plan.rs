@@ -6,9 +6,12 @@ use super::interior::open;
 use super::output::{print, print_json, say};
 use anyhow::Context;
 use glam::DMat4;
-use proxy::interior::{Cell, CellId, Content, Contents, Interior, SemicircleOptions, semicircles};
+use proxy::interior::{
+    Cell, CellId, Content, Contents, Interior, InteriorWarning, SemicircleOptions, semicircles,
+};
 use proxy::mesh::Model;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Where to photograph an interior from: cameras on semicircles before its portals
@@ -70,14 +73,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let poses = poses(&interior, &contents, &options);
     let outside = poses.iter().filter(|pose| !pose.inside).count();
     if outside > 0 {
-        // From as high a smaller semicircle would be outside, too.
-        let remedy = match interior.odd_eye_height() {
-            Some(_) => "correct `eye_height`",
-            None => "give portals a smaller `radius`",
-        };
         say!(
-            "warning: {outside} of {} cameras stand outside their cell; {remedy} in {}",
+            "warning: {outside} of {} cameras stand outside their cell; {} in {}",
             poses.len(),
+            remedy(&interior, &poses)?,
             path.display()
         );
     }
@@ -99,6 +98,31 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         );
     }
     print(&text)
+}
+
+/// What to do about cameras that stand outside their cell, of which there are some.
+fn remedy(interior: &Interior, poses: &[Pose<'_>]) -> anyhow::Result<String> {
+    // From as high a smaller semicircle would be outside, too.
+    if interior.odd_eye_height().is_some() {
+        return Ok("correct `eye_height`".to_owned());
+    }
+    // And so it would be of a portal that is turned round, on the side of its other cell.
+    let odd = interior.check()?;
+    let turned = odd.iter().filter_map(|warning| match warning {
+        InteriorWarning::Turned(portal) => Some(portal.as_str()),
+        _ => None,
+    });
+    let turned: BTreeSet<&str> = turned.collect();
+    let outside = poses.iter().filter(|pose| !pose.inside);
+    let outside: BTreeSet<&str> = outside.map(|pose| pose.portal).collect();
+    let named = outside.intersection(&turned);
+    let named: Vec<String> = named.map(|portal| format!("`{portal}`")).collect();
+    let reverse = format!("reverse the `polygon` of {}", named.join(", "));
+    Ok(match named.len() {
+        0 => "give portals a smaller `radius`".to_owned(),
+        count if count == outside.len() => reverse,
+        _ => format!("{reverse}, and give other portals a smaller `radius`"),
+    })
 }
 
 /// Where the cells of an interior are, whose file is `path`. Only that of cells that are nodes is told by the model.

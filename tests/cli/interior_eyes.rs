@@ -54,3 +54,49 @@ fn a_metre_says_how_high_eyes_are_in_given_rooms_that_do_not_say() {
         assert_eq!(is_told, expected < 2.0, "{said}");
     }
 }
+
+#[test]
+fn a_portal_that_is_turned_round_is_to_be_reversed_and_no_smaller_semicircle_advised() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |door: &str, gap: &str| {
+        let text = format!(
+            r#"{{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
+                "cells": [
+                    {{"name": "hall", "box": {{"min": [0, 0, 0], "max": [4, 2.5, 3]}}}},
+                    {{"name": "study", "box": {{"min": [4, 0, 0], "max": [8, 2.5, 3]}}}}],
+                "portals": [
+                    {{"name": "door", "polygon": [{door}], "cells": ["hall", "study"]}}{gap}]}}"#
+        );
+        std::fs::write(folder.path().join("interior.json"), text).unwrap();
+        lumigraph(folder.path(), "plan interior.json").ok().stderr
+    };
+    let door = "[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]";
+    let turned = "[4, 0, 2], [4, 0, 1], [4, 2, 1], [4, 2, 2]";
+    let gap = format!(
+        r#", {{"name": "gap", "polygon": [{door}], "cells": ["hall", "study"], "radius": 9}}"#
+    );
+    assert_eq!(said(door, ""), "");
+    for (door, gap, advised) in [
+        (
+            turned,
+            "",
+            "26 of 26 cameras stand outside their cell; reverse the `polygon` of `door` in",
+        ),
+        (
+            door,
+            gap.as_str(),
+            "26 of 52 cameras stand outside their cell; give portals a smaller `radius` in",
+        ),
+        (
+            turned,
+            gap.as_str(),
+            "52 of 52 cameras stand outside their cell; reverse the `polygon` of `door`, and give \
+             other portals a smaller `radius` in",
+        ),
+    ] {
+        let said = said(door, gap);
+        assert!(said.contains(advised), "{said}");
+        let is_told = said.contains("portal `door` seems to be turned round");
+        assert_eq!(is_told, door == turned, "{said}");
+    }
+}

@@ -29,6 +29,7 @@ mod nerfstudio;
 mod nodes;
 mod opencv;
 mod path;
+mod readme;
 mod render;
 mod repeat;
 mod report;

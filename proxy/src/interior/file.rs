@@ -12,7 +12,7 @@
 //!     {"name": "attic", "scene": "../attic", "box": {"min": [0, 3, 0], "max": [4, 5, 3]}}
 //!   ],
 //!   "portals": [
-//!     {"name": "door", "polygon": [[4, 0, 2], [4, 0, 1], [4, 2, 1], [4, 2, 2]],
+//!     {"name": "door", "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]],
 //!      "cells": ["hall", "study"], "radius": 1.5},
 //!     {"name": "window", "polygon": […], "cells": ["hall", null]}
 //!   ]
