@@ -40,12 +40,26 @@ pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> 
     Ok(capture_of(dataset).written(folder))
 }
 
+/// Whether [`in_new_folder`] may fill a folder: to be asked before long work.
+///
+/// # Errors
+/// The folder is there and not empty, and `may_be_replaced` does not say that it may go; it cannot be read.
+pub fn check_free(
+    folder: &Path,
+    may_be_replaced: impl Fn(&Path) -> bool,
+) -> Result<(), DatasetError> {
+    if folder.exists() && !is_empty(folder)? && !may_be_replaced(folder) {
+        let folder = folder.to_owned();
+        return Err(DatasetError::NotEmpty { folder });
+    }
+    Ok(())
+}
+
 /// Fills a folder that takes its name only when it is complete. What was there goes only then.
 ///
 /// # Errors
-/// The folder is there and not empty, and `may_be_replaced` does not say that it may go; the path
-/// ends in no name, as `/` does; whatever `fill` fails with; the file system's. Then nothing stays
-/// behind. What a process that is killed leaves is removed by the next that fills this folder.
+/// As [`check_free`]; the path ends in no name, as `/` does; whatever `fill` fails with; the file system's.
+/// Then nothing stays behind. What a process that is killed leaves is removed by the next that fills this folder.
 pub fn in_new_folder<E: From<DatasetError>>(
     folder: &Path,
     may_be_replaced: impl Fn(&Path) -> bool,
@@ -53,14 +67,7 @@ pub fn in_new_folder<E: From<DatasetError>>(
 ) -> Result<(), E> {
     // 1. A place to work, next to the destination: renaming must not cross disks.
     let place = place_of(folder).map_err(|source| io(folder, source))?;
-    let check_free = || -> Result<(), DatasetError> {
-        if place.exists() && !is_empty(folder)? && !may_be_replaced(folder) {
-            let folder = folder.to_owned();
-            return Err(DatasetError::NotEmpty { folder });
-        }
-        Ok(())
-    };
-    check_free()?;
+    check_free(folder, &may_be_replaced)?;
     remove_left(&place);
     let partial = beside(&place, &format!("partial-{}", std::process::id()));
     if partial.exists() {
@@ -70,7 +77,7 @@ pub fn in_new_folder<E: From<DatasetError>>(
     make_folder(&partial)?;
     // 2. Fill it, and let it take the destination's place, unless others have filled that since.
     let done = fill(&partial).and_then(|()| {
-        check_free()?;
+        check_free(folder, &may_be_replaced)?;
         Ok(take_place(&partial, &place).map_err(|source| io(folder, source))?)
     });
     if done.is_err() {

@@ -11,7 +11,7 @@ use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
-use super::targets::check_inputs;
+use super::targets::{check_file, check_inputs};
 use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::anyhow;
 use calibrate::{Pixel, View};
@@ -81,6 +81,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_extensions(args)?;
+    check_file(&args.output, "-o")?;
+    for (file, option) in [
+        (&args.weights, "--weights"),
+        (&args.triangulation, "--triangulation"),
+    ] {
+        file.as_deref()
+            .map_or(Ok(()), |file| check_file(file, option))?;
+    }
     let others = [&args.weights, &args.triangulation].into_iter().flatten();
     let files: Vec<&Path> = others.chain([&args.output]).map(PathBuf::as_path).collect();
     files.iter().try_for_each(|file| check_outside(file))?;

@@ -6,7 +6,7 @@ use super::Usage;
 use super::options::positive;
 use super::output::say;
 use super::stamp::in_unicode;
-use super::targets::check_inputs;
+use super::targets::{check_file, check_inputs};
 use anyhow::Context;
 use calibrate::View;
 use image::{Rgba, RgbaImage};
@@ -180,6 +180,7 @@ impl FilmArgs {
             );
             return Err(Usage(text).into());
         }
+        check_file(video, "--video")?;
         capture::video::ffmpeg().text(&["-version"])?;
         let folder = tempfile::tempdir()?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());

@@ -5,6 +5,7 @@ use super::captured::Opened;
 use super::options::size;
 use super::output::{print, say};
 use super::session::spinner;
+use super::targets::check_new_folder;
 use anyhow::Context;
 use capture::as_argument;
 use datasets::house::{self, HouseOptions};
@@ -56,6 +57,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         };
         return Err(Usage(text.to_owned()).into());
     }
+    check_new_folder(&args.output, |_| false)?;
     if args.name == "house" {
         return house(args);
     }

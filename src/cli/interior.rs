@@ -7,6 +7,7 @@ use super::made;
 use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
+use super::targets::check_new_folder;
 use anyhow::{Context, bail};
 use calibrate::colmap;
 use capture::as_argument;
@@ -118,11 +119,11 @@ fn say_unused(args: &Args) {
 }
 
 /// Fails where an interior would be replaced that was not asked to be, as people correct them by hand, or that
-/// cannot be, as other things lie beside it.
+/// cannot be, as other things lie beside it; and where there is no writing to the folder.
 fn check_free(args: &Args) -> anyhow::Result<()> {
     let folder = args.output.display();
     if !args.output.join(INTERIOR).exists() {
-        return Ok(());
+        return check_new_folder(&args.output, is_ours);
     }
     if let Some(other) = beside_interior(&args.output)? {
         bail!(
@@ -135,7 +136,7 @@ fn check_free(args: &Args) -> anyhow::Result<()> {
             "{folder}: holds an interior already; replace it with --force, or choose another folder"
         );
     }
-    Ok(())
+    check_new_folder(&args.output, is_ours)
 }
 
 fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<()> {

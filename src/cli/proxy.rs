@@ -7,7 +7,7 @@ use super::inputs::files_behind_scene;
 use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
-use super::targets::check_apart;
+use super::targets::{check_apart, check_file, check_folder};
 use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::Context;
 use calibrate::{Pixel, View};
@@ -136,10 +136,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     if let Some(file) = &args.output {
         check_written(args.kind, file)?;
+        check_file(file, "-o")?;
         let mut inputs = files_behind_scene(&args.scene.scene, &scene);
         let named = [&args.mesh, &args.hold_out.hold_out].into_iter();
         inputs.extend(named.flatten().cloned());
         check_apart("the proxy is", [file.as_path()], &inputs)?;
+    } else if let Some(folder) = &scene.folder {
+        check_folder(folder)?;
     }
     let without = args.hold_out.names(&scene)?;
     let (proxy, how, fitted_without) = match by_hand(args, &scene, &without)? {

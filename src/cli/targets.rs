@@ -4,16 +4,50 @@ use anyhow::{Context, bail};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Fails where a folder cannot be made, as a file is in its place.
+/// Fails where a folder that `-o` names cannot be made or written to, before anything is.
 pub(super) fn check_folder(folder: &Path) -> anyhow::Result<()> {
-    let in_the_way = folder.ancestors().find(|p| p.exists() && !p.is_dir());
-    if let Some(file) = in_the_way {
+    check_writable(folder, "-o")
+}
+
+/// The same of a file that an option names, and of the folder that it is to lie in.
+pub(super) fn check_file(file: &Path, option: &str) -> anyhow::Result<()> {
+    if file.is_dir() {
         bail!(
-            "{}: a file is where the folder was to be; choose another -o",
+            "{}: a folder is where the file was to be; choose another {option}",
             file.display()
         );
     }
-    Ok(())
+    check_writable(file.parent().unwrap_or(Path::new("")), option)
+}
+
+/// Fails where [`datasets::in_new_folder`] would for the folder that `-o` names, as far as can be told before
+/// long work.
+pub(super) fn check_new_folder(
+    folder: &Path,
+    may_be_replaced: impl Fn(&Path) -> bool,
+) -> anyhow::Result<()> {
+    check_folder(folder)?;
+    let real = folder.canonicalize().ok();
+    if let Some(above) = real.as_deref().and_then(Path::parent) {
+        // It is made beside its place.
+        check_folder(above)?;
+    }
+    Ok(datasets::check_free(folder, may_be_replaced)?)
+}
+
+fn check_writable(folder: &Path, option: &str) -> anyhow::Result<()> {
+    // The folder itself, or that which it would be made in.
+    let there = folder.ancestors().find(|path| path.exists());
+    let there = there.unwrap_or(Path::new("."));
+    let named = there.display();
+    if !there.is_dir() {
+        bail!("{named}: a file is where the folder was to be; choose another {option}");
+    }
+    // By a file without a name, which nobody sees.
+    match tempfile::tempfile_in(there) {
+        Ok(_) => Ok(()),
+        Err(error) => bail!("{named}: cannot write: {error}; choose another {option}"),
+    }
 }
 
 /// Fails where a file to be written is one of those that pictures are made of, by whatever path.
@@ -95,7 +129,36 @@ mod tests {
 
         assert!(check_folder(&at("new/er")).is_ok());
         assert!(check_folder(&at("images")).is_ok());
-        assert!(check_folder(&at("images/a.png/b")).is_err());
+        let error = check_folder(&at("images/a.png/b")).unwrap_err().to_string();
+        assert!(
+            error.ends_with("a.png: a file is where the folder was to be; choose another -o"),
+            "{error}"
+        );
+        // Nor is anything made.
+        assert!(!at("new").exists());
+        let names = |folder: &str| std::fs::read_dir(at(folder)).unwrap().count();
+        assert_eq!(names("images"), 1);
+        assert!(check_folder(Path::new("new")).is_ok());
+        for (file, said) in [
+            ("images/a.png/b", "a file is where the folder was to be"),
+            ("images", "a folder is where the file was to be"),
+        ] {
+            let error = check_file(&at(file), "--video").unwrap_err().to_string();
+            assert!(
+                error.ends_with(&format!("{said}; choose another --video")),
+                "{error}"
+            );
+        }
+        assert!(check_file(&at("images/b.png"), "-o").is_ok());
+        assert!(check_file(Path::new("b.png"), "-o").is_ok());
+        if cfg!(target_os = "linux") {
+            let error = check_file(Path::new("/proc/b.png"), "-o").unwrap_err();
+            assert!(error.to_string().starts_with("/proc: cannot write: "));
+        }
+        assert!(check_new_folder(&at("new/er"), |_| false).is_ok());
+        assert!(check_new_folder(&at("images"), |_| true).is_ok());
+        let error = check_new_folder(&at("images"), |_| false).unwrap_err();
+        assert!(error.to_string().contains("the folder is not empty"));
 
         let others = |files: &[PathBuf]| others(&at("images"), files).unwrap();
         assert_eq!(others(&[at("images/a.png")]), None);

@@ -327,12 +327,42 @@ fn where_results_cannot_go_is_said_before_any_work() {
         "render wall --path sweep --frames 1 -o file/frames",
         "evaluate wall -o file",
         "walk wall --frames 1 -o file",
+        "interior wall -o file",
+        "bench wall -o file",
+        "generate house -o file",
+        "generate wall -o file/capture",
+        "proxy wall plane -o file/p.json",
+        "field wall --view 0004.png -o file/f.png",
+        "field wall --view 0004.png -o f.png --weights file/f.npz",
+        "render wall --path sweep --frames 1 -o out --video file/film.mp4",
     ] {
         let error = lumigraph(here, line).error(1);
         assert!(
             error.contains("file: a file is where the folder"),
             "{error}"
         );
+    }
+    // Nor where something else lies already: no model was looked at.
+    fs::create_dir(here.join("mine")).unwrap();
+    fs::write(here.join("mine/thesis.txt"), "mine").unwrap();
+    fs::write(here.join("none.glb"), "").unwrap();
+    for more in ["", " --force"] {
+        let error = lumigraph(here, &format!("interior none.glb -o mine{more}")).error(1);
+        assert!(
+            error.starts_with("mine: the folder is not empty"),
+            "{error}"
+        );
+    }
+    if cfg!(target_os = "linux") {
+        for line in [
+            "proxy wall plane -o /proc/p.json",
+            "bench wall -o /proc/measured",
+            "interior none.glb -o /proc/interior",
+        ] {
+            let error = lumigraph(here, line).error(1);
+            assert!(error.starts_with("/proc: cannot write: "), "{error}");
+            assert!(error.ends_with("; choose another -o"), "{error}");
+        }
     }
     let line = "render wall --path sweep --frames 1 -o out --video film.nothing";
     let error = lumigraph(here, line).error(2);

@@ -21,6 +21,7 @@ use super::options::DeviceName;
 use super::output::{print, print_json, say, write_file};
 use super::session::progress;
 use super::stamp::{Stamp, changes, in_unicode, stamps};
+use super::targets::check_folder;
 use anyhow::Context;
 use datasets::house::{HouseOptions, house};
 use indicatif::ProgressBar;
@@ -86,6 +87,9 @@ pub(super) struct Args {
     output: PathBuf,
 }
 
+/// The folder for finished subjects, in that for the report.
+const MEASURED: &str = "measured";
+
 /// A finished subject as it is kept: measured under the same plan it is not measured again.
 #[derive(Serialize, Deserialize)]
 struct Kept {
@@ -109,6 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(minutes) = args.stress {
         return stress::run(minutes, args.seed, args.json);
     }
+    check_folder(&args.output.join(MEASURED))?;
     let effort = match args.full {
         true => Effort {
             thorough: true,
@@ -136,7 +141,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             threads: rayon::current_num_threads(),
             inputs: inputs(&given).with_context(|| name.clone())?,
         };
-        let file = args.output.join("measured").join(format!("{name}.json"));
+        let file = args.output.join(MEASURED).join(format!("{name}.json"));
         let kept = std::fs::read(&file).ok();
         let kept: Option<Kept> = kept.and_then(|bytes| serde_json::from_slice(&bytes).ok());
         if let Some(kept) = kept {
