@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     if let Some(model) = bare_model(&args.scene.scene) {
         if model != args.scene.scene
-            && let Some(note) = other_models(&model)
+            && let Some(note) = other_models(&model, "`lumigraph info PATH` shows")
         {
             say!("note: {note}");
         }

@@ -124,10 +124,11 @@ fn search(
     if let Source::Colmap(model) = &source
         && model != folder
     {
-        warnings.extend(other_models(model).map(Warning::Note));
+        let others = other_models(model, &takes(capture, "PATH"));
+        warnings.extend(others.map(Warning::Note));
     }
     let others: Vec<Source> = found.collect();
-    warnings.extend(others_text(&source, &others).map(Warning::Note));
+    warnings.extend(others_text(capture, &source, &others).map(Warning::Note));
     // OpenCV's calibrations may be in several files, of which one alone can be read.
     let is_part = |error: &SceneError| {
         matches!(source, Source::OpenCv(_)) && matches!(error, SceneError::OpenCv(_))
@@ -201,8 +202,15 @@ pub fn calibration_in(folder: &Path) -> Option<PathBuf> {
     usable.or_else(by_keys)
 }
 
-/// What to say of calibrations that are passed over, if there are any.
-fn others_text(source: &Source, others: &[Source]) -> Option<String> {
+/// What takes a calibration of a capture that is not the first in its folder, for people, to go on with: the one
+/// command that is told of one.
+fn takes(capture: &Path, calibration: &str) -> String {
+    let capture = as_argument(capture);
+    format!("`lumigraph import {capture} --calibration {calibration} -o SCENE` takes")
+}
+
+/// What to say of a capture's calibrations that are passed over, if there are any.
+fn others_text(capture: &Path, source: &Source, others: &[Source]) -> Option<String> {
     let paths = others
         .iter()
         .map(|other| other.path().display().to_string());
@@ -211,9 +219,9 @@ fn others_text(source: &Source, others: &[Source]) -> Option<String> {
         [] => return None,
         [path] => {
             let argument = as_argument(others[0].path());
-            format!("for that in {path} say --calibration {argument}")
+            format!("{} that in {path}", takes(capture, &argument))
         }
-        _ => format!("--calibration takes another: {}", some_of(paths)),
+        _ => format!("{} another: {}", takes(capture, "PATH"), some_of(paths)),
     };
     let lacks_points = matches!(
         source,
@@ -247,8 +255,8 @@ fn some_of(mut listed: Vec<String>) -> String {
 }
 
 /// What to say of the models beside one of several that COLMAP could not join, if there are
-/// others.
-pub fn other_models(model: &Path) -> Option<String> {
+/// others; `takes` is a command, and its verb, that another is for.
+pub fn other_models(model: &Path, takes: &str) -> Option<String> {
     let text = |one: &SubModel| {
         let photos = match one.images {
             Some(photos) => format!("{photos} photos"),
@@ -264,7 +272,7 @@ pub fn other_models(model: &Path) -> Option<String> {
         return None;
     }
     Some(format!(
-        "the calibration is the COLMAP model in {taken}; --calibration takes another: {}",
+        "the calibration is the COLMAP model in {taken}; {takes} another: {}",
         some_of(listed)
     ))
 }

@@ -349,8 +349,8 @@ fn of_a_data_set_s_parts_that_to_train_on_goes_first() {
     }
     let (scene, said) = captures.import("wall");
     assert_eq!(scene.names(), ["train/a.png", "train/b.png"]);
-    let note = "the calibration is ROOT/wall/transforms_train.json; --calibration takes another: \
-                ROOT/wall/transforms_test.json, ROOT/wall/transforms_val.json";
+    let note = "the calibration is ROOT/wall/transforms_train.json; `lumigraph import ROOT/wall --calibration PATH -o \
+                SCENE` takes another: ROOT/wall/transforms_test.json, ROOT/wall/transforms_val.json";
     assert_eq!(said[0], note);
     let first = calibration_in(&captures.at("wall"));
     assert_eq!(first, Some(captures.at("wall/transforms_train.json")));
@@ -376,8 +376,8 @@ fn colmap_s_work_for_another_program_is_used_where_that_left_nothing() {
     captures.transforms("wall/transforms.json", &frames);
     let (scene, said) = captures.import("wall");
     assert_eq!(scene.names(), ["a.png", "b.png"]);
-    let note = "the calibration is ROOT/wall/transforms.json; for that in ROOT/wall/colmap/sparse/0 say \
-                --calibration ROOT/wall/colmap/sparse/0 (the COLMAP model in \
+    let note = "the calibration is ROOT/wall/transforms.json; `lumigraph import ROOT/wall --calibration \
+                ROOT/wall/colmap/sparse/0 -o SCENE` takes that in ROOT/wall/colmap/sparse/0 (the COLMAP model in \
                 ROOT/wall/colmap/sparse/0 may have sparse points, which this has not)";
     assert_eq!(said, [note]);
     assert_eq!(first(), Some(captures.at("wall/transforms.json")));

@@ -41,8 +41,12 @@ fn a_transforms_file_gives_the_pictures_of_the_model_it_was_made_from() {
 
     // Beside a COLMAP model it is passed over, aloud.
     let both = lumigraph(folder.path(), "evaluate wall --proxy plane.json --json").ok();
-    let note = "for that in wall/transforms.json say --calibration wall/transforms.json";
+    let note = "`lumigraph import wall --calibration wall/transforms.json -o SCENE` takes that in \
+                wall/transforms.json\n";
     assert!(both.stderr.contains(note), "{}", both.stderr);
+    let line = "import wall --calibration wall/transforms.json -o scene";
+    let taken = lumigraph(folder.path(), line).ok();
+    assert!(!taken.stderr.contains("takes that"), "{}", taken.stderr);
 
     // Alone it serves.
     fs::remove_dir_all(at("wall/sparse")).unwrap();

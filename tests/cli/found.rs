@@ -183,15 +183,21 @@ fn of_models_that_colmap_could_not_join_the_largest_is_used_aloud() {
     assert!(!ran.stderr.contains("--calibration"), "{}", ran.stderr);
 
     colmap::write_binary(&whole.without_images(&most), &sparse.join("0")).unwrap();
-    let said = "note: the calibration is the COLMAP model in wall/sparse/1 (9 photos); \
-                --calibration takes another: wall/sparse/0 (3 photos)\n";
+    let said = |takes: &str| {
+        format!(
+            "note: the calibration is the COLMAP model in wall/sparse/1 (9 photos); {takes} another: \
+             wall/sparse/0 (3 photos)\n"
+        )
+    };
+    let of_capture = said("`lumigraph import wall --calibration PATH -o SCENE` takes");
     let ran = lumigraph(here, "info wall --json").ok();
     assert_eq!(ran.json()["photos"], 9);
-    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    assert!(ran.stderr.contains(&of_capture), "{}", ran.stderr);
     // The folder of models is no capture.
     let ran = lumigraph(here, "info wall/sparse --json").ok();
     assert_eq!(ran.json()["poses"], 9);
-    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    let of_models = said("`lumigraph info PATH` shows");
+    assert!(ran.stderr.contains(&of_models), "{}", ran.stderr);
 
     // One that was asked for needs no word.
     let line = "import wall --calibration wall/sparse/0 -o scene";

@@ -157,15 +157,15 @@ fn a_capture_with_nothing_but_opencvs_file_is_imported() {
     let file = |name: &str| folder.path().join("capture").join(name);
     fs::copy(file("out_camera_data.yml"), file("second.yml")).unwrap();
     let ran = import(&folder, "capture --force").ok();
-    let said = "note: the calibration is capture/out_camera_data.yml; for that in \
-                capture/second.yml say --calibration capture/second.yml";
+    let said = "note: the calibration is capture/out_camera_data.yml; `lumigraph import capture \
+                --calibration capture/second.yml -o SCENE` takes that in capture/second.yml";
     assert!(ran.stderr.contains(said), "{}", ran.stderr);
     fs::remove_file(file("second.yml")).unwrap();
     let both = source.display();
     let ran = import(&folder, &format!("{both} --force")).ok();
     let said = format!(
-        "note: the calibration is the COLMAP model in {both}/sparse/0; for that in \
-         {both}/out_camera_data.yml say --calibration {both}/out_camera_data.yml"
+        "note: the calibration is the COLMAP model in {both}/sparse/0; `lumigraph import {both} \
+         --calibration {both}/out_camera_data.yml -o SCENE` takes that in {both}/out_camera_data.yml"
     );
     assert!(ran.stderr.contains(&said), "{}", ran.stderr);
 
