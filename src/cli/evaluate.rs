@@ -9,7 +9,7 @@ use super::output::{print, print_json};
 use super::report::Report;
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
-use super::targets::{check_folder, check_inputs};
+use super::targets::{check_folder, check_inputs, others};
 use super::time::TimeArgs;
 use super::took::Start;
 use anyhow::bail;
@@ -171,6 +171,11 @@ fn score_photos(
         bail!("none of the held-out photos can be decoded");
     }
     if let Some(note) = session.note_of_empty() {
+        say!("note: {note}");
+    }
+    if let Some(folder) = output
+        && let Some(note) = others(folder, &files)?
+    {
         say!("note: {note}");
     }
     Ok(lines)

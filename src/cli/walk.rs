@@ -17,7 +17,7 @@ use super::path::NerfstudioArgs;
 use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
-use super::targets::check_folder;
+use super::targets::{check_folder, others};
 use super::took::Start;
 use anyhow::{Context, bail};
 use calibrate::View;
@@ -222,6 +222,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         if let [walked] = &walks[..] {
             args.film.finish(&walked.files, way.fps)?;
         }
+        say_others(args, &walks)?;
         notes.say_new(walk.painter());
         if let Some(note) = empty::note(args, &walks) {
             notes.say(note);
@@ -348,6 +349,23 @@ fn report(
         frames.len(),
         from_before(walks)
     ))
+}
+
+/// Says where pictures of other walks lie among those of these, or beside them, whatever portals showed.
+fn say_others(args: &Args, walks: &[Walked]) -> anyhow::Result<()> {
+    if args.chosen().is_part() {
+        return Ok(());
+    }
+    let own: Vec<PathBuf> = walks.iter().flat_map(|walk| walk.files.clone()).collect();
+    let kinds = PortalFill::ALL.into_iter().chain([PortalFill::Whole]);
+    let folders = kinds.map(|fill| args.output.join(fill.name()));
+    let folders = std::iter::once(args.output.clone()).chain(folders);
+    for folder in folders.filter(|folder| folder.is_dir()) {
+        if let Some(note) = others(&folder, &own)? {
+            say!("note: {note}");
+        }
+    }
+    Ok(())
 }
 
 /// How many frames were there before, for people: of each kind of portals, if that differs.

@@ -292,3 +292,17 @@ fn every_renderer_and_blend_scores_about_alike() {
         );
     }
 }
+
+#[test]
+fn pictures_of_an_earlier_run_are_told_of() {
+    let folder = with_wall();
+    let said = |every: u32| {
+        let line = format!("evaluate wall --proxy plane --size 24x18 --every {every} -o out");
+        lumigraph(folder.path(), &line).ok().stderr
+    };
+    let first = said(3);
+    assert!(!first.contains("of this run"), "{first}");
+    let then = said(8);
+    let note = "note: 2 pictures in out are not of this run, as 0003.png\n";
+    assert!(then.contains(note), "{then}");
+}

@@ -529,3 +529,26 @@ fn layered_images_of_the_nearest_views_are_the_same_in_parts() {
     let ran = lumigraph(here, &format!("{walk} --ldi-views 0 -o x"));
     assert_eq!(ran.code, 2, "{}", ran.stderr);
 }
+
+#[test]
+fn pictures_of_an_earlier_walk_are_told_of() {
+    let folder = with_house();
+    let told = |options: &str| {
+        let line = format!("walk house --size 16x12 {options} -o out");
+        let said = lumigraph(folder.path(), &line).ok().stderr;
+        let told = said.lines().filter(|line| line.contains("of this run"));
+        told.map(str::to_owned).collect::<Vec<String>>()
+    };
+    assert_eq!(told("--frames 3"), [""; 0]);
+    let one = "note: frame_0002.png in out is not of this run";
+    assert_eq!(told("--frames 2"), [one]);
+    // Those of other parts are not of other walks.
+    assert_eq!(told("--frames 0..1/3"), [""; 0]);
+    let all = "note: 3 pictures in out are not of this run, as frame_0000.png";
+    assert_eq!(told("--frames 2 --portals geometry,whole"), [all]);
+    let of_kind = |kind: &str| {
+        format!("note: 2 pictures in out/{kind} are not of this run, as frame_0000.png")
+    };
+    let others = [of_kind("geometry"), of_kind("whole")];
+    assert_eq!(told("--frames 3 --portals whole"), others);
+}
