@@ -91,9 +91,26 @@ impl Seen {
             return None;
         }
         let hit = self.solid.first_hit(from, ray)?;
-        let i = hit.triangle_idx as usize;
+        Some((hit.along, self.cells_of(hit.triangle_idx)))
+    }
+
+    /// Whether so it is with the cells of any triangle that a ray meets up to there, in lengths of the ray.
+    pub(super) fn any_until(
+        &self,
+        from: DVec3,
+        ray: DVec3,
+        along: f64,
+        is: impl Fn(&[CellId]) -> bool,
+    ) -> bool {
+        let met = self.solid.own_hits_until(from, ray, along);
+        met.into_iter().any(|i| is(self.cells_of(i)))
+    }
+
+    /// Of one of `solid`'s triangles.
+    fn cells_of(&self, triangle_idx: u32) -> &[CellId] {
+        let i = triangle_idx as usize;
         let [begin, end] = [i, i + 1].map(|k| self.begins[k] as usize);
-        Some((hit.along, &self.cells[begin..end]))
+        &self.cells[begin..end]
     }
 }
 

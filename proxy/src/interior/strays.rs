@@ -63,7 +63,8 @@ const TRIES: u32 = 16;
 /// Eyes stand between these heights over the floor, and look past the portal by so much, in eyes' heights.
 const HEIGHTS: [f64; 2] = [0.1, 1.6];
 const BESIDE: f64 = 1.0;
-/// A hit so little nearer than what is aimed at, in shares of the distance, is that.
+/// A hit so little nearer than what is aimed at, in shares of the distance, is that; and what lies so little behind
+/// a hit, in shares of the distance and of places' coordinates, is in the same place: files round these to f32.
 const THERE: f64 = 1e-6;
 /// From one place to the next in two and in three dimensions, so that they are spread evenly: powers of
 /// the inverse of the number whose third, or fourth, power is one more than itself (Roberts 2018).
@@ -229,8 +230,9 @@ fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> Vec<Stray> 
     let left = of_eyes.into_par_iter().flat_map_iter(|of_eye| {
         let visibility = all_around(interior, of_eye[0].from, of_eye[0].eye);
         let again = move |old: &Stray| {
-            let hit = seen.first(old.eye, old.seen - old.eye)?;
-            hidden(&visibility, old.from, old.eye, old.seen - old.eye, hit)
+            let (eye, ray) = (old.eye, old.seen - old.eye);
+            let hit = seen.first(eye, ray)?;
+            hidden(seen, &visibility, old.from, eye, ray, hit)
         };
         of_eye.iter().filter_map(again)
     });
@@ -276,7 +278,7 @@ fn before(
             let ray = aim([span[0] - outer, span[1] + outer], place) - eye;
             if let Some(hit) = seen.first(eye, ray) {
                 strays.tried += 1;
-                let stray = hidden(&visibility, from, eye, ray, hit);
+                let stray = hidden(seen, &visibility, from, eye, ray, hit);
                 strays.found.extend(stray);
             }
         }
@@ -289,8 +291,9 @@ fn before(
 }
 
 /// A line of sight, if portals hide what it meets: so many of its lengths away, of some cells. What is of no
-/// cell is never hidden.
+/// cell is never hidden, nor what shares its place with something that is not, as walls of two rooms in one plane do.
 fn hidden(
+    seen: &Seen,
     visibility: &Visibility,
     from: CellId,
     eye: DVec3,
@@ -300,11 +303,14 @@ fn hidden(
     let visible = visibility.cells.iter();
     let shown = visible.filter(|visible| visible.regions.iter().any(|r| r.contains(ray)));
     let shown: Vec<CellId> = shown.map(|visible| visible.cell).collect();
-    let is_hidden = !cells.is_empty() && !cells.iter().any(|id| shown.contains(id));
-    is_hidden.then(|| Stray {
+    let is_drawn = |cells: &[CellId]| cells.is_empty() || cells.iter().any(|id| shown.contains(id));
+    let place = eye + along * ray;
+    let until = along + THERE * (along + place.abs().max_element() / ray.length());
+    let is_hidden = !is_drawn(cells) && !seen.any_until(eye, ray, until, is_drawn);
+    is_hidden.then_some(Stray {
         from,
         eye,
-        seen: eye + along * ray,
+        seen: place,
         shown,
     })
 }

@@ -280,17 +280,7 @@ impl Solid {
         direction: DVec3,
         front_only: bool,
     ) -> Option<Hit> {
-        let from = from_in_world - self.origin;
-        if self.boxed.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
-            return None;
-        }
-        // Unit length, so that the distances compared in f32 are those of the world.
-        let length = direction.length();
-        let unit = direction / length;
-        if !unit.is_finite() {
-            return None;
-        }
-        let ray = Ray::new_inf(from.as_vec3().into(), unit.as_vec3().into());
+        let (ray, unit, length) = self.ray(from_in_world, direction)?;
         let mut nearest: Option<Hit> = None;
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
             let mut bound = f32::INFINITY;
@@ -318,6 +308,55 @@ impl Solid {
             along: hit.along / length,
             ..hit
         })
+    }
+
+    /// Its own triangles that a ray meets, from either side, no farther along than that, in lengths of the ray's
+    /// direction; in order. Of those with the same corners it is the first.
+    pub(crate) fn own_hits_until(
+        &self,
+        from_in_world: DVec3,
+        direction: DVec3,
+        along: f64,
+    ) -> Vec<u32> {
+        let mut met = Vec::new();
+        let Some((ray, unit, length)) = self.ray(from_in_world, direction) else {
+            return met;
+        };
+        let farthest = along * length;
+        let ray = Ray {
+            tmax: (farthest * (1.0 + 4.0 * ROUNDING)) as f32,
+            ..ray
+        };
+        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
+            for &triangle_idx in self.boxed.within(slot) {
+                let corners = self.mesh.corners(triangle_idx as usize);
+                let there = meet(corners.map(|p| p - from_in_world), unit, false);
+                if there.is_some_and(|there| there <= farthest) {
+                    met.push(triangle_idx);
+                }
+            }
+            // None ends the search.
+            f32::INFINITY
+        });
+        met.sort_unstable();
+        met
+    }
+
+    /// The ray for the hierarchy, the direction in unit length, and its length; `None` where nothing can be met.
+    #[inline]
+    fn ray(&self, from_in_world: DVec3, direction: DVec3) -> Option<(Ray, DVec3, f64)> {
+        let from = from_in_world - self.origin;
+        if self.boxed.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
+            return None;
+        }
+        // Unit length, so that the distances compared in f32 are those of the world.
+        let length = direction.length();
+        let unit = direction / length;
+        if !unit.is_finite() {
+            return None;
+        }
+        let ray = Ray::new_inf(from.as_vec3().into(), unit.as_vec3().into());
+        Some((ray, unit, length))
     }
 }
 
@@ -522,10 +561,19 @@ mod tests {
                 let along = meet(corners, unit, carved).filter(|_| a != b && b != c && c != a);
                 along.map(|along| (along, i as u32))
             };
-            let all = (0..mesh.triangles.len()).filter_map(meets);
-            let expected = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let all: Vec<(f64, u32)> = (0..mesh.triangles.len()).filter_map(meets).collect();
+            let nearest = all.iter().copied();
+            let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             let found = solid.first_hit(from, direction).map(|hit| hit.triangle_idx);
-            prop_assert_eq!(found, expected.map(|(_, i)| i));
+            prop_assert_eq!(found, nearest.map(|(_, i)| i));
+            // And all that are as near, but for those with the same corners.
+            let along = nearest.map_or(0.0, |(along, _)| along);
+            let until = along * (1.0 + 1e-9) / direction.length();
+            let met = solid.own_hits_until(from, direction, until);
+            for (_, i) in all.iter().filter(|(there, _)| *there <= along) {
+                let is_it = |k: &u32| mesh.corners(*k as usize) == mesh.corners(*i as usize);
+                prop_assert!(met.iter().any(is_it), "{i} of {met:?}");
+            }
         }
     }
 }

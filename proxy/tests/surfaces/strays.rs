@@ -8,9 +8,10 @@ use crate::house::{self, small_house, view, viewpoint};
 use glam::DVec3;
 use proxy::interior::find::FindOptions;
 use proxy::interior::{
-    Contents, Interior, InteriorWarning, Polygon, compare, fit_to_sight, strays, visible,
+    Contents, Interior, InteriorWarning, Polygon, compare, fit_to_sight, interior_from_nodes,
+    strays, visible,
 };
-use proxy::mesh::Model;
+use proxy::mesh::{Material, Model, ModelNode, Part};
 use proxy::{Mesh, MeshKind, Solid};
 
 /// How far walls' boxes and openings may be moved here, in metres.
@@ -219,5 +220,72 @@ fn closed_doors_beyond_the_middle_of_their_walls_are_seen_from_both_rooms() {
         eprintln!("{leaf:?}: {before} pixels of 150 views were hidden, {after} are");
         assert!(!is_past || before > 100, "{before}");
         assert!(100 * after <= before, "{before} {after}");
+    }
+}
+
+/// Two rooms of 4 × 3 m, each a box of its own and a node: their walls, with a doorway in both, are so far apart.
+fn boxes_as_nodes(apart: f64) -> Model {
+    type Face<'a> = ([f64; 3], [f64; 3], &'a [usize]);
+    let [a, b, middle] = [4.0, 4.0 + apart, 4.0 + 0.5 * apart];
+    let nodes: [(&str, &[Face<'_>]); 3] = [
+        (
+            "cell:a",
+            &[
+                ([0.0, 0.0, 0.0], [a, 2.5, 3.0], &[0, 2, 3, 4, 5]),
+                ([a, 0.0, 0.0], [a, 2.5, 1.0], &[0]),
+                ([a, 2.0, 1.0], [a, 2.5, 2.0], &[0]),
+                ([a, 0.0, 2.0], [a, 2.5, 3.0], &[0]),
+            ],
+        ),
+        (
+            "cell:b",
+            &[
+                ([b, 0.0, 0.0], [8.0, 2.5, 3.0], &[1, 2, 3, 4, 5]),
+                ([b, 0.0, 0.0], [b, 2.0, 1.0], &[0]),
+                ([b, 2.0, 0.0], [b, 2.5, 3.0], &[0]),
+                ([b, 0.0, 2.0], [b, 2.0, 3.0], &[0]),
+            ],
+        ),
+        (
+            "portal:a|b",
+            &[([middle, 0.0, 1.0], [middle, 2.0, 2.0], &[0])],
+        ),
+    ];
+    let mut model = Model {
+        materials: vec![Material::default()],
+        ..Model::default()
+    };
+    for (node_idx, (name, faces)) in (0..).zip(nodes) {
+        let first = model.mesh.triangles.len() as u32;
+        for (min, max, which) in faces {
+            let [min, max] = [*min, *max].map(DVec3::from_array);
+            model.mesh.append(&open_box(min, max, which));
+        }
+        model.parts.push(Part {
+            triangles: first..model.mesh.triangles.len() as u32,
+            node_idx,
+            material_idx: 0,
+        });
+        model.nodes.push(ModelNode {
+            name: name.to_owned(),
+            parent_idx: None,
+        });
+    }
+    model.uvs = vec![[0.0; 2]; model.mesh.positions.len()];
+    model.colors = vec![[255; 4]; model.mesh.positions.len()];
+    model
+}
+
+#[test]
+fn walls_of_two_rooms_in_one_plane_hide_nothing() {
+    for (apart, is_hidden) in [(0.0, false), (0.1, true)] {
+        let model = boxes_as_nodes(apart);
+        let (interior, _) = interior_from_nodes(&model, "m.glb", 1.0).unwrap();
+        assert_eq!((interior.cells.len(), interior.portals.len()), (2, 1));
+        let told = strays(&interior, &model).unwrap();
+        assert!(told.tried > 10_000, "{}", told.tried);
+        // Where they are apart, each is seen past the other's doorway.
+        let found = told.found.len();
+        assert_eq!(found > 0, is_hidden, "{apart} m: {found}");
     }
 }

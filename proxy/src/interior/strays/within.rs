@@ -64,7 +64,7 @@ pub(super) fn within(
             let ray = (1.0 - z * z).sqrt() * DVec3::new(cos, sin, 0.0) + z * DVec3::Z;
             if let Some(hit) = seen.first(eye, ray) {
                 around.tried += 1;
-                let stray = hidden(&visibility, from, eye, ray, hit);
+                let stray = hidden(seen, &visibility, from, eye, ray, hit);
                 around.found.extend(stray);
             }
         }
