@@ -165,12 +165,31 @@ impl StoredMesh {
                 "the hull around it has {count} corners, and a triangle {triangle:?}"
             ));
         }
-        let mesh = mesh::Mesh {
+        hull_of(mesh::Mesh {
             positions: self.positions.into_iter().map(DVec3::from_array).collect(),
             triangles: self.triangles,
-        };
-        Ok(Arc::new(Solid::new(MeshKind::Hull, mesh)))
+        })
     }
+}
+
+/// The closed mesh that bounds a proxy.
+///
+/// # Errors
+/// It is not closed, or its outside is not where it should be.
+fn hull_of(mesh: mesh::Mesh) -> Result<Arc<Solid>, String> {
+    if let Some([from, to]) = mesh.open_edge() {
+        return Err(format!(
+            "the hull around it is not closed, or its triangles do not all go the same way round, at its edge from \
+             {from} to {to}"
+        ));
+    }
+    if !(mesh.volume() > 0.0) {
+        return Err(
+            "the hull around it encloses nothing; its triangles are to be counter-clockwise as seen from outside"
+                .to_owned(),
+        );
+    }
+    Ok(Arc::new(Solid::new(MeshKind::Hull, mesh)))
 }
 
 impl Stored {
@@ -328,7 +347,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
             let (kind, occludes) = kind_of_ply(bytes);
             // Both, before either is made ready for rays.
             let (own, hull) = (mesh()?, mesh::ply_hull(path, bytes)?);
-            let hull = hull.map(|hull| Arc::new(Solid::new(MeshKind::Hull, hull)));
+            let bad = |reason| FileError::Points(path.to_owned(), kind.name(), reason);
+            let hull = hull.map(hull_of).transpose().map_err(bad)?;
             Ok(solid(kind, own, occludes, hull))
         }
         "gltf" | "obj" => Ok(solid(MeshKind::Mesh, mesh()?, true, None)),
@@ -528,7 +548,7 @@ mod tests {
         };
         let mut larger = mesh.clone();
         larger.positions.push(corner(0.5, 3.0));
-        larger.triangles.push([1, 2, 3]);
+        larger.triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
         let hull = Arc::new(Solid::new(MeshKind::Hull, larger));
         let within = Some(Arc::clone(&hull));
         let bounded = DensePoints {
@@ -576,6 +596,52 @@ mod tests {
         assert!(error.contains(".ply"), "{error}");
         let path = folder.path().join("p.ply");
         assert!(write(&path, &Proxy::Points { within: None }, &[], &[]).is_err());
+    }
+
+    #[test]
+    fn a_hull_that_is_open_or_wound_inwards_is_told() {
+        let read = |triangles: &str| {
+            let text = format!(
+                r#"{{"version": 1, "kind": "points", "within": {{
+                    "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -0.0]],
+                    "triangles": {triangles}}}}}"#
+            );
+            let read = parse(Path::new("p.json"), text.as_bytes());
+            read.map_err(|error| error.to_string())
+        };
+        // One corner is there twice.
+        for closed in [
+            "[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]",
+            "[[0, 2, 1], [4, 1, 3], [1, 2, 3], [4, 3, 2]]",
+        ] {
+            let within = read(closed).unwrap();
+            assert_eq!(within.within().unwrap().triangle_count(), 4);
+        }
+        for (triangles, said) in [
+            ("[[0, 2, 1]]", "not closed, or its triangles do not all"),
+            (
+                "[[0, 2, 1], [0, 1, 3], [1, 3, 2], [0, 3, 2]]",
+                "go the same way round, at its edge from [",
+            ),
+            (
+                "[[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]",
+                "counter-clockwise as seen from outside",
+            ),
+            ("[]", "encloses nothing"),
+        ] {
+            let error = read(triangles).unwrap_err();
+            let is_said = error.starts_with("p.json: the hull around it ") && error.contains(said);
+            assert!(is_said, "{error}");
+        }
+        // So it is of a mesh's.
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n\
+                   property double z\nelement face 1\nproperty list uchar uint vertex_indices\n\
+                   element hull_vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
+                   element hull_face 1\nproperty list uchar uint vertex_indices\nend_header\n\
+                   0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let error = parse(Path::new("m.ply"), ply.as_bytes()).unwrap_err();
+        let said = "m.ply: the hull around it is not closed";
+        assert!(error.to_string().starts_with(said), "{error}");
     }
 
     #[test]

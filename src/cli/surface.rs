@@ -114,6 +114,7 @@ impl ProxyArgs {
             .into()),
             Some(file) if is_proxy_file(file) => {
                 let proxy = proxy::read(Path::new(file))?;
+                scene.check_proxy(&proxy, Path::new(file))?;
                 if !without.is_empty() {
                     say!(
                         "note: nothing tells whether {file} was fitted with held-out photos, too; \
@@ -145,6 +146,8 @@ impl ProxyArgs {
                         );
                         return fitted(kind);
                     }
+                    let folder = scene.folder.clone().unwrap_or_default();
+                    scene.check_proxy(&own.proxy, &folder.join(&own.file))?;
                     Ok(ChosenProxy {
                         proxy: own.proxy.clone(),
                         origin: "the scene's own".to_owned(),
@@ -236,11 +239,11 @@ pub(super) fn proxy_json(proxy: &Proxy) -> Value {
     value
 }
 
-/// What bounds a proxy of points, if anything.
+/// What bounds a proxy, if anything: the hull of silhouettes, or one that was given by hand.
 fn within_text(proxy: &Proxy) -> String {
     proxy.within().map_or_else(String::new, |hull| {
         let count = hull.mesh().triangles.len();
-        format!(", within the hull of their silhouettes ({count} triangles)")
+        format!(", within a hull of {count} triangles")
     })
 }
 

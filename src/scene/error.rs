@@ -94,6 +94,19 @@ pub enum SceneError {
     /// The scene's proxy cannot be read or written.
     #[error(transparent)]
     ProxyFile(#[from] proxy::FileError),
+    /// Dense points that were found in none of the scene's photos.
+    #[error(
+        "{}: its points were found in {}, and the scene has none of these photos, but {}; find points in those with \
+         `lumigraph proxy … dense`", path.display(), examples(names), examples(known)
+    )]
+    OtherPhotos {
+        /// The proxy's file.
+        path: PathBuf,
+        /// The photos that it names.
+        names: Vec<String>,
+        /// The scene's.
+        known: Vec<String>,
+    },
     /// No proxy can be fitted.
     #[error(transparent)]
     Fit(#[from] proxy::FitError),

@@ -7,6 +7,7 @@ use proxy::{DensePoints, Proxy, SparsePoint};
 use render::interior::DepthMaps;
 use render::{Lumigraph, PhotoStore, SourceView, Visibility};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::sync::Arc;
 
 impl Scene {
@@ -128,6 +129,26 @@ impl Scene {
             points,
             visibility,
         })
+    }
+
+    /// Whether a proxy that was read from a file is of photos of the scene: of dense points that were found in none
+    /// of them no view sees any.
+    ///
+    /// # Errors
+    /// It names photos, and none of the scene's.
+    pub fn check_proxy(&self, proxy: &Proxy, file: &Path) -> Result<(), SceneError> {
+        let Proxy::Dense(dense) = proxy else {
+            return Ok(());
+        };
+        let is_known = |name: &String| self.photos.iter().any(|photo| photo.name == *name);
+        match dense.names.iter().any(is_known) {
+            true => Ok(()),
+            false => Err(SceneError::OtherPhotos {
+                path: file.to_owned(),
+                names: dense.names.clone(),
+                known: self.names(),
+            }),
+        }
     }
 
     /// The depth maps of the photos of [`Self::lumigraph`], decoded when they are asked for.

@@ -302,3 +302,22 @@ fn what_a_scene_has_no_means_for_is_told() {
         assert!(!folder.path().join("p.ply").exists());
     }
 }
+
+#[test]
+fn dense_points_of_other_photos_are_refused() {
+    let folder = with_wall();
+    let line = "evaluate wall --proxy d.json --size 24x18";
+    let evaluate = |views: &str| {
+        let text = format!(
+            r#"{{"version": 1, "kind": "dense", "views": [{views}],
+                "points": [[0, 0, 1], [1, 0, 1], [0, 1, 1]], "seen_by": [[0], [0], [0]]}}"#
+        );
+        std::fs::write(folder.path().join("d.json"), text).unwrap();
+        lumigraph(folder.path(), line)
+    };
+    let error = evaluate(r#""nope.jpg""#).error(1);
+    let said = "d.json: its points were found in nope.jpg, and the scene has none of these photos, but 0000.png, ";
+    assert!(error.starts_with(said), "{error}");
+    // Some may be held out, or of a larger capture.
+    evaluate(r#""0001.png", "nope.jpg""#).ok();
+}

@@ -34,6 +34,7 @@ pub use skin::Skin;
 pub use texture::{Level, Texture};
 
 use glam::{DMat4, DVec3};
+use std::collections::BTreeMap;
 
 /// A triangle mesh in the world, seen from both sides.
 ///
@@ -63,6 +64,32 @@ impl Mesh {
             a.dot(b.cross(c)) / 6.0
         };
         (0..self.triangles.len()).map(tetrahedron).sum()
+    }
+
+    /// The ends of an edge that triangles run along more often one way than the other, if there is one: none of a
+    /// closed mesh whose triangles all go the same way round. Corners in one place are one.
+    pub fn open_edge(&self) -> Option<[DVec3; 2]> {
+        // 1. By corner, the first in its place.
+        let mut first = BTreeMap::new();
+        let place = |p: &DVec3| (*p + 0.0).to_array().map(f64::to_bits);
+        let places = self.positions.iter().map(place).zip(0_u32..);
+        let same: Vec<u32> = places
+            .map(|(place, i)| *first.entry(place).or_insert(i))
+            .collect();
+        // 2. Every edge, and whether it is run along from its lesser end.
+        let mut edges: Vec<([u32; 2], bool)> = Vec::with_capacity(3 * self.triangles.len());
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| same[i as usize]);
+            let runs = [[a, b], [b, c], [c, a]];
+            let runs = runs.into_iter().filter(|[from, to]| from != to);
+            edges.extend(runs.map(|[from, to]| ([from.min(to), from.max(to)], from < to)));
+        }
+        edges.sort_unstable();
+        let is_open = |runs: &&[([u32; 2], bool)]| {
+            2 * runs.iter().filter(|(_, way)| *way).count() != runs.len()
+        };
+        let open = edges.chunk_by(|a, b| a.0 == b.0).find(is_open)?;
+        Some(open[0].0.map(|i| self.positions[i as usize]))
     }
 
     /// Takes in another mesh as it is: nothing is joined.
