@@ -14,9 +14,12 @@ use std::sync::Arc;
 /// What is wrong with a proxy file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// It cannot be read or written.
+    /// It cannot be read.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Io(PathBuf, std::io::Error),
+    /// It cannot be written.
+    #[error("{path}: cannot write: {error}", path = .0.display(), error = .1)]
+    Write(PathBuf, std::io::Error),
     /// It is not the JSON that was expected.
     #[error("{path}: not a proxy file: {error}", path = .0.display(), error = .1)]
     Json(PathBuf, serde_json::Error),
@@ -419,7 +422,7 @@ pub fn write(
             (text + "\n").into_bytes()
         }
     };
-    write_whole(path, &bytes).map_err(|e| FileError::Io(path.to_owned(), e))
+    write_whole(path, &bytes).map_err(|e| FileError::Write(path.to_owned(), e))
 }
 
 /// Writes a file that appears complete or not at all.
@@ -481,7 +484,9 @@ mod tests {
         // Where a folder has its name, a file cannot take its place.
         let taken = folder.path().join("taken.json");
         std::fs::create_dir(&taken).unwrap();
-        write(&taken, &Proxy::ViewPlane, &[], &[]).unwrap_err();
+        let error = write(&taken, &Proxy::ViewPlane, &[], &[]).unwrap_err();
+        let said = "taken.json: cannot write: ";
+        assert!(error.to_string().contains(said), "{error}");
         assert_eq!(std::fs::read_to_string(&others).unwrap(), "mine");
         assert!(own.is_file());
         let left = std::fs::read_dir(folder.path()).unwrap();

@@ -2,6 +2,7 @@
 
 use super::Cli;
 use super::output::{print, write_file};
+use super::targets::check_folder;
 use anyhow::{Context, bail};
 use calibrate::Rigid3;
 use clap::Parser;
@@ -60,6 +61,7 @@ const STEP: f64 = 0.33;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = &args.output;
+    check_folder(folder)?;
     clear(folder)?;
     let at = |part: &str| folder.join(part).display().to_string();
     let [capture, scene, frames, forward, field, evaluation] = PARTS.map(|(part, _)| at(part));

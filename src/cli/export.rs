@@ -4,7 +4,7 @@ use super::Usage;
 use super::inputs::{calibration_of, files_behind_scene, model_files};
 use super::options::{SceneArgs, beside_counts};
 use super::output::{print, say, write_file};
-use super::targets::check_apart;
+use super::targets::{check_apart, check_file, check_folder};
 use anyhow::bail;
 use calibrate::export::{
     FrameFiles, check_colmap, check_colmap_text, has_board, opencv_yaml, transforms_json,
@@ -57,6 +57,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if is_file && output.is_dir() {
         let message = "is a folder, but this format is a file; give its name with -o";
         return Err(Usage(format!("{} {message}", output.display())).into());
+    }
+    match is_file {
+        true => check_file(output, "-o")?,
+        false => check_folder(output)?,
     }
     let scene = args.scene.open_whole()?;
     let written = match is_file {

@@ -7,6 +7,7 @@ use super::interior::check_no_interior;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
 use super::session::{progress, spinner};
+use super::targets::check_folder;
 use super::uncalibrated::UncalibratedArgs;
 use anyhow::bail;
 use capture::find_photos_folder;
@@ -115,6 +116,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Before what may take hours.
+    check_folder(&args.output)?;
     Scene::check_free(&args.output, args.force)?;
     let given = [&args.calibration, &args.masks, &args.mattes, &args.depth];
     let inputs = given.into_iter().flatten().chain([&args.photos]).cloned();

@@ -17,9 +17,9 @@ pub(super) use say;
 /// Prints to stdout.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    stdout.write_all(text.as_bytes())?;
-    stdout.flush()?;
-    Ok(())
+    let written = stdout.write_all(text.as_bytes());
+    let written = written.and_then(|()| stdout.flush());
+    written.context("standard output: cannot write")
 }
 
 /// Prints JSON to stdout.

@@ -1,7 +1,7 @@
 //! `lumigraph path`
 
 use super::output::{make_parent, print, say};
-use super::targets::check_apart;
+use super::targets::{check_apart, check_file};
 use clap::ValueEnum;
 use render::path::{
     self, CameraPath, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
@@ -89,6 +89,7 @@ fn has_times(path: &CameraPath) -> bool {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    check_file(&args.output, "-o")?;
     let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();
     check_apart("the path is", [args.output.as_path()], &inputs)?;

@@ -83,9 +83,12 @@ pub enum InteriorError {
 /// What is wrong with an interior's file.
 #[derive(Debug, thiserror::Error)]
 pub enum InteriorFileError {
-    /// It cannot be read or written.
+    /// It cannot be read.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Io(PathBuf, std::io::Error),
+    /// It cannot be written.
+    #[error("{path}: cannot write: {error}", path = .0.display(), error = .1)]
+    Write(PathBuf, std::io::Error),
     /// It is not the JSON that was expected.
     #[error("{path}: not {what}: {error}", path = .0.display(), what = .1, error = .2)]
     Json(PathBuf, &'static str, serde_json::Error),

@@ -274,5 +274,5 @@ pub fn write_interior(path: &Path, interior: &Interior) -> Result<(), InteriorFi
     interior.check().map_err(failed)?;
     let json = |e| InteriorFileError::Json(path.to_owned(), "an interior", e);
     let text = serde_json::to_string_pretty(&Stored::of(interior)).map_err(json)? + "\n";
-    write_whole(path, text.as_bytes()).map_err(|e| InteriorFileError::Io(path.to_owned(), e))
+    write_whole(path, text.as_bytes()).map_err(|e| InteriorFileError::Write(path.to_owned(), e))
 }

@@ -3,9 +3,12 @@ use std::path::PathBuf;
 /// What is wrong with a mesh file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
-    /// It cannot be read or written.
+    /// It cannot be read.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Io(PathBuf, std::io::Error),
+    /// It cannot be written.
+    #[error("{path}: cannot write: {error}", path = .0.display(), error = .1)]
+    Write(PathBuf, std::io::Error),
     /// None of the formats known.
     #[error(
         "{path}: meshes are read from .glb, .gltf, .ply and .obj and written as .glb and .ply; \

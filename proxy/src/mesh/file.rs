@@ -89,7 +89,7 @@ pub fn write(
         "ply" => to_ply(mesh, None, "written by lumigraph"),
         _ => return Err(MeshFileError::Extension(path.to_owned())),
     };
-    crate::file::write_whole(path, &bytes).map_err(|e| MeshFileError::Io(path.to_owned(), e))
+    crate::file::write_whole(path, &bytes).map_err(|e| MeshFileError::Write(path.to_owned(), e))
 }
 
 use crate::file::extension;

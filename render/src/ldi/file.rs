@@ -28,9 +28,17 @@ use std::path::{Path, PathBuf};
 /// Why a file is no LDI.
 #[derive(Debug, thiserror::Error)]
 pub enum LdiFileError {
-    /// It cannot be read or written.
+    /// It cannot be read.
     #[error("{}: {source}", .path.display())]
     Io {
+        /// Of the file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It cannot be written.
+    #[error("{}: cannot write: {source}", .path.display())]
+    Write {
         /// Of the file.
         path: PathBuf,
         /// Why.
@@ -281,10 +289,6 @@ pub fn parse(path: &Path, content: &[u8]) -> Result<Layered, LdiFileError> {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, ldi: &Layered) -> Result<(), LdiFileError> {
-    let io = |source| LdiFileError::Io {
-        path: path.to_owned(),
-        source,
-    };
     let beside = path.with_extension(format!("{}.ldi.part", std::process::id()));
     let written = std::fs::File::create(&beside)
         .and_then(|mut file| file.write_all(&bytes(ldi)))
@@ -292,7 +296,10 @@ pub fn write(path: &Path, ldi: &Layered) -> Result<(), LdiFileError> {
     written.map_err(|source| {
         // What is half written is no use; that it cannot be removed no other error.
         let _ = std::fs::remove_file(&beside);
-        io(source)
+        LdiFileError::Write {
+            path: path.to_owned(),
+            source,
+        }
     })
 }
 

@@ -14,9 +14,12 @@ use std::path::{Path, PathBuf};
 /// What is wrong with a path file.
 #[derive(Debug, thiserror::Error)]
 pub enum PathFileError {
-    /// It cannot be read or written.
+    /// It cannot be read.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Io(PathBuf, std::io::Error),
+    /// It cannot be written.
+    #[error("{path}: cannot write: {error}", path = .0.display(), error = .1)]
+    Write(PathBuf, std::io::Error),
     /// It is not the JSON that was expected.
     #[error("{path}: not a path file: {error}", path = .0.display(), error = .1)]
     Json(PathBuf, serde_json::Error),
@@ -307,8 +310,8 @@ pub fn write_keyframes(path: &Path, file: &KeyframeFile) -> Result<(), PathFileE
 }
 
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), PathFileError> {
-    let io = |e| PathFileError::Io(path.to_owned(), e);
-    capture::write_whole(path, |temporary| std::fs::write(temporary, text)).map_err(io)
+    let failed = |e| PathFileError::Write(path.to_owned(), e);
+    capture::write_whole(path, |temporary| std::fs::write(temporary, text)).map_err(failed)
 }
 
 fn interpolation_of(stored: Option<StoredInterpolation>) -> Interpolation {

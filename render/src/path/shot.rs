@@ -35,7 +35,7 @@ pub fn write_shot(
     time_s: Option<f64>,
     layer: &str,
 ) -> Result<(), PathFileError> {
-    let io = |error| PathFileError::Io(file.to_owned(), error);
+    let io = |error| PathFileError::Write(file.to_owned(), error);
     let png = |error: png::EncodingError| match error {
         png::EncodingError::IoError(error) => io(error),
         other => PathFileError::Png(file.to_owned(), other.to_string()),
@@ -168,6 +168,6 @@ mod tests {
         let gone = folder.path().join("gone/b.png");
         assert!(matches!(read(&gone), Err(PathFileError::Io(..))));
         let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), None, "picture");
-        assert!(matches!(failed, Err(PathFileError::Io(..))));
+        assert!(matches!(failed, Err(PathFileError::Write(..))));
     }
 }
