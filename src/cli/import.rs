@@ -10,7 +10,8 @@ use super::session::{progress, spinner};
 use super::targets::check_folder;
 use super::uncalibrated::UncalibratedArgs;
 use anyhow::bail;
-use capture::find_photos_folder;
+use calibrate::{colmap, formats, opencv};
+use capture::{as_argument, find_photos_folder};
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
     DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
@@ -131,6 +132,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_no_interior(&args.photos)?;
     check_no_scene(&args.photos)?;
     let is_video = args.photos.is_file();
+    if is_video {
+        check_no_calibration(args)?;
+    }
     if !is_video && args.uncalibrated.asks_for_frames() {
         let message = "--frames and --fps are for a video's file, and PHOTOS is none";
         return Err(Usage(message.to_owned()).into());
@@ -228,6 +232,21 @@ fn check_no_scene(photos: &Path) -> anyhow::Result<()> {
             "{}: a scene already (scene.json), which can be rendered as it is; to import its photos \
              anew, give the folder that they lie in",
             photos.display()
+        );
+    }
+    Ok(())
+}
+
+/// Fails where PHOTOS is a file that is no video, but may be the photos' calibration.
+fn check_no_calibration(args: &Args) -> anyhow::Result<()> {
+    let file = &args.photos;
+    let format = formats::detect(file).or_else(|| formats::meant(file));
+    if format.is_some() || colmap::is_part(file) || opencv::is_storage_name(file) {
+        let [argument, output] = [file, &args.output].map(|path| as_argument(path));
+        bail!(
+            "{}: a calibration, or no video at any rate; give its photos: `lumigraph import PHOTOS \
+             --calibration {argument} -o {output}`",
+            file.display()
         );
     }
     Ok(())

@@ -239,3 +239,27 @@ fn photos_that_are_missing_or_corrupt_are_left_out_whatever_the_format() {
         fs::remove_file(file).unwrap();
     }
 }
+
+#[test]
+fn a_calibration_in_place_of_photos_is_told_to_be_one() {
+    let folder = with_wall();
+    let here = folder.path();
+    let file = transforms(&here.join("wall/sparse/0"));
+    fs::write(here.join("t.json"), file.to_string()).unwrap();
+    fs::write(here.join("camera.yml"), "%YAML:1.0\n---\n").unwrap();
+    fs::write(here.join("model.nvm"), "").unwrap();
+    for file in [
+        "t.json",
+        "camera.yml",
+        "model.nvm",
+        "wall/sparse/0/images.bin",
+    ] {
+        let error = lumigraph(here, &format!("import {file} -o scene")).error(1);
+        let said = format!(
+            "{file}: a calibration, or no video at any rate; give its photos: `lumigraph import PHOTOS \
+             --calibration {file} -o scene`"
+        );
+        assert_eq!(error, said);
+    }
+    assert!(!here.join("scene").exists());
+}

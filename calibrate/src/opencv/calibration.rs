@@ -177,7 +177,7 @@ pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Whether a name ends like a storage file's.
-pub(super) fn is_storage_name(file: &Path) -> bool {
+pub fn is_storage_name(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default().to_string_lossy();
     let known = ["yml", "yaml", "xml", "json", "gz"];
     known.contains(&extension.to_ascii_lowercase().as_str())

@@ -28,7 +28,7 @@ mod xml;
 mod yaml;
 
 pub use board::Board;
-pub use calibration::{OpenCvCalibration, calibration, read_calibration};
+pub use calibration::{OpenCvCalibration, calibration, is_storage_name, read_calibration};
 pub use cameras::{Keys, OpenCvCamera};
 pub use error::OpenCvError;
 pub use find::{FoundCalibrations, find_calibrations};
