@@ -22,6 +22,10 @@ pub(super) fn say_unused(command: &str, given: &ArgMatches) {
             return;
         }
     }
+    if command == "bench" && is_given("stress") {
+        let why = "--stress writes no report, and draws by all that there is";
+        say_idle(&["device", "output"], is_given, why);
+    }
     let renderer = given.try_get_one::<Renderer>("renderer");
     // A triangulation that is drawn has a grid, whatever renders.
     if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {

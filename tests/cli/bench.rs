@@ -180,7 +180,11 @@ fn scenes_of_one_name_and_none_are_refused() {
 #[test]
 fn scenes_that_try_to_break_things_are_counted() {
     let folder = tempfile::tempdir().unwrap();
-    let ran = lumigraph(folder.path(), "bench --stress 0.01 --seed 7 --json").ok();
+    let line = "bench --stress 0.01 --seed 7 --json --device cpu -o out";
+    let ran = lumigraph(folder.path(), line).ok();
+    let said = "note: --device and --output change nothing: --stress writes no report, and draws by all that there is\n";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    assert!(!folder.path().join("out").exists());
     let result = ran.json();
     assert_eq!(result["first"], 7);
     assert!(result["scenes"].as_u64() > Some(0) && result["bad"].as_array().unwrap().is_empty());
