@@ -1,4 +1,4 @@
-//! LDIs as files, version 3.
+//! LDIs as files, version 3. `docs/ldi.md` says the same at length, for who reads them elsewhere.
 //!
 //! Little-endian, every part at a multiple of 8 bytes:
 //!

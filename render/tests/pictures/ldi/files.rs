@@ -59,6 +59,71 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     assert!(text(&changed(last, &(-1.0_f32).to_le_bytes())).contains("expected a positive number"));
 }
 
+/// Read by what `docs/ldi.md` says alone.
+#[test]
+fn the_layout_is_as_it_is_written_down() {
+    let counts = [2, 0, 1, 3, 0, 1_u8];
+    let ldi = places::random_ldi(&counts, [3, 2], 9);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.ldi");
+    write(&path, &ldi).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let f64_at = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    // The header.
+    assert_eq!(&bytes[..8], b"LUMI-LDI");
+    assert_eq!([8, 12].map(u32_at), [3, 128]);
+    let pose = ldi.view.camera_from_world;
+    let lens = ldi.view.lens;
+    let [fx, fy, cx, cy] = [72, 80, 88, 96].map(f64_at);
+    assert_eq!([16, 24, 32, 40].map(f64_at), pose.rotation.to_array());
+    assert_eq!([48, 56, 64].map(f64_at), pose.translation.to_array());
+    assert_eq!([fx, fy], lens.focal.to_array());
+    assert_eq!([cx, cy], lens.principal.to_array());
+    assert_eq!(f64_at(104), ldi.near);
+    assert_eq!([112, 116, 120].map(u32_at), [ldi.portal, 3, 2]);
+    // Rows, pixels and samples, each part from a multiple of 8 on.
+    assert_eq!([128, 132, 136].map(u32_at), [0, 3, 7]);
+    assert_eq!(bytes[144..150], counts);
+    assert_eq!(bytes[150..152], [0; 2]);
+    assert_eq!(bytes.len(), 152 + 7 * 12);
+    let samples = ldi.samples();
+    for (record, sample) in bytes[152..].chunks(12).zip(&samples) {
+        assert_eq!(record[..3], sample.color[..3]);
+        assert_eq!(record[3], sample.ends.0);
+        let inverse_depth = f32::from_le_bytes(record[4..8].try_into().unwrap());
+        assert_eq!(inverse_depth, sample.inverse_depth);
+        assert_eq!([record[8], record[9]].map(|o| o as i8), sample.offset);
+        let look = u16::from_le_bytes([record[10], record[11]]);
+        assert_eq!(look, sample.look.0);
+        // What it stands for.
+        let [m, a, b] = [look / 1024, look / 32 % 32, look % 32].map(f64::from);
+        let side = ((m - 63.0) / 4.0 + 1.0).exp2();
+        assert!((sample.look.side() / side - 1.0).abs() < 1e-12);
+        let [u, v] = [a, b].map(|step| (2.0 * step + 1.0) / 32.0 - 1.0);
+        let (x, y) = ((u + v) / 2.0, (u - v) / 2.0);
+        let normal = DVec3::new(x, y, 1.0 - x.abs() - y.abs()).normalize();
+        assert!(sample.look.normal().distance(normal) < 1e-12);
+    }
+    // Where the first of them is.
+    let (at, s) = ldi.place(0, 0);
+    let [dx, dy] = samples[0].offset.map(|o| f64::from(o) / 256.0);
+    assert_eq!(at, DVec2::new(0.5 + dx, 0.5 + dy));
+    assert_eq!(s, f64::from(samples[0].inverse_depth));
+    // The checksum.
+    let mut sum = bytes.len() as u64;
+    for part in [&bytes[..124], &bytes[128..]] {
+        let mut part = part.to_vec();
+        part.resize(8 * (part.len() / 8 + 1), 0);
+        for word in part.chunks(8) {
+            let word = u64::from_le_bytes(word.try_into().unwrap());
+            sum = (sum ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            sum ^= sum >> 32;
+        }
+    }
+    assert_eq!(u32_at(124), sum as u32);
+}
+
 #[test]
 fn a_file_with_any_bit_changed_is_told_to_be_damaged() {
     let folder = tempfile::tempdir().unwrap();
