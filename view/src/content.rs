@@ -32,6 +32,8 @@ pub struct House {
     pub model: Model,
     /// What stops who walks.
     pub obstacles: Obstacles,
+    /// Where one can stand in each cell, at eye height: nearest to its middle.
+    standing: Vec<Option<DVec3>>,
     /// Cameras of the photos that show it, if any do.
     cameras: Vec<Stop>,
     /// What draws it from photos, where some show it; taken by the first that draws.
@@ -44,15 +46,26 @@ impl House {
     /// Finds what is in the way in an interior.
     pub fn new(interior: Interior, contents: Contents, model: Model) -> Self {
         let obstacles = Obstacles::new(&interior, &contents, &model);
-        Self {
+        let mut house = Self {
             interior,
             contents,
             model,
             obstacles,
+            standing: Vec::new(),
             cameras: Vec::new(),
             photos: Mutex::new(None),
             ldis: None,
-        }
+        };
+        let ids = (0..house.interior.cells.len() as u32).map(CellId);
+        house.standing = ids.map(|id| house.standing_in(id)).collect();
+        house
+    }
+
+    fn standing_in(&self, id: CellId) -> Option<DVec3> {
+        let (interior, contents) = (&self.interior, &self.contents);
+        let middle = middle_of(self, id)?;
+        self.obstacles
+            .standing_near(interior, contents, &self.model, id, middle)
     }
 
     /// The same, with layered depth images in a folder: those that a walk with the window's options would make.
@@ -91,7 +104,7 @@ impl House {
     }
 }
 
-/// A place to go to by name: a photo's camera, or the middle of a room.
+/// A place to go to by name: a photo's camera, or where one can stand in a room, near its middle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stop {
     /// For people.
@@ -197,7 +210,7 @@ impl Space {
             height,
             camera_from_world,
         };
-        // The first room as the tour enters it.
+        // The first room is looked at as the tour enters it.
         let camera = Camera::of(&lens, width, height);
         let toured = Tour::new(
             &house.interior,
@@ -217,9 +230,14 @@ impl Space {
         let mut stops = Vec::new();
         for (i, cell) in house.interior.cells.iter().enumerate() {
             let id = CellId(i as u32);
+            let stands = house.standing.get(i).copied().flatten();
             let pose = match first {
-                Some(pose) if first_cell == Some(id) => Some(pose),
-                _ => middle_of(house, id).map(|eye| {
+                Some(pose) if first_cell == Some(id) => {
+                    let eye = stands.unwrap_or(pose.center());
+                    let ahead = pose.rotation.conjugate() * DVec3::Z;
+                    Some(Rigid3::looking_at(eye, eye + ahead, up))
+                }
+                _ => stands.or_else(|| middle_of(house, id)).map(|eye| {
                     let ahead = way_out(house, id, eye, up);
                     Rigid3::looking_at(eye, eye + ahead, up)
                 }),
@@ -271,7 +289,7 @@ fn middle_of(house: &House, id: CellId) -> Option<DVec3> {
     Some(house.obstacles.at_eye_height(Some(id), middle))
 }
 
-/// From a room's middle towards one of its openings.
+/// From a place in a room towards one of its openings.
 fn way_out(house: &House, id: CellId, eye: DVec3, up: DVec3) -> DVec3 {
     let portals = house.interior.portals_of(Some(id));
     let ways = portals.filter_map(|(_, portal)| {
@@ -316,8 +334,9 @@ pub(crate) mod tests {
     use super::*;
     use datasets::house::{HouseOptions, house};
     use image::RgbaImage;
-    use proxy::Plane;
+    use proxy::{MeshKind, Plane, Solid};
     use render::PhotoStore;
+    use std::f64::consts::TAU;
 
     /// A small house.
     pub(crate) fn two_rooms() -> Content {
@@ -329,6 +348,39 @@ pub(crate) mod tests {
         let made = house(&options).unwrap();
         let contents = Contents::new(&made.interior, &made.model).unwrap().0;
         Content::Interior(Arc::new(House::new(made.interior, contents, made.model)))
+    }
+
+    #[test]
+    fn where_a_room_is_shown_from_one_stands_on_its_floor_and_walks() {
+        let options = HouseOptions {
+            rooms: 3,
+            triangles: Some(1),
+            ..HouseOptions::default()
+        };
+        let made = house(&options).unwrap();
+        let solid = Solid::new(MeshKind::Mesh, made.model.mesh.clone());
+        let contents = Contents::new(&made.interior, &made.model).unwrap().0;
+        let house = House::new(made.interior, contents, made.model);
+        let space = Space::of_house(&house);
+        assert_eq!(space.stops.len(), 3);
+        for stop in &space.stops {
+            let (name, eye) = (&stop.name, stop.view.center());
+            // Not over a table, as there is one in the middle of the first room.
+            let asides = [DVec3::ZERO, DVec3::X, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Z];
+            for aside in asides {
+                let below = solid.first_hit(eye + 0.15 * aside, DVec3::NEG_Y);
+                let below = below.unwrap().along;
+                assert!((1.5..1.61).contains(&below), "{name}: {below}");
+            }
+            let cell = house.contents.locate(&house.interior, eye);
+            let walked = (0..8).map(|way| {
+                let (sin, cos) = (0.05 + TAU * f64::from(way) / 8.0).sin_cos();
+                let motion = 0.5 * DVec3::new(cos, 0.0, sin);
+                house.obstacles.walk(cell, eye, motion).distance(eye)
+            });
+            let farthest = walked.fold(0.0, f64::max);
+            assert!(farthest > 0.3, "{name}: {farthest}");
+        }
     }
 
     #[test]

@@ -2,9 +2,11 @@
 //!
 //! Seen from above, whatever reaches into the band between half the eyes' height and the eyes is cut
 //! into line segments, and who walks is a disc that they keep out. A doorway is where there are
-//! none.
+//! none. Who came to be in something that is only as high as what stands on tables is let out of it.
 
+mod enclosed;
 mod squares;
+mod standing;
 
 use glam::{DVec2, DVec3};
 use proxy::interior::{CellId, Contents, Interior};
@@ -36,6 +38,8 @@ struct Floor {
     height: f64,
     /// What is in the way, seen from above.
     squares: Squares,
+    /// What of it is cut higher than what stands on tables: walls and cupboards are.
+    higher: Squares,
 }
 
 impl Obstacles {
@@ -67,20 +71,23 @@ impl Obstacles {
     }
 
     fn cut(&self, height: f64, contents: &Contents, model: &Model) -> Floor {
-        let mut segments = Vec::new();
+        let (mut segments, mut higher) = (Vec::new(), Vec::new());
         let lists = contents.triangles.iter().chain([&contents.elsewhere]);
         for i in lists.flatten() {
             let corners = model.mesh.corners(*i as usize);
             let heights = corners.map(|p| p.dot(self.up) - height);
-            for cut in CUTS {
+            for (k, cut) in CUTS.iter().enumerate() {
                 if let Some(ends) = cut_triangle(corners, heights, cut * self.eye_height) {
-                    segments.push(ends.map(|p| self.seen_from_above(p)));
+                    let ends = ends.map(|p| self.seen_from_above(p));
+                    segments.push(ends);
+                    higher.extend((k > 0).then_some(ends));
                 }
             }
         }
         Floor {
             height,
             squares: Squares::new(segments, self.radius),
+            higher: Squares::new(higher, self.radius),
         }
     }
 
@@ -130,35 +137,37 @@ impl Obstacles {
     /// One short step from `from` towards `to`: the nearest place with room for who walks. None
     /// found, or one behind a wall: no step.
     fn kept_out(&self, floor: &Floor, from: DVec2, to: DVec2) -> DVec2 {
+        // Who stands in what is on a table is let out of it.
+        let squares = match self.is_enclosed(&floor.squares, from) {
+            true => &floor.higher,
+            false => &floor.squares,
+        };
         let mut at = to;
         for _ in 0..8 {
-            let Some((nearest, distance)) = self.nearest(floor, at) else {
+            let Some((on, distance)) = nearest(squares, at) else {
                 break;
             };
             if distance >= self.radius * (1.0 - 1e-9) {
                 break;
             }
-            at = nearest + (at - nearest).normalize_or_zero() * self.radius;
+            at = on + (at - on).normalize_or_zero() * self.radius;
         }
-        let room = |at: DVec2| self.nearest(floor, at).map_or(f64::INFINITY, |near| near.1);
         // Who stands where there is too little room may still go where there is more.
-        let enough = room(from).min(0.99 * self.radius);
-        let is_free = room(at) >= enough && !self.crosses(floor, [from, at]);
+        let enough = self.room(squares, from).min(0.99 * self.radius);
+        let is_free = self.room(squares, at) >= enough && !self.crosses(squares, [from, at]);
         if is_free { at } else { from }
     }
 
-    fn crosses(&self, floor: &Floor, [a, b]: [DVec2; 2]) -> bool {
-        let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
-        floor.squares.near(a).iter().any(|&[c, d]| {
-            side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
-        })
+    /// How far away the nearest thing is; infinitely, where nothing is near.
+    fn room(&self, squares: &Squares, at: DVec2) -> f64 {
+        nearest(squares, at).map_or(f64::INFINITY, |near| near.1)
     }
 
-    fn nearest(&self, floor: &Floor, point: DVec2) -> Option<(DVec2, f64)> {
-        let list = floor.squares.near(point);
-        let on = list.iter().map(|ends| nearest_on(*ends, point));
-        let with_distance = on.map(|p| (p, p.distance(point)));
-        with_distance.min_by(|a, b| a.1.total_cmp(&b.1))
+    fn crosses(&self, squares: &Squares, [a, b]: [DVec2; 2]) -> bool {
+        let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
+        squares.near(a).iter().any(|&[c, d]| {
+            side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
+        })
     }
 
     /// How high a cell's floor is, along `up`.
@@ -199,6 +208,16 @@ fn cut_triangle(corners: [DVec3; 3], heights: [f64; 3], level: f64) -> Option<[D
     is_usable.then_some(ends)
 }
 
+/// The nearest point of what is in the way, and how far away it is.
+fn nearest(squares: &Squares, point: DVec2) -> Option<(DVec2, f64)> {
+    let on = squares
+        .near(point)
+        .iter()
+        .map(|ends| nearest_on(*ends, point));
+    let with_distance = on.map(|p| (p, p.distance(point)));
+    with_distance.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 fn nearest_on([a, b]: [DVec2; 2], point: DVec2) -> DVec2 {
     let along = b - a;
     let squared = along.length_squared();
@@ -218,13 +237,16 @@ mod tests {
     use proxy::mesh::Mesh;
     use std::sync::OnceLock;
 
-    struct Place {
-        interior: Interior,
-        contents: Contents,
-        obstacles: Obstacles,
+    /// A house, and what is in the way there.
+    pub(super) struct Place {
+        pub(super) interior: Interior,
+        pub(super) contents: Contents,
+        pub(super) model: Model,
+        pub(super) obstacles: Obstacles,
     }
 
-    fn place() -> &'static Place {
+    /// One of three rooms; in the middle of the first stands a table, and a bowl on it.
+    pub(super) fn place() -> &'static Place {
         static PLACE: OnceLock<Place> = OnceLock::new();
         PLACE.get_or_init(|| {
             let options = HouseOptions {
@@ -239,12 +261,14 @@ mod tests {
             Place {
                 interior,
                 contents,
+                model,
                 obstacles,
             }
         })
     }
 
-    fn middle(place: &Place, id: CellId) -> DVec3 {
+    /// Over the middle of a cell, at eye height.
+    pub(super) fn middle(place: &Place, id: CellId) -> DVec3 {
         let room = place.contents.bounds[id.0 as usize].unwrap();
         place
             .obstacles
@@ -308,18 +332,21 @@ mod tests {
         ) {
             let place = place();
             let obstacles = &place.obstacles;
-            let mut at = middle(place, CellId(0));
+            let Place { interior, contents, model, .. } = place;
+            let over_table = middle(place, CellId(0));
+            let stands = obstacles.standing_near(interior, contents, model, CellId(0), over_table);
+            let mut at = stands.unwrap();
             let height = at.dot(obstacles.up);
             for (angle, length) in ways {
                 let motion = (obstacles.axes[0] * f64::cos(angle)
                     + obstacles.axes[1] * f64::sin(angle)) * length;
                 let before = obstacles.seen_from_above(at);
-                let room = obstacles.nearest(&obstacles.floors[0], before);
+                let room = nearest(&obstacles.floors[0].squares, before);
                 let cell = place.contents.locate(&place.interior, at);
                 let next = obstacles.walk(cell, at, motion);
                 prop_assert!(next.is_finite() && (next.dot(obstacles.up) - height).abs() < 1e-9);
                 prop_assert!(next.distance(at) <= length * 1.5 + obstacles.radius);
-                let after = obstacles.nearest(&obstacles.floors[0], obstacles.seen_from_above(next));
+                let after = nearest(&obstacles.floors[0].squares, obstacles.seen_from_above(next));
                 let least = room.map_or(f64::INFINITY, |r| r.1).min(0.98 * obstacles.radius);
                 prop_assert!(after.is_none_or(|a| a.1 >= least));
                 at = next;
@@ -337,7 +364,23 @@ mod tests {
     }
 
     /// One between two heights, with cells whose floors are so high.
-    fn wall_between(reach: f64, [low, high]: [f64; 2], floors: &[f64]) -> Obstacles {
+    pub(super) fn wall_between(reach: f64, [low, high]: [f64; 2], floors: &[f64]) -> Obstacles {
+        obstacles_of(floors, |up, [x, y]| {
+            let along = reach * (x + y);
+            let (low, high) = (low * up, high * up);
+            Mesh {
+                positions: vec![low - along, low + along, high + along, high - along],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+            }
+        })
+    }
+
+    /// A mesh, made for what is up and what lies across it, in each of some cells whose floors are so
+    /// high.
+    pub(super) fn obstacles_of(
+        floors: &[f64],
+        make: impl FnOnce(DVec3, [DVec3; 2]) -> Mesh,
+    ) -> Obstacles {
         let mut interior = place().interior.clone();
         interior.portals.clear();
         interior.cells.truncate(floors.len());
@@ -346,15 +389,11 @@ mod tests {
         }
         let up = interior.up;
         let across = up.any_orthonormal_vector();
-        let along = reach * (across + up.cross(across));
-        let (low, high) = (low * up, high * up);
         let model = Model {
-            mesh: Mesh {
-                positions: vec![low - along, low + along, high + along, high - along],
-                triangles: vec![[0, 1, 2], [0, 2, 3]],
-            },
+            mesh: make(up, [across, up.cross(across)]),
             ..Model::default()
         };
+        let triangles: Vec<u32> = (0..model.mesh.triangles.len() as u32).collect();
         let room = |floor: &f64| {
             Some(RoomBox {
                 min: DVec3::new(-9.0, *floor, -9.0),
@@ -362,7 +401,7 @@ mod tests {
             })
         };
         let mut contents = Contents::default();
-        contents.triangles = floors.iter().map(|_| vec![0, 1]).collect();
+        contents.triangles = floors.iter().map(|_| triangles.clone()).collect();
         contents.bounds = floors.iter().map(room).collect();
         Obstacles::new(&interior, &contents, &model)
     }
