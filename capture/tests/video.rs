@@ -174,6 +174,87 @@ fn hundreds_of_frames_are_taken_into_a_folder_of_any_name() {
     );
 }
 
+/// Where the data of each frame are in an .mp4 of one H.264 stream: units with their lengths before
+/// them, of which those of types 1 and 5 are slices.
+fn slices(file: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let number = |at: usize| u32::from_be_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    let name = file.windows(4).position(|four| four == b"mdat").unwrap();
+    let (mut at, end) = (name + 4, name - 4 + number(name - 4));
+    let mut slices = Vec::new();
+    while at < end {
+        let unit = at + 4..at + 4 + number(at);
+        at = unit.end;
+        if matches!(file[unit.start] & 31, 1 | 5) {
+            slices.push(unit);
+        }
+    }
+    slices
+}
+
+#[test]
+fn damaged_frames_are_no_photos_and_what_is_wrong_is_told() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    // A key frame each second.
+    let words = "-c:v libx264 -g 8 -keyint_min 8 -sc_threshold 0 -bf 0 -movflags +faststart";
+    let words: Vec<&str> = words.split(' ').collect();
+    let whole = write_video(&ffmpeg, here.path(), &[2, 10, 12, 18], &words);
+    let bytes = fs::read(whole).unwrap();
+    let slices = slices(&bytes);
+    assert_eq!(slices.len(), 24);
+    let with_damage = |name: &str, frames: &[usize]| {
+        let mut bytes = bytes.clone();
+        for slice in frames.iter().map(|i| slices[*i].clone()) {
+            bytes[slice.start + slice.len() / 4..slice.end].fill(0);
+        }
+        let video = here.path().join(name);
+        fs::write(&video, bytes).unwrap();
+        video
+    };
+    let photos = here.path().join("photos");
+    let extract = |video: &Path| {
+        let mut told = Vec::new();
+        let frames = video::extract(&ffmpeg, video, FrameCount::Frames(3), &photos, &mut |at| {
+            if let VideoProgress::Damaged(damage) = at {
+                told.push(damage);
+            }
+        });
+        (frames, told)
+    };
+
+    // 1. From the damaged frame to the next key frame, whichever are sharp.
+    let (frames, told) = extract(&with_damage("damaged.mp4", &[10]));
+    let times: Vec<f64> = frames.unwrap().iter().map(|f| f.time_s * 8.0).collect();
+    assert_eq!((times[0].round(), times[2].round()), (2.0, 18.0));
+    assert!(times[1] < 9.5, "{times:?}");
+    assert_eq!((told.len(), told[0].frames), (1, 6), "{told:?}");
+    assert!(told[0].errors > 0 && !told[0].first.is_empty(), "{told:?}");
+
+    // 2. The end is missing.
+    let cut_off = here.path().join("cut-off.mp4");
+    fs::write(&cut_off, &bytes[..slices[15].start + 20]).unwrap();
+    let (frames, told) = extract(&cut_off);
+    assert!(frames.unwrap().iter().all(|f| f.time_s < 2.0));
+    assert!(told.len() == 1 && told[0].errors > 0, "{told:?}");
+
+    // 3. Nothing is left.
+    let (frames, told) = extract(&with_damage("nothing.mp4", &[0, 8, 16]));
+    let error = frames.unwrap_err();
+    assert!(
+        matches!(error, VideoError::Damaged { whole: 0, .. }),
+        "{error}"
+    );
+    let error = error.to_string();
+    assert!(
+        error.contains("nothing.mp4: 0 of its 24 frames can be"),
+        "{error}"
+    );
+    assert!(
+        error.contains("copy the file again") && told.is_empty(),
+        "{error}"
+    );
+}
+
 #[test]
 fn what_is_no_video_is_refused() {
     let Some(ffmpeg) = ffmpeg() else { return };

@@ -4,7 +4,7 @@ use super::options::WARNINGS_SHOWN;
 use super::output::say;
 use super::session::{progress, spinner};
 use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
-use capture::video::{self, FrameCount, VideoFrame, VideoProgress};
+use capture::video::{self, Damage, FrameCount, VideoFrame, VideoProgress};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 use lumigraph::scene::Scene;
@@ -68,6 +68,9 @@ impl UncalibratedArgs {
             VideoProgress::Scored { frames, time_s } => {
                 bar.set_message(format!("scoring frames: {frames}, up to {time_s:.1} s"));
             }
+            VideoProgress::Damaged(damage) => bar.suspend(|| {
+                say!("note: {}: {}", video.display(), damaged(&damage));
+            }),
             VideoProgress::Writing { frames } => {
                 bar.set_message(format!("writing {frames} frames"));
             }
@@ -114,6 +117,18 @@ impl UncalibratedArgs {
         report(&made, photos.photos.len(), options.matching);
         Ok(made.model)
     }
+}
+
+/// What is said of a video that could not all be decoded.
+fn damaged(damage: &Damage) -> String {
+    let passed_over = match damage.frames {
+        0 => String::new(),
+        1 => ", and one damaged frame is passed over".to_owned(),
+        frames => format!(", and {frames} damaged frames are passed over"),
+    };
+    format!(
+        "{damage}; some of it may be missing{passed_over}: copy the file again if it should be whole"
+    )
 }
 
 /// A progress bar for the step at hand.
@@ -171,4 +186,28 @@ fn report(made: &Outcome, photos: usize, matching: Matching) {
         "note: COLMAP placed {} of {photos} photos; `info` gives the reprojection error",
         made.reconstruction.images.len()
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_damaged_video_it_is_said_what_is_left_out_and_what_to_do() {
+        let damage = |errors, frames| Damage {
+            errors,
+            first: "error while decoding MB 0 8".to_owned(),
+            frames,
+        };
+        assert_eq!(
+            damaged(&damage(39, 22)),
+            "ffmpeg reports 39 errors, the first: error while decoding MB 0 8; some of it may be \
+             missing, and 22 damaged frames are passed over: copy the file again if it should be whole"
+        );
+        assert_eq!(
+            damaged(&damage(1, 0)),
+            "ffmpeg reports an error: error while decoding MB 0 8; some of it may be missing: copy \
+             the file again if it should be whole"
+        );
+    }
 }

@@ -20,20 +20,23 @@ pub struct ScoredFrame {
     pub time_s: f64,
     /// The larger the sharper; comparable between frames of one video.
     pub sharpness: f64,
+    /// Whether it could not be decoded whole, or may be predicted from one that could not.
+    pub is_damaged: bool,
 }
 
 /// The indices of the sharpest frame of each of so many equal stretches of time, rising.
-/// The earlier of equally sharp ones; none where a stretch has no frame. Frames come in the
-/// order of their times.
+/// The earlier of equally sharp ones; none where a stretch has no frame, or damaged ones alone.
+/// Frames come in the order of their times.
 pub fn choose(frames: &[ScoredFrame], count: FrameCount) -> Vec<usize> {
+    let is_whole = |i: &usize| !frames[*i].is_damaged;
     let [first, .., last] = frames else {
-        return (0..frames.len()).collect();
+        return (0..frames.len()).filter(is_whole).collect();
     };
     // The last frame is shown about as long as the others.
     let step_s = (last.time_s - first.time_s) / (frames.len() - 1) as f64;
     let duration_s = last.time_s - first.time_s + step_s;
     if !(duration_s > 0.0) {
-        return vec![0];
+        return (0..frames.len()).find(is_whole).into_iter().collect();
     }
     let per_second = |fps: f64| (fps * duration_s).round() as usize;
     let stretches = match count {
@@ -43,7 +46,8 @@ pub fn choose(frames: &[ScoredFrame], count: FrameCount) -> Vec<usize> {
     };
     let stretches = stretches.clamp(1, frames.len());
     let mut best: Vec<Option<usize>> = vec![None; stretches];
-    for (i, frame) in frames.iter().enumerate() {
+    for i in (0..frames.len()).filter(is_whole) {
+        let frame = frames[i];
         let share = (frame.time_s - first.time_s) / duration_s;
         // A frame on a border begins the later stretch, however its time was rounded.
         let stretch = ((share * stretches as f64 + 1e-6) as usize).min(stretches - 1);
@@ -63,6 +67,7 @@ mod tests {
         let frame = |(i, &sharpness): (usize, &f64)| ScoredFrame {
             time_s: 5.0 + i as f64 / fps,
             sharpness,
+            is_damaged: false,
         };
         sharpness.iter().enumerate().map(frame).collect()
     }
@@ -98,8 +103,24 @@ mod tests {
         varied.push(ScoredFrame {
             time_s: 6.0,
             sharpness: 0.5,
+            is_damaged: false,
         });
         assert_eq!(choose(&varied, FrameCount::Frames(4)), [4, 10]);
+    }
+
+    #[test]
+    fn damaged_frames_are_passed_over_however_sharp() {
+        let mut six = frames(30.0, &[1.0, 3.0, 2.0, 7.0, 7.0, 5.0]);
+        six[1].is_damaged = true;
+        six[3].is_damaged = true;
+        assert_eq!(choose(&six, FrameCount::Frames(2)), [2, 4]);
+        assert_eq!(choose(&six, FrameCount::Frames(6)), [0, 2, 4, 5]);
+        six.iter_mut().for_each(|frame| frame.time_s = 0.0);
+        six[0].is_damaged = true;
+        assert_eq!(choose(&six, FrameCount::Auto), [2], "at one time");
+        six.iter_mut().for_each(|frame| frame.is_damaged = true);
+        assert_eq!(choose(&six, FrameCount::Auto), [0; 0]);
+        assert_eq!(choose(&six[..1], FrameCount::Auto), [0; 0]);
     }
 
     #[test]
@@ -109,6 +130,7 @@ mod tests {
         let still = [ScoredFrame {
             time_s: 0.0,
             sharpness: 1.0,
+            is_damaged: false,
         }; 3];
         assert_eq!(choose(&still, FrameCount::Auto), [0]);
     }

@@ -1,3 +1,4 @@
+use super::Damage;
 use crate::ToolError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -37,6 +38,22 @@ pub enum VideoError {
         path: PathBuf,
         /// How many it has.
         frames: usize,
+    },
+    /// A video with too few frames that are whole.
+    #[error(
+        "{}: {whole} of its {frames} frames can be decoded undamaged, expected two or more: {damage}; \
+         copy the file again, or give a folder of photos",
+        path.display()
+    )]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// How many frames it has.
+        frames: usize,
+        /// How many of them are whole.
+        whole: usize,
+        /// What is wrong.
+        damage: Damage,
     },
     /// The folder for the frames holds something else.
     #[error(

@@ -16,11 +16,13 @@
 //! ```
 
 mod choose;
+mod damage;
 mod error;
 mod list;
 mod scan;
 
 pub use choose::{FrameCount, ScoredFrame, choose};
+pub use damage::Damage;
 pub use error::VideoError;
 pub use list::VideoFrame;
 pub use scan::{scan, sharpness};
@@ -34,7 +36,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A step of an extraction, for progress.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum VideoProgress {
     /// So many frames were scored, up to this time.
     Scored {
@@ -43,6 +45,8 @@ pub enum VideoProgress {
         /// Of the last one.
         time_s: f64,
     },
+    /// Not all of the video could be decoded; frames that are damaged are passed over.
+    Damaged(Damage),
     /// So many of the chosen frames are being written.
     Writing {
         /// How many in all.
@@ -127,10 +131,11 @@ pub fn encode(
 /// named by their time in seconds, and a list of them. A folder that holds anything else is
 /// left alone. Where an earlier run did the same
 /// with the same video, nothing is done; another video's frames are replaced. An
-/// interrupted run leaves no folder, or the earlier one.
+/// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt are
+/// passed over, with those up to the next key frame, which are predicted from them.
 ///
 /// # Errors
-/// `ffmpeg` is missing or fails; a file that is no video or has but one frame; a folder that
+/// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame; a folder that
 /// holds anything but an earlier run's frames; files that cannot be read or written.
 pub fn extract(
     ffmpeg: &Tool,
@@ -155,12 +160,25 @@ pub fn extract(
 
     // 1. Which frames.
     let spelling = scan::spelling(ffmpeg)?;
-    let scored = scan::scan_with(ffmpeg, spelling, video, report)?;
+    let scanned = scan::scan_with(ffmpeg, spelling, video, report)?;
+    let scored = scanned.frames;
     if scored.len() < 2 {
         return Err(VideoError::NoVideo {
             path: video.to_owned(),
             frames: scored.len(),
         });
+    }
+    if let Some(damage) = scanned.damage {
+        let whole = scored.len() - damage.frames;
+        if whole < 2 {
+            return Err(VideoError::Damaged {
+                path: video.to_owned(),
+                frames: scored.len(),
+                whole,
+                damage,
+            });
+        }
+        report(VideoProgress::Damaged(damage));
     }
     let chosen = choose(&scored, count);
     report(VideoProgress::Writing {
@@ -175,7 +193,8 @@ pub fn extract(
         fs::remove_dir_all(&partial).map_err(failed(&partial))?;
     }
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
-    write_frames(ffmpeg, spelling, video, &chosen, &partial)?;
+    let from = scan::input(video, scanned.decoding);
+    write_frames(ffmpeg, spelling, from, &chosen, &partial)?;
     let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     let mut frames = Vec::new();
     for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
@@ -197,11 +216,11 @@ pub fn extract(
     Ok(frames)
 }
 
-/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, ….
+/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, …. `arguments` say of which video.
 fn write_frames(
     ffmpeg: &Tool,
     spelling: scan::Spelling,
-    video: &Path,
+    mut arguments: Vec<OsString>,
     chosen: &[usize],
     folder: &Path,
 ) -> Result<(), VideoError> {
@@ -216,7 +235,6 @@ fn write_frames(
     fs::write(&filter_file, filter).map_err(&failed)?;
 
     // 2. The frames.
-    let mut arguments = scan::input(video);
     arguments.extend([spelling.filter_file.into(), scan::file(&filter_file)]);
     arguments.extend(spelling.passthrough.map(Into::into));
     let quality = "-c:v mjpeg -q:v 1 -qmin 1 -bitexact -f image2";

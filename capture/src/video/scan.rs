@@ -1,3 +1,4 @@
+use super::damage::{Damage, Log};
 use super::{ScoredFrame, VideoError, VideoProgress};
 use crate::{Tool, ToolError};
 use std::ffi::OsString;
@@ -17,26 +18,60 @@ pub fn scan(
     video: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Vec<ScoredFrame>, VideoError> {
-    scan_with(ffmpeg, spelling(ffmpeg)?, video, report)
+    Ok(scan_with(ffmpeg, spelling(ffmpeg)?, video, report)?.frames)
 }
 
+/// A video's frames, and what is wrong with it.
+pub(super) struct Scan {
+    pub(super) frames: Vec<ScoredFrame>,
+    pub(super) damage: Option<Damage>,
+    /// How they were decoded: to have the same ones again, as many of a damaged video.
+    pub(super) decoding: Decoding,
+}
+
+/// How ffmpeg decodes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Decoding {
+    /// With as many threads as it likes, several frames at once: it may not tell which are corrupt.
+    Fast,
+    /// One after the other, each with a line about it.
+    Told,
+}
+
+/// A video with which anything is wrong is decoded a second time, to know which frames are damaged.
 pub(super) fn scan_with(
     ffmpeg: &Tool,
     spelling: Spelling,
     video: &Path,
     report: &mut dyn FnMut(VideoProgress),
-) -> Result<Vec<ScoredFrame>, VideoError> {
+) -> Result<Scan, VideoError> {
+    let scan = scan_once(ffmpeg, spelling, video, Decoding::Fast, report)?;
+    match scan.damage {
+        None => Ok(scan),
+        Some(_) => scan_once(ffmpeg, spelling, video, Decoding::Told, report),
+    }
+}
+
+fn scan_once(
+    ffmpeg: &Tool,
+    spelling: Spelling,
+    video: &Path,
+    decoding: Decoding,
+    report: &mut dyn FnMut(VideoProgress),
+) -> Result<Scan, VideoError> {
     // Frames come on stdout, each with its size, and what they are on stderr, line by line.
     let filter = format!(
         "scale=w={SCORED_SIDE}:h={SCORED_SIDE}:force_original_aspect_ratio=decrease:flags=area,\
          format=gray,showinfo=checksum=0"
     );
-    let mut arguments = input(video);
+    let mut arguments = input(video, decoding);
     arguments.extend(["-vf", &filter].map(Into::into));
     arguments.extend(spelling.passthrough.map(Into::into));
     arguments.extend("-c:v pgm -f image2pipe pipe:1".split(' ').map(Into::into));
     let mut times_s: Vec<f64> = Vec::new();
+    let mut log = Log::default();
     let mut on_line = |line: &str| {
+        log.read(line);
         let Some(time_s) = shown_at_s(line) else {
             return;
         };
@@ -61,18 +96,29 @@ pub(super) fn scan_with(
         },
         other => other.into(),
     })?;
-    let frames = times_s.into_iter().zip(scores);
-    let frame = |(time_s, sharpness)| ScoredFrame { time_s, sharpness };
-    Ok(frames.map(frame).collect())
+    let mut is_damaged = log.damaged().into_iter();
+    let frame = |(time_s, sharpness)| ScoredFrame {
+        time_s,
+        sharpness,
+        is_damaged: is_damaged.next().unwrap_or(false),
+    };
+    let frames: Vec<ScoredFrame> = times_s.into_iter().zip(scores).map(frame).collect();
+    let damaged = frames.iter().filter(|frame| frame.is_damaged).count();
+    Ok(Scan {
+        frames,
+        damage: log.damage(damaged),
+        decoding,
+    })
 }
 
-/// What all calls begin with.
-pub(super) fn input(video: &Path) -> Vec<OsString> {
-    let mut arguments: Vec<OsString> = "-hide_banner -nostdin -nostats -v info -i"
-        .split(' ')
-        .map(Into::into)
-        .collect();
-    arguments.push(file(video));
+/// What all calls begin with. Each line that is printed has its level.
+pub(super) fn input(video: &Path, decoding: Decoding) -> Vec<OsString> {
+    let mut words = "-hide_banner -nostdin -nostats -v level+info".to_owned();
+    if decoding == Decoding::Told {
+        words += " -debug_ts -threads 1";
+    }
+    let mut arguments: Vec<OsString> = words.split(' ').map(Into::into).collect();
+    arguments.extend(["-i".into(), file(video)]);
     arguments.extend("-map 0:v:0 -an -sn -dn".split(' ').map(Into::into));
     arguments
 }
