@@ -58,6 +58,34 @@ impl FieldOptions {
         }
         Ok(())
     }
+
+    /// What of these and of a method is not the default, as the command line spells it:
+    /// `--k 11 --grid 64`; empty where all is.
+    pub fn spelled(&self, method: Method) -> String {
+        let default = Self::default();
+        let mut words = Vec::new();
+        if self.k != default.k {
+            words.push(format!("--k {}", self.k));
+        }
+        if self.beta != default.beta {
+            words.push(format!("--beta {}", self.beta));
+        }
+        words.extend(match self.blend {
+            Blend::Consistent => None,
+            Blend::Paper => Some("--blend paper".to_owned()),
+        });
+        words.extend(match self.resolution {
+            Resolution::Footprint => None,
+            Resolution::Distance => Some("--resolution distance".to_owned()),
+            Resolution::Length => Some("--resolution length".to_owned()),
+        });
+        words.extend(match method {
+            Method::Exact => Some("--renderer exact".to_owned()),
+            Method::TRIANGULATED => None,
+            Method::Triangulated { cells_across } => Some(format!("--grid {cells_across}")),
+        });
+        words.join(" ")
+    }
 }
 
 /// The formula for the weights.

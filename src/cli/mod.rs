@@ -33,6 +33,7 @@ mod render;
 mod report;
 mod session;
 mod shape;
+mod shot;
 mod stamp;
 mod surface;
 mod targets;

@@ -11,6 +11,7 @@ use super::output::{print, print_json};
 use super::path::NerfstudioArgs;
 use super::report::Report;
 use super::session::{Session, progress};
+use super::shot::say_other_look;
 use super::stamp::in_unicode;
 use super::surface::ProxyArgs;
 use super::targets::{check_folder, check_inputs, others};
@@ -83,6 +84,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let file = file.filter(|_| !asked.is_derived());
     let read = args.views.views.as_ref().or(file.as_ref());
     args.nerfstudio.say_unused(read);
+    if let (Some(read), None) = (read, args.max_error) {
+        let options = args.field.options().spelled(args.field.method());
+        say_other_look(read, &[options]);
+    }
     let why_empty = asked.why_empty(args.nerfstudio.is_unplaced(read));
     check_folder(&args.output)?;
     check_outside(&args.output)?;

@@ -17,6 +17,7 @@ use super::path::NerfstudioArgs;
 use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
+use super::shot::say_other_look;
 use super::targets::{check_folder, others};
 use super::took::Start;
 use anyhow::{Context, bail};
@@ -450,7 +451,12 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
 /// The frames of a path, or of a tour.
 fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
     let (path, tour) = match &args.path {
-        Some(file) => (path::read_in(file, &args.nerfstudio.frame()?)?, None),
+        Some(file) => {
+            let fills = fills(&args.portals)?.into_iter();
+            let read = path::read_in(file, &args.nerfstudio.frame()?)?;
+            say_other_look(file, &fills.map(PortalFill::spelled).collect::<Vec<_>>());
+            (read, None)
+        }
         None => {
             let tour = tour::plan(args, opened)?;
             (tour.clone(), Some(tour))

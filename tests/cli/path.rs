@@ -3,7 +3,7 @@
 use crate::interior::with_house;
 use crate::run::{files, lumigraph, with_wall};
 use image::RgbaImage;
-use render::path::{read, write_shot};
+use render::path::{ShotLook, read, write_shot};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -94,7 +94,14 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
     let tour = read(&here.join("tour/path.json")).unwrap();
     let view = &tour.frames[1].view;
     let picture = pixels(&here.join("tour/frame_0001.png"));
-    write_shot(&here.join("shot_0001.png"), &picture, view, None, "picture").unwrap();
+    let shoot = |layer: &str, options: &str| {
+        let look = ShotLook {
+            layer: layer.to_owned(),
+            options: options.to_owned(),
+        };
+        write_shot(&here.join("shot_0001.png"), &picture, view, None, &look).unwrap();
+    };
+    shoot("picture", "");
     // Interiors are drawn again, and it goes where paths go.
     lumigraph(here, "walk house --path shot_0001.png -o again").ok();
     assert!(pixels(&here.join("again/shot_0001.png")) == picture);
@@ -105,6 +112,29 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
     }
     let again = read(&here.join("lumigraph.json")).unwrap();
     assert_eq!(again.frames[0].view, *view);
+    // What it shows and is not drawn is told.
+    let notes = |output: &str| {
+        let line = format!("walk house --path shot_0001.png -o {output}");
+        let said = lumigraph(here, &line).ok().stderr;
+        let of_shot = said
+            .lines()
+            .filter(|line| line.starts_with("note: shot_0001.png: "));
+        of_shot.map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(notes("alike").is_empty());
+    shoot("picture", "--portals texture");
+    assert_eq!(
+        notes("geometry"),
+        [
+            "note: shot_0001.png: it was drawn with --portals texture; with default options the \
+          picture is another"
+        ]
+    );
+    shoot("depth", "");
+    assert_eq!(
+        notes("picture"),
+        ["note: shot_0001.png: it shows the depth of its view; what is drawn is the picture"]
+    );
     // Pictures from elsewhere are not.
     let error = lumigraph(here, "walk house --path tour/frame_0001.png -o x").error(1);
     let expected = "tour/frame_0001.png: no pose is stored in it; expected a screenshot";

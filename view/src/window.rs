@@ -354,8 +354,8 @@ impl App {
                 self.shown = Some(*shown);
                 self.show_picture();
             }
-            Event::News(News::Shot(Ok(path))) => {
-                self.status.said = Some(format!("saved {}", path.display()));
+            Event::News(News::Shot(Ok(shot))) => {
+                self.status.said = Some(format!("saved {}{}", shot.file.display(), shot.note));
             }
             Event::News(News::Shot(Err(text)) | News::Trouble(text)) => {
                 self.status.said = Some(text);

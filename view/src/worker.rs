@@ -5,12 +5,12 @@ use crate::content::{Content, House, Space};
 use crate::draw_house::draw_house;
 use crate::draw_scene::{Drawn, SceneDrawer};
 use crate::picture::{Request, Shown};
+use crate::shot::{self, Shot};
 use image::RgbaImage;
 use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, Walk, WalkOptions};
-use render::path::write_shot;
 use render::{DeviceChoice, Engine, Lumigraph};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ pub enum News {
     /// A picture.
     Shown(Box<Shown>),
     /// A screenshot was written, or why not.
-    Shot(Result<PathBuf, String>),
+    Shot(Result<Shot, String>),
     /// What went wrong, for people.
     Trouble(String),
 }
@@ -223,6 +223,7 @@ struct Desk<'s> {
     options: &'s WorkerOptions,
     tell: &'s dyn Fn(News),
     revision: u64,
+    is_interior: bool,
     /// What was asked for last, by whichever content it was drawn.
     last: &'s mut Option<Request>,
     reduction: u32,
@@ -241,6 +242,7 @@ impl<'s> Desk<'s> {
             options,
             tell,
             revision,
+            is_interior: false,
             last,
             reduction: 1,
         }
@@ -279,6 +281,7 @@ impl<'s> Desk<'s> {
     }
 
     fn serve_house(&mut self, house: &House) -> Option<Given> {
+        self.is_interior = true;
         let mut options = self.options.walk;
         let painter = match house.take_photos() {
             Some(photos) => {
@@ -352,23 +355,12 @@ impl<'s> Desk<'s> {
                         }
                     }
                     if let Some((_, picture)) = &kept {
-                        (self.tell)(News::Shot(self.write(&request, picture)));
+                        let folder = &self.options.output;
+                        let written = shot::write(folder, &request, picture, self.is_interior);
+                        (self.tell)(News::Shot(written));
                     }
                 }
             }
-        }
-    }
-
-    fn write(&self, request: &Request, picture: &RgbaImage) -> Result<PathBuf, String> {
-        let folder = &self.options.output;
-        let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        let file = free_name(folder);
-        let look = &request.look;
-        let time_s = look.moment.map(|moment| moment.time_s);
-        match write_shot(&file, picture, &request.view, time_s, look.layer.name()) {
-            Ok(()) => Ok(file),
-            Err(error) => Err(error.to_string()),
         }
     }
 
@@ -394,13 +386,6 @@ fn say_new(notes: &[&str], said: &mut BTreeSet<String>, tell: &dyn Fn(News)) {
             tell(News::Trouble((*note).to_owned()));
         }
     }
-}
-
-/// A name in a folder that is not taken: `shot_0001.png` and so on.
-fn free_name(folder: &Path) -> PathBuf {
-    let name = |i: u32| folder.join(format!("shot_{i:04}.png"));
-    let first = (1..u32::MAX).map(name).find(|path| !path.exists());
-    first.unwrap_or_else(|| name(0))
 }
 
 /// Whether two requests are for the same picture as files have it.
@@ -504,9 +489,10 @@ mod tests {
         };
         assert_eq!((shown.id, shown.revision), (1, 2));
         worker.shoot();
-        let News::Shot(Ok(file)) = wait() else {
+        let News::Shot(Ok(Shot { file, note })) = wait() else {
             panic!("a shot");
         };
+        assert_eq!(note, "");
         let again = render::path::read(&file).unwrap();
         let lumigraph = wall(100);
         let frame = Frame::new(&lumigraph, again.frames[0].view.clone(), Default::default());

@@ -39,6 +39,14 @@ impl PortalFill {
         }
     }
 
+    /// This where it is not the default, as the command line spells it: `--portals ldi`; else empty.
+    pub fn spelled(self) -> String {
+        match self {
+            Self::Geometry => String::new(),
+            other => format!("--portals {}", other.name()),
+        }
+    }
+
     /// The fill of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         let mut all = Self::ALL.into_iter().chain([Self::Whole]);

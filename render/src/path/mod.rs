@@ -10,7 +10,7 @@ pub use file::{
     write_keyframes,
 };
 pub use nerfstudio::{NerfstudioFrame, write_nerfstudio};
-pub use shot::{SHOT_KEYWORD, write_shot};
+pub use shot::{SHOT_KEYWORD, ShotLook, read_shot_look, write_shot};
 pub(crate) use spline::{Curve, mean_rotation};
 
 use calibrate::{Camera, CameraError, ModelKind, Rigid3, View};

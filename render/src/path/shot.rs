@@ -7,13 +7,16 @@ use super::{
 };
 use calibrate::View;
 use image::RgbaImage;
-
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Cursor};
+use std::io::{BufRead, BufReader, BufWriter, Cursor, Seek};
 use std::path::Path;
 
 /// The text chunk's keyword.
 pub const SHOT_KEYWORD: &str = "lumigraph path";
+/// Those of the chunks that say what of its view the picture shows.
+const LAYER_KEYWORD: &str = "lumigraph layer";
+const OPTIONS_KEYWORD: &str = "lumigraph options";
 /// What a PNG begins with.
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
@@ -22,9 +25,18 @@ pub(super) fn is_png(bytes: &[u8]) -> bool {
     bytes.starts_with(&SIGNATURE)
 }
 
+/// What a screenshot shows of its view.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShotLook {
+    /// "picture", or another layer's name.
+    pub layer: String,
+    /// The options that it was drawn with and that are not the defaults, as the command line spells
+    /// them: `--k 11 --grid 64`.
+    pub options: String,
+}
+
 /// Writes a picture with the view that it was drawn for, the time that it shows the scene as of, in
-/// seconds, if time plays a part, and what of it is shown ("picture", or another layer's name). The file
-/// appears complete or not at all.
+/// seconds, if time plays a part, and what of it is shown. The file appears complete or not at all.
 ///
 /// # Errors
 /// A file that cannot be written; a view or a time that no file can hold.
@@ -33,7 +45,7 @@ pub fn write_shot(
     picture: &RgbaImage,
     view: &View,
     time_s: Option<f64>,
-    layer: &str,
+    look: &ShotLook,
 ) -> Result<(), PathFileError> {
     let io = |error| PathFileError::Write(file.to_owned(), error);
     let png = |error: png::EncodingError| match error {
@@ -58,12 +70,15 @@ pub fn write_shot(
         let mut encoder = png::Encoder::new(out, picture.width(), picture.height());
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder
-            .add_text_chunk(SHOT_KEYWORD.to_owned(), text)
-            .map_err(png)?;
-        encoder
-            .add_text_chunk("lumigraph layer".to_owned(), layer.to_owned())
-            .map_err(png)?;
+        for (keyword, text) in [
+            (SHOT_KEYWORD, &text),
+            (LAYER_KEYWORD, &look.layer),
+            (OPTIONS_KEYWORD, &look.options),
+        ] {
+            encoder
+                .add_text_chunk(keyword.to_owned(), text.clone())
+                .map_err(png)?;
+        }
         let mut writer = encoder.write_header().map_err(png)?;
         writer.write_image_data(picture.as_raw()).map_err(png)?;
         writer.finish().map_err(png)?;
@@ -76,20 +91,39 @@ pub fn write_shot(
     written
 }
 
+/// What a file shows of its view if it is a screenshot; what cannot be read is none.
+pub fn read_shot_look(file: &Path) -> Option<ShotLook> {
+    let mut texts = texts(BufReader::new(File::open(file).ok()?)).ok()?;
+    Some(ShotLook {
+        layer: texts.remove(LAYER_KEYWORD)?,
+        options: texts.remove(OPTIONS_KEYWORD)?,
+    })
+}
+
+/// A PNG's texts by their keywords, of several the first: those before its pixels.
+fn texts(png: impl BufRead + Seek) -> Result<BTreeMap<String, String>, png::DecodingError> {
+    let mut decoder = png::Decoder::new(png);
+    // It may be large beyond all measure, and says nothing of the pose.
+    decoder.set_ignore_iccp_chunk(true);
+    let reader = decoder.read_info()?;
+    let mut texts = BTreeMap::new();
+    for chunk in &reader.info().uncompressed_latin1_text {
+        let text = texts.entry(chunk.keyword.clone());
+        text.or_insert_with(|| chunk.text.clone());
+    }
+    Ok(texts)
+}
+
 /// The view that a screenshot was drawn for, as a path of one frame that is called as the file.
 ///
 /// # Errors
 /// A damaged PNG, or one without a pose.
 pub(super) fn parse_shot(file: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    // It may be large beyond all measure, and says nothing of the pose.
-    decoder.set_ignore_iccp_chunk(true);
-    let reader = decoder.read_info();
-    let reader = reader.map_err(|error| PathFileError::Png(file.to_owned(), error.to_string()))?;
-    let chunks = &reader.info().uncompressed_latin1_text;
-    let chunk = chunks.iter().find(|chunk| chunk.keyword == SHOT_KEYWORD);
-    let chunk = chunk.ok_or_else(|| PathFileError::NoPose(file.to_owned()))?;
-    let (mut path, _) = parse_own(file, chunk.text.as_bytes())?;
+    let texts = texts(Cursor::new(bytes));
+    let texts = texts.map_err(|error| PathFileError::Png(file.to_owned(), error.to_string()))?;
+    let text = texts.get(SHOT_KEYWORD);
+    let text = text.ok_or_else(|| PathFileError::NoPose(file.to_owned()))?;
+    let (mut path, _) = parse_own(file, text.as_bytes())?;
     if let ([frame], Some(stem)) = (path.frames.as_mut_slice(), file.file_stem()) {
         frame.name = stem.to_string_lossy().into_owned();
     }
@@ -130,18 +164,26 @@ mod tests {
         PathFrame::of_view("a".to_owned(), &view).unwrap().view
     }
 
+    fn look() -> ShotLook {
+        ShotLook {
+            layer: "picture".to_owned(),
+            options: "--k 11 --beta 0.05".to_owned(),
+        }
+    }
+
     #[test]
     fn a_shot_gives_its_view_and_its_pixels_back() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("shot_0001.png");
         let picture = RgbaImage::from_fn(32, 24, |x, y| Rgba([x as u8, y as u8, 7, (x * y) as u8]));
-        write_shot(&file, &picture, &view(), Some(1.5), "picture").unwrap();
+        write_shot(&file, &picture, &view(), Some(1.5), &look()).unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), picture);
         let path = read(&file).unwrap();
         assert_eq!(path.frames.len(), 1);
         assert_eq!(path.frames[0].view, view());
         assert_eq!(path.frames[0].time_s, Some(1.5));
         assert_eq!(path.frames[0].name, "shot_0001");
+        assert_eq!(read_shot_look(&file), Some(look()));
         // It begins a path of keyframes, too.
         let begun = read_keyframes(&file, &NerfstudioFrame::default());
         let KeyframeFile {
@@ -160,14 +202,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.png");
         RgbaImage::new(2, 2).save(&file).unwrap();
+        assert_eq!(read_shot_look(&file), None);
         assert!(matches!(read(&file), Err(PathFileError::NoPose(_))));
         std::fs::write(&file, SIGNATURE).unwrap();
         assert!(matches!(read(&file), Err(PathFileError::Png(..))));
         std::fs::write(&file, "no picture").unwrap();
         assert!(matches!(read(&file), Err(PathFileError::Json(..))));
+        assert_eq!(read_shot_look(&file), None);
         let gone = folder.path().join("gone/b.png");
+        assert_eq!(read_shot_look(&gone), None);
         assert!(matches!(read(&gone), Err(PathFileError::Io(..))));
-        let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), None, "picture");
+        let failed = write_shot(&gone, &RgbaImage::new(32, 24), &view(), None, &look());
         assert!(matches!(failed, Err(PathFileError::Write(..))));
     }
 }

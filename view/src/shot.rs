@@ -1,0 +1,137 @@
+//! Screenshots: what their files have, and what of the screen they do not.
+
+use crate::picture::{Layer, Look, Request};
+use image::RgbaImage;
+use render::path::{ShotLook, write_shot};
+use std::path::{Path, PathBuf};
+
+/// A screenshot that was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shot {
+    /// Its file.
+    pub file: PathBuf,
+    /// How the picture differs from the screen's, and from what is drawn of its view again, for
+    /// people; empty, or to be said behind the file's name.
+    pub note: String,
+}
+
+/// Writes a picture as files have it, with its view and how it was drawn, to the next free name in a
+/// folder, which is made where it is missing.
+///
+/// # Errors
+/// Why it is not written, for people.
+pub(crate) fn write(
+    folder: &Path,
+    request: &Request,
+    picture: &RgbaImage,
+    is_interior: bool,
+) -> Result<Shot, String> {
+    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    let file = free_name(folder);
+    let look = &request.look;
+    let time_s = look.moment.map(|moment| moment.time_s);
+    let kept = kept(look, is_interior);
+    write_shot(&file, picture, &request.view, time_s, &kept).map_err(|error| error.to_string())?;
+    let note = note(look, &kept, is_interior);
+    Ok(Shot { file, note })
+}
+
+/// What of a look the file knows.
+fn kept(look: &Look, is_interior: bool) -> ShotLook {
+    ShotLook {
+        // What no photo covers is marked on the screen only.
+        layer: match look.layer {
+            Layer::Coverage => Layer::Picture.name().to_owned(),
+            layer => layer.name().to_owned(),
+        },
+        options: match is_interior {
+            true => look.portals.spelled(),
+            false => look.options.spelled(look.method),
+        },
+    }
+}
+
+fn note(look: &Look, kept: &ShotLook, is_interior: bool) -> String {
+    let command = if is_interior { "walk" } else { "render" };
+    let mut note = String::new();
+    if look.exposure_stops != 0.0 {
+        note += ", without the exposure";
+    }
+    if kept.layer != Layer::Picture.name() {
+        note += &format!("; of its view `{command}` draws the picture");
+    } else if !kept.options.is_empty() {
+        note += &format!("; `{command}` draws it with {}", kept.options);
+    }
+    note
+}
+
+/// A name in a folder that is not taken: `shot_0001.png` and so on.
+fn free_name(folder: &Path) -> PathBuf {
+    let name = |i: u32| folder.join(format!("shot_{i:04}.png"));
+    let first = (1..u32::MAX).map(name).find(|path| !path.exists());
+    first.unwrap_or_else(|| name(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::{Lens, Rigid3, View};
+    use glam::DVec2;
+    use render::Method;
+    use render::interior::PortalFill;
+    use render::path::read_shot_look;
+
+    #[test]
+    fn a_shot_says_what_it_takes_to_draw_it_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut request = Request {
+            id: 1,
+            view: View {
+                lens: Lens::pinhole(DVec2::splat(8.0), DVec2::splat(4.0)),
+                width: 8,
+                height: 8,
+                camera_from_world: Rigid3::IDENTITY,
+            },
+            look: Look::default(),
+            is_moving: false,
+            hover: None,
+        };
+        let mut told = |change: &dyn Fn(&mut Look), is_interior: bool| {
+            request.look = Look::default();
+            change(&mut request.look);
+            let picture = RgbaImage::new(8, 8);
+            let shot = write(folder.path(), &request, &picture, is_interior).unwrap();
+            let kept = read_shot_look(&shot.file).unwrap();
+            (kept.layer, kept.options, shot.note)
+        };
+        let texts = |layer: &str, options: &str, note: &str| {
+            (layer.to_owned(), options.to_owned(), note.to_owned())
+        };
+        assert_eq!(told(&|_| {}, false), texts("picture", "", ""));
+        let panel = |look: &mut Look| {
+            look.options.k = 11;
+            look.options.beta = 0.05;
+            look.method = Method::Triangulated { cells_across: 64 };
+            look.exposure_stops = 0.7;
+            look.portals = PortalFill::Ldi;
+        };
+        let options = "--k 11 --beta 0.05 --grid 64";
+        let note = format!(", without the exposure; `render` draws it with {options}");
+        assert_eq!(told(&panel, false), texts("picture", options, &note));
+        let note = ", without the exposure; `walk` draws it with --portals ldi";
+        assert_eq!(told(&panel, true), texts("picture", "--portals ldi", note));
+        let exact = |look: &mut Look| {
+            look.layer = Layer::Field;
+            look.method = Method::Exact;
+        };
+        let note = "; of its view `render` draws the picture";
+        assert_eq!(
+            told(&exact, false),
+            texts("field", "--renderer exact", note)
+        );
+        let coverage = |look: &mut Look| look.layer = Layer::Coverage;
+        assert_eq!(told(&coverage, false), texts("picture", "", ""));
+        assert!(folder.path().join("shot_0005.png").is_file());
+    }
+}
