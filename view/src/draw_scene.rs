@@ -2,6 +2,7 @@
 
 use crate::compose::{depth_picture, nearest_stop, over_background, photo_picture, shaded_picture};
 use crate::content::Space;
+use crate::memory::Memories;
 use crate::overlay::mesh_of;
 use crate::picture::{DepthGrid, Hover, Layer, Lines, Request, Shown, Support};
 use calibrate::{Pixel, View};
@@ -179,6 +180,7 @@ impl<'a> SceneDrawer<'a> {
             unreachable!("made above");
         };
         let (width, height) = (frame.desired.width, frame.desired.height);
+        let memories = Memories::now(&self.lumigraph.photos, engine);
         // 2. The layer.
         let picture = match look.layer {
             Layer::Picture | Layer::Coverage => {
@@ -230,6 +232,7 @@ impl<'a> SceneDrawer<'a> {
         let hover = request.hover.map(|pixel| hover(frame, asked, pixel));
         let image = timed(&mut stages, "compose", || over_background(&picture, look));
         let store = &self.lumigraph.photos;
+        let coarse = Memories::now(store, engine).told_since(memories);
         let scored = frame.scored();
         let shown = Shown {
             id: request.id,
@@ -245,7 +248,7 @@ impl<'a> SceneDrawer<'a> {
             cell: None,
             stages,
             skipped: format!(
-                "{} of {} photos never decoded, {} never asked",
+                "{} of {} photos never decoded, {} never asked{coarse}",
                 store.len() - store.decoded(),
                 store.len(),
                 scored.ever.iter().filter(|was| !**was).count()

@@ -13,6 +13,7 @@ mod keyframes;
 mod keys;
 mod lines;
 mod loader;
+mod memory;
 mod overlay;
 mod panel;
 mod picture;

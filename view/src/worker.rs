@@ -586,6 +586,28 @@ mod tests {
     }
 
     #[test]
+    fn of_photos_that_are_coarse_for_want_of_memory_it_is_said_why() {
+        let said = |budget| {
+            let mut lumigraph = wall(0);
+            let photos = &mut Arc::get_mut(&mut lumigraph).unwrap().photos;
+            photos.set_budget(budget);
+            let space = Space::of_scene(&lumigraph);
+            let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
+            let mut drawer = SceneDrawer::new(&lumigraph, &space, render::Skips::ALL);
+            // The second time nothing is prepared.
+            let drawn = [1, 2].map(|id| drawer.draw(&mut engine, &request(id, 0.25), 1).unwrap());
+            drawn.map(|(_, shown)| shown.skipped)
+        };
+        for said in said(None) {
+            assert!(!said.contains("memory"), "{said}");
+        }
+        let coarse = "; photos from coarser mip levels, as --cpu-memory is too little";
+        for said in said(Some(4000)) {
+            assert!(said.ends_with(coarse), "{said}");
+        }
+    }
+
+    #[test]
     fn every_layer_and_size_is_drawn() {
         let lumigraph = wall(0);
         let space = Space::of_scene(&lumigraph);
