@@ -119,6 +119,12 @@ impl App {
         }
     }
 
+    /// Whether the pointer is, where it is now.
+    fn is_over_panels(&self) -> bool {
+        let pane_and_pointer = self.pane.as_ref().zip(self.pointer);
+        pane_and_pointer.is_some_and(|(pane, at)| pane.panels.takes(at))
+    }
+
     fn on_button(&mut self, button: MouseButton, is_down: bool) {
         let Some(at) = self.pointer else {
             return;
@@ -206,11 +212,11 @@ impl App {
             WindowEvent::CursorLeft { .. } => self.on_pointer(None),
             WindowEvent::MouseInput { state, button, .. } => {
                 let is_down = state == ElementState::Pressed;
-                if !consumed || !is_down {
+                if !is_down || !self.is_over_panels() {
                     self.on_button(button, is_down);
                 }
             }
-            WindowEvent::MouseWheel { delta, .. } if !consumed => {
+            WindowEvent::MouseWheel { delta, .. } if !self.is_over_panels() => {
                 let notches = match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(y),
                     MouseScrollDelta::PixelDelta(by) => by.y / 50.0,

@@ -7,9 +7,10 @@ use crate::picture::{Look, Shown};
 use crate::plan::Plan;
 use crate::state::State;
 use crate::trace::{Took, Watch};
+use calibrate::Pixel;
 use egui::{
-    ClippedPrimitive, Color32, Context, FontId, PlatformOutput, Pos2, RawInput, Rect, TextStyle,
-    TextureHandle, TextureOptions, TexturesDelta, ViewportId, vec2,
+    ClippedPrimitive, Color32, Context, FontId, Order, PlatformOutput, Pos2, RawInput, Rect,
+    TextStyle, TextureHandle, TextureOptions, TexturesDelta, ViewportId, vec2,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -146,6 +147,15 @@ impl Panels {
         let size = vec2(width as f32, height as f32) / self.scale;
         let is_there = width > 0 && height > 0;
         input.screen_rect = is_there.then(|| Rect::from_min_size(Pos2::ZERO, size));
+    }
+
+    /// Whether a button or the wheel at a pixel is for the panels, as they were laid out last. What egui
+    /// says of that when it is told is by where the pointer was then.
+    pub(super) fn takes(&self, at: Pixel) -> bool {
+        let place = Pos2::new(at.x as f32, at.y as f32) / self.scale;
+        let layer = self.context.layer_id_at(place);
+        let is_over = layer.is_some_and(|layer| layer.order != Order::Background);
+        is_over || self.context.egui_is_using_pointer()
     }
 
     /// Brings a picture to the textures.
@@ -293,6 +303,27 @@ mod tests {
                 assert!(!has_new_letters(&next), "scale {scale}, frame {i}");
                 discard(next);
             }
+        }
+    }
+
+    #[test]
+    fn where_panels_are_the_scene_has_no_buttons() {
+        let size = (1280, 800);
+        for scale in [1.0, 1.5] {
+            let mut panels = Panels::warm(scale, size, TEXTURE_SIDE);
+            let status = Status::default();
+            let mut shows = all_shown();
+            // More than once, as egui lays out by what was before; nobody points at anything.
+            let mut lay_out = |shows: &mut Shows| {
+                for _ in 0..3 {
+                    discard(frame(&mut panels, size, &status, shows));
+                }
+                let places = [(1150.0, 200.0), (640.0, 400.0), (40.0, 400.0)];
+                places.map(|(x, y)| panels.takes(Pixel::new(x, y)))
+            };
+            assert_eq!(lay_out(&mut shows), [true, true, false], "panel and help");
+            shows.panel = false;
+            assert_eq!(lay_out(&mut shows), [false, true, false], "the help alone");
         }
     }
 
