@@ -261,6 +261,34 @@ fn finished_steps_are_not_repeated() {
 }
 
 #[test]
+fn a_locked_database_is_told_from_other_failures() {
+    let mut bench = Bench::new();
+    // As of an import that was killed, whose COLMAP is still at work; some COLMAPs tell where they were.
+    let said =
+        "Matching block [1/2, 1/1]\nSQLite error: database is locked\n*** Aborted at 17 ***\n";
+    let stack: String = (0..12).map(|i| format!("    @     0x{i} main\n")).collect();
+    bench.write("say-exhaustive_matcher", &format!("{said}{stack}"));
+    bench.write("fail-exhaustive_matcher", "");
+    let error = bench.run().unwrap_err().to_string();
+    assert!(
+        error.contains("another COLMAP is at work on this database"),
+        "{error}"
+    );
+    assert!(
+        error.ends_with("or end it, then start again to go on"),
+        "{error}"
+    );
+    // What the log has of an earlier time is over.
+    bench.write("say-exhaustive_matcher", "Matching block [1/2, 1/1]\n");
+    let error = bench.run().unwrap_err().to_string();
+    assert!(
+        error.contains("check that memory and disk suffice"),
+        "{error}"
+    );
+    assert!(!error.contains("another COLMAP"), "{error}");
+}
+
+#[test]
 fn an_interrupted_step_leaves_nothing_that_counts() {
     let mut bench = Bench::new();
     // The first step: of its database nothing is kept, or the camera would be made twice.

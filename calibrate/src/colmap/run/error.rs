@@ -70,6 +70,11 @@ pub(super) const OVERLAP: &str = "photos need overlap (each shows most of what i
     shows, from a step further on, not by turning on the spot), texture, and little blur; take \
     more of them, or match all pairs";
 
+/// What helps where SQLite says that the database is locked. An import that is killed leaves its COLMAP at
+/// work: that ends when it next has something to say, as nobody listens.
+pub(super) const LOCKED: &str = "another COLMAP is at work on this database, such as one that an import \
+    left behind when it was killed; wait until it has ended, or end it, then start again to go on";
+
 pub(super) fn io_error(
     path: impl Into<PathBuf>,
     doing: &'static str,

@@ -105,6 +105,11 @@ pub(super) fn found_no_pair(log: &str) -> bool {
     messages(log).any(|line| line.contains("No good initial image pair found"))
 }
 
+/// Whether a line says that another program writes to the database: SQLite's words.
+pub(super) fn is_of_lock(line: &str) -> bool {
+    line.contains("database is locked")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

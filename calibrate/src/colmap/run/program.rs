@@ -1,6 +1,6 @@
 //! COLMAP's programs and their options, old and new.
 
-use super::error::{OVERLAP, io_error};
+use super::error::{LOCKED, OVERLAP, io_error};
 use super::{Event, Matching, Options, RunError, Step, log, outcome};
 use capture::{PhotoSet, Tool, ToolError};
 use std::ffi::OsString;
@@ -181,10 +181,7 @@ impl<'a> Program<'a> {
         let mut arguments = told(&partial)?;
         let mut ran = self.run_once(step, &arguments.words, step.log(), report);
         let is_first = ran.is_ok();
-        if let Err(ToolError::Failed { .. }) = ran
-            && can_be_closer
-            && self.found_no_pair()?
-        {
+        if ran.as_ref().is_err_and(Stopped::is_failure) && can_be_closer && self.found_no_pair()? {
             report(Event::PhotosAreClose);
             arguments.give_known(CLOSER, CLOSE_PAIR);
             ran = self.run_once(step, &arguments.words, step.log(), report);
@@ -205,8 +202,8 @@ impl<'a> Program<'a> {
                     self.rename(SECOND_MODELS, PARTIAL_MODELS)?;
                     self.rename(SECOND_LOG, step.log())?;
                 }
-                Ok(()) | Err(ToolError::Failed { .. }) => {}
-                Err(source) => return Err(source.into()),
+                Err(stopped) if !stopped.is_failure() => return Err(stopped.source.into()),
+                Ok(()) | Err(_) => {}
             }
             self.remove(SECOND_MODELS)?;
             self.remove(SECOND_LOG)?;
@@ -225,19 +222,22 @@ impl<'a> Program<'a> {
         words: &[OsString],
         log: &str,
         report: &mut dyn FnMut(Event),
-    ) -> Result<(), ToolError> {
+    ) -> Result<(), Stopped> {
         let photos = self.photos.photos.len() as u64;
         report(Event::Progress {
             step,
             done: 0,
             total: photos,
         });
+        let mut is_locked = false;
         let mut on_line = |line: &str| {
+            is_locked |= log::is_of_lock(line);
             if let Some((done, total)) = log::progress(step, line, photos) {
                 report(Event::Progress { step, done, total });
             }
         };
-        self.colmap.run(words, &self.work.join(log), &mut on_line)
+        let ran = self.colmap.run(words, &self.work.join(log), &mut on_line);
+        ran.map_err(|source| Stopped { source, is_locked })
     }
 
     /// Whether the mapper gave up as no two photos, or no two more, suit it to begin with.
@@ -248,14 +248,32 @@ impl<'a> Program<'a> {
     }
 }
 
+/// Why a program did not come to a good end.
+struct Stopped {
+    source: ToolError,
+    /// Whether it said that another writes to the database, anywhere: stacks may follow.
+    is_locked: bool,
+}
+
+impl Stopped {
+    /// Whether it ran, and failed.
+    fn is_failure(&self) -> bool {
+        matches!(self.source, ToolError::Failed { .. })
+    }
+}
+
 /// What a step's error becomes.
-fn failed(step: Step) -> impl FnOnce(ToolError) -> RunError {
-    move |source| match source {
-        ToolError::Failed { .. } => RunError::Failed {
+fn failed(step: Step) -> impl FnOnce(Stopped) -> RunError {
+    move |stopped| match (stopped.is_failure(), stopped.source) {
+        (true, source) => RunError::Failed {
             source,
-            remedy: step.remedy(),
+            remedy: if stopped.is_locked {
+                LOCKED
+            } else {
+                step.remedy()
+            },
         },
-        other => other.into(),
+        (false, other) => other.into(),
     }
 }
 
