@@ -135,9 +135,13 @@ impl Reconstruction {
                 observing.map(move |keypoint| (image, keypoint))
             })
         };
+        // How far a lens maps rays one to one takes long to find out.
+        let mut lenses: BTreeMap<CameraId, Option<Lens>> = BTreeMap::new();
         let error = |(image, keypoint): (&Image, &Keypoint)| {
             let camera = self.cameras.get(&image.camera_id)?;
-            self.error_px(image, &camera.lens().ok()?, keypoint, origin_of(camera))
+            let lens = lenses.entry(image.camera_id);
+            let lens = lens.or_insert_with(|| camera.lens().ok()).as_ref()?;
+            self.error_px(image, lens, keypoint, origin_of(camera))
         };
         let step = observations().count().div_ceil(JUDGED).max(1);
         let mut errors: Vec<f64> = observations().step_by(step).filter_map(error).collect();
