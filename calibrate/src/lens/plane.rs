@@ -98,6 +98,9 @@ fn rational_radius(r: f64, k: &[f64; 6]) -> (f64, f64) {
 /// bounded by [`sideways_bound`]. Where the sum is positive definite on a disc, which is
 /// convex, the mapping is one to one there.
 pub(super) fn limit(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> f64 {
+    if always_grows(k, p, s) {
+        return f64::INFINITY;
+    }
     let grows = |r: f64| {
         let (value, slope) = rational_radius(r, k);
         slope.min(value / r) > sideways_bound(r, p, s) * r
@@ -114,6 +117,16 @@ pub(super) fn limit(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> f64 {
     let far = scan(1450.0, 1450, f64::INFINITY, |steps| grows(radius(steps)));
     // Infinity stays what it is.
     radius(far)
+}
+
+/// Whether it is plain that a mapping is one to one throughout: looking for the radius up to which it is takes
+/// long then, as there is none. The eigenvalues are 1 + k₁r² or more, which is 2√k₁·r or more.
+fn always_grows(k: &[f64; 6], p: &[f64; 2], s: &[f64; 4]) -> bool {
+    // Powers of the largest radius are numbers, too.
+    let usual = k.iter().all(|k| (0.0..1e9).contains(k));
+    let sideways = sideways_bound(0.0, p, s);
+    // By far more than rounding.
+    usual && k[3..] == [0.0; 3] && *s == [0.0; 4] && sideways * sideways <= 3.9 * k[0]
 }
 
 /// The point that [`rational_prism`] maps to a distorted one.
@@ -157,6 +170,40 @@ pub(super) fn bend(k: &[f64], p: &[f64; 2], radius: f64) -> f64 {
 mod tests {
     use super::super::difference;
     use super::*;
+
+    #[test]
+    fn what_plainly_grows_always_is_found_to() {
+        let scanned = |k: &[f64; 6], p: &[f64; 2]| {
+            let grows = |r: f64| {
+                let (value, slope) = rational_radius(r, k);
+                slope.min(value / r) > sideways_bound(r, p, &[0.0; 4]) * r
+            };
+            let places = (1..2000).map(|step| 1e-4 * (0.0135 * f64::from(step)).exp());
+            places.into_iter().all(grows)
+        };
+        for k1 in [0.0_f64, 1e-9, 0.004, 0.05, 2.0, 9e8] {
+            for k2 in [0.0, 1e-7, 0.3] {
+                let k = [k1, k2, 0.1 * k2, 0.0, 0.0, 0.0];
+                // The most that is plain, and somewhat more than may be.
+                let most = (3.9 * k1).sqrt() / 6.0;
+                for p in [[0.0, 0.0], [0.999 * most, 0.0], [0.6 * most, -0.7 * most]] {
+                    assert!(always_grows(&k, &p, &[0.0; 4]), "{k1} {k2} {p:?}");
+                    assert!(scanned(&k, &p), "{k1} {k2} {p:?}");
+                }
+                assert!(!always_grows(&k, &[1.1 * most + 1e-9, 0.0], &[0.0; 4]));
+            }
+        }
+        assert!(!always_grows(
+            &[0.1, -0.01, 0.0, 0.0, 0.0, 0.0],
+            &[0.0; 2],
+            &[0.0; 4]
+        ));
+        assert!(!always_grows(
+            &[0.1, 0.01, 0.0, 0.1, 0.0, 0.0],
+            &[0.0; 2],
+            &[0.0; 4]
+        ));
+    }
 
     #[test]
     fn derivatives_meet_finite_differences() {
