@@ -170,24 +170,42 @@ impl Channel {
         (1.4826 * *median).max(MIN_NOISE)
     }
 
+    /// Sums by photo of each observation's value less its point's weighted mean, or where all weights are zero
+    /// the plain mean, times its weight. `totals` are the points' weights.
+    fn summed(
+        &self,
+        weights: &[f64],
+        totals: &[f64],
+        value: impl Fn(usize) -> f64,
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
+        for (range, &total) in self.start.windows(2).zip(totals) {
+            let range = range[0]..range[1];
+            let mean = if total > 0.0 {
+                let weighted = range.clone().map(|i| weights[i] * value(i));
+                weighted.fold(0.0, |sum, value| sum + value) / total
+            } else {
+                range.clone().map(&value).sum::<f64>() / range.len() as f64
+            };
+            for i in range {
+                out[self.photo[i]] += weights[i] * (value(i) - mean);
+            }
+        }
+    }
+
     /// The weighted least-squares gains, points eliminated (Schur's complement), by
     /// conjugate gradients with Jacobi's preconditioner from the gains given.
     fn solve(&self, weights: &[f64], prior: f64, x: &mut [f64]) {
         let count = self.photo_count;
         // S·x: each observation's x less its point's mean, weighted, summed by photo.
-        let mut scratch = vec![0.0; self.log.len()];
-        let mut summed = |value: &dyn Fn(usize) -> f64, out: &mut [f64]| {
-            for i in 0..scratch.len() {
-                scratch[i] = value(i);
-            }
-            self.less_point_means(weights, &mut scratch);
-            out.fill(0.0);
-            for i in 0..scratch.len() {
-                out[self.photo[i]] += weights[i] * scratch[i];
-            }
+        let weight_of = |range: &[usize]| {
+            let weights = weights[range[0]..range[1]].iter();
+            weights.fold(0.0, |sum, weight| sum + weight)
         };
+        let totals: Vec<f64> = self.start.windows(2).map(weight_of).collect();
         let mut b = vec![0.0; count];
-        summed(&|i| self.log[i], &mut b);
+        self.summed(weights, &totals, |i| self.log[i], &mut b);
         let mut diagonal = vec![prior; count];
         for (&photo, weight) in self.photo.iter().zip(weights) {
             diagonal[photo] += weight;
@@ -199,7 +217,7 @@ impl Channel {
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
 
         let mut product = vec![0.0; count];
-        summed(&|i| x[self.photo[i]], &mut product);
+        self.summed(weights, &totals, |i| x[self.photo[i]], &mut product);
         let mut r: Vec<f64> = (0..count)
             .map(|i| b[i] - product[i] - prior * x[i])
             .collect();
@@ -214,7 +232,7 @@ impl Channel {
             if !(rz > enough) {
                 break;
             }
-            summed(&|i| p[self.photo[i]], &mut product);
+            self.summed(weights, &totals, |i| p[self.photo[i]], &mut product);
             for i in 0..count {
                 product[i] += prior * p[i];
             }
