@@ -2,6 +2,7 @@
 
 use calibrate::{Distortion, Lens, Pixel, View};
 use glam::DVec3;
+use proxy::Rays;
 use rayon::prelude::*;
 
 /// The rays of the last lens and image size, for the next frame along a path.
@@ -62,7 +63,14 @@ impl RayMap {
         }
         let width = view.width as usize;
         let count = width * view.height as usize;
+        // Those that the surface was scanned along are known.
+        let known = (count <= Rays::MOST_KEPT).then(|| Rays::of(&lens, (view.width, view.height)));
+        let known = known.flatten();
         let ray = |i: usize| {
+            if let Some(known) = &known {
+                let at = known.at(i % width, i / width);
+                return at.map_or([f32::NAN; 4], |at| [at.x as f32, at.y as f32, 1.0, 0.0]);
+            }
             let pixel = Pixel::center_of((i % width) as u32, (i / width) as u32);
             ray_of(&lens, pixel).map_or([f32::NAN; 4], |ray| ray.as_vec3().extend(0.0).to_array())
         };

@@ -5,6 +5,7 @@ use calibrate::{Distortion, Lens, Pixel, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Pixels of a row whose bounds are kept together.
 pub(super) const BLOCK: usize = 16;
@@ -18,7 +19,7 @@ pub struct Rays {
     pub(super) lens: Lens,
     /// Pixels across and down.
     pub(super) size: [usize; 2],
-    pub(super) bent: Option<Bent>,
+    pub(super) bent: Option<Arc<Bent>>,
 }
 
 /// Rays of a lens that bends them, each by where it meets the plane z = 1.
@@ -87,6 +88,9 @@ impl Bounds {
 }
 
 impl Rays {
+    /// Rays of so many pixels, of one lens or of several, are kept for whoever asks for them again: 64 MiB.
+    pub const MOST_KEPT: usize = 1 << 22;
+
     /// `None` where some pixel looks aside or back.
     pub fn of(lens: &Lens, size: (u32, u32)) -> Option<Self> {
         Self::by(Threads::All, lens, size)
@@ -100,7 +104,7 @@ impl Rays {
             bent: None,
         };
         if lens.distortion() != Distortion::None {
-            rays.bent = Some(Bent::of(threads, lens, size)?);
+            rays.bent = Some(kept(lens, size, || Bent::of(threads, lens, size))?);
         }
         Some(rays)
     }
@@ -137,6 +141,39 @@ impl Rays {
     pub fn are_straight(&self) -> bool {
         self.bent.is_none()
     }
+}
+
+/// Of a lens, and a picture of so many pixels.
+type OfLens = (Lens, [usize; 2], Arc<Bent>);
+
+/// The last that were asked for, the latest last: photos of one camera have the same, and a photo that is drawn again.
+static LAST: Mutex<Vec<OfLens>> = Mutex::new(Vec::new());
+
+/// Those that are known, or what `find` finds. That may take long: others do not wait for it, and find the same.
+fn kept(lens: &Lens, size: [usize; 2], find: impl FnOnce() -> Option<Bent>) -> Option<Arc<Bent>> {
+    let lock = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let take = |last: &mut Vec<OfLens>| {
+        let place = last.iter().position(|of| (of.0, of.1) == (*lens, size));
+        place.map(|place| last.remove(place))
+    };
+    {
+        let mut last = lock();
+        if let Some(known) = take(&mut last) {
+            let bent = Arc::clone(&known.2);
+            last.push(known);
+            return Some(bent);
+        }
+    }
+    let bent = Arc::new(find()?);
+    if bent.at.len() <= Rays::MOST_KEPT {
+        let mut last = lock();
+        take(&mut last);
+        last.push((*lens, size, Arc::clone(&bent)));
+        while last.iter().map(|of| of.2.at.len()).sum::<usize>() > Rays::MOST_KEPT {
+            last.remove(0);
+        }
+    }
+    Some(bent)
 }
 
 impl Bent {
