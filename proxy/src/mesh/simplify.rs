@@ -53,18 +53,31 @@ impl Mesh {
     }
 }
 
-/// The edges, each once, ascending, and how many triangles each has.
-fn edges(mesh: &Mesh) -> Vec<([u32; 2], u32)> {
-    let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-    let ends = |(a, b): (u32, u32)| [a.min(b), a.max(b)];
-    let mut all: Vec<[u32; 2]> = mesh
-        .triangles
-        .par_iter()
-        .flat_map_iter(|t| sides(t).map(ends))
-        .collect();
+/// The triangles' sides, ascending; those of an edge are one after the other.
+fn sides(mesh: &Mesh) -> Vec<Side> {
+    let mut all = vec![Side(0); 3 * mesh.triangles.len()];
+    let of_triangles = all.par_chunks_exact_mut(3).zip(&mesh.triangles);
+    of_triangles.for_each(|(sides, t)| {
+        for k in 0..3 {
+            sides[k] = Side::between(t[k], t[(k + 1) % 3]);
+        }
+    });
     all.par_sort_unstable();
-    let runs = all.chunk_by(|a, b| a == b);
-    runs.map(|run| (run[0], run.len() as u32)).collect()
+    all
+}
+
+/// Both ends of a triangle's side as one number, which is sorted sooner: the lesser one first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side(u64);
+
+impl Side {
+    fn between(a: u32, b: u32) -> Self {
+        Self(u64::from(a.min(b)) << 32 | u64::from(a.max(b)))
+    }
+
+    fn ends(self) -> [u32; 2] {
+        [(self.0 >> 32) as u32, self.0 as u32]
+    }
 }
 
 fn quadrics(mesh: &Mesh) -> Vec<Quadric> {
@@ -80,16 +93,18 @@ fn quadrics(mesh: &Mesh) -> Vec<Quadric> {
         }
     }
     // Planes across the surface along its borders.
-    let border: Vec<[u32; 2]> = edges(mesh)
-        .into_iter()
-        .filter(|(_, n)| *n == 1)
-        .map(|(ends, _)| ends)
+    let sides = sides(mesh);
+    let edges = sides.chunk_by(|a, b| a == b);
+    let border: Vec<Side> = edges
+        .filter(|sides| sides.len() == 1)
+        .map(|sides| sides[0])
         .collect();
+    drop(sides);
     for (i, triangle) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(i);
         for k in 0..3 {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-            if border.binary_search(&[a.min(b), a.max(b)]).is_err() {
+            if border.binary_search(&Side::between(a, b)).is_err() {
                 continue;
             }
             let (from, to) = (corners[k], corners[(k + 1) % 3]);
@@ -146,40 +161,32 @@ impl Around {
 struct Candidate {
     cost: f64,
     ends: [u32; 2],
-    position: DVec3,
 }
 
 fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize, share: f64) {
     // 1. What each edge costs.
-    let edges = edges(mesh);
+    let sides = sides(mesh);
     let mut is_border = vec![false; mesh.positions.len()];
-    for (ends, _) in edges.iter().filter(|(_, n)| *n != 2) {
+    for edge in sides.chunk_by(|a, b| a == b).filter(|e| e.len() != 2) {
+        let ends = edge[0].ends();
         ends.iter().for_each(|i| is_border[*i as usize] = true);
     }
-    let candidate = |&(ends, triangles): &([u32; 2], u32)| {
+    let candidate = |edge: &[Side]| {
+        let ends = edge[0].ends();
         let [on_a, on_b] = ends.map(|i| is_border[i as usize]);
         // An edge across, from border to border, would pinch the surface.
-        if triangles > 2 || (on_a && on_b && triangles == 2) {
+        if edge.len() > 2 || (on_a && on_b && edge.len() == 2) {
             return None;
         }
+        let (position, quadric) = contracted(mesh, quadrics, &is_border, ends);
         let [a, b] = ends.map(|i| mesh.positions[i as usize]);
-        let mut quadric = quadrics[ends[0] as usize];
-        quadric += quadrics[ends[1] as usize];
-        let position = match (on_a, on_b) {
-            (true, false) => a,
-            (false, true) => b,
-            _ => quadric.least_near(a.midpoint(b)),
-        };
         // Where all is flat, short edges go first.
         let cost = quadric.at(position) + 1e-9 * quadric.weight() * a.distance_squared(b);
-        cost.is_finite().then_some(Candidate {
-            cost,
-            ends,
-            position,
-        })
+        cost.is_finite().then_some(Candidate { cost, ends })
     };
-    let mut candidates: Vec<Candidate> = edges.par_iter().filter_map(candidate).collect();
-    drop(edges);
+    let edges = sides.par_chunk_by(|a, b| a == b);
+    let mut candidates: Vec<Candidate> = edges.filter_map(candidate).collect();
+    drop(sides);
     let order = |a: &Candidate, b: &Candidate| a.cost.total_cmp(&b.cost).then(a.ends.cmp(&b.ends));
     let considered = ((candidates.len() as f64 * share) as usize).max(64);
     if considered < candidates.len() {
@@ -191,7 +198,8 @@ fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize, share: 
     let around = Around::new(mesh);
     let mut is_touched = vec![false; mesh.positions.len()];
     let mut left = mesh.triangles.len();
-    for Candidate { ends, position, .. } in candidates {
+    let mut ring = Ring::default();
+    for Candidate { ends, .. } in candidates {
         if left <= max_triangles {
             break;
         }
@@ -199,10 +207,13 @@ fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize, share: 
         if is_touched[a as usize] || is_touched[b as usize] {
             continue;
         }
-        let Some(ring) = contractible(mesh, &around, ends, position) else {
+        // Neither end was touched: it is where it was when the cost was found.
+        let (position, _) = contracted(mesh, quadrics, &is_border, ends);
+        if !ring.is_contractible(mesh, &around, ends, position) {
             continue;
-        };
-        ring.iter().for_each(|i| is_touched[*i as usize] = true);
+        }
+        let touched = ends.iter().chain(ring.next_to.iter().flatten());
+        touched.for_each(|i| is_touched[*i as usize] = true);
         mesh.positions[a as usize] = position;
         let other = quadrics[b as usize];
         quadrics[a as usize] += other;
@@ -219,48 +230,74 @@ fn pass(mesh: &mut Mesh, quadrics: &mut [Quadric], max_triangles: usize, share: 
         .retain(|[a, b, c]| a != b && b != c && c != a);
 }
 
-/// Both ends of an edge and all corners next to them, if the edge can go: the surface stays
-/// what it is (Dey et al. 1999, the link condition), and no triangle turns over.
-fn contractible(mesh: &Mesh, around: &Around, ends: [u32; 2], position: DVec3) -> Option<Vec<u32>> {
-    let mut next_to: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
-    let mut shared = 0;
-    for k in 0..2 {
-        let (here, there) = (ends[k], ends[1 - k]);
-        for t in around.of(here) {
-            let triangle = mesh.triangles[*t as usize];
-            next_to[k].extend(triangle.iter().filter(|i| !ends.contains(i)));
-            if triangle.contains(&there) {
-                shared += 1;
-                continue;
-            }
-            let corners = mesh.corners(*t as usize);
-            let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
-            let mut moved = corners;
-            for (corner, i) in moved.iter_mut().zip(triangle) {
-                if i == here {
-                    *corner = position;
+/// Where both ends of an edge go, and what holds them.
+fn contracted(
+    mesh: &Mesh,
+    quadrics: &[Quadric],
+    is_border: &[bool],
+    ends: [u32; 2],
+) -> (DVec3, Quadric) {
+    let [a, b] = ends.map(|i| mesh.positions[i as usize]);
+    let mut quadric = quadrics[ends[0] as usize];
+    quadric += quadrics[ends[1] as usize];
+    let position = match ends.map(|i| is_border[i as usize]) {
+        [true, false] => a,
+        [false, true] => b,
+        _ => quadric.least_near(a.midpoint(b)),
+    };
+    (position, quadric)
+}
+
+/// The corners next to both ends of an edge.
+#[derive(Default)]
+struct Ring {
+    next_to: [Vec<u32>; 2],
+}
+
+impl Ring {
+    /// Whether the edge can go: the surface stays what it is (Dey et al. 1999, the link condition), and no
+    /// triangle turns over. If so, the corners next to it are found.
+    fn is_contractible(
+        &mut self,
+        mesh: &Mesh,
+        around: &Around,
+        ends: [u32; 2],
+        position: DVec3,
+    ) -> bool {
+        let mut shared = 0;
+        for (k, next_to) in self.next_to.iter_mut().enumerate() {
+            next_to.clear();
+            let (here, there) = (ends[k], ends[1 - k]);
+            for t in around.of(here) {
+                let triangle = mesh.triangles[*t as usize];
+                next_to.extend(triangle.iter().filter(|i| !ends.contains(i)));
+                if triangle.contains(&there) {
+                    shared += 1;
+                    continue;
+                }
+                let corners = mesh.corners(*t as usize);
+                let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+                let mut moved = corners;
+                for (corner, i) in moved.iter_mut().zip(triangle) {
+                    if i == here {
+                        *corner = position;
+                    }
+                }
+                let (before, after) = (normal(corners), normal(moved));
+                let is_turned = before.dot(after) < MIN_COS * before.length() * after.length();
+                if is_turned || (after == DVec3::ZERO && before != DVec3::ZERO) {
+                    return false;
                 }
             }
-            let (before, after) = (normal(corners), normal(moved));
-            let is_turned = before.dot(after) < MIN_COS * before.length() * after.length();
-            if is_turned || (after == DVec3::ZERO && before != DVec3::ZERO) {
-                return None;
-            }
+            next_to.sort_unstable();
+            next_to.dedup();
         }
-        next_to[k].sort_unstable();
-        next_to[k].dedup();
+        let [of_a, of_b] = &self.next_to;
+        let common = of_a
+            .iter()
+            .filter(|i| of_b.binary_search(i).is_ok())
+            .count();
+        // Each triangle of the edge has one corner apart from it; half of them were counted twice.
+        common == shared / 2
     }
-    let [of_a, of_b] = &next_to;
-    let common = of_a
-        .iter()
-        .filter(|i| of_b.binary_search(i).is_ok())
-        .count();
-    // Each triangle of the edge has one corner apart from it; half of them were counted twice.
-    if common != shared / 2 {
-        return None;
-    }
-    let mut ring = ends.to_vec();
-    ring.extend(of_a);
-    ring.extend(of_b);
-    Some(ring)
 }
