@@ -3,6 +3,7 @@
 use super::DepthMap;
 use super::small::SmallPhoto;
 use super::sweep::Costs;
+use pulp::Arch;
 
 /// What it costs neighbours to be one step apart, and to be farther apart; the latter less
 /// across an edge of the photo.
@@ -17,19 +18,20 @@ const EDGE: f32 = 8.0;
 /// The inverse depth of each pixel that the photo uses.
 pub(super) fn depths(photo: &SmallPhoto, costs: &Costs) -> DepthMap {
     let (width, height, count) = (photo.width, photo.height, costs.count);
-    let mut sums = vec![0_u16; costs.costs.len()];
-    // Four directions on the way down, and their opposites on the way up.
-    for backwards in [false, true] {
-        for (dx, dy) in [(1_isize, 0_isize), (1, 1), (0, 1), (-1, 1)] {
-            add_path(photo, costs, [dx, dy], backwards, &mut sums);
-        }
-    }
+    let sums = vec![0_u16; costs.costs.len()];
+    // A closure that gives away what it has is compiled for wide vectors: see `Comparison::new`.
+    let sums = Arch::new().dispatch(
+        #[inline(always)]
+        move || all_paths(photo, costs, sums),
+    );
     let inverse_depth = |pixel: usize| -> f32 {
         if !photo.used[pixel] {
             return 0.0;
         }
         let sums = &sums[pixel * count..][..count];
-        let best = (0..count).min_by_key(|&d| sums[d]).unwrap_or(0);
+        // In two passes, of which the first is one for vectors.
+        let least = sums.iter().copied().fold(u16::MAX, u16::min);
+        let best = sums.iter().position(|sum| *sum == least).unwrap_or(0);
         if best == 0 || best == count - 1 {
             // On the range's end it may as well lie beyond.
             return 0.0;
@@ -49,7 +51,20 @@ pub(super) fn depths(photo: &SmallPhoto, costs: &Costs) -> DepthMap {
     }
 }
 
+/// Adds the least costs of paths in all directions.
+#[inline(always)]
+fn all_paths(photo: &SmallPhoto, costs: &Costs, mut sums: Vec<u16>) -> Vec<u16> {
+    // Four directions on the way down, and their opposites on the way up.
+    for backwards in [false, true] {
+        for (dx, dy) in [(1_isize, 0_isize), (1, 1), (0, 1), (-1, 1)] {
+            add_path(photo, costs, [dx, dy], backwards, &mut sums);
+        }
+    }
+    sums
+}
+
 /// Adds the least costs of paths in one direction.
+#[inline(always)]
 fn add_path(
     photo: &SmallPhoto,
     costs: &Costs,
@@ -64,7 +79,6 @@ fn add_path(
     let stride = count + 3;
     let mut last = vec![WALL; width * stride];
     let mut current = last.clone();
-    let mut previous = vec![WALL; stride];
     for row in 0..height {
         let y = if backwards { height - 1 - row } else { row };
         std::mem::swap(&mut last, &mut current);
@@ -78,16 +92,24 @@ fn add_path(
             let own = &costs.costs[pixel * count..][..count];
             let (px, py) = (x as isize + towards * dx, y as isize + towards * dy);
             let inside = px >= 0 && py >= 0 && px < width as isize && py < height as isize;
-            let out = x * stride..(x + 1) * stride;
             if inside {
-                let from = if dy == 0 { &current } else { &last };
-                previous.copy_from_slice(&from[px as usize * stride..][..stride]);
-                let before = py as usize * width + px as usize;
+                let px = px as usize;
+                let (previous, out) = if dy > 0 {
+                    (&last[px * stride..], &mut current[x * stride..])
+                } else if px < x {
+                    let (previous, out) = current.split_at_mut(x * stride);
+                    (&previous[px * stride..], out)
+                } else {
+                    let (out, previous) = current.split_at_mut(px * stride);
+                    (&*previous, &mut out[x * stride..])
+                };
+                let before = py as usize * width + px;
                 let difference = (photo.grays[pixel] - photo.grays[before]).abs();
                 let jump = (f32::from(JUMP) / (1.0 + difference / EDGE)) as u16;
-                step_path(&previous, own, jump.max(LEAST_JUMP), &mut current[out]);
+                let jump = jump.max(LEAST_JUMP);
+                step_path(&previous[..stride], own, jump, &mut out[..stride]);
             } else {
-                start_path(own, &mut current[out]);
+                start_path(own, &mut current[x * stride..][..stride]);
             }
             let path = &current[x * stride + 1..][..count];
             let sums = &mut sums[pixel * count..][..count];
@@ -97,6 +119,7 @@ fn add_path(
     }
 }
 
+#[inline(always)]
 fn start_path(own: &[u8], out: &mut [u16]) {
     let count = own.len();
     for (out, own) in out[1..=count].iter_mut().zip(own) {
@@ -106,6 +129,7 @@ fn start_path(own: &[u8], out: &mut [u16]) {
 }
 
 /// Hirschmüller 2008, equation 13.
+#[inline(always)]
 fn step_path(previous: &[u16], own: &[u8], jump: u16, out: &mut [u16]) {
     let count = own.len();
     let floor = previous[count + 2];
