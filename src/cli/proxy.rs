@@ -197,17 +197,23 @@ fn check_written(kind: Kind, file: &Path) -> Result<(), FileError> {
 }
 
 /// Where what was chosen among all kinds is written: to the file that was asked for, or beside it where such files
-/// cannot hold it, so that the choice is not lost.
+/// cannot hold it, so that the choice is not lost. Nothing that is there is written over unasked: of `p.ply`, `p_2.ply`
+/// and so on the first that is free is taken.
 fn file_for(file: &Path, proxy: &Proxy) -> PathBuf {
     let form = Form::of(proxy);
     let Err(error) = form.check(file, proxy.kind()) else {
         return file.to_owned();
     };
-    let beside = file.with_extension(form.exact_extension());
-    if beside.exists() {
-        // It was not asked for; writing says why the other cannot be.
-        return file.to_owned();
-    }
+    let named = |i: u32| {
+        let mut name = file.file_stem().unwrap_or_default().to_owned();
+        if i > 1 {
+            name.push(format!("_{i}"));
+        }
+        name.push(format!(".{}", form.exact_extension()));
+        file.with_file_name(name)
+    };
+    let free = (1..).map(named).find(|beside| !beside.exists());
+    let beside = free.unwrap_or_else(|| named(1));
     say!("note: {error}; it goes to {}", beside.display());
     beside
 }
