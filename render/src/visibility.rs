@@ -42,10 +42,13 @@ pub(crate) const REDUCTION: u32 = 2;
 pub struct DistanceMap {
     /// In texels.
     pub size: [u32; 2],
-    /// Row by row, 1/distance over [`Self::unit`]; zero where there is nothing. These are
-    /// the largest of 3 × 3 rays, so that what lies beside something nearer, where no proxy
-    /// is exact, counts as hidden by it. They fit 16 bits: at most one as a rule, and 6e4
-    /// where something all but touches the camera.
+    /// Row by row, 1/distance over [`Self::unit`]; zero where there is nothing. They fit 16 bits:
+    /// at most one as a rule, and 6e4 where something all but touches the camera.
+    ///
+    /// Each is that of its own ray. Between a near texel and a far one what is filtered is nearer
+    /// than the far one nearly all the way, so less than a texel beside something near counts as
+    /// hidden by it. Not more may: what a photo shows beside a silhouette other photos nearby show
+    /// beside it, too, and were none of them to count, what far ones show would be drawn there as a line.
     pub values: Vec<f32>,
     /// What the values are in units of, 1/world units.
     pub unit: f64,
@@ -141,21 +144,13 @@ impl DistanceMap {
 
     /// Of the inverse distances of texels, row by row.
     fn of(size: [u32; 2], rows: &[Vec<f64>]) -> Self {
-        let [width, height] = size.map(|side| side as usize);
         // The unit keeps the values within what 16 bits hold.
         let unit = unit_of(rows);
-        let around = |i: usize, side: usize| i.saturating_sub(1)..(i + 2).min(side);
-        let values = (0..height)
-            .flat_map(|y| (0..width).map(move |x| (x, y)))
-            .map(|(x, y)| {
-                let block = around(y, height).flat_map(|y| around(x, width).map(move |x| (x, y)));
-                let value = block.map(|(x, y)| rows[y][x]).fold(0.0, f64::max);
-                f16::from_f64((value / unit).min(MOST)).to_f32()
-            });
-        let values: Vec<f32> = values.collect();
+        let stored = |value: &f64| f16::from_f64((value / unit).min(MOST)).to_f32();
+        let values: Vec<f32> = rows.iter().flatten().map(stored).collect();
         Self {
             size,
-            largest: largest_of(&values, width),
+            largest: largest_of(&values, size[0] as usize),
             values,
             unit,
         }
@@ -297,6 +292,24 @@ mod tests {
         let map = map(5.0, 1, 1e-9);
         assert_eq!(map.unit, 0.2);
         assert_eq!(DistanceMap::of([2, 1], &[vec![0.0; 2]]).unit, 1.0);
+    }
+
+    #[test]
+    fn what_lies_beside_something_nearer_is_seen() {
+        // Four texels are eight pixels of the photo.
+        let map = map(5.0, 4, 0.4);
+        let at = |x: f64, distance: f64| {
+            let nearest = map.inverse_distance(Pixel::new(x, 3.0));
+            visible(1.0 / distance, nearest)
+        };
+        // The wall, right behind its edge and up to half a texel beyond; what is before it, up to there.
+        for x in [1.0, 5.0, 7.0, 8.0, 8.5] {
+            assert!(at(x, 5.0) < 2e-3, "{x}: {}", at(x, 5.0));
+            assert_eq!(at(x, 2.5), 1.0, "{x}");
+        }
+        for x in [9.0, 10.0, 11.0, 20.0] {
+            assert_eq!(at(x, 5.0), 1.0, "{x}");
+        }
     }
 
     #[test]
