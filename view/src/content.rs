@@ -210,7 +210,7 @@ impl Space {
             height,
             camera_from_world,
         };
-        // The first room is looked at as the tour enters it.
+        // The first room is looked at on the way that the tour takes.
         let camera = Camera::of(&lens, width, height);
         let toured = Tour::new(
             &house.interior,
@@ -220,9 +220,14 @@ impl Space {
             64,
             15.0,
         );
-        let first = toured
-            .ok()
-            .map(|tour| tour.path.frames[0].view.camera_from_world);
+        let toured: Vec<Rigid3> = toured.map_or_else(
+            |_| Vec::new(),
+            |tour| {
+                let frames = tour.path.frames.iter();
+                frames.map(|frame| frame.view.camera_from_world).collect()
+            },
+        );
+        let first = toured.first();
         let first_cell = first.and_then(|pose| {
             let eye = pose.center();
             house.contents.locate(&house.interior, eye)
@@ -234,7 +239,11 @@ impl Space {
             let pose = match first {
                 Some(pose) if first_cell == Some(id) => {
                     let eye = stands.unwrap_or(pose.center());
-                    let ahead = pose.rotation.conjugate() * DVec3::Z;
+                    // From where one stands it goes another way than from the middle.
+                    let ways = toured.iter().map(|pose| pose.center() - eye);
+                    let mut ways = ways.map(|way| way - up * way.dot(up));
+                    let way = ways.find(|way| way.length() > eye_height);
+                    let ahead = way.unwrap_or(pose.rotation.conjugate() * DVec3::Z);
                     Some(Rigid3::looking_at(eye, eye + ahead, up))
                 }
                 _ => stands.or_else(|| middle_of(house, id)).map(|eye| {
