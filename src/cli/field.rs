@@ -91,7 +91,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let others = [&args.weights, &args.triangulation].into_iter().flatten();
     let files: Vec<&Path> = others.chain([&args.output]).map(PathBuf::as_path).collect();
-    files.iter().try_for_each(|file| check_outside(file))?;
+    files
+        .iter()
+        .try_for_each(|file| check_outside(file, "-o"))?;
     let mut scene = args.scene.open()?;
     check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
     let mut without = args.hold_out.names(&scene)?;

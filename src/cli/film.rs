@@ -3,6 +3,7 @@
 mod kept;
 
 use super::Usage;
+use super::interior::check_outside;
 use super::options::positive;
 use super::output::say;
 use super::stamp::in_unicode;
@@ -181,6 +182,7 @@ impl FilmArgs {
             return Err(Usage(text).into());
         }
         check_file(video, "--video")?;
+        check_outside(video, "--video")?;
         capture::video::ffmpeg().text(&["-version"])?;
         let folder = tempfile::tempdir()?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());
@@ -239,7 +241,13 @@ impl FilmArgs {
         let video = self.video.iter();
         check_inputs(all.iter().chain(video).map(PathBuf::as_path), inputs)?;
         if !self.resume {
-            kept::forget(folder)?;
+            if kept::forget(folder)? {
+                say!(
+                    "note: {}: frames that runs with --resume left here are no longer gone on with, as this run \
+                     has none",
+                    folder.display()
+                );
+            }
             return Ok(vec![false; files.len()]);
         }
         kept::begin(folder, all, inputs)?;

@@ -458,8 +458,8 @@ pub(super) fn check_holds_none(folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Fails where something else, a file or a folder of files, is to be written into the folder of an interior that
-/// could be replaced, however far below: it could not be any more.
-pub(super) fn check_outside(path: &Path) -> anyhow::Result<()> {
+/// could be replaced, however far below: it could not be any more. The option names it.
+pub(super) fn check_outside(path: &Path, option: &str) -> anyhow::Result<()> {
     let whole = std::path::absolute(path).ok();
     // What is to be made, `house/film` or `../film`, lies in what is there.
     let there = whole.and_then(|whole| whole.ancestors().find_map(|p| p.canonicalize().ok()));
@@ -469,7 +469,7 @@ pub(super) fn check_outside(path: &Path) -> anyhow::Result<()> {
     });
     if let Some(holder) = holder {
         bail!(
-            "{}: {} holds an interior, and what else lies there keeps it from being replaced; choose another -o",
+            "{}: {} holds an interior, and what else lies there keeps it from being replaced; choose another {option}",
             path.display(),
             holder.display()
         );

@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let why_empty = asked.why_empty(args.nerfstudio.is_unplaced(read));
     check_folder(&args.output)?;
-    check_outside(&args.output)?;
+    check_outside(&args.output, "-o")?;
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
     let without = args.hold_out.names(&scene)?;

@@ -17,6 +17,14 @@ pub(super) fn check_file(file: &Path, option: &str) -> anyhow::Result<()> {
             file.display()
         );
     }
+    // It would be another file in the place of a device or a pipe: of `/dev/stdout` for all that write there.
+    let is_link = file.is_symlink() && file.starts_with("/dev");
+    if is_link || (file.exists() && !file.is_file()) {
+        bail!(
+            "{}: no file, and would be replaced by one; choose another {option}",
+            file.display()
+        );
+    }
     check_writable(file.parent().unwrap_or(Path::new("")), option)
 }
 
@@ -26,11 +34,11 @@ pub(super) fn check_new_folder(
     folder: &Path,
     may_be_replaced: impl Fn(&Path) -> bool,
 ) -> anyhow::Result<()> {
-    check_folder(folder)?;
     let real = folder.canonicalize().ok();
-    if let Some(above) = real.as_deref().and_then(Path::parent) {
-        // It is made beside its place.
-        check_folder(above)?;
+    match real.as_deref().and_then(Path::parent) {
+        // It is made beside its place, which it takes.
+        Some(above) if folder.is_dir() => check_folder(above)?,
+        _ => check_folder(folder)?,
     }
     Ok(datasets::check_free(folder, may_be_replaced)?)
 }
@@ -154,6 +162,11 @@ mod tests {
         if cfg!(target_os = "linux") {
             let error = check_file(Path::new("/proc/b.png"), "-o").unwrap_err();
             assert!(error.to_string().starts_with("/proc: cannot write: "));
+            for device in ["/dev/null", "/dev/stdout"] {
+                let error = check_file(Path::new(device), "-o").unwrap_err();
+                let said = format!("{device}: no file, and would be replaced by one; ");
+                assert!(error.to_string().starts_with(&said), "{error}");
+            }
         }
         assert!(check_new_folder(&at("new/er"), |_| false).is_ok());
         assert!(check_new_folder(&at("images"), |_| true).is_ok());

@@ -159,7 +159,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     check_folder(&args.output)?;
     check_holds_none(&args.output)?;
-    check_outside(&args.output)?;
+    check_outside(&args.output, "-o")?;
     args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");

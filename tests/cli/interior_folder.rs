@@ -99,6 +99,9 @@ fn nothing_else_is_written_into_an_interiors_folder() {
         assert!(files(&house) == before, "{line}");
     }
     // Beside it is room, also as seen from within.
+    let film = format!("walk house {walk} -o walk --video house/film.mp4");
+    let error = lumigraph(here, &film).error(1);
+    assert!(error.ends_with("choose another --video"), "{error}");
     lumigraph(&house, &format!("walk . {walk} -o ../walk")).ok();
     assert!(files(&house) == before);
     assert!(here.join("walk/frame_0000.png").exists());

@@ -314,9 +314,13 @@ fn frames_that_a_run_without_resume_made_are_not_taken_for_those_of_before() {
     let render = "render wall --proxy plane --path sweep --size 48x36 --frames 2 -o out";
     lumigraph(here, &format!("{render} --resume")).ok();
     assert!(resume.exists());
-    lumigraph(here, &format!("{render} --k 2")).ok();
+    let told = "note: out: frames that runs with --resume left here are no longer gone on with";
+    let ran = lumigraph(here, &format!("{render} --k 2")).ok();
+    assert!(ran.stderr.contains(told), "{}", ran.stderr);
     let frames = files(&here.join("out"));
     assert_eq!(frames.len(), 2);
+    let ran = lumigraph(here, &format!("{render} --k 2")).ok();
+    assert!(!ran.stderr.contains(told), "{}", ran.stderr);
     let error = lumigraph(here, &format!("{render} --resume")).error(1);
     let said = "out: there are frames here that a run without --resume made";
     assert!(error.contains(said), "{error}");

@@ -41,16 +41,18 @@ const BETWEEN: &str = "3";
 
 /// The text of a line that tells of an error.
 fn error_in(line: &str) -> Option<&str> {
-    let after = |marker: &str| {
-        let (before, after) = line.split_once(marker)?;
-        // A title may read like anything.
-        (!before.contains("[info] ")).then_some(after)
-    };
-    let of_file = |text: &str| line.find(text).map(|at| &line[at..]);
-    let error = LEVELS.into_iter().find_map(after);
+    let level = |marker: &str| from(line, marker).map(|told| &told[marker.len()..]);
+    let error = LEVELS.into_iter().find_map(level);
     error
-        .or_else(|| OF_FILE.into_iter().find_map(of_file))
+        .or_else(|| OF_FILE.into_iter().find_map(|text| from(line, text)))
         .map(str::trim)
+}
+
+/// A line from where it says something; `None` where it is only information: titles and the files' names may read
+/// like anything.
+fn from<'a>(line: &'a str, text: &str) -> Option<&'a str> {
+    let at = line.find(text)?;
+    (!line[..at].contains("[info] ")).then(|| &line[at..])
 }
 
 /// A frame as it came out of the decoder.
@@ -93,7 +95,7 @@ impl Log {
             self.errors += 1;
             self.first.get_or_insert_with(|| error.to_owned());
         }
-        self.is_corrupt |= line.contains(CORRUPT_FRAME);
+        self.is_corrupt |= from(line, CORRUPT_FRAME).is_some();
         if let Some(decoded) = Decoded::parse(line, self.is_corrupt) {
             self.decoded.push(decoded);
             self.is_corrupt = false;
@@ -148,9 +150,15 @@ mod tests {
             "[h264 @ 0x55] [info] concealing 319 DC, 319 AC, 319 MV errors in I frame",
             "[mov,mp4 @ 0x55] [warning] multiple edit list entries, a/v desync might occur",
             "[info]     title           : [error] my corrupt film",
+            "[info]     title           : Packet corrupt",
+            "[info] Input #0, mov,mp4, from 'corrupt decoded frame.mp4':",
         ] {
             assert_eq!(first(&[fine]), None, "{fine}");
         }
+        let mut log = Log::default();
+        log.read("[info] Input #0, mov,mp4, from 'corrupt decoded frame.mp4':");
+        log.read("[info] decoder -> pts:0 keyframe:1 frame_type:1");
+        assert_eq!(log.damaged(), [false]);
         // Of ffmpeg 4 to 6, then of 7 on.
         let old = [
             "[h264 @ 0x55] [error] error while decoding MB 0 8, bytestream 13273",

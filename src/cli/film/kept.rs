@@ -138,15 +138,17 @@ pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> an
 }
 
 /// Gives up what runs in a folder have agreed on, as others' frames take the place of theirs there: [`begin`]
-/// refuses to go on with those. What is no plan is somebody else's file, and stays.
+/// refuses to go on with those. What is no plan is somebody else's file, and stays. Whether there was one.
 ///
 /// # Errors
 /// The file cannot be removed.
-pub(super) fn forget(folder: &Path) -> anyhow::Result<()> {
-    match Plan::of(folder) {
-        Ok(_) => remove(&[file_in(folder)]),
-        Err(_) => Ok(()),
+pub(super) fn forget(folder: &Path) -> anyhow::Result<bool> {
+    let _held = hold(folder);
+    let is_plan = file_in(folder).exists() && Plan::of(folder).is_ok();
+    if is_plan {
+        remove(&[file_in(folder)])?;
     }
+    Ok(is_plan)
 }
 
 /// The photos that the frames in a folder are made without, as some run found them damaged: by name, with what is
