@@ -77,8 +77,10 @@ struct Line {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();
     let output = args.output.as_deref();
-    output.map_or(Ok(()), check_folder)?;
-    output.map_or(Ok(()), |folder| check_outside(folder, "-o"))?;
+    if let Some(folder) = output {
+        check_folder(folder)?;
+        check_outside(folder, "-o")?;
+    }
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;
     // What cannot be compared is said at once: fitting a proxy may take long.

@@ -81,19 +81,20 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_extensions(args)?;
-    check_file(&args.output, "-o")?;
-    for (file, option) in [
-        (&args.weights, "--weights"),
-        (&args.triangulation, "--triangulation"),
-    ] {
-        file.as_deref()
-            .map_or(Ok(()), |file| check_file(file, option))?;
+    let outputs = [
+        (Some(&args.output), "-o"),
+        (args.weights.as_ref(), "--weights"),
+        (args.triangulation.as_ref(), "--triangulation"),
+    ];
+    let mut files: Vec<&Path> = Vec::new();
+    for (file, option) in outputs {
+        let Some(file) = file else {
+            continue;
+        };
+        check_file(file, option)?;
+        check_outside(file, "-o")?;
+        files.push(file);
     }
-    let others = [&args.weights, &args.triangulation].into_iter().flatten();
-    let files: Vec<&Path> = others.chain([&args.output]).map(PathBuf::as_path).collect();
-    files
-        .iter()
-        .try_for_each(|file| check_outside(file, "-o"))?;
     let mut scene = args.scene.open()?;
     check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
     let mut without = args.hold_out.names(&scene)?;

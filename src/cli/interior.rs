@@ -121,20 +121,19 @@ fn say_unused(args: &Args) {
 /// Fails where an interior would be replaced that was not asked to be, as people correct them by hand, or that
 /// cannot be, as other things lie beside it; and where there is no writing to the folder.
 fn check_free(args: &Args) -> anyhow::Result<()> {
-    let folder = args.output.display();
-    if !args.output.join(INTERIOR).exists() {
-        return check_new_folder(&args.output, is_ours);
-    }
-    if let Some(other) = beside_interior(&args.output)? {
-        bail!(
-            "{folder}: the folder is not empty: it holds an interior, and {other}; choose another, or move that away \
-             first"
-        );
-    }
-    if !args.force {
-        bail!(
-            "{folder}: holds an interior already; replace it with --force, or choose another folder"
-        );
+    if args.output.join(INTERIOR).exists() {
+        let folder = args.output.display();
+        if let Some(other) = beside_interior(&args.output)? {
+            bail!(
+                "{folder}: the folder is not empty: it holds an interior, and {other}; choose another, or move that \
+                 away first"
+            );
+        }
+        if !args.force {
+            bail!(
+                "{folder}: holds an interior already; replace it with --force, or choose another folder"
+            );
+        }
     }
     check_new_folder(&args.output, is_ours)
 }

@@ -227,6 +227,17 @@ mod tests {
         (folder, scene)
     }
 
+    /// What is said of the plane that is taken of the first photo alone: once its calibration has depths,
+    /// without which there is none.
+    fn note_of_plane(scene: &mut Scene, others: &BTreeSet<String>) -> String {
+        let error = scene.fit_best(others).unwrap_err().to_string();
+        assert!(error.contains("give the plane by hand"), "{error}");
+        scene.photos[0].depth_bounds = Some([2.0, 6.0]);
+        let fitted = scene.fit_best(others).unwrap();
+        assert_eq!(fitted.proxy.kind(), "plane");
+        fitted.note.unwrap()
+    }
+
     #[test]
     fn points_that_nobody_else_saw_are_not_taken() {
         let (_folder, mut scene) = wall();
@@ -236,12 +247,7 @@ mod tests {
         let fitted = scene.fit_best(&but_two).unwrap();
         assert_eq!(fitted.proxy.kind(), "points");
         // Of those that the photo left saw with others nothing is known without these.
-        let error = scene.fit_best(&others).unwrap_err().to_string();
-        assert!(error.contains("give the plane by hand"), "{error}");
-        scene.photos[0].depth_bounds = Some([2.0, 6.0]);
-        let fitted = scene.fit_best(&others).unwrap();
-        assert_eq!(fitted.proxy.kind(), "plane");
-        let note = fitted.note.unwrap();
+        let note = note_of_plane(&mut scene, &others);
         let said = "; no points (0 sparse points are too few for a surface); no dense (";
         assert!(note.contains(said), "{note}");
     }
@@ -262,12 +268,7 @@ mod tests {
 
         // 2. One alone agrees with none, and tells no depths.
         let others: BTreeSet<String> = scene.names().into_iter().skip(1).collect();
-        let error = scene.fit_best(&others).unwrap_err().to_string();
-        assert!(error.contains("give the plane by hand"), "{error}");
-        scene.photos[0].depth_bounds = Some([2.0, 6.0]);
-        let fitted = scene.fit_best(&others).unwrap();
-        assert_eq!(fitted.proxy.kind(), "plane");
-        let note = fitted.note.unwrap();
+        let note = note_of_plane(&mut scene, &others);
         assert!(
             note.starts_with("1 photos are too few to compare proxies by; no dense ("),
             "{note}"

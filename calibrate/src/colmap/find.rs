@@ -86,6 +86,13 @@ pub fn side_by_side(model: &Path) -> Vec<SubModel> {
     all.into_iter().flatten().map(counted).collect()
 }
 
+/// How many images the largest has of the models in the numbered folders within one, as far as their files tell.
+pub(super) fn most_images(folder: &Path) -> usize {
+    let counts = numbered(folder).into_iter();
+    let counts = counts.filter_map(|model| count_images(&model));
+    counts.max().unwrap_or(0) as usize
+}
+
 /// The folders within one that are called by numbers, in the order of these.
 fn numbered(folder: &Path) -> Vec<PathBuf> {
     let number = |path: PathBuf| {

@@ -1,6 +1,7 @@
 //! One channel's gains: robust least squares in the logarithms.
 
 use super::Observation;
+use std::ops::Range;
 
 /// One channel of the observations, ordered by point.
 #[derive(Clone, Debug, Default)]
@@ -136,20 +137,20 @@ impl Channel {
     /// Subtracts from the values of each point's observations their weighted mean, or
     /// where all weights are zero their plain mean.
     fn less_point_means(&self, weights: &[f64], values: &mut [f64]) {
-        for range in self.start.windows(2) {
+        for (range, total) in self.start.windows(2).zip(self.totals(weights)) {
             let range = range[0]..range[1];
-            let (mut sum, mut total) = (0.0, 0.0);
-            for i in range.clone() {
-                sum += weights[i] * values[i];
-                total += weights[i];
-            }
-            let mean = if total > 0.0 {
-                sum / total
-            } else {
-                values[range.clone()].iter().sum::<f64>() / range.len() as f64
-            };
+            let mean = mean(weights, total, range.clone(), |i| values[i]);
             values[range].iter_mut().for_each(|v| *v -= mean);
         }
+    }
+
+    /// The points' weights, each all of its observations'.
+    fn totals(&self, weights: &[f64]) -> Vec<f64> {
+        let total = |range: &[usize]| {
+            let weights = weights[range[0]..range[1]].iter();
+            weights.fold(0.0, |sum, weight| sum + weight)
+        };
+        self.start.windows(2).map(total).collect()
     }
 
     /// The median absolute residual as a Gaussian's standard deviation; a mean of n
@@ -170,8 +171,8 @@ impl Channel {
         (1.4826 * *median).max(MIN_NOISE)
     }
 
-    /// Sums by photo of each observation's value less its point's weighted mean, or where all weights are zero
-    /// the plain mean, times its weight. `totals` are the points' weights.
+    /// Sums by photo of each observation's value less its point's [`mean`], times its weight. `totals` are the
+    /// points' weights.
     fn summed(
         &self,
         weights: &[f64],
@@ -182,12 +183,7 @@ impl Channel {
         out.fill(0.0);
         for (range, &total) in self.start.windows(2).zip(totals) {
             let range = range[0]..range[1];
-            let mean = if total > 0.0 {
-                let weighted = range.clone().map(|i| weights[i] * value(i));
-                weighted.fold(0.0, |sum, value| sum + value) / total
-            } else {
-                range.clone().map(&value).sum::<f64>() / range.len() as f64
-            };
+            let mean = mean(weights, total, range.clone(), &value);
             for i in range {
                 out[self.photo[i]] += weights[i] * (value(i) - mean);
             }
@@ -199,11 +195,7 @@ impl Channel {
     fn solve(&self, weights: &[f64], prior: f64, x: &mut [f64]) {
         let count = self.photo_count;
         // S·x: each observation's x less its point's mean, weighted, summed by photo.
-        let weight_of = |range: &[usize]| {
-            let weights = weights[range[0]..range[1]].iter();
-            weights.fold(0.0, |sum, weight| sum + weight)
-        };
-        let totals: Vec<f64> = self.start.windows(2).map(weight_of).collect();
+        let totals = self.totals(weights);
         let mut b = vec![0.0; count];
         self.summed(weights, &totals, |i| self.log[i], &mut b);
         let mut diagonal = vec![prior; count];
@@ -256,6 +248,17 @@ impl Channel {
             }
             rz = next;
         }
+    }
+}
+
+/// The weighted mean of a point's observations, or where all their weights are zero the plain mean; `total` is what
+/// the weights add up to.
+fn mean(weights: &[f64], total: f64, range: Range<usize>, value: impl Fn(usize) -> f64) -> f64 {
+    if total > 0.0 {
+        let weighted = range.map(|i| weights[i] * value(i));
+        weighted.fold(0.0, |sum, value| sum + value) / total
+    } else {
+        range.clone().map(value).sum::<f64>() / range.len() as f64
     }
 }
 

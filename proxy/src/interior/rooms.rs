@@ -35,7 +35,7 @@ use super::{
     Cell, CellId, Content, Contents, Extra, Interior, InteriorError, InteriorFileError,
     InteriorWarning, Polygon, Portal,
 };
-use crate::mesh::{Model, PORTAL_NODE};
+use crate::mesh::{Model, PORTAL_NODE, Place, place};
 use glam::DVec3;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -262,13 +262,6 @@ fn without_number<'a>(name: &'a str, ids: &BTreeMap<&str, CellId>) -> &'a str {
     let is_number = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
     let is_copy = !ids.contains_key(name) && (whole.is_empty() || ids.contains_key(whole));
     if is_number && is_copy { whole } else { name }
-}
-
-/// A corner, the same where its position is.
-type Place = [u64; 3];
-
-fn place(p: DVec3) -> Place {
-    p.to_array().map(|x| (x + 0.0).to_bits())
 }
 
 /// The sides that only one of some triangles has, by where they begin and end; their ends.

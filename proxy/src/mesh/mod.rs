@@ -36,6 +36,13 @@ pub use texture::{Level, Texture};
 use glam::{DMat4, DVec3};
 use std::collections::BTreeMap;
 
+/// A corner, the same where its position is.
+pub(crate) type Place = [u64; 3];
+
+pub(crate) fn place(p: DVec3) -> Place {
+    p.to_array().map(|x| (x + 0.0).to_bits())
+}
+
 /// A triangle mesh in the world, seen from both sides.
 ///
 /// Triangles wind counter-clockwise where they are looked at from outside, or from where the
@@ -71,8 +78,7 @@ impl Mesh {
     pub fn open_edge(&self) -> Option<[DVec3; 2]> {
         // 1. By corner, the first in its place.
         let mut first = BTreeMap::new();
-        let place = |p: &DVec3| (*p + 0.0).to_array().map(f64::to_bits);
-        let places = self.positions.iter().map(place).zip(0_u32..);
+        let places = self.positions.iter().map(|p| place(*p)).zip(0_u32..);
         let same: Vec<u32> = places
             .map(|(place, i)| *first.entry(place).or_insert(i))
             .collect();

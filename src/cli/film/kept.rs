@@ -144,7 +144,7 @@ pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> an
 /// The file cannot be removed.
 pub(super) fn forget(folder: &Path) -> anyhow::Result<bool> {
     let _held = hold(folder);
-    let is_plan = file_in(folder).exists() && Plan::of(folder).is_ok();
+    let is_plan = Plan::of(folder).is_ok();
     if is_plan {
         remove(&[file_in(folder)])?;
     }

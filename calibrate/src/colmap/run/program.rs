@@ -2,6 +2,7 @@
 
 use super::error::{LOCKED, OVERLAP, io_error};
 use super::{Event, Matching, Options, RunError, Step, log, outcome};
+use crate::colmap::find::most_images;
 use capture::{PhotoSet, Tool, ToolError};
 use std::ffi::OsString;
 use std::fs;
@@ -189,15 +190,15 @@ impl<'a> Program<'a> {
         ran.map_err(failed(step))?;
 
         // 2. Where it placed few, once more from closer photos: the larger model is kept.
-        let placed = outcome::size(&partial)?;
-        let is_few = placed.0 < USUAL_MODEL && 2 * placed.0 < self.photos.photos.len();
+        let placed = most_images(&partial);
+        let is_few = placed < USUAL_MODEL && 2 * placed < self.photos.photos.len();
         if is_first && is_few && can_be_closer {
             report(Event::PhotosAreClose);
             let second = self.work.join(SECOND_MODELS);
             let mut arguments = told(&second)?;
             arguments.give_known(CLOSER, CLOSE_PAIR);
             match self.run_once(step, &arguments.words, SECOND_LOG, report) {
-                Ok(()) if outcome::size(&second)? > placed => {
+                Ok(()) if outcome::size(&second)? > outcome::size(&partial)? => {
                     self.remove(PARTIAL_MODELS)?;
                     self.rename(SECOND_MODELS, PARTIAL_MODELS)?;
                     self.rename(SECOND_LOG, step.log())?;
