@@ -101,6 +101,25 @@ impl FrameSource {
         self.time_penalty < f64::INFINITY
     }
 
+    /// fovBlend: rises smoothly from 0 at the image's border to 1 at the feather's width;
+    /// negative outside the image.
+    pub fn fov_blend(&self, pixel: Pixel) -> f64 {
+        let [width, height] = self.size;
+        let border = pixel
+            .x
+            .min(width - pixel.x)
+            .min(pixel.y)
+            .min(height - pixel.y);
+        if border < 0.0 {
+            return -1.0;
+        }
+        if border >= self.feather_px {
+            return 1.0;
+        }
+        let s = border / self.feather_px;
+        s * s * (3.0 - 2.0 * s)
+    }
+
     /// A source view as a desired one has it, without feather and alike in footprint.
     #[cfg(test)]
     pub(crate) fn of(view: &View, desired: &View) -> Self {
@@ -459,24 +478,9 @@ impl<'a> Frame<'a> {
             .project(source.rotation * point.ray + source.translation * point.inverse_distance)
     }
 
-    /// fovBlend: rises smoothly from 0 at the image's border to 1 at the feather's width;
-    /// negative outside the image.
+    /// [`FrameSource::fov_blend`] of a source view.
     pub fn fov_blend(&self, source_idx: usize, pixel: Pixel) -> f64 {
-        let source = &self.sources[source_idx];
-        let [width, height] = source.size;
-        let border = pixel
-            .x
-            .min(width - pixel.x)
-            .min(pixel.y)
-            .min(height - pixel.y);
-        if border < 0.0 {
-            return -1.0;
-        }
-        if border >= source.feather_px {
-            return 1.0;
-        }
-        let s = border / source.feather_px;
-        s * s * (3.0 - 2.0 * s)
+        self.sources[source_idx].fov_blend(pixel)
     }
 
     /// How much a source view counts for a proxy point that falls on a pixel of its image:

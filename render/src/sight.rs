@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod exhaustive;
+mod hidden;
 mod known;
 mod reach;
 #[cfg(test)]
@@ -11,6 +12,7 @@ mod views;
 use crate::frame::FrameSource;
 use crate::surface::FacetMap;
 use crate::tiles::TILE;
+use crate::visibility::Visibility;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use known::Known;
@@ -152,6 +154,19 @@ pub(crate) fn within_sight(
     with_moved(map, moved)
 }
 
+/// Moves what every photo that has it in its image has something before along its ray, to the nearest
+/// place before it that one shows. See `hidden.rs`.
+pub(crate) fn out_of_hiding(
+    map: FacetMap,
+    desired: &View,
+    rays: Option<&Rays>,
+    sources: &[FrameSource],
+    visibility: &Visibility,
+) -> FacetMap {
+    let moved = hidden::hidden(&map, desired, rays, sources, visibility);
+    with_moved(map, moved)
+}
+
 /// What is to be moved, row by row.
 fn to_move(
     map: &FacetMap,
@@ -168,7 +183,7 @@ fn to_move(
 
 /// The map with that moved.
 fn with_moved(mut map: FacetMap, moved: Vec<Vec<Moved>>) -> FacetMap {
-    if moved.iter().any(|row| !row.is_empty()) {
+    if moved.iter().any(|row| !row.is_empty()) && map.seers.tiles.is_empty() {
         map.seers = Seers::new(map.size.map(|side| side as usize));
     }
     let width = map.size[0] as usize;
@@ -229,6 +244,50 @@ const PART: usize = 32;
 /// found when they are first asked for.
 type InReach = [Option<Vec<u32>>];
 
+/// A pixel's ray and the inverse distance of what it sees, if it is anything.
+fn look(
+    map: &FacetMap,
+    desired: &View,
+    rays: Option<&Rays>,
+    x: usize,
+    y: usize,
+) -> Option<(DVec3, f64)> {
+    let plane = map
+        .planes
+        .get(map.facet_of[y * map.size[0] as usize + x] as usize)?;
+    let ray = match rays {
+        Some(rays) => rays.at(x, y)?.extend(1.0),
+        None => desired
+            .lens
+            .unproject(Pixel::center_of(x as u32, y as u32))?,
+    };
+    Some((ray, plane.dot(ray)))
+}
+
+/// The views that may see something of what the tile around a pixel looks at, wherever that is moved.
+fn in_reach(
+    map: &FacetMap,
+    views: &Views<'_>,
+    looks: &impl Fn(usize, usize) -> Option<(DVec3, f64)>,
+    x: usize,
+    y: usize,
+) -> Vec<u32> {
+    let of_tile = |at: usize, side: u32| {
+        let first = at / TILE * TILE;
+        first..(first + TILE).min(side as usize)
+    };
+    let [width, height] = map.size;
+    let mut beam = Beam::NONE;
+    for y in of_tile(y, height) {
+        for x in of_tile(x, width) {
+            if let Some((ray, s)) = looks(x, y) {
+                beam = beam.with(ray, s);
+            }
+        }
+    }
+    views.within(&beam.nearer(nearest_tried()))
+}
+
 /// What is moved, row by row. What is known to be seen is skipped.
 fn moved(
     map: &FacetMap,
@@ -240,32 +299,8 @@ fn moved(
     let [width, height] = map.size.map(|side| side as usize);
     let nearest_tried = nearest_tried();
     let is_straight = rays.is_some_and(Rays::are_straight);
-    let ray = |x: usize, y: usize| match rays {
-        Some(rays) => rays.at(x, y).map(|at| at.extend(1.0)),
-        None => desired.lens.unproject(Pixel::center_of(x as u32, y as u32)),
-    };
-    // The pixel's ray and the inverse distance of what it sees, if it is anything.
-    let looks = |x: usize, y: usize| {
-        let plane = map.planes.get(map.facet_of[y * width + x] as usize)?;
-        let ray = ray(x, y)?;
-        Some((ray, plane.dot(ray)))
-    };
-    // The views that may see something of what the tile around a pixel looks at.
-    let in_reach = |x: usize, y: usize| {
-        let of_tile = |at: usize, side: usize| {
-            let first = at / TILE * TILE;
-            first..(first + TILE).min(side)
-        };
-        let mut beam = Beam::NONE;
-        for y in of_tile(y, height) {
-            for x in of_tile(x, width) {
-                if let Some((ray, s)) = looks(x, y) {
-                    beam = beam.with(ray, s);
-                }
-            }
-        }
-        views.within(&beam.nearer(nearest_tried))
-    };
+    let looks = |x: usize, y: usize| look(map, desired, rays, x, y);
+    let in_reach = |x: usize, y: usize| in_reach(map, views, &looks, x, y);
     // What a run along straight rays sees lies on a line.
     let is_seen = |pixels: &Range<usize>, y: usize, last: &mut usize, near: &mut InReach| {
         let ends = || Some([looks(pixels.start, y)?, looks(pixels.end - 1, y)?]);

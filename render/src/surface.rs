@@ -2,7 +2,7 @@
 
 use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
-use crate::sight::{Seers, within_sight};
+use crate::sight::{Seers, out_of_hiding, within_sight};
 use crate::spare::PixelNumbers;
 use crate::tiles::{FacetTiles, TILE};
 use calibrate::{Pixel, View};
@@ -37,7 +37,7 @@ pub struct FacetMap {
     pub facet_of: PixelNumbers,
     pub(crate) size: [u32; 2],
     pub(crate) tiles: FacetTiles,
-    /// From this facet on they are pixels' own, moved to where a photo has them.
+    /// From this facet on they are pixels' own, moved to where a photo has or shows them.
     pub(crate) moved_from: u32,
     /// Which photos have what was moved.
     pub(crate) seers: Seers,
@@ -94,7 +94,11 @@ impl Surface {
             Proxy::Mesh(solid) => {
                 let rays = rays();
                 let map = FacetMap::of_mesh(solid, desired, rays.as_ref());
-                Self::Facets(within_sight(map, desired, rays.as_ref(), sources))
+                let map = within_sight(map, desired, rays.as_ref(), sources);
+                Self::Facets(match &lumigraph.visibility {
+                    None => map,
+                    Some(seen) => out_of_hiding(map, desired, rays.as_ref(), sources, seen),
+                })
             }
         }
     }
@@ -400,7 +404,7 @@ impl FacetMap {
         }
     }
 
-    fn of_mesh(solid: &Solid, desired: &View, rays: Option<&Rays>) -> Self {
+    pub(crate) fn of_mesh(solid: &Solid, desired: &View, rays: Option<&Rays>) -> Self {
         let center = desired.center();
         let rotation = desired.camera_from_world.rotation;
         let plane =

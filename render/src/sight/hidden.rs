@@ -1,0 +1,334 @@
+//! What every photo has something before, moved to where one looks past that.
+
+use super::views::Views;
+use super::{
+    HALVINGS, Moved, STEPS, factor, from_source, in_reach, look, nearest_tried, sees_well,
+};
+use crate::frame::FrameSource;
+use crate::options::MAX_CONTRIBUTORS;
+use crate::surface::FacetMap;
+use crate::tiles::TILE;
+use crate::visibility::{Visibility, visible};
+use calibrate::{Pixel, View};
+use glam::DVec3;
+use proxy::Rays;
+use rayon::prelude::*;
+
+/// A photo shows a point from which half of it is left, or more, of what it counts with nothing before the point.
+const SHOWN: f64 = 0.5;
+
+/// One pixel is asked of so many across and down: where it is seen, so are they.
+const BLOCK: usize = 2;
+
+/// The source views, and their distance maps.
+struct Asked<'a> {
+    views: Views<'a>,
+    visibility: &'a Visibility,
+    /// By source view: how many cameras are nearer.
+    turn: Vec<usize>,
+}
+
+impl<'a> Asked<'a> {
+    fn new(sources: &'a [FrameSource], visibility: &'a Visibility) -> Self {
+        let mut nearest: Vec<usize> = (0..sources.len()).collect();
+        let distance = |i: &usize| sources[*i].center.length_squared();
+        nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let mut turn = vec![0; sources.len()];
+        let nearest = nearest.into_iter().enumerate();
+        nearest.for_each(|(k, view)| turn[view] = k);
+        Self {
+            views: Views::new(sources),
+            visibility,
+            turn,
+        }
+    }
+
+    /// Where a source view has the point at ray / s in its image, and how much is left of it there.
+    fn visible(&self, view: usize, ray: DVec3, s: f64) -> Option<(Pixel, f64)> {
+        let source = &self.views.sources[view];
+        let point = from_source(source, ray, s);
+        let [width, height] = source.size;
+        let is_inside = |p: &Pixel| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height;
+        let pixel = source.lens.project(point).filter(is_inside)?;
+        let nearest = self.visibility.map(view).inverse_distance(pixel);
+        Some((pixel, visible(s / point.length(), nearest)))
+    }
+
+    /// Whether one has the point at ray / s in its image, with nothing before it.
+    fn sees(&self, view: usize, ray: DVec3, s: f64) -> bool {
+        let seen = self.visible(view, ray, s);
+        seen.is_some_and(|(_, left)| left >= SHOWN)
+    }
+
+    /// The same beyond doubt of rounding, and so far from the image's border that it counts.
+    fn shows(&self, view: usize, ray: DVec3, s: f64) -> bool {
+        let source = &self.views.sources[view];
+        let counts = |(pixel, left): (Pixel, f64)| left * source.fov_blend(pixel) >= SHOWN;
+        self.visible(view, ray, s).is_some_and(counts) && sees_well(source, ray, s)
+    }
+
+    /// The nearest place before the point at ray / s that one of some shows: as how many times as near, and who does.
+    fn nearest_shown(&self, near: &[u32], ray: DVec3, s: f64) -> Option<(f64, usize)> {
+        let mut along = Vec::new();
+        self.views.along(near, ray, s * nearest_tried(), &mut along);
+        let shown = |times: f64| {
+            let s = s * times;
+            let mut all = along.iter().filter(|(_, stretch)| stretch.has(s));
+            let found = all.find(|(view, _)| self.shows(*view as usize, ray, s));
+            found.map(|(view, _)| *view as usize)
+        };
+        let mut steps = 1..=STEPS;
+        let (k, mut view) = steps.find_map(|k| Some((k, shown(factor(k))?)))?;
+        // Between it and the one before, so that neighbouring pixels move alike.
+        let (mut times, mut beyond) = (factor(k), factor(k - 1));
+        for _ in 0..HALVINGS {
+            let middle = (times * beyond).sqrt();
+            match shown(middle) {
+                Some(shows) => (times, view) = (middle, shows),
+                None => beyond = middle,
+            }
+        }
+        Some((times, view))
+    }
+}
+
+/// What is to be moved, row by row: what every photo that has it in its image has something before, to the
+/// nearest place before it along its ray that a photo shows.
+///
+/// Nobody knows what is there, nor, but that it is no nearer, where: it may be a dome. What photos have
+/// in its direction is what is before it, and painting that shows an object a second time, beside itself.
+/// Where a photo looks past the object there is what lies beside it.
+pub(super) fn hidden(
+    map: &FacetMap,
+    desired: &View,
+    rays: Option<&Rays>,
+    sources: &[FrameSource],
+    visibility: &Visibility,
+) -> Vec<Vec<Moved>> {
+    let asked = Asked::new(sources, visibility);
+    let [width, height] = map.size.map(|side| side as usize);
+    let looks = |x: usize, y: usize| look(map, desired, rays, x, y);
+    // As many as contribute to a pixel at most, those whose cameras are nearest: others would need distance maps
+    // that nothing else in the picture does.
+    let near_tile = |x: usize, y: usize| {
+        let mut near = in_reach(map, &asked.views, &looks, x, y);
+        near.sort_by_key(|view| asked.turn[*view as usize]);
+        near.truncate(MAX_CONTRIBUTORS);
+        near
+    };
+    // Whether anyone sees what a pixel looks at. Who saw the last mostly does, and the others are found when they are
+    // first asked for, by tile.
+    let is_seen = |[x, y]: [usize; 2], last: &mut Option<usize>, near: &mut Option<Vec<u32>>| {
+        let Some((ray, s)) = looks(x, y).filter(|(_, s)| *s > 0.0) else {
+            return true;
+        };
+        if last.is_some_and(|view| asked.sees(view, ray, s)) {
+            return true;
+        }
+        let near = near.get_or_insert_with(|| near_tile(x, y));
+        let mut all = near.iter().map(|view| *view as usize);
+        *last = all.find(|view| asked.sees(*view, ray, s));
+        last.is_some()
+    };
+    let of_tiles = |tile_row: usize| {
+        let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
+        let mut moved: Vec<Vec<Moved>> = rows.clone().map(|_| Vec::new()).collect();
+        let mut near: Vec<Option<Vec<u32>>> = vec![None; width.div_ceil(TILE)];
+        for top in rows.clone().step_by(BLOCK) {
+            let mut last = None;
+            for left in (0..width).step_by(BLOCK) {
+                let near = &mut near[left / TILE];
+                if is_seen([left, top], &mut last, near) {
+                    continue;
+                }
+                // They move alike, where that is shown of all.
+                let mut before = None;
+                for y in top..(top + BLOCK).min(rows.end) {
+                    for x in left..(left + BLOCK).min(width) {
+                        if is_seen([x, y], &mut last, near) {
+                            continue;
+                        }
+                        let Some((near, (ray, s))) = near.as_deref().zip(looks(x, y)) else {
+                            continue;
+                        };
+                        let is_shown =
+                            |(times, view): &(f64, usize)| asked.shows(*view, ray, s * times);
+                        before = before.filter(is_shown);
+                        before = before.or_else(|| asked.nearest_shown(near, ray, s));
+                        moved[y - rows.start].extend(before.map(|(times, view)| Moved {
+                            x,
+                            plane: ray * (s * times / ray.length_squared()),
+                            source_idx: view as u32,
+                        }));
+                    }
+                }
+            }
+        }
+        moved
+    };
+    let tile_rows = (0..map.tiles.down()).into_par_iter();
+    tile_rows.flat_map_iter(of_tiles).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Frame;
+    use crate::lumigraph::{Lumigraph, SourceView};
+    use crate::options::FieldOptions;
+    use crate::photos::PhotoStore;
+    use crate::surface::Surface;
+    use calibrate::{Lens, Rigid3};
+    use glam::DVec2;
+    use image::RgbaImage;
+    use proxy::{Mesh, MeshKind, Proxy, Solid};
+    use std::sync::Arc;
+
+    const SIZE: (u32, u32) = (80, 60);
+    /// How far the board is, and from where to where it reaches.
+    const BOARD: f64 = 2.0;
+    const LEFT: f64 = 0.2;
+    const RIGHT: f64 = 0.8;
+
+    /// Looks along z from a place on the x axis, 45° to either side.
+    fn view(x: f64) -> View {
+        let center = DVec3::X * x;
+        View {
+            lens: Lens::pinhole(DVec2::splat(40.0), DVec2::new(40.0, 30.0)),
+            width: SIZE.0,
+            height: SIZE.1,
+            camera_from_world: Rigid3::looking_at(center, center + DVec3::Z, DVec3::Y),
+        }
+    }
+
+    /// A board before a far wall, which photos from these places see.
+    fn board(places: &[f64]) -> Lumigraph {
+        let board = |left: f64, right: f64, high: f64, z: f64| Mesh {
+            positions: [(left, -high), (right, -high), (right, high), (left, high)]
+                .map(|(x, y)| DVec3::new(x, y, z))
+                .to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let mut mesh = board(-200.0, 200.0, 200.0, 40.0);
+        mesh.append(&board(LEFT, RIGHT, 9.0, BOARD));
+        let proxy = Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh)));
+        let source = |x: &f64| SourceView {
+            name: format!("{x}.png"),
+            view: view(*x),
+            gain: [1.0; 3],
+            time_s: None,
+        };
+        let sources: Vec<SourceView> = places.iter().map(source).collect();
+        let photo = RgbaImage::new(SIZE.0, SIZE.1);
+        Lumigraph {
+            visibility: Visibility::of(&proxy, &sources),
+            photos: PhotoStore::from_images(vec![photo; places.len()]),
+            sources,
+            proxy,
+            points: Vec::new(),
+        }
+    }
+
+    /// Of each pixel of the middle row, from the place 0: the tangent of its ray, and the depth it sees.
+    fn seen(lumigraph: &Lumigraph) -> Vec<(f64, f64)> {
+        let frame = Frame::new(lumigraph, view(0.0), FieldOptions::default());
+        let Surface::Facets(map) = &frame.surface else {
+            panic!("facets")
+        };
+        let row = (0..SIZE.0 as usize).map(|x| (x, SIZE.1 as usize / 2));
+        let of_pixel = |(x, y)| {
+            let (ray, s) = look(map, &frame.desired, None, x, y).unwrap();
+            let in_world = frame.desired.camera_from_world.rotation.conjugate() * ray;
+            (in_world.x / in_world.z, in_world.z / s)
+        };
+        row.map(of_pixel).collect()
+    }
+
+    #[test]
+    fn what_all_photos_have_something_before_moves_to_where_one_looks_past() {
+        // The photo's own ray to the point of the wall at tangent t passes the board's plane at 1 + 2 (t − 1/40).
+        let behind = |place: f64, t: f64, z: f64| place + BOARD * (t - place / z);
+        let hides = |x: f64| (LEFT..=RIGHT).contains(&x);
+        let mut moved = 0;
+        for (t, z) in seen(&board(&[1.0])) {
+            let on_board = hides(BOARD * t);
+            if on_board {
+                assert_eq!(z, BOARD, "{t}");
+                continue;
+            }
+            // Texels are two pixels, or 0.1 on the board.
+            let by = 0.11;
+            let at_wall = behind(1.0, t, 40.0);
+            if t < -0.97 {
+                // The photo does not have it in its image.
+                continue;
+            }
+            if !(LEFT - by..RIGHT + by).contains(&at_wall) {
+                assert!((z - 40.0).abs() < 1e-9, "{t}: {z}");
+            } else if hides(at_wall - 0.06) && hides(at_wall + 0.06) {
+                // A pixel, or 0.05 on the board, stays with the one beside it.
+                moved += 1;
+                // It looks past, and by no more than it must.
+                let x = behind(1.0, t, z);
+                assert!(z < 40.0 && (x - LEFT).abs() < by, "{t}: {z}, {x}");
+            }
+        }
+        assert!(moved > 8, "{moved}");
+    }
+
+    #[test]
+    fn what_another_photo_shows_stays() {
+        let far = |places: &[f64]| {
+            let seen = seen(&board(places));
+            seen.iter().filter(|(_, z)| *z > 39.0).count()
+        };
+        let (one, both) = (far(&[1.0]), far(&[1.0, -1.0]));
+        // The board takes twelve of the 80, and hides as many from either photo.
+        assert!(one < 58 && both == 68, "{one}, {both}");
+    }
+
+    #[test]
+    fn all_moves_that_nobody_sees_and_that_is_shown_before() {
+        let lumigraph = board(&[1.0, 0.8, 300.0, -300.0]);
+        let visibility = lumigraph.visibility.as_ref().unwrap();
+        let desired = view(0.0);
+        let places = lumigraph
+            .sources
+            .iter()
+            .map(|s| FrameSource::of(&s.view, &desired));
+        let sources: Vec<FrameSource> = places.collect();
+        let Proxy::Mesh(solid) = &lumigraph.proxy else {
+            panic!("a mesh")
+        };
+        let rays = Rays::of(&desired.lens, SIZE);
+        let map = FacetMap::of_mesh(solid, &desired, rays.as_ref());
+        let asked = Asked::new(&sources, visibility);
+        let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility);
+        let is_seen = |x: usize, y: usize| {
+            let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
+            (0..sources.len()).any(|view| asked.sees(view, ray, s))
+        };
+        let mut count = 0;
+        for (y, row) in moved.iter().enumerate() {
+            for x in 0..SIZE.0 as usize {
+                let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
+                let is_seen = is_seen(x, y) || is_seen(x / BLOCK * BLOCK, y / BLOCK * BLOCK);
+                let shown = |s: f64| (0..sources.len()).find(|view| asked.shows(*view, ray, s));
+                let first = (1..=STEPS).find(|k| shown(s * factor(*k)).is_some());
+                let found = row.iter().find(|moved| moved.x == x);
+                assert_eq!(found.is_some(), !is_seen && first.is_some(), "{x} {y}");
+                if let Some((moved, k)) = found.zip(first) {
+                    // It may move as another of its block does.
+                    let at = moved.plane.dot(ray);
+                    assert!(at > s * factor(k - 1) && at < s * factor(k + 3), "{x} {y}");
+                    let view = moved.source_idx as usize;
+                    assert!(
+                        asked.shows(view, ray, 1.001 * at) || asked.shows(view, ray, 0.999 * at)
+                    );
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 100, "{count}");
+    }
+}
