@@ -230,7 +230,7 @@ impl FilmArgs {
 
     /// Which frames of a folder are there already: of `files`, which this run makes. `all` are those of
     /// the whole film, and `inputs` the files that frames are made of, over which none is written. Without
-    /// `--resume` none counts as there, and no run goes on with frames in that folder any more.
+    /// `--resume` none counts as there.
     pub(super) fn begin(
         &self,
         folder: &Path,
@@ -241,13 +241,6 @@ impl FilmArgs {
         let video = self.video.iter();
         check_inputs(all.iter().chain(video).map(PathBuf::as_path), inputs)?;
         if !self.resume {
-            if kept::forget(folder)? {
-                say!(
-                    "note: {}: frames that runs with --resume left here are no longer gone on with, as this run \
-                     has none",
-                    folder.display()
-                );
-            }
             return Ok(vec![false; files.len()]);
         }
         kept::begin(folder, all, inputs)?;
@@ -301,7 +294,10 @@ impl FilmArgs {
     /// Writes a frame.
     pub(super) fn write(&self, file: &Path, mut picture: RgbaImage) -> anyhow::Result<()> {
         self.background.behind(&mut picture);
-        Ok(capture::write_png(file, &picture)?)
+        match self.resume {
+            true => Ok(capture::write_png(file, &picture)?),
+            false => write_picture(file, &picture),
+        }
     }
 
     /// Makes the film of written frames, if one is asked for.
@@ -335,6 +331,23 @@ impl FilmArgs {
     pub(super) fn video(&self) -> Option<PathBuf> {
         self.video.as_deref().map(in_unicode)
     }
+}
+
+/// Writes a picture of a run without `--resume`. A film of runs that have it gives way where it has a frame of that
+/// name, which is said: they no longer go on with it.
+pub(super) fn write_picture(file: &Path, picture: &RgbaImage) -> anyhow::Result<()> {
+    let given_up = kept::give_up(file)?;
+    let here = std::env::current_dir().unwrap_or_default();
+    for film in &given_up {
+        let folder = film.folder.strip_prefix(&here);
+        let folder = folder.ok().filter(|folder| *folder != Path::new(""));
+        say!(
+            "note: {}: frames that runs with --resume left here are no longer gone on with, as this run has none",
+            folder.unwrap_or(&film.folder).display()
+        );
+    }
+    // Their folders are held until it is there.
+    Ok(capture::write_png(file, picture)?)
 }
 
 #[cfg(test)]

@@ -170,11 +170,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let named = || args.interior.display().to_string();
     options.library = references.options(opened.photos.is_some());
     let way = match args.held_out {
-        true => Way {
-            frames: held_out(opened.photos.as_ref(), args.size).with_context(named)?,
-            fps: FPS,
-            tour: None,
-        },
+        true => {
+            let frames = held_out(opened.photos.as_ref(), args.size).with_context(named)?;
+            Way {
+                files: frames.iter().map(|frame| frame.file.clone()).collect(),
+                frames,
+                fps: FPS,
+                tour: None,
+            }
+        }
         false => way(args, &opened)?,
     };
     check_views(args, &way.frames)?;
@@ -265,9 +269,11 @@ fn walk_all(
             1 => args.output.clone(),
             _ => args.output.join(fill.name()),
         };
-        let files = way.frames.iter().map(|frame| folder.join(&frame.file));
+        let in_folder = |file: &PathBuf| folder.join(file);
+        let all: Vec<PathBuf> = way.files.iter().map(in_folder).collect();
+        let files = way.frames.iter().map(|frame| in_folder(&frame.file));
         let files: Vec<PathBuf> = files.collect();
-        let is_there = args.film.begin(&folder, &files, &files, inputs)?;
+        let is_there = args.film.begin(&folder, &files, &all, inputs)?;
         begun.push((*fill, files, is_there));
     }
     // 2. The path, not before: beside frames that are not of this walk stays theirs.
@@ -408,6 +414,8 @@ fn fills(names: &[String]) -> anyhow::Result<Vec<PortalFill>> {
 /// What is to be drawn.
 struct Way {
     frames: Vec<Named>,
+    /// Of all frames of the path, as those of several parts of it share a folder: from that folder.
+    files: Vec<PathBuf>,
     /// How many of them a film shows a second.
     fps: f64,
     /// The whole tour that they are of, if they are of one.
@@ -462,19 +470,19 @@ fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
             (tour.clone(), Some(tour))
         }
     };
-    // Of all frames: those of several parts of a path share a folder.
     let names = path.frames.iter().map(|f| (f.name.as_str(), true));
     let files = picture_files("frame", names, Path::new(""))?;
-    let frames = path.frames.into_iter().zip(files).enumerate();
+    let frames = path.frames.into_iter().zip(&files).enumerate();
     let named = frames.map(|(index, (frame, file))| Named {
         index,
         name: frame.name,
-        file,
+        file: file.clone(),
         view: cut(frame.view, args.size),
         truth: None,
     });
     Ok(Way {
         frames: args.chosen().of(named.collect())?,
+        files,
         fps: path.fps,
         tour,
     })

@@ -322,13 +322,49 @@ fn frames_that_a_run_without_resume_made_are_not_taken_for_those_of_before() {
     let ran = lumigraph(here, &format!("{render} --k 2")).ok();
     assert!(!ran.stderr.contains(told), "{}", ran.stderr);
     let error = lumigraph(here, &format!("{render} --resume")).error(1);
-    let said = "out: there are frames here that a run without --resume made";
+    let said = "out: there are frames here, but no resume.json: a run without --resume made some";
     assert!(error.contains(said), "{error}");
     assert!(files(&here.join("out")) == frames);
     // A file that only has that name stays.
     fs::write(&resume, r#"{"work": []}"#).unwrap();
     lumigraph(here, render).ok();
     assert_eq!(fs::read(&resume).unwrap(), br#"{"work": []}"#);
+}
+
+#[test]
+fn a_film_is_gone_on_with_as_long_as_none_of_its_frames_is_another_runs() {
+    let folder = with_wall();
+    let here = folder.path();
+    let render = "render wall --proxy plane --size 48x36 -o out";
+    let film = |frames: &str| format!("{render} --path sweep --frames {frames} --resume");
+    lumigraph(here, &film("0..2/3")).ok();
+    let before = files(&here.join("out"));
+    let is_kept = || {
+        let now = files(&here.join("out"));
+        before.iter().all(|(file, bytes)| now[file] == *bytes)
+    };
+    // One that draws other frames, and one that draws none.
+    let ran = lumigraph(here, &format!("{render} --views wall/sparse/0")).ok();
+    assert!(!ran.stderr.contains("no longer gone on"), "{}", ran.stderr);
+    assert!(is_kept());
+    lumigraph(here, &film("0..2/3")).ok();
+    let photo = here.join("wall/images/0003.png");
+    let bytes = fs::read(&photo).unwrap();
+    fs::write(&photo, &bytes[..bytes.len() / 2]).unwrap();
+    let other = format!("{render} --path sweep --frames 3");
+    let error = lumigraph(here, &format!("{other} --strict")).error(1);
+    assert!(error.contains("0003.png"), "{error}");
+    assert!(is_kept());
+    // One that draws a frame that the film has not drawn yet.
+    fs::write(&photo, &bytes).unwrap();
+    let ran = lumigraph(
+        here,
+        &format!("{render} --path sweep --frames 2..3/3 --k 2"),
+    )
+    .ok();
+    assert!(ran.stderr.contains("no longer gone on"), "{}", ran.stderr);
+    let error = lumigraph(here, &film("3")).error(1);
+    assert!(error.contains("but no resume.json"), "{error}");
 }
 
 #[test]

@@ -15,6 +15,9 @@ use std::time::Duration;
 struct Plan {
     version: String,
     arguments: Vec<String>,
+    /// All frames of the film, from its folder; none of earlier versions.
+    #[serde(default)]
+    frames: Vec<PathBuf>,
     /// None of earlier versions.
     #[serde(default)]
     inputs: Vec<Stamp>,
@@ -26,6 +29,11 @@ struct Plan {
 /// Where a run says what it makes.
 fn file_in(folder: &Path) -> PathBuf {
     folder.join("resume.json")
+}
+
+/// A picture as a plan in a folder names it.
+fn name_in(folder: &Path, picture: &Path) -> PathBuf {
+    in_unicode(picture.strip_prefix(folder).unwrap_or(picture))
 }
 
 /// How often, and how far apart, a run tries to hold a folder: ten seconds together. Others hold it for as long as
@@ -49,8 +57,8 @@ fn hold(folder: &Path) -> Option<File> {
 }
 
 impl Plan {
-    /// This run's, without what decides no pixel.
-    fn own(inputs: &[PathBuf]) -> Self {
+    /// This run's, for a film of these frames in a folder, without what decides no pixel.
+    fn own(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> Self {
         const ALONE: [&str; 3] = ["--resume", "--json", "--no-ldi-files"];
         const WITH_VALUE: [&str; 4] = ["--video", "--fps", "--threads", "--frames"];
         let mut arguments = Vec::new();
@@ -81,6 +89,7 @@ impl Plan {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             arguments,
+            frames: frames.iter().map(|frame| name_in(folder, frame)).collect(),
             inputs,
             left_out: BTreeMap::new(),
         }
@@ -98,20 +107,20 @@ impl Plan {
     }
 }
 
-/// Begins a film of these frames, made of the files `inputs`, in a folder, or goes on with it.
+/// Begins a film of these frames, all that it has, made of the files `inputs`, in a folder, or goes on with it.
 ///
 /// # Errors
 /// What is there was made by another command line, or of other files.
 pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> anyhow::Result<()> {
     let file = file_in(folder);
-    let own = Plan::own(inputs);
+    let own = Plan::own(folder, frames, inputs);
     make_parent(&file)?;
     let _held = hold(folder);
     match std::fs::read(&file) {
         Ok(bytes) => {
             let plan: Option<Plan> = serde_json::from_slice(&bytes).ok();
             let is_same = |p: &Plan| p.version == own.version && p.arguments == own.arguments;
-            let Some(plan) = plan.filter(is_same) else {
+            let Some(mut plan) = plan.filter(is_same) else {
                 bail!(
                     "{}: the frames in this folder were made by another command line; choose \
                      another folder, or remove this one",
@@ -126,29 +135,53 @@ pub(super) fn begin(folder: &Path, frames: &[PathBuf], inputs: &[PathBuf]) -> an
                     file.display()
                 );
             }
-            Ok(())
+            if plan.frames == own.frames {
+                return Ok(());
+            }
+            plan.frames = own.frames;
+            plan.write(folder)
         }
         Err(_) if frames.iter().any(|f| f.exists()) => bail!(
-            "{}: there are frames here that a run without --resume made; choose another folder, \
-             or remove this one",
+            "{}: there are frames here, but no resume.json: a run without --resume made some of them; choose \
+             another folder, or remove this one",
             folder.display()
         ),
         Err(_) => own.write(folder),
     }
 }
 
-/// Gives up what runs in a folder have agreed on, as others' frames take the place of theirs there: [`begin`]
-/// refuses to go on with those. What is no plan is somebody else's file, and stays. Whether there was one.
+/// A film that was given up, and a hold on its folder.
+pub(super) struct GivenUp {
+    pub(super) folder: PathBuf,
+    _held: Option<File>,
+}
+
+/// Gives up the films, in the folders that a picture is to lie in, that have it for a frame, as it takes that frame's
+/// place, whether or not it is drawn yet: [`begin`] refuses to go on with them. What comes back is to be kept until the
+/// picture is written, so that no run begins before. What is no plan is somebody else's file, and stays.
 ///
 /// # Errors
-/// The file cannot be removed.
-pub(super) fn forget(folder: &Path) -> anyhow::Result<bool> {
-    let _held = hold(folder);
-    let is_plan = Plan::of(folder).is_ok();
-    if is_plan {
-        remove(&[file_in(folder)])?;
+/// A film's plan cannot be removed.
+pub(super) fn give_up(picture: &Path) -> anyhow::Result<Vec<GivenUp>> {
+    let whole = std::path::absolute(picture).unwrap_or_else(|_| picture.to_owned());
+    let mut given_up = Vec::new();
+    for folder in whole.ancestors().skip(1) {
+        let name = name_in(folder, &whole);
+        let is_frame = || Plan::of(folder).is_ok_and(|plan| plan.frames.contains(&name));
+        if !is_frame() {
+            continue;
+        }
+        let held = hold(folder);
+        // Another run may have given it up meanwhile.
+        if is_frame() {
+            remove(&[file_in(folder)])?;
+            given_up.push(GivenUp {
+                folder: folder.to_owned(),
+                _held: held,
+            });
+        }
     }
-    Ok(is_plan)
+    Ok(given_up)
 }
 
 /// The photos that the frames in a folder are made without, as some run found them damaged: by name, with what is
