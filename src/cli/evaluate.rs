@@ -1,6 +1,7 @@
 //! `lumigraph evaluate`
 
 use super::exposure::ExposureArgs;
+use super::film::write_picture;
 use super::inputs::files_behind_scene;
 use super::interior::check_outside;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, compared};
@@ -203,7 +204,7 @@ fn score_each(
         let moment = session.moment(&named(name), session.scene.time_s(name))?;
         let drawn = session.draw_timed(&desired, moment.as_ref())?;
         if let Some(files) = files {
-            capture::write_png(&files[i], &drawn.picture)?;
+            write_picture(&files[i], &drawn.picture)?;
         }
         lines.push(Line {
             name: name.clone(),

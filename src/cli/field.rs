@@ -3,6 +3,7 @@
 use super::Usage;
 use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
+use super::film::write_picture;
 use super::frames::{Asked, NamedView};
 use super::inputs::files_behind_scene;
 use super::interior::check_outside;
@@ -152,7 +153,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let picture = field_picture(&frame, &contributors, &colors);
     let mut written = vec![&args.output];
     make_parent(&args.output)?;
-    capture::write_png(&args.output, &picture)?;
+    write_picture(&args.output, &picture)?;
     if let Some(file) = &args.weights {
         write_weights(file, &frame, &contributors)?;
         written.push(file);

@@ -368,6 +368,38 @@ fn a_film_is_gone_on_with_as_long_as_none_of_its_frames_is_another_runs() {
 }
 
 #[test]
+fn pictures_that_other_commands_make_are_not_taken_for_frames_of_before() {
+    let folder = with_wall();
+    let here = folder.path();
+    let render = "render wall --proxy plane --size 48x36 --resume";
+    for (film, other, told) in [
+        (
+            "--views wall/sparse/0 -o views",
+            "evaluate wall --proxy plane --size 48x36 --every 4 --no-exposure -o views",
+            "note: views: frames that",
+        ),
+        (
+            "--path sweep --frames 0..1/2 -o sweep",
+            "field wall --proxy plane --view 0004.png -o sweep/frame_0000.png",
+            "note: sweep: frames that",
+        ),
+        (
+            "--path sweep --frames 0..1/2 -o other",
+            "field wall --proxy plane --view 0004.png -o other/../other/frame_0001.png",
+            "other: frames that",
+        ),
+    ] {
+        lumigraph(here, &format!("{render} {film}")).ok();
+        let ran = lumigraph(here, other).ok();
+        let notes = ran.stderr.matches("runs with --resume left here");
+        assert_eq!(notes.count(), 1, "{}", ran.stderr);
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+        let error = lumigraph(here, &format!("{render} {film}")).error(1);
+        assert!(error.contains("but no resume.json"), "{error}");
+    }
+}
+
+#[test]
 fn frames_made_of_other_files_are_not_mixed_in() {
     let folder = with_wall();
     let here = folder.path();
