@@ -250,6 +250,9 @@ impl FilmArgs {
 
     /// The photos without which frames of a folder are made, as a run found them damaged: by name, with what is
     /// wrong with each. Runs know of each other with `--resume` alone.
+    ///
+    /// # Errors
+    /// A run without it has put a picture in the place of one of the film's frames since it began.
     pub(super) fn left_out(&self, folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
         match self.resume {
             true => kept::left_out(folder),

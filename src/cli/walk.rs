@@ -264,6 +264,7 @@ fn walk_all(
 ) -> anyhow::Result<Vec<Walked>> {
     // 1. Which frames are there.
     let mut begun = Vec::new();
+    let mut folders = Vec::new();
     for fill in fills {
         let folder = match fills.len() {
             1 => args.output.clone(),
@@ -275,6 +276,7 @@ fn walk_all(
         let files: Vec<PathBuf> = files.collect();
         let is_there = args.film.begin(&folder, &files, &all, inputs)?;
         begun.push((*fill, files, is_there));
+        folders.push(folder);
     }
     // 2. The path, not before: beside frames that are not of this walk stays theirs.
     if let Some(tour) = &way.tour {
@@ -286,6 +288,10 @@ fn walk_all(
         walk.begin();
         let drawn = draw(walk, fill, &way.frames, files, &is_there, &args.film, notes);
         walks.push(drawn?);
+    }
+    // 4. Whether they are still of one film.
+    for folder in &folders {
+        args.film.left_out(folder)?;
     }
     Ok(walks)
 }

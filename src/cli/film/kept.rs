@@ -2,7 +2,7 @@
 
 use super::super::output::{make_parent, write_file};
 use super::super::stamp::{Stamp, changes, in_unicode, stamps};
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -102,6 +102,22 @@ impl Plan {
         serde_json::from_slice(&bytes).with_context(named)
     }
 
+    /// The same of a film that this run has begun: that the plan is gone is said with what to do.
+    fn of_begun(folder: &Path) -> anyhow::Result<Self> {
+        Self::of(folder).map_err(|error| {
+            let io = error.downcast_ref::<std::io::Error>();
+            if io.is_none_or(|io| io.kind() != ErrorKind::NotFound) {
+                return error;
+            }
+            anyhow!(
+                "{}: resume.json is gone: a run without --resume put a picture in the place of one of these frames \
+                 meanwhile. What this run drew stays; draw the others again with --frames and without --resume, or \
+                 the film in another folder",
+                folder.display()
+            )
+        })
+    }
+
     fn write(&self, folder: &Path) -> anyhow::Result<()> {
         write_file(&file_in(folder), &serde_json::to_vec_pretty(self)?)
     }
@@ -188,16 +204,16 @@ pub(super) fn give_up(picture: &Path) -> anyhow::Result<Vec<GivenUp>> {
 /// wrong with each.
 ///
 /// # Errors
-/// The file beside the frames cannot be read.
+/// The file beside the frames cannot be read, or is gone, as another run has given the film up.
 pub(super) fn left_out(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
-    Ok(Plan::of(folder)?.left_out)
+    Ok(Plan::of_begun(folder)?.left_out)
 }
 
 /// Goes on without photos that were found damaged, for all runs that share a folder: where none of them knew,
 /// every frame of the film that is there (`all`) is removed, and else those of this run (`own`).
 ///
 /// # Errors
-/// Files cannot be read, written or removed.
+/// Files cannot be read, written or removed; as [`left_out`], and then no frame is removed.
 pub(super) fn leave_out(
     damaged: &BTreeMap<String, String>,
     folder: &Path,
@@ -205,7 +221,7 @@ pub(super) fn leave_out(
     all: &[PathBuf],
 ) -> anyhow::Result<()> {
     let _held = hold(folder);
-    let mut plan = Plan::of(folder)?;
+    let mut plan = Plan::of_begun(folder)?;
     let known = plan.left_out.len();
     plan.left_out.extend(damaged.clone());
     if plan.left_out.len() == known {
@@ -252,5 +268,38 @@ mod tests {
             }
         });
         assert!(left_out(folder.path()).unwrap().keys().eq(&names));
+    }
+
+    #[test]
+    fn a_run_whose_film_is_given_up_keeps_its_frames_and_says_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let frames = ["cam0/0.png", "cam0/1.png"].map(|name| folder.join(name));
+        begin(folder, &frames, &[]).unwrap();
+        std::fs::create_dir(folder.join("cam0")).unwrap();
+        std::fs::write(&frames[0], "a frame").unwrap();
+        // Of other names, or beside it.
+        for other in ["cam0/2.png", "0.png", "cam0/0.svg", "cam0/cam0/0.png"] {
+            assert!(give_up(&folder.join(other)).unwrap().is_empty(), "{other}");
+        }
+        assert_eq!(left_out(folder).unwrap(), BTreeMap::new());
+        // Which is not there yet.
+        let given_up = give_up(&frames[1]).unwrap();
+        assert_eq!(given_up.len(), 1);
+        assert_eq!(given_up[0].folder, folder);
+        drop(given_up);
+        assert!(give_up(&frames[1]).unwrap().is_empty());
+        let damaged = BTreeMap::from([("a.png".to_owned(), "cut short".to_owned())]);
+        let errors = [
+            left_out(folder).unwrap_err(),
+            leave_out(&damaged, folder, &frames, &frames).unwrap_err(),
+        ];
+        for error in errors.map(|error| error.to_string()) {
+            let said = format!("{}: resume.json is gone: ", folder.display());
+            assert!(error.starts_with(&said), "{error}");
+        }
+        assert!(frames[0].exists());
+        let error = begin(folder, &frames, &[]).unwrap_err().to_string();
+        assert!(error.contains("but no resume.json"), "{error}");
     }
 }
