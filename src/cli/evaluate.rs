@@ -176,10 +176,10 @@ fn score_photos(
     if let Some(note) = session.note_of_empty() {
         say!("note: {note}");
     }
-    if let Some(folder) = output
-        && let Some(note) = others(folder, &files)?
-    {
-        say!("note: {note}");
+    if let Some(folder) = output {
+        for note in others([folder], &files)? {
+            say!("note: {note}");
+        }
     }
     Ok(lines)
 }

@@ -176,8 +176,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         is_there.fill(false);
     }
     args.film.finish(&files, fps)?;
-    if let Some(note) = others(&args.output, &files)?.filter(|_| !chosen.is_part()) {
-        say!("note: {note}");
+    if !chosen.is_part() {
+        for note in others([folder.as_path()], &files)? {
+            say!("note: {note}");
+        }
     }
 
     let report = Report::new(&session, &start);

@@ -88,14 +88,28 @@ pub(super) fn check_apart<'a>(
     }
 }
 
-/// What to say of pictures in a folder that are none of those just written, if there are any: films of
-/// all that lies there would show them, too.
+/// What to say of pictures that are none of those just written, for each folder that has some: of these folders, as
+/// far as they are there, and those that files were written to. Films of all that lies there would show them, too.
 ///
 /// # Errors
-/// The folder cannot be read.
-pub(super) fn others(folder: &Path, files: &[PathBuf]) -> anyhow::Result<Option<String>> {
-    let failed = || folder.display().to_string();
+/// A folder cannot be read.
+pub(super) fn others<'a>(
+    folders: impl IntoIterator<Item = &'a Path>,
+    files: &'a [PathBuf],
+) -> anyhow::Result<Vec<String>> {
     let own: BTreeSet<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let written_to = files.iter().filter_map(|file| file.parent());
+    let folders: BTreeSet<&Path> = folders.into_iter().chain(written_to).collect();
+    let mut notes = Vec::new();
+    for folder in folders.into_iter().filter(|folder| folder.is_dir()) {
+        notes.extend(others_in(folder, &own)?);
+    }
+    Ok(notes)
+}
+
+/// The same of one folder, without those that lie in it.
+fn others_in(folder: &Path, own: &BTreeSet<&Path>) -> anyhow::Result<Option<String>> {
+    let failed = || folder.display().to_string();
     let mut others = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(failed)? {
         let path = entry.with_context(failed)?.path();
@@ -173,8 +187,17 @@ mod tests {
         let error = check_new_folder(&at("images"), |_| false).unwrap_err();
         assert!(error.to_string().contains("the folder is not empty"));
 
-        let others = |files: &[PathBuf]| others(&at("images"), files).unwrap();
-        assert_eq!(others(&[at("images/a.png")]), None);
-        assert!(others(&[]).unwrap().starts_with("a.png in "));
+        std::fs::create_dir(at("images/cam0")).unwrap();
+        std::fs::write(at("images/cam0/b.png"), "b").unwrap();
+        let others = |files: &[PathBuf]| {
+            let notes = others([at("images").as_path()], files).unwrap();
+            let first = |note: &String| note.split(" in ").next().unwrap().to_owned();
+            notes.iter().map(first).collect::<Vec<String>>()
+        };
+        assert_eq!(others(&[at("images/a.png")]), [""; 0]);
+        assert_eq!(others(&[]), ["a.png"]);
+        // Folders within are others' unless something was written there.
+        assert_eq!(others(&[at("images/cam0/a.png")]), ["a.png", "b.png"]);
+        assert_eq!(others(&[at("images/gone/a.png")]), ["a.png"]);
     }
 }

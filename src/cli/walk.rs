@@ -372,11 +372,10 @@ fn say_others(args: &Args, walks: &[Walked]) -> anyhow::Result<()> {
     let own: Vec<PathBuf> = walks.iter().flat_map(|walk| walk.files.clone()).collect();
     let kinds = PortalFill::ALL.into_iter().chain([PortalFill::Whole]);
     let folders = kinds.map(|fill| args.output.join(fill.name()));
-    let folders = std::iter::once(args.output.clone()).chain(folders);
-    for folder in folders.filter(|folder| folder.is_dir()) {
-        if let Some(note) = others(&folder, &own)? {
-            say!("note: {note}");
-        }
+    let folders: Vec<PathBuf> = folders.collect();
+    let folders = folders.iter().chain([&args.output]).map(PathBuf::as_path);
+    for note in others(folders, &own)? {
+        say!("note: {note}");
     }
     Ok(())
 }

@@ -34,8 +34,8 @@ fn photo(folder: &TempDir, i: usize) -> PathBuf {
     at(folder, &format!("wall/images/000{i}.png"))
 }
 
-#[test]
-fn each_camera_of_a_rig_may_have_a_folder() {
+/// The wall, as taken by two cameras that have a folder each: those of even numbers, and of odd ones.
+fn rig() -> TempDir {
     let camera = |name: &str| format!("cam{}", name.as_bytes()[3] % 2);
     let folder = called(|name| format!("{}/{name}", camera(name)));
     for i in 0..9 {
@@ -45,6 +45,29 @@ fn each_camera_of_a_rig_may_have_a_folder() {
         fs::rename(photo(&folder, i), place.join(name)).unwrap();
     }
     fs::remove_dir(at(&folder, "wall/images")).unwrap();
+    folder
+}
+
+#[test]
+fn pictures_of_an_earlier_run_are_told_of_in_each_cameras_folder() {
+    let folder = rig();
+    let said = |every: u32| {
+        let line = format!("evaluate wall --proxy plane --size 24x18 --every {every} -o out");
+        let said = lumigraph(folder.path(), &line).ok().stderr;
+        let told = said.lines().filter(|line| line.contains("of this run"));
+        told.map(str::to_owned).collect::<Vec<String>>()
+    };
+    assert_eq!(said(2), [""; 0]);
+    let expected = [
+        "note: 2 pictures in out/cam0 are not of this run, as 0004.png",
+        "note: 0007.png in out/cam1 is not of this run",
+    ];
+    assert_eq!(said(3), expected);
+}
+
+#[test]
+fn each_camera_of_a_rig_may_have_a_folder() {
+    let folder = rig();
     // What lies beside photos is none.
     let mattes = at(&folder, "wall/mattes/cam0");
     fs::create_dir_all(&mattes).unwrap();
