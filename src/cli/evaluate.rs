@@ -3,7 +3,6 @@
 use super::exposure::ExposureArgs;
 use super::film::write_picture;
 use super::inputs::files_behind_scene;
-use super::interior::check_outside;
 use super::options::{DrawArgs, FieldArgs, SceneArgs, compared};
 use super::output::say;
 use super::output::{print, print_json};
@@ -80,7 +79,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let output = args.output.as_deref();
     if let Some(folder) = output {
         check_folder(folder)?;
-        check_outside(folder, "-o")?;
     }
     let scene = args.scene.open()?;
     let held_out = held_out(args, &scene)?;

@@ -6,7 +6,6 @@ use super::exposure::ExposureArgs;
 use super::film::write_picture;
 use super::frames::{Asked, NamedView};
 use super::inputs::files_behind_scene;
-use super::interior::check_outside;
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
 use super::output::{make_parent, print, write_file};
@@ -93,7 +92,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             continue;
         };
         check_file(file, option)?;
-        check_outside(file, "-o")?;
         files.push(file);
     }
     let mut scene = args.scene.open()?;

@@ -3,7 +3,6 @@
 mod kept;
 
 use super::Usage;
-use super::interior::check_outside;
 use super::options::positive;
 use super::output::say;
 use super::stamp::in_unicode;
@@ -182,7 +181,6 @@ impl FilmArgs {
             return Err(Usage(text).into());
         }
         check_file(video, "--video")?;
-        check_outside(video, "--video")?;
         capture::video::ffmpeg().text(&["-version"])?;
         let folder = tempfile::tempdir()?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());

@@ -4,7 +4,6 @@ use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{Asked, NamedView, ViewArgs, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
-use super::interior::check_outside;
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
@@ -90,7 +89,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let why_empty = asked.why_empty(args.nerfstudio.is_unplaced(read));
     check_folder(&args.output)?;
-    check_outside(&args.output, "-o")?;
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
     let without = args.hold_out.names(&scene)?;

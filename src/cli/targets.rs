@@ -1,12 +1,15 @@
 //! What a command is about to write: not over what it reads, and only where it can.
 
+use super::interior::check_outside;
 use anyhow::{Context, bail};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Fails where a folder that `-o` names cannot be made or written to, before anything is.
+/// Fails where a folder that `-o` names cannot be made or written to, or would lie in that of an interior, before
+/// anything is.
 pub(super) fn check_folder(folder: &Path) -> anyhow::Result<()> {
-    check_writable(folder, "-o")
+    check_writable(folder, "-o")?;
+    check_outside(folder, "-o")
 }
 
 /// The same of a file that an option names, and of the folder that it is to lie in.
@@ -25,11 +28,12 @@ pub(super) fn check_file(file: &Path, option: &str) -> anyhow::Result<()> {
             file.display()
         );
     }
-    check_writable(file.parent().unwrap_or(Path::new("")), option)
+    check_writable(file.parent().unwrap_or(Path::new("")), option)?;
+    check_outside(file, option)
 }
 
 /// Fails where [`datasets::in_new_folder`] would for the folder that `-o` names, as far as can be told before
-/// long work.
+/// long work, or where that is to lie in the folder of an interior. It may be such a folder itself.
 pub(super) fn check_new_folder(
     folder: &Path,
     may_be_replaced: impl Fn(&Path) -> bool,

@@ -8,7 +8,7 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of};
-use super::interior::{check_holds_none, check_outside};
+use super::interior::check_holds_none;
 use super::made::{self, Made};
 use super::notes::Notes;
 use super::options::{cut, size};
@@ -157,9 +157,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         persist: args.persist,
         ..defaults
     };
-    check_folder(&args.output)?;
     check_holds_none(&args.output)?;
-    check_outside(&args.output, "-o")?;
+    check_folder(&args.output)?;
     args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");

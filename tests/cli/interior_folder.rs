@@ -79,7 +79,19 @@ fn nothing_else_is_written_into_an_interiors_folder() {
     let evaluate = "evaluate wall --proxy plane --size 16x12";
     let field = "field wall --view 0000.png --proxy plane";
     let walk = "--frames 1 --size 16x12";
-    for (from, line) in [
+    let others = [
+        "demo -o house/demo",
+        "bench wall -o house/measured",
+        "generate wall -o house/wall",
+        "import wall -o house/scene",
+        "export wall --format colmap -o house/model",
+        "export wall --format transforms -o house/t.json",
+        "proxy wall plane -o house/p.json",
+        "path p.json --format lumigraph -o house/new/er/p.json",
+        "interior house/house.glb --find -o house/found",
+    ];
+    let others = others.map(|line| ("", line.to_owned()));
+    let pictures = [
         ("", format!("render wall {render} -o house")),
         ("", format!("render wall {render} -o house/new/er")),
         ("house", format!("render ../wall {render} -o .")),
@@ -91,11 +103,18 @@ fn nothing_else_is_written_into_an_interiors_folder() {
         ),
         ("", format!("walk house {walk} -o house/walk")),
         ("house", format!("walk . {walk} -o ldi")),
-    ] {
+    ];
+    for (from, line) in pictures.into_iter().chain(others) {
         let error = lumigraph(&here.join(from), &line).error(1);
-        let said = "house holds an interior, and what else lies there keeps it from being replaced; \
-                    choose another -o";
-        assert!(error.contains(said), "{line}: {error}");
+        let option = match line.contains("--weights") {
+            true => "--weights",
+            false => "-o",
+        };
+        let said = format!(
+            "house holds an interior, and what else lies there keeps it from being replaced; \
+             choose another {option}"
+        );
+        assert!(error.contains(&said), "{line}: {error}");
         assert!(files(&house) == before, "{line}");
     }
     // Beside it is room, also as seen from within.
