@@ -7,7 +7,7 @@ use super::inputs::files_behind_scene;
 use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
-use super::targets::{check_apart, check_file, check_folder};
+use super::targets::{check_apart, check_file, check_scene_folder};
 use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::Context;
 use calibrate::{Pixel, View};
@@ -142,7 +142,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         inputs.extend(named.flatten().cloned());
         check_apart("the proxy is", [file.as_path()], &inputs)?;
     } else if let Some(folder) = &scene.folder {
-        check_folder(folder)?;
+        check_scene_folder(folder)?;
     }
     let without = args.hold_out.names(&scene)?;
     let (proxy, how, fitted_without) = match by_hand(args, &scene, &without)? {

@@ -8,8 +8,13 @@ use std::path::{Path, PathBuf};
 /// Fails where a folder that `-o` names cannot be made or written to, or would lie in that of an interior, before
 /// anything is.
 pub(super) fn check_folder(folder: &Path) -> anyhow::Result<()> {
-    check_writable(folder, "-o")?;
+    check_writable(folder, "choose another -o")?;
     check_outside(folder, "-o")
+}
+
+/// Fails where there is no writing to a scene's own folder, into which a command writes what has no `-o`.
+pub(super) fn check_scene_folder(folder: &Path) -> anyhow::Result<()> {
+    check_writable(folder, "give a file elsewhere with -o")
 }
 
 /// The same of a file that an option names, and of the folder that it is to lie in.
@@ -28,7 +33,8 @@ pub(super) fn check_file(file: &Path, option: &str) -> anyhow::Result<()> {
             file.display()
         );
     }
-    check_writable(file.parent().unwrap_or(Path::new("")), option)?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    check_writable(folder, &format!("choose another {option}"))?;
     check_outside(file, option)
 }
 
@@ -47,18 +53,19 @@ pub(super) fn check_new_folder(
     Ok(datasets::check_free(folder, may_be_replaced)?)
 }
 
-fn check_writable(folder: &Path, option: &str) -> anyhow::Result<()> {
+/// `remedy` is what to do where that cannot be.
+fn check_writable(folder: &Path, remedy: &str) -> anyhow::Result<()> {
     // The folder itself, or that which it would be made in.
     let there = folder.ancestors().find(|path| path.exists());
     let there = there.unwrap_or(Path::new("."));
     let named = there.display();
     if !there.is_dir() {
-        bail!("{named}: a file is where the folder was to be; choose another {option}");
+        bail!("{named}: a file is where the folder was to be; {remedy}");
     }
     // By a file without a name, which nobody sees.
     match tempfile::tempfile_in(there) {
         Ok(_) => Ok(()),
-        Err(error) => bail!("{named}: cannot write: {error}; choose another {option}"),
+        Err(error) => bail!("{named}: cannot write: {error}; {remedy}"),
     }
 }
 
@@ -180,6 +187,12 @@ mod tests {
         if cfg!(target_os = "linux") {
             let error = check_file(Path::new("/proc/b.png"), "-o").unwrap_err();
             assert!(error.to_string().starts_with("/proc: cannot write: "));
+            let error = check_scene_folder(Path::new("/proc")).unwrap_err();
+            assert!(
+                error
+                    .to_string()
+                    .ends_with("; give a file elsewhere with -o")
+            );
             for device in ["/dev/null", "/dev/stdout"] {
                 let error = check_file(Path::new(device), "-o").unwrap_err();
                 let said = format!("{device}: no file, and would be replaced by one; ");
