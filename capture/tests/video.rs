@@ -237,7 +237,13 @@ fn damaged_frames_are_no_photos_and_what_is_wrong_is_told() {
     assert!(frames.unwrap().iter().all(|f| f.time_s < 2.0));
     assert!(told.len() == 1 && told[0].errors > 0, "{told:?}");
 
-    // 3. Nothing is left.
+    // 3. What is whole is all in the first stretch.
+    let (frames, told) = extract(&with_damage("early.mp4", &[2, 8, 16]));
+    let times: Vec<f64> = frames.unwrap().iter().map(|f| f.time_s * 8.0).collect();
+    assert_eq!(times, [0.0, 1.0]);
+    assert_eq!((told.len(), told[0].frames), (1, 22), "{told:?}");
+
+    // 4. Nothing is left.
     let (frames, told) = extract(&with_damage("nothing.mp4", &[0, 8, 16]));
     let error = frames.unwrap_err();
     assert!(

@@ -24,31 +24,61 @@ pub struct ScoredFrame {
     pub is_damaged: bool,
 }
 
+/// As many photos are the least that show depth.
+const AT_LEAST: usize = 2;
+
 /// The indices of the sharpest frame of each of so many equal stretches of time, rising.
 /// The earlier of equally sharp ones; none where a stretch has no frame, or damaged ones alone.
+/// Where that leaves but one of several, the time of the whole frames is what is divided, at least in two.
 /// Frames come in the order of their times.
 pub fn choose(frames: &[ScoredFrame], count: FrameCount) -> Vec<usize> {
-    let is_whole = |i: &usize| !frames[*i].is_damaged;
+    let wanted = stretches(frames, count);
+    let chosen = sharpest(frames, wanted);
+    if chosen.len() >= AT_LEAST.min(wanted) {
+        return chosen;
+    }
+    let whole: Vec<usize> = (0..frames.len())
+        .filter(|&i| !frames[i].is_damaged)
+        .collect();
+    let left: Vec<ScoredFrame> = whole.iter().map(|&i| frames[i]).collect();
+    let stretches = stretches(&left, count).max(AT_LEAST);
+    let chosen = sharpest(&left, stretches).into_iter();
+    chosen.map(|i| whole[i]).collect()
+}
+
+/// How long frames are shown in all, in seconds; 0 for fewer than two.
+fn duration_s(frames: &[ScoredFrame]) -> f64 {
     let [first, .., last] = frames else {
-        return (0..frames.len()).filter(is_whole).collect();
+        return 0.0;
     };
     // The last frame is shown about as long as the others.
     let step_s = (last.time_s - first.time_s) / (frames.len() - 1) as f64;
-    let duration_s = last.time_s - first.time_s + step_s;
-    if !(duration_s > 0.0) {
-        return (0..frames.len()).find(is_whole).into_iter().collect();
-    }
-    let per_second = |fps: f64| (fps * duration_s).round() as usize;
+    last.time_s - first.time_s + step_s
+}
+
+/// How many stretches of time a frame each is asked of: one or more, and no more than there are frames.
+fn stretches(frames: &[ScoredFrame], count: FrameCount) -> usize {
+    let per_second = |fps: f64| (fps * duration_s(frames)).round() as usize;
     let stretches = match count {
         FrameCount::Auto => per_second(AUTO_PER_SECOND).clamp(AUTO_AT_LEAST, AUTO_AT_MOST),
         FrameCount::Frames(count) => count,
         FrameCount::PerSecond(fps) => per_second(fps),
     };
-    let stretches = stretches.clamp(1, frames.len());
+    stretches.clamp(1, frames.len().max(1))
+}
+
+/// The sharpest whole frame of each of so many equal stretches; the first one where all frames are shown at one
+/// time.
+fn sharpest(frames: &[ScoredFrame], stretches: usize) -> Vec<usize> {
+    let mut whole = (0..frames.len()).filter(|&i| !frames[i].is_damaged);
+    let duration_s = duration_s(frames);
+    if !(duration_s > 0.0) {
+        return whole.next().into_iter().collect();
+    }
     let mut best: Vec<Option<usize>> = vec![None; stretches];
-    for i in (0..frames.len()).filter(is_whole) {
+    for i in whole {
         let frame = frames[i];
-        let share = (frame.time_s - first.time_s) / duration_s;
+        let share = (frame.time_s - frames[0].time_s) / duration_s;
         // A frame on a border begins the later stretch, however its time was rounded.
         let stretch = ((share * stretches as f64 + 1e-6) as usize).min(stretches - 1);
         let sharper = |other: usize| frame.sharpness > frames[other].sharpness;
@@ -121,6 +151,30 @@ mod tests {
         six.iter_mut().for_each(|frame| frame.is_damaged = true);
         assert_eq!(choose(&six, FrameCount::Auto), [0; 0]);
         assert_eq!(choose(&six[..1], FrameCount::Auto), [0; 0]);
+    }
+
+    #[test]
+    fn whole_frames_that_lie_close_together_are_taken_apart() {
+        // The first ten of two seconds are whole.
+        let mut sharpness = vec![1.0; 60];
+        sharpness[3] = 2.0;
+        sharpness[9] = 3.0;
+        let mut early = frames(30.0, &sharpness);
+        for frame in &mut early[10..] {
+            frame.is_damaged = true;
+        }
+        assert_eq!(choose(&early, FrameCount::Frames(3)), [3, 4, 9]);
+        assert_eq!(choose(&early, FrameCount::PerSecond(1.0)), [3, 9]);
+        assert_eq!(choose(&early, FrameCount::Frames(1)), [9], "as asked for");
+        // Two of ten minutes.
+        let mut long = frames(30.0, &vec![1.0; 18_000]);
+        for frame in &mut long[2..] {
+            frame.is_damaged = true;
+        }
+        assert_eq!(choose(&long, FrameCount::Auto), [0, 1]);
+        assert_eq!(choose(&long, FrameCount::PerSecond(0.1)), [0, 1]);
+        long[0].is_damaged = true;
+        assert_eq!(choose(&long, FrameCount::Auto), [1]);
     }
 
     #[test]
