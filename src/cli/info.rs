@@ -10,7 +10,7 @@ use super::surface::{proxy_json, proxy_text};
 use calibrate::{TRUSTED_TIE, WeakGroup, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
-use lumigraph::scene::{ImportOptions, Photo, Scene, SceneError, other_models};
+use lumigraph::scene::{Photo, Scene, SceneError, other_models};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -88,12 +88,8 @@ fn open(args: &Args) -> anyhow::Result<Scene> {
         info_of_file::say_unused_keys(&args.keys.keys(), &own);
         return args.scene.open_whole();
     }
-    let options = ImportOptions {
-        keys: args.keys.keys(),
-        strict: args.scene.strict,
-        ..ImportOptions::default()
-    };
-    let (scene, warnings) = Scene::import(folder, &options)?;
+    let keys = args.keys.keys();
+    let (scene, warnings) = Scene::open_capture(folder, args.scene.strict, Some(&keys))?;
     print_warnings(&warnings);
     Ok(scene)
 }

@@ -27,6 +27,14 @@ pub enum SceneError {
     /// Another program's calibration cannot be read.
     #[error(transparent)]
     Format(#[from] calibrate::formats::FormatError),
+    /// What is wrong with a capture that was opened without `import`, where options of that mend it.
+    #[error("{source}; {whose}")]
+    OfImport {
+        /// What is wrong.
+        source: Box<SceneError>,
+        /// Which of the options that it suggests are whose.
+        whose: String,
+    },
     /// An OpenCV calibration's poses cannot be given to the photos.
     #[error("{}: the file holds {problem}", path.display())]
     Poses {
@@ -116,7 +124,7 @@ pub enum SceneError {
     /// The capture holds no photos.
     #[error(
         "{}: no photos here, neither in it nor in `images` or other folders within; give the folder \
-         that holds the photos, and their calibration with --calibration", .0.display()
+         that holds the photos, and their calibration with `import --calibration`", .0.display()
     )]
     NoPhotos(PathBuf),
     /// A folder of masks, mattes or depth maps has none for any photo.

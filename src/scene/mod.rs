@@ -33,6 +33,7 @@ mod silhouettes;
 mod source;
 mod split;
 mod store;
+mod suggested;
 #[cfg(test)]
 mod tests;
 mod times;

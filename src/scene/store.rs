@@ -4,7 +4,7 @@ use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
 use super::relative::relative;
 use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
-use super::{ImportOptions, Photo, Scene, SceneError, SceneProxy, Warning};
+use super::{Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
 use capture::without_byte_order_mark;
@@ -53,11 +53,7 @@ impl Scene {
     pub fn open(folder: &Path, strict: bool) -> Result<(Self, Vec<Warning>), SceneError> {
         let path = folder.join(SCENE_FILE);
         if !Self::is_scene(folder) {
-            let options = ImportOptions {
-                strict,
-                ..ImportOptions::default()
-            };
-            return Self::import(folder, &options);
+            return Self::open_capture(folder, strict, None);
         }
         let bytes = std::fs::read(&path).map_err(|e| io(&path, "read the scene", e))?;
         let file = SceneFile::parse(&path, &bytes)?;

@@ -417,8 +417,15 @@ fn silhouettes_are_no_ignore_masks_unless_asked_for() {
             GrayImage::from_fn(SIZE.0, SIZE.1, |x, _| Luma([if x < 40 { 255 } else { 0 }]));
         save(at(&folder, &format!("wall/masks/{i:04}.png")), &object);
     }
+    let whose = "; --mattes and --masks are options of `lumigraph import wall -o SCENE`\n";
+    for line in ["info wall", "proxy wall plane -o plane.json"] {
+        let ran = lumigraph(folder.path(), line).ok();
+        let note = format!("--masks masks ignores all else{whose}");
+        assert!(ran.stderr.contains(&note), "{line}: {}", ran.stderr);
+    }
     let ran = lumigraph(folder.path(), "import wall -o a").ok();
     assert!(ran.stderr.contains("--mattes masks cuts"), "{}", ran.stderr);
+    assert!(!ran.stderr.contains(whose), "{}", ran.stderr);
     assert!(!ran.stdout.contains("ignore masks"), "{}", ran.stdout);
     let ran = lumigraph(folder.path(), "import wall --masks masks -o b").ok();
     assert!(!ran.stderr.contains("--mattes"), "{}", ran.stderr);
