@@ -55,6 +55,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.scene.strict {
         check_photos(&scene)?;
     }
+    if let Err(error) = scene.check_own_proxy() {
+        say!("note: {error}");
+    }
     let weak = scene.reconstruction.weakly_tied(TRUSTED_TIE);
     let info = gather(&scene, &weak)?;
     if args.json {

@@ -72,10 +72,22 @@ pub(super) fn fit(
 }
 
 impl ProxyArgs {
-    /// Whether none is asked for, so that a scene's own is taken.
+    /// Whether [`Self::choose`] takes a scene's own whatever it was fitted with: it has one, none is asked for, and
+    /// no photo is held out.
+    ///
+    /// # Errors
+    /// It would, and that is of none of the scene's photos.
     #[cfg(feature = "window")]
-    pub(super) fn is_default(&self) -> bool {
-        self.proxy.is_none()
+    pub(super) fn takes_own(
+        &self,
+        scene: &Scene,
+        without: &BTreeSet<String>,
+    ) -> Result<bool, SceneError> {
+        let is_taken = self.proxy.is_none() && scene.proxy.is_some() && without.is_empty();
+        if is_taken {
+            scene.check_own_proxy()?;
+        }
+        Ok(is_taken)
     }
 
     /// Whether kinds are to be compared.
@@ -146,8 +158,7 @@ impl ProxyArgs {
                         );
                         return fitted(kind);
                     }
-                    let folder = scene.folder.clone().unwrap_or_default();
-                    scene.check_proxy(&own.proxy, &folder.join(&own.file))?;
+                    scene.check_own_proxy()?;
                     Ok(ChosenProxy {
                         proxy: own.proxy.clone(),
                         origin: "the scene's own".to_owned(),
@@ -272,4 +283,55 @@ pub(super) fn proxy_text(proxy: &Proxy) -> String {
         triple(plane.point()),
         triple(plane.normal())
     )
+}
+
+#[cfg(all(test, feature = "window"))]
+mod tests {
+    use super::*;
+    use lumigraph::scene::file::Extra;
+    use std::path::PathBuf;
+
+    #[test]
+    fn a_scenes_own_points_of_other_photos_are_not_taken_as_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let capture = folder.path().join("wall");
+        let options = datasets::Options {
+            size: Some((64, 48)),
+            views: Some(5),
+            samples_per_side: Some(2),
+        };
+        let wall = datasets::by_name("wall", &options).unwrap();
+        datasets::write(&wall, &capture).unwrap();
+        let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        scene.folder = Some(PathBuf::from("scene"));
+        let none = BTreeSet::new();
+        let any = ProxyArgs { proxy: None };
+        assert!(!any.takes_own(&scene, &none).unwrap(), "it has none");
+
+        let mut of_photo = |name: &str| {
+            let text = format!(
+                r#"{{"version": 1, "kind": "dense", "views": ["{name}"],
+                    "points": [[0, 0, 1], [1, 0, 1], [0, 1, 1]], "seen_by": [[0], [0], [0]]}}"#
+            );
+            scene.proxy = Some(SceneProxy {
+                proxy: proxy::parse(Path::new("proxy.json"), text.as_bytes()).unwrap(),
+                file: "proxy.json".to_owned(),
+                fitted_without: Some(Vec::new()),
+                other: Extra::new(),
+            });
+            any.takes_own(&scene, &none)
+        };
+        assert!(of_photo("0001.png").unwrap());
+        let error = of_photo("nope.jpg").unwrap_err().to_string();
+        let said = Path::new("scene").join("proxy.json");
+        let said = format!("{}: its points were found in nope.jpg", said.display());
+        assert!(error.starts_with(&said), "{error}");
+        // Nobody asks for it.
+        let plane = ProxyArgs {
+            proxy: Some("plane".to_owned()),
+        };
+        assert!(!plane.takes_own(&scene, &none).unwrap());
+        let held_out = BTreeSet::from(["0002.png".to_owned()]);
+        assert!(!any.takes_own(&scene, &held_out).unwrap());
+    }
 }

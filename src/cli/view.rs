@@ -246,7 +246,7 @@ impl Load {
         };
         // 1. At once.
         exposure.forget(&mut scene);
-        let is_ready = proxy.is_default() && scene.proxy.is_some() && without.is_empty();
+        let is_ready = proxy.takes_own(&scene, &without)?;
         let quick = match &scene.proxy {
             Some(own) if is_ready => Some(own.proxy.clone()),
             _ => {

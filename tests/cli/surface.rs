@@ -316,4 +316,18 @@ fn dense_points_of_other_photos_are_refused() {
     assert!(error.starts_with(said), "{error}");
     // Some may be held out, or of a larger capture.
     evaluate(r#""0001.png", "nope.jpg""#).ok();
+
+    // A scene's own likewise.
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "proxy scene plane").ok();
+    let said_by_info = || lumigraph(here, "info scene").ok().stderr;
+    assert!(!said_by_info().contains("its points"));
+    evaluate(r#""nope.jpg""#).error(1);
+    std::fs::copy(here.join("d.json"), here.join("scene/proxy.json")).unwrap();
+    let said = format!("scene/proxy.{}", &said[2..]);
+    let note = said_by_info();
+    assert!(note.contains(&format!("note: {said}")), "{note}");
+    let error = lumigraph(here, "render scene --path orbit -o out").error(1);
+    assert!(error.starts_with(&said), "{error}");
 }

@@ -97,6 +97,7 @@ pub(super) fn default_proxy(
 ) -> anyhow::Result<(Proxy, Option<String>, String)> {
     let own = scene.proxy.as_ref();
     if let Some(own) = own.filter(|own| seen_by(own, without).is_none()) {
+        scene.check_own_proxy()?;
         return Ok((own.proxy.clone(), None, "the scene's own".to_owned()));
     }
     let again = own.and_then(|own| kind_of(own, scene));
