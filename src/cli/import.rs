@@ -225,27 +225,37 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Fails of a scene whose photos lie elsewhere: there is nothing to import.
+/// Fails of a scene whose photos lie elsewhere, and of a scene's file: there is nothing to import.
 fn check_no_scene(photos: &Path) -> anyhow::Result<()> {
-    if Scene::is_scene(photos) && find_photos_folder(photos).is_none() {
-        bail!(
-            "{}: a scene already (scene.json), which can be rendered as it is; to import its photos \
-             anew, give the folder that they lie in",
-            photos.display()
-        );
-    }
-    Ok(())
+    let what = if photos.is_file() && photos.ends_with("scene.json") {
+        "the file of a scene, whose folder can be rendered as it is"
+    } else if Scene::is_scene(photos) && find_photos_folder(photos).is_none() {
+        "a scene already (scene.json), which can be rendered as it is"
+    } else {
+        return Ok(());
+    };
+    bail!(
+        "{}: {what}; to import its photos anew, give the folder that they lie in",
+        photos.display()
+    )
 }
 
-/// Fails where PHOTOS is a file that is no video, but may be the photos' calibration.
+/// Fails where PHOTOS is a file that is no video: the photos' calibration, maybe, or what else is written as
+/// OpenCV's files are.
 fn check_no_calibration(args: &Args) -> anyhow::Result<()> {
     let file = &args.photos;
     let format = formats::detect(file).or_else(|| formats::meant(file));
-    if format.is_some() || colmap::is_part(file) || opencv::is_storage_name(file) {
+    if format.is_some() || colmap::is_part(file) || opencv::may_be_calibration(file) {
         let [argument, output] = [file, &args.output].map(|path| as_argument(path));
         bail!(
             "{}: a calibration, or no video at any rate; give its photos: `lumigraph import PHOTOS \
              --calibration {argument} -o {output}`",
+            file.display()
+        );
+    }
+    if opencv::is_storage_name(file) {
+        bail!(
+            "{}: no video, nor a calibration that is known here; give a video, or the folder of the photos",
             file.display()
         );
     }

@@ -262,4 +262,21 @@ fn a_calibration_in_place_of_photos_is_told_to_be_one() {
         assert_eq!(error, said);
     }
     assert!(!here.join("scene").exists());
+
+    // OpenCV's matrices are one, whatever their file is called; other programs' JSON is none.
+    lumigraph(here, "export wall --format opencv -o cal.json").ok();
+    let error = lumigraph(here, "import cal.json -o scene").error(1);
+    assert!(error.starts_with("cal.json: a calibration, or"), "{error}");
+    lumigraph(here, "import wall -o made").ok();
+    lumigraph(here, "proxy made plane -o plane.json").ok();
+    fs::write(here.join("split.json"), r#"{"test": ["0003.png"]}"#).unwrap();
+    for (file, said) in [
+        ("made/scene.json", "the file of a scene, whose folder can"),
+        ("plane.json", "no video, nor a calibration"),
+        ("split.json", "no video, nor a calibration"),
+    ] {
+        let error = lumigraph(here, &format!("import {file} -o scene")).error(1);
+        assert!(error.starts_with(&format!("{file}: {said}")), "{error}");
+        assert!(!error.contains("--calibration"), "{error}");
+    }
 }

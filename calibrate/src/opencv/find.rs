@@ -28,7 +28,6 @@ pub struct FoundCalibrations {
 /// one that holds matrices the way OpenCV writes them, whole or damaged.
 pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
     let mut found = FoundCalibrations::default();
-    let is_small = |file: &Path| fs::metadata(file).is_ok_and(|m| m.len() <= LARGEST);
     for file in files(folder) {
         if !(is_storage_name(&file) && is_small(&file)) {
             continue;
@@ -50,6 +49,21 @@ pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
     };
     found.unusable.sort_by_key(lacks_a_name);
     found
+}
+
+/// Whether a file may be meant for a calibration: by its name, and, as many programs write JSON for all kinds of
+/// things, one of that also by what it holds.
+pub fn may_be_calibration(file: &Path) -> bool {
+    let extension = file.extension().unwrap_or_default();
+    let looks_like_one = || {
+        let is_one = || read_calibration(file, &Keys::default()).is_ok();
+        is_small(file) && (holds_matrices(file) || holds_poses(file) || is_one())
+    };
+    is_storage_name(file) && (!extension.eq_ignore_ascii_case("json") || looks_like_one())
+}
+
+fn is_small(file: &Path) -> bool {
+    fs::metadata(file).is_ok_and(|m| m.len() <= LARGEST)
 }
 
 /// Whether a file has the mark of OpenCV's matrices, as far as it can be unpacked.
