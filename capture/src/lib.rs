@@ -39,7 +39,7 @@ pub use photo_set::{
 };
 pub use resize::{reduced_size, resize, resize_mask};
 pub use sequence::is_sequence;
-pub use text::without_byte_order_mark;
+pub use text::{Lines, byte_lines, lines, without_byte_order_mark};
 pub use times::{
     NameTime, TimeListError, Times, from_earliest, number_in_name, read_times, time_in_name,
     times_of_names,

@@ -105,6 +105,7 @@ fn lists_are_read_with_or_without_a_header() {
         "a.jpg,1.5\nb/b.jpg,-0.2",
         "name,seconds\na.jpg,1.5\nb/b.jpg,-0.2\n",
         "\u{feff}# by hand\r\n\r\nphoto, time in s\r\n a.jpg , 1.5 \r\n\"b/b.jpg\",-2e-1\r\n",
+        "name,seconds\ra.jpg,1.5\r\rb/b.jpg,-0.2\r",
     ] {
         assert_eq!(read(text).unwrap(), expected, "{text}");
     }
@@ -140,6 +141,10 @@ fn mistakes_in_lists_are_told_by_line() {
         ),
         (
             "a.jpg,1\n\nx.jpg,2\n",
+            "times.csv, line 3: there is no photo x.jpg; names are paths within the photo folder",
+        ),
+        (
+            "a.jpg,1\r\rx.jpg,2\r",
             "times.csv, line 3: there is no photo x.jpg; names are paths within the photo folder",
         ),
         (

@@ -368,7 +368,7 @@ const HIDES_NOTHING: &str = " without occlusion";
 fn kind_of_ply(bytes: &[u8]) -> (MeshKind, bool) {
     // Within the first few lines, or nowhere.
     let header = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
-    let mut lines = header.lines();
+    let mut lines = capture::lines(&header);
     let name = lines.find_map(|line| line.strip_prefix("comment ")?.strip_prefix(KIND_COMMENT));
     let Some(name) = name else {
         return (MeshKind::Mesh, true);

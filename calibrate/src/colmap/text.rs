@@ -166,7 +166,7 @@ pub(super) fn read_points(
 /// The lines of a file, numbered.
 struct Lines<'a> {
     path: &'a Path,
-    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    lines: std::iter::Enumerate<capture::Lines<'a>>,
 }
 
 impl<'a> Lines<'a> {
@@ -183,7 +183,7 @@ impl<'a> Lines<'a> {
         })?;
         Ok(Self {
             path,
-            lines: text.lines().enumerate(),
+            lines: capture::lines(text).enumerate(),
         })
     }
 

@@ -172,7 +172,7 @@ fn find_list(bundle: &Path) -> Result<PathBuf, FormatError> {
 /// The photos' names, one a line. A line may end with Bundler's "0 FOCAL".
 fn names((list, bytes): (&Path, &[u8])) -> Result<Vec<String>, FormatError> {
     let mut names = Vec::new();
-    for (index, line) in build::text(list, bytes)?.lines().enumerate() {
+    for (index, line) in capture::lines(build::text(list, bytes)?).enumerate() {
         if line.trim().is_empty() {
             continue;
         }

@@ -13,7 +13,7 @@ pub(super) const LINE: usize = 80;
 /// The words that have not been read yet.
 pub(super) struct Words<'a> {
     path: &'a Path,
-    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    lines: std::iter::Enumerate<capture::Lines<'a>>,
     words: std::str::SplitWhitespace<'a>,
     line_idx: usize,
 }
@@ -22,7 +22,7 @@ impl<'a> Words<'a> {
     pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
         Self {
             path,
-            lines: text.lines().enumerate(),
+            lines: capture::lines(text).enumerate(),
             words: "".split_whitespace(),
             line_idx: 0,
         }

@@ -69,6 +69,17 @@ fn what_editors_and_other_systems_do_to_text() {
             "{sample:?} with returns"
         );
     }
+    // What is made of lines, as old Macs end them.
+    for sample in [Cameras, Images, Points, Nvm, NvmFixed, Bundler] {
+        let text = sample.text();
+        let plain = samples::parse(sample, text.as_bytes()).unwrap();
+        let returns = text.replace('\n', "\r");
+        assert_eq!(
+            samples::parse(sample, returns.as_bytes()).as_ref(),
+            Ok(&plain),
+            "{sample:?} with returns alone"
+        );
+    }
 }
 
 #[test]

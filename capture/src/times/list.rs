@@ -1,5 +1,6 @@
 //! Times in a file: `name,seconds` a line.
 
+use crate::lines;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -52,7 +53,7 @@ pub fn read_times(
     let mut times: BTreeMap<String, f64> = BTreeMap::new();
     let mut line_of: BTreeMap<String, usize> = BTreeMap::new();
     let mut is_first = true;
-    for (line, content) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+    for (line, content) in (1..).zip(lines(text.trim_start_matches('\u{feff}'))) {
         let content = content.trim();
         if content.is_empty() || content.starts_with('#') {
             continue;

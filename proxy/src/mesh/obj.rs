@@ -2,7 +2,7 @@
 
 use super::polygon::{Fan, Fans};
 use super::{Mesh, MeshFileError};
-use capture::without_byte_order_mark;
+use capture::{byte_lines, without_byte_order_mark};
 use glam::DVec3;
 use std::path::Path;
 
@@ -13,7 +13,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     // The greatest index so far and the line that has it: corners may follow their faces.
     let mut greatest = (0, 0);
     let mut fans = Fans::default();
-    for (number, line) in lines(bytes).enumerate() {
+    for (number, line) in byte_lines(bytes).enumerate() {
         let line_number = number + 1;
         let failed = |problem: String| MeshFileError::Line {
             path: path.to_owned(),
@@ -82,13 +82,6 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
     }
     fans.mend(&mut mesh);
     Ok(mesh)
-}
-
-/// Lines that end in a new line, in a return and a new line, or, as old Macs write them, in a return alone.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let lines = bytes.split(|b| *b == b'\n');
-    let lines = lines.map(|line| line.strip_suffix(b"\r").unwrap_or(line));
-    lines.flat_map(|line| line.split(|b| *b == b'\r'))
 }
 
 /// The corner that `7`, `7/1`, `7//3`, `7/1/3` or `-1` names, from 0.

@@ -45,6 +45,7 @@ fn parse_named(
         format: header.format,
         bytes: &bytes[header.length..],
         line: header.lines + 1,
+        line_end: header.line_end,
     };
     let mut mesh = Mesh::default();
     // The greatest index and the element, record and line that have it: faces may come first.
@@ -266,6 +267,8 @@ struct Numbers<'a> {
     bytes: &'a [u8],
     /// Of a text file, from 1.
     line: usize,
+    /// The last byte of each line.
+    line_end: u8,
 }
 
 impl Numbers<'_> {
@@ -275,7 +278,7 @@ impl Numbers<'_> {
             let blank = self.bytes.iter().take_while(|b| b.is_ascii_whitespace());
             let mut length = 0;
             for byte in blank {
-                self.line += usize::from(*byte == b'\n');
+                self.line += usize::from(*byte == self.line_end);
                 length += 1;
             }
             self.bytes = &self.bytes[length..];

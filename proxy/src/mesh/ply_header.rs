@@ -74,6 +74,8 @@ pub(super) struct Header {
     pub(super) length: usize,
     /// Lines up to there.
     pub(super) lines: usize,
+    /// The last byte of each.
+    pub(super) line_end: u8,
 }
 
 /// Reads a header; an error is a line, from 1, and what is wrong with it.
@@ -82,11 +84,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, (usize, String)> {
     let mut elements: Vec<Element> = Vec::new();
     let mut at = 0;
     let mut lines = 0;
+    let line_end = line_end(bytes);
     loop {
         lines += 1;
         let failed = |problem: &str| Err((lines, problem.to_owned()));
         let rest = &bytes[at..];
-        let Some(end) = rest.iter().position(|b| *b == b'\n') else {
+        let Some(end) = rest.iter().position(|b| *b == line_end) else {
             return failed("the header has no end; is this a whole PLY file?");
         };
         let line = rest[..end].trim_ascii();
@@ -152,5 +155,18 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, (usize, String)> {
         elements,
         length: at,
         lines,
+        line_end,
     })
+}
+
+/// What all lines of a header end in, as its first does: a return alone, as in the format's first description, or
+/// a new line. Numbers that look like another line's end may follow its last line.
+fn line_end(bytes: &[u8]) -> u8 {
+    let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'));
+    let is_return = |at: usize| bytes[at] == b'\r' && bytes.get(at + 1) != Some(&b'\n');
+    if first.is_some_and(is_return) {
+        b'\r'
+    } else {
+        b'\n'
+    }
 }

@@ -292,6 +292,33 @@ fn ply_is_read_from_text_and_both_binary_orders() {
 }
 
 #[test]
+fn lines_of_a_ply_file_may_end_in_returns() {
+    let header = |format: &str| {
+        let text = format!(
+            "ply\nformat {format} 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+             property float z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n"
+        );
+        text.replace('\n', "\r")
+    };
+    let text = header("ascii") + "0 0 0\r1 0 0\r0 1 0\r3 0 1 2\r";
+    assert_eq!(parse("a.ply", &text).unwrap(), triangle());
+    assert_eq!(
+        message("a.ply", text.replace("3 0 1 2", "3 0 1 x")),
+        "a.ply, line 13: `x` is no whole number"
+    );
+    // A number that begins as a new line does.
+    let first = f32::from_le_bytes([b'\n', 0, 0, 0x3f]);
+    let mut bytes = header("binary_little_endian").into_bytes();
+    for x in [first, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+        bytes.extend(x.to_le_bytes());
+    }
+    bytes.extend([3, 0, 1, 2]);
+    let read = parse("a.ply", &bytes).unwrap();
+    assert_eq!(read.positions[0], DVec3::new(f64::from(first), 0.0, 0.0));
+    assert_eq!(read.positions[1..], triangle().positions[1..]);
+}
+
+#[test]
 fn ply_strips_of_triangles_are_read() {
     let header = |format: &str| {
         format!(
