@@ -32,6 +32,10 @@ impl fmt::Display for Damage {
 const CORRUPT_FRAME: &str = "corrupt decoded frame";
 /// Warnings that are errors of the file, said by demuxers and by ffmpeg itself.
 const OF_FILE: [&str; 3] = [CORRUPT_FRAME, "corrupt input packet", "Packet corrupt"];
+/// What begins its decoder's lines about an MJPEG, whose frames it never calls corrupt, and what those are about that
+/// say what is wrong with the next frame's picture, and not with notes within it.
+const OF_MJPEG: &str = "[mjpeg @ ";
+const OF_PICTURE: [&str; 4] = ["overread ", "error count: ", "error dc", "error y="];
 /// How lines of errors are marked where levels are printed (`-v level+…`).
 const LEVELS: [&str; 3] = ["[error] ", "[fatal] ", "[panic] "];
 /// What begins the line about each decoded frame that `-debug_ts` prints, and what frames between two
@@ -53,6 +57,14 @@ fn error_in(line: &str) -> Option<&str> {
 fn from<'a>(line: &'a str, text: &str) -> Option<&'a str> {
     let at = line.find(text)?;
     (!line[..at].contains("[info] ")).then(|| &line[at..])
+}
+
+/// Whether a line says that the next frame is not whole.
+fn is_of_frame(line: &str) -> bool {
+    let of_mjpeg = line.strip_prefix(OF_MJPEG);
+    let error = of_mjpeg.and_then(|line| line.split_once("] [error] "));
+    let is_of_picture = |(_, error): (&str, &str)| OF_PICTURE.iter().any(|b| error.starts_with(*b));
+    from(line, CORRUPT_FRAME).is_some() || error.is_some_and(is_of_picture)
 }
 
 /// A frame as it came out of the decoder.
@@ -95,7 +107,7 @@ impl Log {
             self.errors += 1;
             self.first.get_or_insert_with(|| error.to_owned());
         }
-        self.is_corrupt |= from(line, CORRUPT_FRAME).is_some();
+        self.is_corrupt |= is_of_frame(line);
         if let Some(decoded) = Decoded::parse(line, self.is_corrupt) {
             self.decoded.push(decoded);
             self.is_corrupt = false;
@@ -188,6 +200,30 @@ mod tests {
             first(&packet),
             told(1, "Packet corrupt (stream = 0, dts = 283500).")
         );
+    }
+
+    #[test]
+    fn errors_in_pictures_of_an_mjpeg_are_of_the_next_frame() {
+        let mut log = Log::default();
+        let frame = "[info] decoder -> ist_index:0 type:video frame_pts:0 keyframe:1 frame_type:1";
+        for line in [
+            frame,
+            "[mjpeg @ 0x55] [error] overread 8",
+            "[mjpeg @ 0x55] [warning] EOI missing, emulating",
+            frame,
+            "[mjpeg @ 0x55] [error] unable to decode APP fields: Invalid data found",
+            frame,
+            "[h264 @ 0x55] [error] error y=1 x=2",
+            frame,
+            "[mjpeg @ 0x55] [error] error y=1 x=2",
+            "[mjpeg @ 0x55] [error] overread 8",
+            frame,
+            frame,
+        ] {
+            log.read(line);
+        }
+        assert_eq!(log.damaged(), [false, true, false, false, true, false]);
+        assert_eq!(log.damage(2).unwrap().errors, 5);
     }
 
     #[test]

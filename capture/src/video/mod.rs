@@ -131,9 +131,10 @@ pub fn encode(
 /// named by their time in seconds, and a list of them. A folder that holds anything else is
 /// left alone. Where an earlier run did the same
 /// with the same video, nothing is done; another video's frames are replaced. An
-/// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt are
-/// passed over, with those up to the next key frame, which are predicted from them. Where that
-/// leaves one photo of several, they are taken of the time of the whole frames ([`choose()`]).
+/// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt, and
+/// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
+/// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
+/// whole frames ([`choose()`]).
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame; a folder that
