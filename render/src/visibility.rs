@@ -34,6 +34,9 @@ const FAR_UNITS: f64 = 100.0;
 /// The largest value stored; 16 bits hold it just as it is.
 const MOST: f64 = 6e4;
 
+/// What is more than so many times as near as what is a texel beside it takes that texel, too.
+const MUCH_NEARER: f32 = 2.5;
+
 /// Photo pixels a texel of a map, across and down.
 pub(crate) const REDUCTION: u32 = 2;
 
@@ -49,6 +52,9 @@ pub struct DistanceMap {
     /// than the far one nearly all the way, so less than a texel beside something near counts as
     /// hidden by it. Not more may: what a photo shows beside a silhouette other photos nearby show
     /// beside it, too, and were none of them to count, what far ones show would be drawn there as a line.
+    ///
+    /// But beside something much nearer a texel has that thing's: of what is far behind it the photo has its blurred
+    /// rim there, and from where the far place is drawn, that would be anywhere, an outline in the air.
     pub values: Vec<f32>,
     /// What the values are in units of, 1/world units.
     pub unit: f64,
@@ -148,6 +154,7 @@ impl DistanceMap {
         let unit = unit_of(rows);
         let stored = |value: &f64| f16::from_f64((value / unit).min(MOST)).to_f32();
         let values: Vec<f32> = rows.iter().flatten().map(stored).collect();
+        let values = with_rims(&values, size[0] as usize);
         Self {
             size,
             largest: largest_of(&values, size[0] as usize),
@@ -186,6 +193,19 @@ impl DistanceMap {
             * f64::from(self.sample((pixel.x / reduction) as f32, (pixel.y / reduction) as f32))
     }
 
+    /// The greatest inverse distance of the texel that has a pixel of the photo and the eight around it.
+    pub(crate) fn nearest_beside(&self, pixel: Pixel) -> f64 {
+        let [width, height] = self.size.map(|side| side as usize);
+        let around = |at: f64, count: usize| {
+            let texel = ((at / f64::from(REDUCTION)) as usize).min(count - 1);
+            texel.saturating_sub(1)..(texel + 2).min(count)
+        };
+        let (columns, rows) = (around(pixel.x, width), around(pixel.y, height));
+        let row = |y: usize| &self.values[y * width..][columns.clone()];
+        let nearest = rows.flat_map(row).copied().fold(0.0, f32::max);
+        self.unit * f64::from(nearest)
+    }
+
     /// The value at a position in texels.
     pub(crate) fn sample(&self, x: f32, y: f32) -> f32 {
         let [width, height] = self.size;
@@ -202,6 +222,29 @@ impl DistanceMap {
         let (upper, lower) = (across(y0), across(y1));
         upper + fy * (lower - upper)
     }
+}
+
+/// The values of a map that is so wide, where something much nearer is beside them, that. Nothing stays nothing.
+fn with_rims(values: &[f32], width: usize) -> Vec<f32> {
+    // The greatest of three across, then of three of those down.
+    let across = |row: &[f32]| -> Vec<f32> {
+        let beside = |x: usize| row[x.saturating_sub(1)..(x + 2).min(width)].iter();
+        let greatest = |x: usize| beside(x).copied().fold(0.0, f32::max);
+        (0..width).map(greatest).collect()
+    };
+    let rows: Vec<Vec<f32>> = values.chunks(width).map(across).collect();
+    let beside = |x: usize, y: usize| {
+        let rows = rows[y.saturating_sub(1)..(y + 2).min(rows.len())].iter();
+        rows.map(|row| row[x]).fold(0.0, f32::max)
+    };
+    let with_rim = |(i, &value): (usize, &f32)| {
+        let greatest = beside(i % width, i / width);
+        match value > 0.0 && greatest > MUCH_NEARER * value {
+            true => greatest,
+            false => value,
+        }
+    };
+    values.iter().enumerate().map(with_rim).collect()
 }
 
 /// What inverse distances are stored in units of: the nearest, or less where that is so near that
@@ -310,6 +353,25 @@ mod tests {
         for x in [9.0, 10.0, 11.0, 20.0] {
             assert_eq!(at(x, 5.0), 1.0, "{x}");
         }
+    }
+
+    #[test]
+    fn what_lies_beside_something_much_nearer_is_its_rim() {
+        let at = |nearer: f64, x: f64| {
+            let nearest = map(5.0, 4, nearer / 5.0).inverse_distance(Pixel::new(x, 3.0));
+            visible(0.2, nearest)
+        };
+        for x in [7.0, 9.0, 10.0] {
+            assert!(at(2.6, x) < 2e-3, "{x}: {}", at(2.6, x));
+        }
+        assert_eq!(at(2.4, 9.0), 1.0);
+        for x in [11.0, 20.0] {
+            assert_eq!(at(2.6, x), 1.0, "{x}");
+        }
+        // Nothing has no place before which anything is.
+        let values = [0.0, 1.0, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1];
+        let rimmed = [0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.1, 0.1, 0.1];
+        assert_eq!(with_rims(&values, 3), rimmed);
     }
 
     #[test]

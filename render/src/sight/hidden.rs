@@ -8,7 +8,7 @@ use crate::frame::FrameSource;
 use crate::options::MAX_CONTRIBUTORS;
 use crate::surface::FacetMap;
 use crate::tiles::TILE;
-use crate::visibility::{Visibility, visible};
+use crate::visibility::{TOLERANCE, Visibility, visible};
 use calibrate::{Pixel, View};
 use glam::DVec3;
 use proxy::Rays;
@@ -17,8 +17,14 @@ use rayon::prelude::*;
 /// A photo shows a point from which half of it is left, or more, of what it counts with nothing before the point.
 const SHOWN: f64 = 0.5;
 
-/// One pixel is asked of so many across and down: where it is seen, so are they.
+/// What is so many times as near is another thing, and not the same surface farther on.
+const NEARER: f64 = 1.5;
+
+/// One pixel is asked of so many across and down: where it is seen, so are they, and where not, what is as far.
 const BLOCK: usize = 2;
+
+/// So many across and down, of what is as far, move alike if they can, or not much farther.
+const ALIKE: usize = 4;
 
 /// The source views, and their distance maps.
 struct Asked<'a> {
@@ -43,15 +49,18 @@ impl<'a> Asked<'a> {
         }
     }
 
-    /// Where a source view has the point at ray / s in its image, and how much is left of it there.
+    /// Where a source view has the point at ray / s in its image, and how much is left of it there: nothing on the
+    /// rim of something much nearer, of which the photo has at least the blur there.
     fn visible(&self, view: usize, ray: DVec3, s: f64) -> Option<(Pixel, f64)> {
         let source = &self.views.sources[view];
         let point = from_source(source, ray, s);
         let [width, height] = source.size;
         let is_inside = |p: &Pixel| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height;
         let pixel = source.lens.project(point).filter(is_inside)?;
-        let nearest = self.visibility.map(view).inverse_distance(pixel);
-        Some((pixel, visible(s / point.length(), nearest)))
+        let (map, s) = (self.visibility.map(view), s / point.length());
+        let left = visible(s, map.inverse_distance(pixel));
+        let is_on_rim = left >= SHOWN && map.nearest_beside(pixel) > NEARER * s;
+        Some((pixel, if is_on_rim { 0.0 } else { left }))
     }
 
     /// Whether one has the point at ray / s in its image, with nothing before it.
@@ -67,29 +76,43 @@ impl<'a> Asked<'a> {
         self.visible(view, ray, s).is_some_and(counts) && sees_well(source, ray, s)
     }
 
-    /// The nearest place before the point at ray / s that one of some shows: as how many times as near, and who does.
-    fn nearest_shown(&self, near: &[u32], ray: DVec3, s: f64) -> Option<(f64, usize)> {
+    /// The nearest place before the point at ray / s that one of some shows, from a step on.
+    fn nearest_shown(&self, near: &[u32], ray: DVec3, s: f64, first: i32) -> Option<Shown> {
         let mut along = Vec::new();
         self.views.along(near, ray, s * nearest_tried(), &mut along);
-        let shown = |times: f64| {
-            let s = s * times;
+        let shown = |step: i32| {
+            let s = s * factor(step);
             let mut all = along.iter().filter(|(_, stretch)| stretch.has(s));
             let found = all.find(|(view, _)| self.shows(*view as usize, ray, s));
             found.map(|(view, _)| *view as usize)
         };
-        let mut steps = 1..=STEPS;
-        let (k, mut view) = steps.find_map(|k| Some((k, shown(factor(k))?)))?;
-        // Between it and the one before, so that neighbouring pixels move alike.
-        let (mut times, mut beyond) = (factor(k), factor(k - 1));
+        let (step, view) = (first..=STEPS).find_map(|step| Some((step, shown(step)?)))?;
+        // Where between it and the one before who shows it begins to, so that neighbouring pixels move alike.
+        let (mut times, mut beyond) = (factor(step), factor(step - 1));
         for _ in 0..HALVINGS {
             let middle = (times * beyond).sqrt();
-            match shown(middle) {
-                Some(shows) => (times, view) = (middle, shows),
-                None => beyond = middle,
+            match self.shows(view, ray, s * middle) {
+                true => times = middle,
+                false => beyond = middle,
             }
         }
-        Some((times, view))
+        Some(Shown { times, step, view })
     }
+}
+
+/// Where something that is hidden is shown.
+#[derive(Clone, Copy)]
+struct Shown {
+    /// How many times as near, which lies between this step and the one before.
+    times: f64,
+    step: i32,
+    /// Who shows it.
+    view: usize,
+}
+
+/// Whether inverse distances may be of the same surface.
+fn are_near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= TOLERANCE * a.max(b)
 }
 
 /// What is to be moved, row by row: what every photo that has it in its image has something before, to the
@@ -134,32 +157,45 @@ pub(super) fn hidden(
         let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
         let mut moved: Vec<Vec<Moved>> = rows.clone().map(|_| Vec::new()).collect();
         let mut near: Vec<Option<Vec<u32>>> = vec![None; width.div_ceil(TILE)];
+        // What moved last nearby, from what inverse distance.
+        let mut alike: Vec<Option<(f64, Shown)>> = vec![None; width.div_ceil(ALIKE)];
         for top in rows.clone().step_by(BLOCK) {
+            if top % ALIKE == 0 {
+                alike.fill(None);
+            }
             let mut last = None;
             for left in (0..width).step_by(BLOCK) {
                 let near = &mut near[left / TILE];
                 if is_seen([left, top], &mut last, near) {
                     continue;
                 }
-                // They move alike, where that is shown of all.
-                let mut before = None;
+                let Some((_, first_s)) = looks(left, top) else {
+                    continue;
+                };
+                let alike = &mut alike[left / ALIKE];
                 for y in top..(top + BLOCK).min(rows.end) {
                     for x in left..(left + BLOCK).min(width) {
-                        if is_seen([x, y], &mut last, near) {
-                            continue;
-                        }
-                        let Some((near, (ray, s))) = near.as_deref().zip(looks(x, y)) else {
+                        // What lies beside is hidden, too, unless it is something else.
+                        let looks = looks(x, y).filter(|(_, s)| {
+                            are_near(*s, first_s) || !is_seen([x, y], &mut last, near)
+                        });
+                        let Some(((ray, s), near)) = looks.zip(near.as_deref()) else {
                             continue;
                         };
+                        let before = alike.filter(|(other, _)| are_near(s, *other));
+                        let before = before.map(|(_, shown)| shown);
                         let is_shown =
-                            |(times, view): &(f64, usize)| asked.shows(*view, ray, s * times);
-                        before = before.filter(is_shown);
-                        before = before.or_else(|| asked.nearest_shown(near, ray, s));
-                        moved[y - rows.start].extend(before.map(|(times, view)| Moved {
+                            |shown: &Shown| asked.shows(shown.view, ray, s * shown.times);
+                        let from = before.map_or(1, |shown| (shown.step - 1).max(1));
+                        let shown = before.filter(is_shown);
+                        let shown = shown.or_else(|| asked.nearest_shown(near, ray, s, from));
+                        let Some(shown) = shown else { continue };
+                        *alike = Some((s, shown));
+                        moved[y - rows.start].push(Moved {
                             x,
-                            plane: ray * (s * times / ray.length_squared()),
-                            source_idx: view as u32,
-                        }));
+                            plane: ray * (s * shown.times / ray.length_squared()),
+                            source_idx: shown.view as u32,
+                        });
                     }
                 }
             }
@@ -256,8 +292,9 @@ mod tests {
                 assert_eq!(z, BOARD, "{t}");
                 continue;
             }
-            // Texels are two pixels, or 0.1 on the board.
-            let by = 0.11;
+            // Texels are two pixels, or 0.1 on the board. One may be half on it, one beside it is its rim in the
+            // map, and one beside that is here.
+            let by = 0.36;
             let at_wall = behind(1.0, t, 40.0);
             if t < -0.97 {
                 // The photo does not have it in its image.
@@ -306,21 +343,23 @@ mod tests {
         let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility);
         let is_seen = |x: usize, y: usize| {
             let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
-            (0..sources.len()).any(|view| asked.sees(view, ray, s))
+            ((0..sources.len()).any(|view| asked.sees(view, ray, s)), s)
         };
-        let mut count = 0;
+        let (mut count, mut nearest) = (0, 0);
         for (y, row) in moved.iter().enumerate() {
             for x in 0..SIZE.0 as usize {
                 let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
-                let is_seen = is_seen(x, y) || is_seen(x / BLOCK * BLOCK, y / BLOCK * BLOCK);
+                let (first, first_s) = is_seen(x / BLOCK * BLOCK, y / BLOCK * BLOCK);
+                let is_seen = first || (!are_near(s, first_s) && is_seen(x, y).0);
                 let shown = |s: f64| (0..sources.len()).find(|view| asked.shows(*view, ray, s));
                 let first = (1..=STEPS).find(|k| shown(s * factor(*k)).is_some());
                 let found = row.iter().find(|moved| moved.x == x);
                 assert_eq!(found.is_some(), !is_seen && first.is_some(), "{x} {y}");
                 if let Some((moved, k)) = found.zip(first) {
-                    // It may move as another of its block does.
+                    // It may move as others beside it do.
                     let at = moved.plane.dot(ray);
-                    assert!(at > s * factor(k - 1) && at < s * factor(k + 3), "{x} {y}");
+                    assert!(at > s * factor(k - 1), "{x} {y}");
+                    nearest += usize::from(at < s * factor(k + 3));
                     let view = moved.source_idx as usize;
                     assert!(
                         asked.shows(view, ray, 1.001 * at) || asked.shows(view, ray, 0.999 * at)
@@ -329,6 +368,6 @@ mod tests {
                 }
             }
         }
-        assert!(count > 100, "{count}");
+        assert!(count > 100 && nearest > count * 3 / 4, "{count}, {nearest}");
     }
 }
