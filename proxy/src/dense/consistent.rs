@@ -95,8 +95,25 @@ fn alike(a: f64, b: f64) -> bool {
     (a - b).abs() <= AGREE * a.max(b)
 }
 
+/// The inverse depth along a photo's ray, turned to the world, at which it meets what lies that deep in another; `None`
+/// where it does not.
+fn along(photo: &SmallPhoto, ray: DVec3, other: &SmallPhoto, inverse_there: f64) -> Option<f64> {
+    // At s the depth there is that of the photo's own camera, and the ray's over s.
+    let axis = other.rotation.row(2);
+    let (of_camera, of_ray) = (axis.dot(photo.center - other.center), axis.dot(ray));
+    let s = of_ray * inverse_there / (1.0 - of_camera * inverse_there);
+    (s > 0.0 && s.is_finite()).then_some(s)
+}
+
+/// Of one number or more; of an even count the mean of the two in the middle.
+fn median(numbers: &mut [f64]) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let count = numbers.len();
+    numbers[(count - 1) / 2].midpoint(numbers[count / 2])
+}
+
 /// One point for each cell of a photo in which there is any, that nearest to its middle: one that
-/// photos agree on, else one that was measured.
+/// photos agree on, at the median of their depths, else one that was measured.
 fn of_photo(
     i: usize,
     photos: &[Option<SmallPhoto>],
@@ -118,13 +135,14 @@ fn of_photo(
     if compared.is_none() && measured.is_none() {
         return Vec::new();
     }
+    // The inverse depth by which another does.
     let agrees = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
         let (at, depth) = other.project(position)?;
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
         let off = (inverse - 1.0 / depth).abs();
         let near = (AGREE * inverse).max(AGREE_STEPS * map.step);
         // Unknown is 0, which lies within a step of what is far.
-        (inverse > 0.0 && off <= near).then_some(())
+        (inverse > 0.0 && off <= near).then_some(inverse)
     };
     // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
     let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
@@ -164,11 +182,14 @@ fn of_photo(
                 return None;
             }
             let position = photo.point(x, y, inverse);
-            let mut seen_by: Vec<u32> = with_maps
-                .iter()
-                .filter(|(_, other, map)| agrees(position, other, map).is_some())
-                .map(|(j, ..)| *j as u32)
-                .collect();
+            let (mut seen_by, mut depths) = (Vec::new(), vec![inverse]);
+            let ray = photo.rotation.transpose() * photo.ray(x, y);
+            for (j, other, map) in &with_maps {
+                if let Some(there) = agrees(position, other, map) {
+                    seen_by.push(*j as u32);
+                    depths.extend(along(photo, ray, other, there));
+                }
+            }
             if seen_by.len() < needed || !position.is_finite() {
                 return None;
             }
@@ -178,7 +199,11 @@ fn of_photo(
             seen_by.push(i as u32);
             seen_by.sort_unstable();
             Some(Agreed {
-                position,
+                // What a sensor measured nobody knows better.
+                position: match own {
+                    0 => photo.point(x, y, median(&mut depths)),
+                    _ => position,
+                },
                 seen_by,
                 cell,
             })
@@ -224,5 +249,69 @@ mod tests {
         assert_eq!(count([&far, &unknown, &unknown]), 0);
         assert_eq!(count([&far, &far, &unknown]), 0);
         assert_eq!(count([&far, &far, &far]), 8 * 6);
+    }
+
+    fn small(camera_from_world: Rigid3) -> SmallPhoto {
+        let view = View {
+            lens: Lens::pinhole(DVec2::splat(30.0), DVec2::new(16.0, 12.0)),
+            width: 32,
+            height: 24,
+            camera_from_world,
+        };
+        let gray = RgbaImage::from_pixel(32, 24, Rgba([100, 100, 100, 255]));
+        SmallPhoto::new(&view, &gray, 32).unwrap()
+    }
+
+    #[test]
+    fn a_point_lies_at_the_median_of_the_depths_that_agree() {
+        let photo = small(Rigid3::IDENTITY);
+        let map = |depth: f64| DepthMap {
+            inverse_depths: vec![(1.0 / depth) as f32; photo.width * photo.height],
+            step: 1e-6,
+        };
+        let depths = |maps: [f64; 4]| {
+            let maps = maps.map(map);
+            let neighbours: Vec<Vec<usize>> = (0..4)
+                .map(|i| (0..4).filter(|j| *j != i).collect())
+                .collect();
+            let maps = maps.each_ref().map(Some);
+            points(
+                &vec![Some(photo.clone()); 4],
+                &maps,
+                &[None; 4],
+                &neighbours,
+                4,
+            )
+        };
+        // The first photo has all points; the last does not agree with it.
+        for point in depths([10.09, 10.0, 9.99, 10.5]) {
+            assert!((point.position.z - 10.0).abs() < 1e-5, "{point:?}");
+            assert_eq!(point.seen_by, [0, 1, 2]);
+        }
+        for point in depths([10.09, 10.02, 10.0, 9.99]) {
+            assert!((point.position.z - 10.01).abs() < 1e-4, "{point:?}");
+            assert_eq!(point.seen_by, [0, 1, 2, 3]);
+        }
+    }
+
+    #[test]
+    fn another_photos_depth_is_met_along_the_ray() {
+        let photo = small(Rigid3::IDENTITY);
+        let center = DVec3::new(2.0, -0.5, 0.7);
+        let other = small(Rigid3::looking_at(
+            center,
+            DVec3::new(0.3, 0.2, 5.0),
+            DVec3::Y,
+        ));
+        for (x, y, inverse) in [(3, 4, 0.2), (20, 13, 0.15), (31, 0, 0.3)] {
+            let (_, depth) = other.project(photo.point(x, y, inverse)).unwrap();
+            let ray = photo.rotation.transpose() * photo.ray(x, y);
+            let met = along(&photo, ray, &other, 1.0 / depth).unwrap();
+            assert!((met - inverse).abs() < 1e-12, "{met}");
+        }
+        // What lies behind this photo is met nowhere before it.
+        let behind = small(Rigid3::looking_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y));
+        let ray = photo.ray(16, 12);
+        assert_eq!(along(&photo, ray, &behind, 1.0 / 12.0), None);
     }
 }

@@ -130,12 +130,13 @@ impl Matching {
             Some(measured::reduced(photo, &views[i], &depth(i)?))
         });
         let measured = measured.collect();
-        let affinity = Affinity::new(views, sparse);
+        let shown = neighbours::shown(&photos, sparse);
+        let affinity = Affinity::new(views, &shown);
         Self {
             spacing: options.spacing,
             neighbours: affinity.neighbours(|i| photos[i].is_some()),
             affinity,
-            ranges: neighbours::depth_ranges(&photos, sparse),
+            ranges: neighbours::depth_ranges(&photos, &shown),
             maps: photos.iter().map(|_| Vec::new()).collect(),
             photos,
             measured,

@@ -81,6 +81,23 @@ impl Affinity {
     }
 }
 
+/// The points, each seen by those of its photos alone that show it when they are made straight: of wide lenses
+/// that is a part. What lies far aside has hardly any depth along the axis, and what nothing shows cannot be compared.
+pub(super) fn shown(photos: &[Option<SmallPhoto>], sparse: &[SparsePoint]) -> Vec<SparsePoint> {
+    let shown = |point: &SparsePoint| {
+        let by = |i: &u32| {
+            let photo = photos[*i as usize].as_ref()?;
+            photo.index(photo.project(point.position)?.0)
+        };
+        let seen_by = point.seen_by.iter().copied();
+        SparsePoint {
+            position: point.position,
+            seen_by: seen_by.filter(|i| by(i).is_some()).collect(),
+        }
+    };
+    sparse.par_iter().map(shown).collect()
+}
+
 /// The least and greatest inverse depth to try for each photo, from the points it sees.
 pub(super) fn depth_ranges(
     photos: &[Option<SmallPhoto>],

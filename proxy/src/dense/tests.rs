@@ -1,6 +1,6 @@
 use super::*;
 use crate::{Mesh, MeshKind, Solid};
-use calibrate::{Lens, Pixel, Rigid3};
+use calibrate::{Distortion, Lens, Pixel, Rigid3};
 use glam::{DVec2, DVec3};
 use image::Rgba;
 
@@ -484,4 +484,34 @@ fn photos_that_tell_nothing_add_nothing() {
     });
     let points = densify(&views, &odd, |_| Some(blank.clone()), |_| None, &options);
     assert!(points[4..].iter().all(|p| p.position.is_finite()));
+}
+
+#[test]
+fn points_beside_what_straight_photos_show_of_wide_ones_say_nothing() {
+    let (_, mut views, sparse) = seen_by_nine();
+    let fisheye = Distortion::Fisheye { k: [0.0; 4] };
+    for view in &mut views {
+        view.lens = Lens::new(DVec2::splat(60.0), DVec2::new(96.0, 72.0), fisheye);
+    }
+    // The last looks the other way: it has in common with the others what is beside all.
+    let back = Rigid3::looking_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
+    views[8].camera_from_world = back;
+    let photo = RgbaImage::from_pixel(192, 144, Rgba([100, 100, 100, 255]));
+    let matching = |points: &[SparsePoint]| {
+        Matching::new(&views, points, |_| Some(photo.clone()), |_| None, &SMALL)
+    };
+    let beside = |i: i32| SparsePoint {
+        position: DVec3::new(3.0, 0.04 * f64::from(i), 0.01 * f64::from(i % 7 - 3)),
+        seen_by: (0..9).collect(),
+    };
+    let mut all = sparse.clone();
+    all.iter_mut().for_each(|point| point.seen_by.truncate(8));
+    let before = matching(&all);
+    all.extend((-20..20).map(beside));
+    let after = matching(&all);
+    assert_eq!(after.ranges, before.ranges);
+    assert_eq!(after.neighbours, before.neighbours);
+    assert!(after.neighbours[8].is_empty() && after.neighbours[0].len() == 5);
+    // They are points as before, for others to use.
+    assert_eq!(after.points(&all, None)[..all.len()], all[..]);
 }
