@@ -5,7 +5,7 @@ use super::cutout::Cutout;
 use super::fit::{Fitted, Kind, unfit};
 use super::{Scene, SceneError};
 use calibrate::View;
-use image::RgbaImage;
+use image::{GrayImage, RgbaImage};
 use proxy::dense::{DensePoints, Matching};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
@@ -30,6 +30,8 @@ struct Judge {
     name: String,
     desired: View,
     truth: RgbaImage,
+    /// What to use of it, where a mask says so: the rest does not judge.
+    used: Option<GrayImage>,
 }
 
 /// The scene made small, and the photos that judge.
@@ -98,12 +100,16 @@ impl<'a> Trials<'a> {
             let view = scene.view(name)?;
             let (width, height) = capture::reduced_size((view.width, view.height), LONG_SIDE);
             match scene.truth(name, without)? {
-                Ok(truth) => judges.push(Judge {
-                    source_idx,
-                    name: name.clone(),
-                    desired: view.resized(width, height),
-                    truth: truth.resized(width, height).pixels,
-                }),
+                Ok(truth) => {
+                    let truth = truth.resized(width, height);
+                    judges.push(Judge {
+                        source_idx,
+                        name: name.clone(),
+                        desired: view.resized(width, height),
+                        truth: truth.pixels,
+                        used: truth.used,
+                    });
+                }
                 Err(error) => {
                     damaged.insert(name.clone(), error.to_string());
                 }
@@ -327,7 +333,7 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// PSNR of a judge's picture, in dB.
+    /// PSNR of a judge's picture, in dB: of what is to be used of the photo.
     fn score(&self, judge: usize) -> Result<f64, SceneError> {
         let judge = &self.judges[judge];
         let part = Part {
@@ -337,7 +343,16 @@ impl<'a> Trials<'a> {
         let (desired, options) = (judge.desired.clone(), FieldOptions::default());
         let frame = Frame::with(&self.lumigraph, desired, options, &part);
         let picture = cpu::render(&frame, Method::Exact).map_err(|e| self.undrawn(e))?;
-        Ok(score::score(&picture, &judge.truth).map_err(unfit)?.psnr)
+        let (picture, truth) = (&picture, &judge.truth);
+        let used = match &judge.used {
+            Some(used) => score::score_masked(picture, truth, used).map_err(unfit)?,
+            None => None,
+        };
+        Ok(match used {
+            Some(used) => used.psnr_masked,
+            // Of a photo without a mask, or with one that leaves nothing.
+            None => score::score(picture, truth).map_err(unfit)?.psnr,
+        })
     }
 
     /// Why a picture could not be drawn.
@@ -349,5 +364,68 @@ impl<'a> Trials<'a> {
             }
             error => unfit(error),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use datasets::Options;
+    use image::Luma;
+
+    #[test]
+    fn what_masks_cover_does_not_judge() {
+        let options = Options {
+            size: Some((64, 48)),
+            views: Some(6),
+            samples_per_side: Some(1),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let capture = folder.path().join("wall");
+        let made = datasets::by_name("wall", &options).unwrap();
+        datasets::write(&made, &capture).unwrap();
+        let none = BTreeSet::new();
+        let scores = |scene: &Scene| {
+            let mut trials = Trials::new(scene, &none, 2).unwrap();
+            let (scores, _) = trials.scores(Kind::Plane, None).unwrap();
+            assert!(scores.complete());
+            scores.0.into_iter().flatten().collect::<Vec<_>>()
+        };
+        let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        let clean = scores(&scene);
+        // What nobody else sees, at other places in other photos.
+        for (i, photo) in scene.photos.iter_mut().enumerate() {
+            let left = 9 * i as u32;
+            let hides = |x: u32, y: u32| (left..left + 9).contains(&x) && y >= 24;
+            let mut picture = image::open(&photo.path).unwrap().into_rgba8();
+            for (x, y, pixel) in picture.enumerate_pixels_mut() {
+                if hides(x, y) {
+                    pixel.0 = [255, 0, 255, 255];
+                }
+            }
+            picture.save(&photo.path).unwrap();
+            let mask = GrayImage::from_fn(64, 48, |x, y| Luma([if hides(x, y) { 0 } else { 255 }]));
+            let file = capture.join(format!("mask{i}.png"));
+            mask.save(&file).unwrap();
+            photo.ignore_mask = Some(file);
+        }
+        let masked = scores(&scene);
+        for (masked, clean) in masked.iter().zip(&clean) {
+            assert!(
+                (masked - clean).abs() < 2.5,
+                "{masked} dB, clean {clean} dB"
+            );
+        }
+        // Without masks it does.
+        for photo in &mut scene.photos {
+            photo.ignore_mask = None;
+        }
+        let all = scores(&scene);
+        assert!(
+            all.iter()
+                .zip(&clean)
+                .all(|(all, clean)| all + 3.0 < *clean),
+            "{all:?}"
+        );
     }
 }
