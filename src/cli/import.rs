@@ -80,6 +80,9 @@ pub(super) struct Args {
     /// [default: PHOTOS/depth, if there]
     #[arg(long, value_name = "DIR")]
     depth: Option<PathBuf>,
+    /// Use no depth maps
+    #[arg(long, conflicts_with_all = ["depth", "depth_scale"])]
+    no_depth: bool,
     /// World units a step of the depth maps
     #[arg(long, value_name = "UNITS", default_value_t = DEPTH_UNITS_PER_STEP,
         value_parser = positive)]
@@ -165,6 +168,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         no_masks: args.no_masks,
         mattes: args.mattes.clone(),
         depth: args.depth.clone(),
+        no_depth: args.no_depth,
         depth_scale: args.depth_scale,
     };
     let first = match args.turntable {

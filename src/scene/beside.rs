@@ -137,6 +137,7 @@ impl Scene {
         };
         let depth = match given(&options.depth).transpose()? {
             Some(folder) => Some(folder),
+            None if options.no_depth => None,
             None => within(DEPTH_FOLDER),
         };
         for (kind, folder, asked) in [
@@ -238,7 +239,12 @@ impl Scene {
         for photo in &self.photos {
             let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
             for (kind, path) in photo.beside() {
-                check_beside(kind, path, &photo.name, (camera.width, camera.height))?;
+                let size = (camera.width, camera.height);
+                let checked = check_beside(kind, path, &photo.name, size);
+                checked.map_err(|error| match kind {
+                    Beside::DepthMap => SceneError::DepthMap(error),
+                    _ => SceneError::Capture(error),
+                })?;
             }
         }
         Ok(())

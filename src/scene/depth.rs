@@ -1,8 +1,11 @@
-//! Whether depth maps are in the units of the scene.
+//! Which depth maps found in a capture cannot be used, and whether they are in the units of the scene.
 
-use super::beside::DEPTH_UNITS_PER_STEP;
-use super::{Photo, Scene, Warning};
+use super::beside::{DEPTH_FOLDER, DEPTH_UNITS_PER_STEP};
+use super::{ImportOptions, Photo, Scene, Warning};
 use calibrate::Image;
+use capture::{Beside, CaptureError, check_beside};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// So many depth maps, spread over the photos, tell for all.
 const JUDGED: usize = 4;
@@ -15,6 +18,45 @@ const OTHER_UNITS: f64 = 1.5;
 const NEARLY: f64 = 1.1;
 
 impl Scene {
+    /// Takes from the photos the depth maps that cannot be used (of another size, of another kind, unreadable),
+    /// and says so, where the photos' `home` has them by its folder's name alone: what nobody asked for ends
+    /// nothing that does without. Those taken, by their photos' names.
+    pub(super) fn pass_over_depth(
+        &mut self,
+        home: &Path,
+        options: &ImportOptions,
+        warnings: &mut Vec<Warning>,
+    ) -> BTreeMap<String, PathBuf> {
+        let mut passed_over = BTreeMap::new();
+        if options.depth.is_some() {
+            return passed_over;
+        }
+        let images = self.images_by_name();
+        let reason = |photo: &Photo| {
+            let map = photo.depth_map.as_ref()?;
+            let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
+            let size = (camera.width, camera.height);
+            check_beside(Beside::DepthMap, map, &photo.name, size).err()
+        };
+        let reasons: Vec<Option<CaptureError>> = self.photos.iter().map(reason).collect();
+        let found = self.photos.iter().filter(|p| p.depth_map.is_some()).count();
+        for (photo, reason) in self.photos.iter_mut().zip(&reasons) {
+            if reason.is_some() {
+                photo.depth_scale = None;
+                let map = photo.depth_map.take();
+                passed_over.extend(map.map(|map| (photo.name.clone(), map)));
+            }
+        }
+        if let Some(reason) = reasons.iter().flatten().next() {
+            warnings.push(Warning::Note(format!(
+                "{}: {} of {found} depth maps are not used, for one: {reason}; --no-depth leaves all of them out",
+                home.join(DEPTH_FOLDER).display(),
+                passed_over.len(),
+            )));
+        }
+        passed_over
+    }
+
     /// Says so where depth maps are in other units than the sparse points that are seen in their photos: a
     /// scale that is wrong moves all surfaces made of them, and nothing else tells.
     pub(super) fn judge_depth(&self, warnings: &mut Vec<Warning>) {

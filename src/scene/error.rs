@@ -60,6 +60,9 @@ pub enum SceneError {
     /// The photos cannot be listed, or one of them is not as calibrated.
     #[error(transparent)]
     Capture(#[from] capture::CaptureError),
+    /// A depth map that was asked for, or that a scene names, cannot be used.
+    #[error("{0}; `import --no-depth` does without any")]
+    DepthMap(capture::CaptureError),
     /// A turntable's photos are not all of one size.
     #[error(
         "{}: the photo has {} × {} pixels and {other} {} × {}; a turntable's photos come from one \

@@ -42,6 +42,8 @@ pub struct ImportOptions {
     /// The folder with depth maps, named likewise; `None`: the capture's `depth`, if it has
     /// one.
     pub depth: Option<PathBuf>,
+    /// Without [`Self::depth`], use none.
+    pub no_depth: bool,
     /// World units a step of the depth maps.
     pub depth_scale: f64,
 }
@@ -56,6 +58,7 @@ impl Default for ImportOptions {
             no_masks: false,
             mattes: None,
             depth: None,
+            no_depth: false,
             depth_scale: DEPTH_UNITS_PER_STEP,
             times: TimeSource::default(),
         }
@@ -77,12 +80,13 @@ impl Scene {
     /// maps with their photos', from the files' headers. Photos get times where some are to be
     /// had (see [`TimeSource`]). A photo that the calibration calls otherwise in letters' case, in how marks are
     /// written or in what it ends in alone is found, with a note. A calibrated photo that is missing, or whose
-    /// header cannot be read, is left out with a warning as long as two others remain.
+    /// header cannot be read, is left out with a warning as long as two others remain. Depth maps that cannot be
+    /// used are passed over with a note where nobody asked for them.
     ///
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of
-    /// another size than calibrated; a mask, matte or depth map of another size than its
-    /// photo, or unreadable; a list of times with a mistake; too few photos left, or with
+    /// another size than calibrated; a mask or matte of another size than its photo, or
+    /// unreadable, or a depth map of [`ImportOptions::depth`]; a list of times with a mistake; too few photos left, or with
     /// [`ImportOptions::strict`] any missing or corrupt one.
     pub fn import(
         capture: &Path,
@@ -145,7 +149,9 @@ impl Scene {
 
         // 4. What lies beside them.
         scene.find_beside(&home, &meant, options, &mut warnings)?;
-        if let Some(named) = named {
+        let passed_over = scene.pass_over_depth(&home, options, &mut warnings);
+        if let Some(mut named) = named {
+            named.forget_depth(&passed_over);
             scene.add_named(named, options, &mut warnings);
         }
         scene.check_beside()?;

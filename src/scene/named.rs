@@ -28,6 +28,15 @@ impl Named {
         let file = file.clone();
         Ok(Some(Self { file, beside }))
     }
+
+    /// Forgets depth maps that are passed over for these photos: what is wrong with them is said.
+    pub(super) fn forget_depth(&mut self, passed_over: &BTreeMap<String, PathBuf>) {
+        let real = |path: &Path| path.canonicalize().ok();
+        self.beside.depth_maps.retain(|photo, map| {
+            let over = passed_over.get(photo);
+            over.is_none_or(|over| real(over) != real(map))
+        });
+    }
 }
 
 fn by_photo<T>(named: BTreeMap<String, T>, listed: &Listed<'_>) -> BTreeMap<String, T> {
@@ -67,7 +76,7 @@ impl Scene {
                 ));
             }
         }
-        if options.depth.is_none() {
+        if options.depth.is_none() && !options.no_depth {
             // A scale that was asked for is that of the scene's units.
             let is_asked = options.depth_scale != DEPTH_UNITS_PER_STEP;
             let scale = options.depth_scale * if is_asked { 1.0 } else { applied_scale };

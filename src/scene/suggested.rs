@@ -8,7 +8,7 @@ use std::path::Path;
 /// Options that choose among the matrices of OpenCV's file.
 const OF_KEYS: [&str; 3] = ["--camera-matrix", "--distortion", "--fisheye"];
 /// Others that say how a capture is to be read.
-const OF_READING: [&str; 3] = ["--mattes", "--masks", "--depth-scale"];
+const OF_READING: [&str; 4] = ["--mattes", "--masks", "--depth-scale", "--no-depth"];
 
 impl Scene {
     /// Imports a capture in memory with the defaults, for a command that has no options for anything else, but

@@ -5,6 +5,7 @@ mod bench;
 mod captures;
 mod damaged_photos;
 mod degenerate;
+mod depth_maps;
 mod evaluate;
 mod export;
 mod exposure;

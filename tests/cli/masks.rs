@@ -492,14 +492,15 @@ fn depth_maps_are_recorded_with_their_scale() {
 
     // Bytes are no depths.
     save(at(&folder, "wall/depth/0001.png"), &mask_of(1));
+    let asked = "import wall --depth wall/depth -o other";
     assert_eq!(
-        lumigraph(folder.path(), "info wall").error(1),
+        lumigraph(folder.path(), asked).error(1),
         "wall/depth/0001.png: found 1 channels of 8 bits, expected a depth map of one channel of \
-         16 bits; write depths as 16-bit grey PNG, or leave it out"
+         16 bits; write depths as 16-bit grey PNG, or leave it out; `import --no-depth` does without any"
     );
     let small: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::new(48, 36);
     small.save(at(&folder, "wall/depth/0001.png")).unwrap();
-    let error = lumigraph(folder.path(), "info wall").error(1);
+    let error = lumigraph(folder.path(), asked).error(1);
     assert!(
         error.contains("the depth map has 48 × 36 pixels and its photo 0001.png"),
         "{error}"

@@ -1,0 +1,104 @@
+//! Depth maps that a capture has and that are not as they should be.
+
+use crate::run::{lumigraph, with_wall};
+use image::{ImageBuffer, Luma};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+type Steps = ImageBuffer<Luma<u16>, Vec<u16>>;
+
+/// Puts a map of half the photos' size in a file's place.
+fn halve(file: &Path) {
+    Steps::new(48, 36).save(file).unwrap();
+}
+
+fn scene_json(folder: &Path, scene: &str) -> Value {
+    serde_json::from_slice(&fs::read(folder.join(scene).join("scene.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn maps_of_another_size_that_nobody_named_are_passed_over() {
+    let folder = with_wall();
+    let here = folder.path();
+    let run = |line: &str| lumigraph(here, line).ok();
+    run("import wall -o before");
+    halve(&here.join("wall/depth/0003.png"));
+    let reason = "wall/depth/0003.png: the depth map has 48 × 36 pixels and its photo 0003.png 96 × 72; make \
+                  it as large as the photo, or leave it out";
+    let note = format!(
+        "note: wall/depth: 1 of 9 depth maps are not used, for one: {reason}; --no-depth leaves all of them out"
+    );
+    let whose = "; --no-depth is an option of `lumigraph import wall -o SCENE`\n";
+
+    // 1. Others are used.
+    let ran = run("import wall -o scene");
+    assert!(ran.stderr.contains(&format!("{note}\n")), "{}", ran.stderr);
+    assert!(ran.stdout.ends_with(", 8 depth maps\n"), "{}", ran.stdout);
+    let photo = scene_json(here, "scene")["photos"][3].clone();
+    assert!(photo.get("depth_map").is_none(), "{photo}");
+    assert!(photo.get("depth_scale").is_none(), "{photo}");
+
+    // 2. None ends what does without.
+    let ran = run("evaluate wall --proxy plane --size 24x18");
+    let said = format!("{note}{whose}");
+    assert!(ran.stderr.contains(&said), "{}", ran.stderr);
+    for i in 0..9 {
+        // Not so, either.
+        fs::write(here.join(format!("wall/depth/{i:04}.png")), "no picture").unwrap();
+    }
+    let ran = run("info wall");
+    let said = "note: wall/depth: 9 of 9 depth maps are not used, for one: wall/depth/0000.png: ";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    assert!(!ran.stdout.contains("depth maps"), "{}", ran.stdout);
+
+    // 3. What is asked for, or named by a scene, is an error.
+    halve(&here.join("wall/depth/0000.png"));
+    let remedy = "or leave it out; `import --no-depth` does without any";
+    for line in ["import wall --depth wall/depth -o asked", "info before"] {
+        let error = lumigraph(here, line).error(1);
+        assert!(
+            error.contains("wall/depth/0000.png: the depth map has 48"),
+            "{error}"
+        );
+        assert!(error.ends_with(remedy), "{error}");
+    }
+
+    // 4. Nor is anything said where they are not wanted.
+    let ran = run("import wall --no-depth -o without");
+    assert!(!ran.stderr.contains("depth"), "{}", ran.stderr);
+    assert!(!ran.stdout.contains("depth"), "{}", ran.stdout);
+    for option in ["--depth wall/depth", "--depth-scale 2"] {
+        let ran = lumigraph(here, &format!("import wall --no-depth {option} -o s"));
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn maps_that_a_transforms_file_names_as_well_are_told_once() {
+    let folder = with_wall();
+    let here = folder.path();
+    let run = |line: &str| lumigraph(here, line).ok();
+    run("export wall --format transforms -o wall/transforms.json");
+    fs::remove_dir_all(here.join("wall/sparse")).unwrap();
+    let kept = fs::read(here.join("wall/depth/0004.png")).unwrap();
+    halve(&here.join("wall/depth/0004.png"));
+    let ran = run("import wall -o scene");
+    let told = ran.stderr.matches("depth maps are not used").count();
+    let named = ran.stderr.contains("depth maps that are not used");
+    assert_eq!((told, named), (1, false), "{}", ran.stderr);
+    assert!(ran.stdout.ends_with(", 8 depth maps\n"), "{}", ran.stdout);
+    let ran = run("import wall --no-depth -o without");
+    assert!(!ran.stdout.contains("depth"), "{}", ran.stdout);
+
+    // One that it names elsewhere takes its place.
+    fs::write(here.join("wall/whole.png"), kept).unwrap();
+    let file = here.join("wall/transforms.json");
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(text.contains("\"depth/0004.png\""), "{text}");
+    fs::write(&file, text.replace("\"depth/0004.png\"", "\"whole.png\"")).unwrap();
+    let ran = run("import wall -o again");
+    assert!(ran.stdout.ends_with(", 9 depth maps\n"), "{}", ran.stdout);
+    let photo = scene_json(here, "again")["photos"][4].clone();
+    assert_eq!(photo["depth_map"], "../wall/whole.png");
+}
