@@ -1,9 +1,10 @@
-//! Which depth maps found in a capture cannot be used, and whether they are in the units of the scene.
+//! Which depth maps found in a capture cannot be used, whether they are in the units of the
+//! scene, and whether their largest value may be none.
 
 use super::beside::{DEPTH_FOLDER, DEPTH_UNITS_PER_STEP};
 use super::{ImportOptions, Photo, Scene, Warning};
 use calibrate::Image;
-use capture::{Beside, CaptureError, check_beside};
+use capture::{Beside, CaptureError, DepthMap, check_beside};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,9 @@ const ENOUGH: usize = 20;
 /// Depths that are so many times another's are in other units. Maps and points may both be far off here and
 /// there, but not half of them.
 const OTHER_UNITS: f64 = 1.5;
+/// Where more per cent of a map's pixels have the largest value, it may stand for an unknown depth: some sensors
+/// write it so, and of depths that reach farther it is where they end.
+const LARGEST_PERCENT: usize = 3;
 /// Within this factor of a power of ten, that is meant.
 const NEARLY: f64 = 1.1;
 
@@ -58,7 +62,8 @@ impl Scene {
     }
 
     /// Says so where depth maps are in other units than the sparse points that are seen in their photos: a
-    /// scale that is wrong moves all surfaces made of them, and nothing else tells.
+    /// scale that is wrong moves all surfaces made of them, and nothing else tells. Says, too, where maps have
+    /// the largest value so often that it may be no depth.
     pub(super) fn judge_depth(&self, warnings: &mut Vec<Warning>) {
         let with_maps: Vec<&Photo> = self
             .photos
@@ -68,10 +73,22 @@ impl Scene {
         let images = self.images_by_name();
         let step = with_maps.len().div_ceil(JUDGED).max(1);
         let mut ratios: Vec<f64> = Vec::new();
-        for photo in with_maps.iter().step_by(step) {
+        let mut judged = 0;
+        let mut at_largest: Vec<&Photo> = Vec::new();
+        for photo in with_maps.iter().copied().step_by(step) {
             let image = images[photo.name.as_str()];
-            ratios.extend(self.depths_over_points(photo, image).unwrap_or_default());
+            let camera = &self.reconstruction.cameras[&image.camera_id];
+            // What is wrong with a map is said when it is needed.
+            let Ok(Some(map)) = photo.decode_depth((camera.width, camera.height)) else {
+                continue;
+            };
+            judged += 1;
+            if is_often_largest(&map, scale_of(photo)) {
+                at_largest.push(photo);
+            }
+            ratios.extend(self.depths_over_points(&map, image));
         }
+        warnings.extend(note_of_largest(&at_largest, judged, with_maps.len()));
         if ratios.len() < ENOUGH {
             return;
         }
@@ -81,8 +98,7 @@ impl Scene {
         if (1.0 / OTHER_UNITS..=OTHER_UNITS).contains(&ratio) {
             return;
         }
-        let scale = with_maps[0].depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
-        let meant = rounded(scale / ratio);
+        let meant = rounded(scale_of(with_maps[0]) / ratio);
         warnings.push(Warning::Note(format!(
             "the depth maps' depths are {} times those of the sparse points in their photos (median of {} points): \
              were they not meant, --depth-scale {meant} makes them agree",
@@ -91,11 +107,8 @@ impl Scene {
         )));
     }
 
-    /// What a photo's map says, over how deep the sparse points are that were observed there. What is wrong
-    /// with the map is said when it is needed.
-    fn depths_over_points(&self, photo: &Photo, image: &Image) -> Option<Vec<f64>> {
-        let camera = &self.reconstruction.cameras[&image.camera_id];
-        let map = photo.decode_depth((camera.width, camera.height)).ok()??;
+    /// What a photo's map says, over how deep the sparse points are that were observed there.
+    fn depths_over_points(&self, map: &DepthMap, image: &Image) -> Vec<f64> {
         let ratio = |keypoint: &calibrate::Keypoint| {
             let point = self.reconstruction.points.get(&keypoint.point?)?;
             let depth = (image.camera_from_world * point.position).z;
@@ -105,8 +118,42 @@ impl Scene {
             let ratio = f64::from(measured) / depth;
             (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
         };
-        Some(image.keypoints.iter().filter_map(ratio).collect())
+        image.keypoints.iter().filter_map(ratio).collect()
     }
+}
+
+/// World units a step of a photo's depth map.
+fn scale_of(photo: &Photo) -> f64 {
+    photo.depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP)
+}
+
+/// The largest depth that a map in steps of so many world units can say, in world units.
+fn largest(units_per_step: f64) -> f32 {
+    (f64::from(u16::MAX) * units_per_step) as f32
+}
+
+/// Whether a map has the largest value in more than [`LARGEST_PERCENT`] of its pixels.
+fn is_often_largest(map: &DepthMap, units_per_step: f64) -> bool {
+    let largest = largest(units_per_step);
+    let is_it = |depth: &&f32| **depth > 0.0 && **depth >= largest;
+    let count = map.depths.iter().filter(is_it).count();
+    100 * count > LARGEST_PERCENT * map.depths.len()
+}
+
+/// What to say of photos whose maps often have the largest value, if there are any among those `judged`, of all
+/// that there are.
+fn note_of_largest(photos: &[&Photo], judged: usize, total: usize) -> Option<Warning> {
+    let first = photos.first()?;
+    let file = first.depth_map.as_ref()?;
+    Some(Warning::Note(format!(
+        "{}: more than {LARGEST_PERCENT} % of the depth map's pixels are {}, the largest value of 16 bits, as in {} \
+         of {judged} depth maps looked at, of {total}: it counts as a depth of {} world units; where the depth is \
+         unknown write 0",
+        file.display(),
+        u16::MAX,
+        photos.len(),
+        largest(scale_of(first)),
+    )))
 }
 
 /// The power of ten that is nearly as much, else two digits.

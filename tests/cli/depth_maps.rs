@@ -1,9 +1,10 @@
 //! Depth maps that a capture has and that are not as they should be.
 
 use crate::run::{lumigraph, with_wall};
-use image::{ImageBuffer, Luma};
+use image::{GrayImage, ImageBuffer, Luma};
 use serde_json::Value;
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 type Steps = ImageBuffer<Luma<u16>, Vec<u16>>;
@@ -101,4 +102,55 @@ fn maps_that_a_transforms_file_names_as_well_are_told_once() {
     assert!(ran.stdout.ends_with(", 9 depth maps\n"), "{}", ran.stdout);
     let photo = scene_json(here, "again")["photos"][4].clone();
     assert_eq!(photo["depth_map"], "../wall/whole.png");
+}
+
+#[test]
+fn maps_whose_largest_value_may_mean_none_are_told_once() {
+    let folder = with_wall();
+    let here = folder.path();
+    let fill = |photos: Range<u32>, columns: u32| {
+        for i in photos {
+            let file = here.join(format!("wall/depth/{i:04}.png"));
+            let mut map: Steps = image::open(&file).unwrap().into_luma16();
+            for (x, _, pixel) in map.enumerate_pixels_mut() {
+                if x < columns {
+                    pixel.0 = [u16::MAX];
+                }
+            }
+            map.save(file).unwrap();
+        }
+    };
+    let said = "% of the depth map's pixels are 65535";
+    // Two of 96 columns may be far away.
+    fill(0..9, 2);
+    let ran = lumigraph(here, "import wall -o scene").ok();
+    assert!(!ran.stderr.contains(said), "{}", ran.stderr);
+
+    // The first, the fourth and the seventh are looked at.
+    fill(2..9, 8);
+    let ran = lumigraph(here, "import wall -o scene --force").ok();
+    let note = format!(
+        "note: wall/depth/0003.png: more than 3 {said}, the largest value of 16 bits, as in 2 of 3 depth maps \
+         looked at, of 9: it counts as a depth of 65.535 world units; where the depth is unknown write 0\n"
+    );
+    assert!(ran.stderr.contains(&note), "{}", ran.stderr);
+    assert_eq!(ran.stderr.matches(said).count(), 1, "{}", ran.stderr);
+    assert!(ran.stdout.ends_with(", 9 depth maps\n"), "{}", ran.stdout);
+    let line = "import wall --depth-scale 0.002 -o scene --force";
+    let ran = lumigraph(here, line).ok();
+    assert!(
+        ran.stderr.contains("a depth of 131.07 world units"),
+        "{}",
+        ran.stderr
+    );
+
+    // Where ignored, it is no depth.
+    fs::create_dir(here.join("wall/masks")).unwrap();
+    let used = |x: u32, _: u32| Luma([if x < 8 { 0_u8 } else { 255 }]);
+    for i in 0..9 {
+        let file = here.join(format!("wall/masks/{i:04}.png"));
+        GrayImage::from_fn(96, 72, used).save(file).unwrap();
+    }
+    let ran = lumigraph(here, "import wall -o scene --force").ok();
+    assert!(!ran.stderr.contains(said), "{}", ran.stderr);
 }
