@@ -17,6 +17,9 @@ use rayon::prelude::*;
 /// A photo shows a point from which half of it is left, or more, of what it counts with nothing before the point.
 const SHOWN: f64 = 0.5;
 
+/// So much of a photo's weight is left within its border that those from which a point is hidden are nothing beside it.
+const COUNTS: f64 = 0.02;
+
 /// What is so many times as near is another thing, and not the same surface farther on.
 const NEARER: f64 = 1.5;
 
@@ -63,13 +66,18 @@ impl<'a> Asked<'a> {
         Some((pixel, if is_on_rim { 0.0 } else { left }))
     }
 
-    /// Whether one has the point at ray / s in its image, with nothing before it.
-    fn sees(&self, view: usize, ray: DVec3, s: f64) -> bool {
-        let seen = self.visible(view, ray, s);
-        seen.is_some_and(|(_, left)| left >= SHOWN)
+    /// What one says of the point at ray / s.
+    fn says(&self, view: usize, ray: DVec3, s: f64) -> Says {
+        let counts = |pixel| self.views.sources[view].fov_blend(pixel) >= COUNTS;
+        match self.visible(view, ray, s) {
+            Some((_, left)) if left < SHOWN => Says::Hidden,
+            Some((pixel, _)) if counts(pixel) => Says::Seen,
+            _ => Says::Nothing,
+        }
     }
 
-    /// The same beyond doubt of rounding, and so far from the image's border that it counts.
+    /// Whether one has the point at ray / s in its image, with nothing before it, beyond doubt of rounding, and so far
+    /// within its border that half of it counts.
     fn shows(&self, view: usize, ray: DVec3, s: f64) -> bool {
         let source = &self.views.sources[view];
         let counts = |(pixel, left): (Pixel, f64)| left * source.fov_blend(pixel) >= SHOWN;
@@ -98,6 +106,15 @@ impl<'a> Asked<'a> {
         }
         Some(Shown { times, step, view })
     }
+}
+
+/// What a source view says of a point: that it has it in its image, with nothing before it and not just within the
+/// border, where it hardly counts; that something is before it; or nothing.
+#[derive(PartialEq)]
+enum Says {
+    Seen,
+    Hidden,
+    Nothing,
 }
 
 /// Where something that is hidden is shown.
@@ -139,19 +156,23 @@ pub(super) fn hidden(
         near.truncate(MAX_CONTRIBUTORS);
         near
     };
-    // Whether anyone sees what a pixel looks at. Who saw the last mostly does, and the others are found when they are
+    // Whether anyone sees what a pixel looks at, or nobody has something before it. Who saw the last mostly does, and the others are found when they are
     // first asked for, by tile.
     let is_seen = |[x, y]: [usize; 2], last: &mut Option<usize>, near: &mut Option<Vec<u32>>| {
         let Some((ray, s)) = looks(x, y).filter(|(_, s)| *s > 0.0) else {
             return true;
         };
-        if last.is_some_and(|view| asked.sees(view, ray, s)) {
+        if last.is_some_and(|view| asked.says(view, ray, s) == Says::Seen) {
             return true;
         }
         let near = near.get_or_insert_with(|| near_tile(x, y));
-        let mut all = near.iter().map(|view| *view as usize);
-        *last = all.find(|view| asked.sees(*view, ray, s));
-        last.is_some()
+        let mut is_hidden = false;
+        *last = near.iter().map(|view| *view as usize).find(|view| {
+            let says = asked.says(*view, ray, s);
+            is_hidden |= says == Says::Hidden;
+            says == Says::Seen
+        });
+        last.is_some() || !is_hidden
     };
     let of_tiles = |tile_row: usize| {
         let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
@@ -343,7 +364,9 @@ mod tests {
         let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility);
         let is_seen = |x: usize, y: usize| {
             let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
-            ((0..sources.len()).any(|view| asked.sees(view, ray, s)), s)
+            let all = || (0..sources.len()).map(|view| asked.says(view, ray, s));
+            let is_seen = all().any(|says| says == Says::Seen);
+            (is_seen || !all().any(|says| says == Says::Hidden), s)
         };
         let (mut count, mut nearest) = (0, 0);
         for (y, row) in moved.iter().enumerate() {
