@@ -1,6 +1,8 @@
 //! Ignore masks: where a photo does not count.
 
 use crate::pyramid::{MAX_LEVELS, halve};
+use crate::score::HALF;
+use calibrate::Pixel;
 use image::GrayImage;
 use std::fmt;
 
@@ -45,6 +47,14 @@ impl Mask {
     /// A mask that ignores everything, whatever the photo's size.
     pub(crate) fn nothing() -> Self {
         Self::new(GrayImage::new(1, 1))
+    }
+
+    /// Whether at least half of a photo counts at a pixel; outside as on the border.
+    pub(crate) fn uses(&self, pixel: Pixel) -> bool {
+        let finest = &self.levels[0];
+        let at = |at: f64, side: u32| (at.max(0.0) as u32).min(side - 1);
+        let (x, y) = (at(pixel.x, finest.width()), at(pixel.y, finest.height()));
+        finest.get_pixel(x, y).0[0] >= HALF
     }
 
     /// Bounds of the values between two corners of a rectangle in pixels; what lies outside

@@ -10,6 +10,7 @@ mod tests;
 mod views;
 
 use crate::frame::FrameSource;
+use crate::photos::PhotoStore;
 use crate::surface::FacetMap;
 use crate::tiles::TILE;
 use crate::visibility::Visibility;
@@ -162,8 +163,9 @@ pub(crate) fn out_of_hiding(
     rays: Option<&Rays>,
     sources: &[FrameSource],
     visibility: &Visibility,
+    photos: &PhotoStore,
 ) -> FacetMap {
-    let moved = hidden::hidden(&map, desired, rays, sources, visibility);
+    let moved = hidden::hidden(&map, desired, rays, sources, visibility, photos);
     with_moved(map, moved)
 }
 

@@ -97,7 +97,10 @@ impl Surface {
                 let map = within_sight(map, desired, rays.as_ref(), sources);
                 Self::Facets(match &lumigraph.visibility {
                     None => map,
-                    Some(seen) => out_of_hiding(map, desired, rays.as_ref(), sources, seen),
+                    Some(seen) => {
+                        let photos = &lumigraph.photos;
+                        out_of_hiding(map, desired, rays.as_ref(), sources, seen, photos)
+                    }
                 })
             }
         }

@@ -1,5 +1,6 @@
 //! Photos that judge proxies: each is drawn small from all the others and compared.
 
+use super::beside::USED;
 use super::carved_points::{CarvedPoints, on_surface};
 use super::cutout::Cutout;
 use super::fit::{Fitted, Kind, unfit};
@@ -9,6 +10,7 @@ use image::{GrayImage, RgbaImage};
 use proxy::dense::{DensePoints, Matching};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
+use render::score::PSNR_CAP_DB;
 use render::{FieldOptions, Frame, Lumigraph, Method, Part, RenderError, Visibility, cpu, score};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -20,6 +22,8 @@ const PHOTO_SIDE: u32 = 640;
 /// What is fitted to photos is fitted without so large a share of them at a time, at most.
 /// (What is made of points is made without each alone.)
 const FOLD: usize = 6;
+/// Of a photo of which a mask leaves less than this share, that would say too little, and all judges.
+const LEAST_USED: f64 = 0.05;
 /// A kind that is so far behind after so many judges is not tried on the rest.
 const HOPELESS_DB: f64 = 2.0;
 const EARLIEST: usize = 3;
@@ -30,7 +34,7 @@ struct Judge {
     name: String,
     desired: View,
     truth: RgbaImage,
-    /// What to use of it, where a mask says so: the rest does not judge.
+    /// What to use of it, where a mask says so: the rest does not judge, unless it is nearly all.
     used: Option<GrayImage>,
 }
 
@@ -102,12 +106,16 @@ impl<'a> Trials<'a> {
             match scene.truth(name, without)? {
                 Ok(truth) => {
                     let truth = truth.resized(width, height);
+                    let is_enough = |used: &GrayImage| {
+                        let count = used.pixels().filter(|p| p.0[0] >= USED).count();
+                        count as f64 >= LEAST_USED * f64::from(width * height)
+                    };
                     judges.push(Judge {
                         source_idx,
                         name: name.clone(),
                         desired: view.resized(width, height),
                         truth: truth.pixels,
-                        used: truth.used,
+                        used: truth.used.filter(is_enough),
                     });
                 }
                 Err(error) => {
@@ -348,11 +356,12 @@ impl<'a> Trials<'a> {
             Some(used) => score::score_masked(picture, truth, used).map_err(unfit)?,
             None => None,
         };
-        Ok(match used {
+        let psnr = match used {
             Some(used) => used.psnr_masked,
-            // Of a photo without a mask, or with one that leaves nothing.
             None => score::score(picture, truth).map_err(unfit)?.psnr,
-        })
+        };
+        // What none differs in says nothing of the others.
+        Ok(psnr.min(PSNR_CAP_DB))
     }
 
     /// Why a picture could not be drawn.

@@ -95,6 +95,11 @@ fn alike(a: f64, b: f64) -> bool {
     (a - b).abs() <= AGREE * a.max(b)
 }
 
+/// How far from an inverse depth others agree with it, where a step between those tried is so wide.
+fn near(inverse: f64, step: f64) -> f64 {
+    (AGREE * inverse).max(AGREE_STEPS * step)
+}
+
 /// The inverse depth along a photo's ray, turned to the world, at which it meets what lies that deep in another; `None`
 /// where it does not.
 fn along(photo: &SmallPhoto, ray: DVec3, other: &SmallPhoto, inverse_there: f64) -> Option<f64> {
@@ -140,9 +145,8 @@ fn of_photo(
         let (at, depth) = other.project(position)?;
         let inverse = f64::from(map.inverse_depths[other.index(at)?]);
         let off = (inverse - 1.0 / depth).abs();
-        let near = (AGREE * inverse).max(AGREE_STEPS * map.step);
         // Unknown is 0, which lies within a step of what is far.
-        (inverse > 0.0 && off <= near).then_some(inverse)
+        (inverse > 0.0 && off <= near(inverse, map.step)).then_some(inverse)
     };
     // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
     let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
@@ -183,11 +187,14 @@ fn of_photo(
             }
             let position = photo.point(x, y, inverse);
             let (mut seen_by, mut depths) = (Vec::new(), vec![inverse]);
+            let step = maps[i].map_or(0.0, |own| own.step);
             let ray = photo.rotation.transpose() * photo.ray(x, y);
             for (j, other, map) in &with_maps {
                 if let Some(there) = agrees(position, other, map) {
                     seen_by.push(*j as u32);
-                    depths.extend(along(photo, ray, other, there));
+                    // Of one that looks across the ray a little there is much along it.
+                    let met = along(photo, ray, other, there);
+                    depths.extend(met.filter(|s| (s - inverse).abs() <= near(inverse, step)));
                 }
             }
             if seen_by.len() < needed || !position.is_finite() {

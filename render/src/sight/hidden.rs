@@ -6,6 +6,7 @@ use super::{
 };
 use crate::frame::FrameSource;
 use crate::options::MAX_CONTRIBUTORS;
+use crate::photos::PhotoStore;
 use crate::surface::FacetMap;
 use crate::tiles::TILE;
 use crate::visibility::{TOLERANCE, Visibility, visible};
@@ -33,12 +34,13 @@ const ALIKE: usize = 4;
 struct Asked<'a> {
     views: Views<'a>,
     visibility: &'a Visibility,
+    photos: &'a PhotoStore,
     /// By source view: how many cameras are nearer.
     turn: Vec<usize>,
 }
 
 impl<'a> Asked<'a> {
-    fn new(sources: &'a [FrameSource], visibility: &'a Visibility) -> Self {
+    fn new(sources: &'a [FrameSource], visibility: &'a Visibility, photos: &'a PhotoStore) -> Self {
         let mut nearest: Vec<usize> = (0..sources.len()).collect();
         let distance = |i: &usize| sources[*i].center.length_squared();
         nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
@@ -48,18 +50,22 @@ impl<'a> Asked<'a> {
         Self {
             views: Views::new(sources),
             visibility,
+            photos,
             turn,
         }
     }
 
-    /// Where a source view has the point at ray / s in its image, and how much is left of it there: nothing on the
-    /// rim of something much nearer, of which the photo has at least the blur there.
+    /// Where a source view has the point at ray / s in its image, if its mask does not ignore it there, and how much is
+    /// left of it: nothing on the rim of something much nearer, of which the photo has at least the blur there.
     fn visible(&self, view: usize, ray: DVec3, s: f64) -> Option<(Pixel, f64)> {
         let source = &self.views.sources[view];
         let point = from_source(source, ray, s);
         let [width, height] = source.size;
         let is_inside = |p: &Pixel| p.x >= 0.0 && p.y >= 0.0 && p.x <= width && p.y <= height;
         let pixel = source.lens.project(point).filter(is_inside)?;
+        if self.photos.mask(view).is_some_and(|mask| !mask.uses(pixel)) {
+            return None;
+        }
         let (map, s) = (self.visibility.map(view), s / point.length());
         let left = visible(s, map.inverse_distance(pixel));
         let is_on_rim = left >= SHOWN && map.nearest_beside(pixel) > NEARER * s;
@@ -144,8 +150,9 @@ pub(super) fn hidden(
     rays: Option<&Rays>,
     sources: &[FrameSource],
     visibility: &Visibility,
+    photos: &PhotoStore,
 ) -> Vec<Vec<Moved>> {
-    let asked = Asked::new(sources, visibility);
+    let asked = Asked::new(sources, visibility, photos);
     let [width, height] = map.size.map(|side| side as usize);
     let looks = |x: usize, y: usize| look(map, desired, rays, x, y);
     // As many as contribute to a pixel at most, those whose cameras are nearest: others would need distance maps
@@ -233,11 +240,10 @@ mod tests {
     use crate::frame::Frame;
     use crate::lumigraph::{Lumigraph, SourceView};
     use crate::options::FieldOptions;
-    use crate::photos::PhotoStore;
     use crate::surface::Surface;
     use calibrate::{Lens, Rigid3};
     use glam::DVec2;
-    use image::RgbaImage;
+    use image::{GrayImage, RgbaImage};
     use proxy::{Mesh, MeshKind, Proxy, Solid};
     use std::sync::Arc;
 
@@ -346,6 +352,22 @@ mod tests {
     }
 
     #[test]
+    fn what_a_mask_ignores_shows_nothing() {
+        let mut lumigraph = board(&[1.0, -1.0]);
+        let far = |lumigraph: &Lumigraph| {
+            let seen = seen(lumigraph);
+            seen.iter().filter(|(_, z)| *z > 39.0).count()
+        };
+        let one = far(&board(&[1.0]));
+        let nothing = GrayImage::new(SIZE.0, SIZE.1);
+        let photos = std::mem::replace(&mut lumigraph.photos, PhotoStore::from_images(Vec::new()));
+        lumigraph.photos = photos.with_masks(&[false, true], move |_| Ok(nothing.clone()));
+        // As if there were the first photo alone, but for what only the other has in its image.
+        let masked = far(&lumigraph);
+        assert!(masked >= one && masked < one + 4, "{masked}, {one}");
+    }
+
+    #[test]
     fn all_moves_that_nobody_sees_and_that_is_shown_before() {
         let lumigraph = board(&[1.0, 0.8, 300.0, -300.0]);
         let visibility = lumigraph.visibility.as_ref().unwrap();
@@ -360,8 +382,9 @@ mod tests {
         };
         let rays = Rays::of(&desired.lens, SIZE);
         let map = FacetMap::of_mesh(solid, &desired, rays.as_ref());
-        let asked = Asked::new(&sources, visibility);
-        let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility);
+        let photos = &lumigraph.photos;
+        let asked = Asked::new(&sources, visibility, photos);
+        let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility, photos);
         let is_seen = |x: usize, y: usize| {
             let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
             let all = || (0..sources.len()).map(|view| asked.says(view, ray, s));
