@@ -163,8 +163,8 @@ pub(super) fn hidden(
         near.truncate(MAX_CONTRIBUTORS);
         near
     };
-    // Whether anyone sees what a pixel looks at, or nobody has something before it. Who saw the last mostly does, and the others are found when they are
-    // first asked for, by tile.
+    // Whether anyone sees what a pixel looks at, or nobody has something before it. Who saw the last mostly does, and
+    // the others are found when they are first asked for, by tile.
     let is_seen = |[x, y]: [usize; 2], last: &mut Option<usize>, near: &mut Option<Vec<u32>>| {
         let Some((ray, s)) = looks(x, y).filter(|(_, s)| *s > 0.0) else {
             return true;
