@@ -193,19 +193,6 @@ impl DistanceMap {
             * f64::from(self.sample((pixel.x / reduction) as f32, (pixel.y / reduction) as f32))
     }
 
-    /// The greatest inverse distance of the texel that has a pixel of the photo and the eight around it.
-    pub(crate) fn nearest_beside(&self, pixel: Pixel) -> f64 {
-        let [width, height] = self.size.map(|side| side as usize);
-        let around = |at: f64, count: usize| {
-            let texel = ((at / f64::from(REDUCTION)) as usize).min(count - 1);
-            texel.saturating_sub(1)..(texel + 2).min(count)
-        };
-        let (columns, rows) = (around(pixel.x, width), around(pixel.y, height));
-        let row = |y: usize| &self.values[y * width..][columns.clone()];
-        let nearest = rows.flat_map(row).copied().fold(0.0, f32::max);
-        self.unit * f64::from(nearest)
-    }
-
     /// The value at a position in texels.
     pub(crate) fn sample(&self, x: f32, y: f32) -> f32 {
         let [width, height] = self.size;

@@ -86,8 +86,8 @@ impl Scene {
     /// # Errors
     /// No calibration or no photos where they should be; a damaged calibration; a photo of
     /// another size than calibrated; a mask or matte of another size than its photo, or
-    /// unreadable, or a depth map of [`ImportOptions::depth`]; a list of times with a mistake; too few photos left, or with
-    /// [`ImportOptions::strict`] any missing or corrupt one.
+    /// unreadable, or such a depth map of [`ImportOptions::depth`]; a list of times with a mistake;
+    /// too few photos left, or with [`ImportOptions::strict`] any missing or corrupt one.
     pub fn import(
         capture: &Path,
         options: &ImportOptions,

@@ -110,7 +110,8 @@ fn along(photo: &SmallPhoto, ray: DVec3, other: &SmallPhoto, inverse_there: f64)
     (s > 0.0 && s.is_finite()).then_some(s)
 }
 
-/// Of one number or more; of an even count the mean of the two in the middle.
+/// Of one number or more; of an even count the mean of the two in the middle, as the upper one (`cloud::median`) would
+/// bring all points nearer.
 fn median(numbers: &mut [f64]) -> f64 {
     numbers.sort_by(f64::total_cmp);
     let count = numbers.len();

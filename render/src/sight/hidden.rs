@@ -68,7 +68,9 @@ impl<'a> Asked<'a> {
         }
         let (map, s) = (self.visibility.map(view), s / point.length());
         let left = visible(s, map.inverse_distance(pixel));
-        let is_on_rim = left >= SHOWN && map.nearest_beside(pixel) > NEARER * s;
+        // A pixel around it has its texel and those beside that.
+        let around = [-1.0, 1.0].map(|by| [pixel.x + by, pixel.y + by]);
+        let is_on_rim = left >= SHOWN && map.largest_within(around[0], around[1]) > NEARER * s;
         Some((pixel, if is_on_rim { 0.0 } else { left }))
     }
 
