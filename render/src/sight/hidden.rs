@@ -14,6 +14,7 @@ use calibrate::{Pixel, View};
 use glam::DVec3;
 use proxy::Rays;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// A photo shows a point from which half of it is left, or more, of what it counts with nothing before the point.
 const SHOWN: f64 = 0.5;
@@ -24,7 +25,8 @@ const COUNTS: f64 = 0.02;
 /// What is so many times as near is another thing, and not the same surface farther on.
 const NEARER: f64 = 1.5;
 
-/// One pixel is asked of so many across and down: where it is seen, so are they, and where not, what is as far.
+/// One pixel is asked of so many across and down. What is as far as that in the others is seen if it is, unless it is
+/// otherwise with the block to the right, below, or at the corner between.
 const BLOCK: usize = 2;
 
 /// So many across and down, of what is as far, move alike if they can, or not much farther.
@@ -154,39 +156,83 @@ pub(super) fn hidden(
     visibility: &Visibility,
     photos: &PhotoStore,
 ) -> Vec<Vec<Moved>> {
-    let asked = Asked::new(sources, visibility, photos);
-    let [width, height] = map.size.map(|side| side as usize);
-    let looks = |x: usize, y: usize| look(map, desired, rays, x, y);
-    // As many as contribute to a pixel at most, those whose cameras are nearest: others would need distance maps
-    // that nothing else in the picture does.
-    let near_tile = |x: usize, y: usize| {
-        let mut near = in_reach(map, &asked.views, &looks, x, y);
-        near.sort_by_key(|view| asked.turn[*view as usize]);
-        near.truncate(MAX_CONTRIBUTORS);
-        near
+    let looks = Looks {
+        map,
+        desired,
+        rays,
+        asked: Asked::new(sources, visibility, photos),
+        near: vec![OnceLock::new(); map.size[0].div_ceil(TILE as u32) as usize * map.tiles.down()],
     };
-    // Whether anyone sees what a pixel looks at, or nobody has something before it. Who saw the last mostly does, and
-    // the others are found when they are first asked for, by tile.
-    let is_seen = |[x, y]: [usize; 2], last: &mut Option<usize>, near: &mut Option<Vec<u32>>| {
-        let Some((ray, s)) = looks(x, y).filter(|(_, s)| *s > 0.0) else {
+    let [width, height] = map.size.map(|side| side as usize);
+    // 1. One pixel of each block.
+    let of_row = |top: usize| -> Vec<bool> {
+        let mut last = None;
+        let lefts = (0..width).step_by(BLOCK);
+        lefts
+            .map(|left| looks.is_seen(left, top, &mut last))
+            .collect()
+    };
+    let tops: Vec<usize> = (0..height).step_by(BLOCK).collect();
+    let firsts: Vec<Vec<bool>> = tops.into_par_iter().map(of_row).collect();
+    // 2. The others.
+    let tile_rows = (0..map.tiles.down()).into_par_iter();
+    tile_rows
+        .flat_map_iter(|tile_row| looks.moved_of_tiles(tile_row, &firsts))
+        .collect()
+}
+
+/// What the pixels of a picture look at, and who may see it.
+struct Looks<'a> {
+    map: &'a FacetMap,
+    desired: &'a View,
+    rays: Option<&'a Rays>,
+    asked: Asked<'a>,
+    /// By tile, row by row; see [`Self::near`].
+    near: Vec<OnceLock<Vec<u32>>>,
+}
+
+impl Looks<'_> {
+    fn at(&self, x: usize, y: usize) -> Option<(DVec3, f64)> {
+        look(self.map, self.desired, self.rays, x, y)
+    }
+
+    /// Who is asked about the pixels of a tile, found when first asked for: as many as contribute to a pixel at most,
+    /// those whose cameras are nearest. Others would need distance maps that nothing else in the picture does.
+    fn near(&self, x: usize, y: usize) -> &[u32] {
+        let across = (self.map.size[0] as usize).div_ceil(TILE);
+        let tile = y / TILE * across + x / TILE;
+        self.near[tile].get_or_init(|| {
+            let looks = |x, y| self.at(x, y);
+            let mut near = in_reach(self.map, &self.asked.views, &looks, x, y);
+            near.sort_by_key(|view| self.asked.turn[*view as usize]);
+            near.truncate(MAX_CONTRIBUTORS);
+            near
+        })
+    }
+
+    /// Whether anyone sees what a pixel looks at, or nobody has something before it. Who saw the `last` mostly does.
+    fn is_seen(&self, x: usize, y: usize, last: &mut Option<usize>) -> bool {
+        let Some((ray, s)) = self.at(x, y).filter(|(_, s)| *s > 0.0) else {
             return true;
         };
-        if last.is_some_and(|view| asked.says(view, ray, s) == Says::Seen) {
+        if last.is_some_and(|view| self.asked.says(view, ray, s) == Says::Seen) {
             return true;
         }
-        let near = near.get_or_insert_with(|| near_tile(x, y));
         let mut is_hidden = false;
-        *last = near.iter().map(|view| *view as usize).find(|view| {
-            let says = asked.says(*view, ray, s);
+        let mut near = self.near(x, y).iter().map(|view| *view as usize);
+        *last = near.find(|view| {
+            let says = self.asked.says(*view, ray, s);
             is_hidden |= says == Says::Hidden;
             says == Says::Seen
         });
         last.is_some() || !is_hidden
-    };
-    let of_tiles = |tile_row: usize| {
+    }
+
+    /// What is moved of a row of tiles, by row. Of each block it is known whether its first pixel is seen.
+    fn moved_of_tiles(&self, tile_row: usize, firsts: &[Vec<bool>]) -> Vec<Vec<Moved>> {
+        let [width, height] = self.map.size.map(|side| side as usize);
         let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
         let mut moved: Vec<Vec<Moved>> = rows.clone().map(|_| Vec::new()).collect();
-        let mut near: Vec<Option<Vec<u32>>> = vec![None; width.div_ceil(TILE)];
         // What moved last nearby, from what inverse distance.
         let mut alike: Vec<Option<(f64, Shown)>> = vec![None; width.div_ceil(ALIKE)];
         for top in rows.clone().step_by(BLOCK) {
@@ -195,45 +241,54 @@ pub(super) fn hidden(
             }
             let mut last = None;
             for left in (0..width).step_by(BLOCK) {
-                let near = &mut near[left / TILE];
-                if is_seen([left, top], &mut last, near) {
-                    continue;
-                }
-                let Some((_, first_s)) = looks(left, top) else {
-                    continue;
-                };
                 let alike = &mut alike[left / ALIKE];
+                // Where blocks beside it are otherwise, seeing ends within it.
+                let (column, row) = (left / BLOCK, top / BLOCK);
+                let first = firsts[row][column];
+                let beside = firsts[row..].iter().take(2);
+                let mut beside = beside.flat_map(|row| row[column..].iter().take(2));
+                let are_alike = beside.all(|is_seen| *is_seen == first);
+                let facet_at = |x: usize, y: usize| self.map.facet_of[y * width + x];
+                let (facet, mut looks) = (facet_at(left, top), None);
                 for y in top..(top + BLOCK).min(rows.end) {
                     for x in left..(left + BLOCK).min(width) {
-                        // What lies beside is hidden, too, unless it is something else.
-                        let looks = looks(x, y).filter(|(_, s)| {
-                            are_near(*s, first_s) || !is_seen([x, y], &mut last, near)
-                        });
-                        let Some(((ray, s), near)) = looks.zip(near.as_deref()) else {
-                            continue;
+                        let mut is_of_first = || {
+                            let first = *looks.get_or_insert_with(|| self.at(left, top));
+                            let both = first.zip(self.at(x, y));
+                            both.is_some_and(|((_, a), (_, b))| are_near(a, b))
                         };
-                        let before = alike.filter(|(other, _)| are_near(s, *other));
-                        let before = before.map(|(_, shown)| shown);
-                        let is_shown =
-                            |shown: &Shown| asked.shows(shown.view, ray, s * shown.times);
-                        let from = before.map_or(1, |shown| (shown.step - 1).max(1));
-                        let shown = before.filter(is_shown);
-                        let shown = shown.or_else(|| asked.nearest_shown(near, ray, s, from));
-                        let Some(shown) = shown else { continue };
-                        *alike = Some((s, shown));
-                        moved[y - rows.start].push(Moved {
-                            x,
-                            plane: ray * (s * shown.times / ray.length_squared()),
-                            source_idx: shown.view as u32,
-                        });
+                        let is_alike = facet_at(x, y) == facet || is_of_first();
+                        let is_seen = match (x, y) == (left, top) || (are_alike && is_alike) {
+                            true => first,
+                            false => self.is_seen(x, y, &mut last),
+                        };
+                        if !is_seen {
+                            let shown = self.moves(x, y, alike);
+                            moved[y - rows.start].extend(shown);
+                        }
                     }
                 }
             }
         }
         moved
-    };
-    let tile_rows = (0..map.tiles.down()).into_par_iter();
-    tile_rows.flat_map_iter(of_tiles).collect()
+    }
+
+    /// Where a pixel moves; as the last did nearby, from what inverse distance, if it can.
+    fn moves(&self, x: usize, y: usize, alike: &mut Option<(f64, Shown)>) -> Option<Moved> {
+        let ((ray, s), asked) = (self.at(x, y)?, &self.asked);
+        let before = alike.filter(|(other, _)| are_near(s, *other));
+        let before = before.map(|(_, shown)| shown);
+        let is_shown = |shown: &Shown| asked.shows(shown.view, ray, s * shown.times);
+        let from = before.map_or(1, |shown| (shown.step - 1).max(1));
+        let shown = before.filter(is_shown);
+        let shown = shown.or_else(|| asked.nearest_shown(self.near(x, y), ray, s, from))?;
+        *alike = Some((s, shown));
+        Some(Moved {
+            x,
+            plane: ray * (s * shown.times / ray.length_squared()),
+            source_idx: shown.view as u32,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -331,8 +386,7 @@ mod tests {
             }
             if !(LEFT - by..RIGHT + by).contains(&at_wall) {
                 assert!((z - 40.0).abs() < 1e-9, "{t}: {z}");
-            } else if hides(at_wall - 0.06) && hides(at_wall + 0.06) {
-                // A pixel, or 0.05 on the board, stays with the one beside it.
+            } else if hides(at_wall) {
                 moved += 1;
                 // It looks past, and by no more than it must.
                 let x = behind(1.0, t, z);
@@ -397,8 +451,18 @@ mod tests {
         for (y, row) in moved.iter().enumerate() {
             for x in 0..SIZE.0 as usize {
                 let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
-                let (first, first_s) = is_seen(x / BLOCK * BLOCK, y / BLOCK * BLOCK);
-                let is_seen = first || (!are_near(s, first_s) && is_seen(x, y).0);
+                let corner = [x, y].map(|at| at / BLOCK * BLOCK);
+                let (first, first_s) = is_seen(corner[0], corner[1]);
+                let beside = [[0, 0], [BLOCK, 0], [0, BLOCK], [BLOCK, BLOCK]];
+                let beside = beside.map(|[right, below]| [corner[0] + right, corner[1] + below]);
+                let mut beside = beside
+                    .iter()
+                    .filter(|[x, y]| *x < SIZE.0 as usize && *y < SIZE.1 as usize);
+                let are_alike = beside.all(|[x, y]| is_seen(*x, *y).0 == first);
+                let is_seen = match are_alike && are_near(s, first_s) {
+                    true => first,
+                    false => is_seen(x, y).0,
+                };
                 let shown = |s: f64| (0..sources.len()).find(|view| asked.shows(*view, ray, s));
                 let first = (1..=STEPS).find(|k| shown(s * factor(*k)).is_some());
                 let found = row.iter().find(|moved| moved.x == x);
