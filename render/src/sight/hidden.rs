@@ -29,7 +29,8 @@ const NEARER: f64 = 1.5;
 /// otherwise with the block to the right, below, or at the corner between.
 const BLOCK: usize = 2;
 
-/// So many across and down, of what is as far, move alike if they can, or not much farther.
+/// So many across and down, of what is as far, move alike if they can, or not much farther; where one is shown nowhere
+/// the next are not looked for.
 const ALIKE: usize = 4;
 
 /// The source views, and their distance maps.
@@ -233,8 +234,8 @@ impl Looks<'_> {
         let [width, height] = self.map.size.map(|side| side as usize);
         let rows = tile_row * TILE..((tile_row + 1) * TILE).min(height);
         let mut moved: Vec<Vec<Moved>> = rows.clone().map(|_| Vec::new()).collect();
-        // What moved last nearby, from what inverse distance.
-        let mut alike: Vec<Option<(f64, Shown)>> = vec![None; width.div_ceil(ALIKE)];
+        // Where what was looked for last nearby is shown, if it is, and from what inverse distance.
+        let mut alike: Vec<Option<(f64, Option<Shown>)>> = vec![None; width.div_ceil(ALIKE)];
         for top in rows.clone().step_by(BLOCK) {
             if top % ALIKE == 0 {
                 alike.fill(None);
@@ -273,16 +274,22 @@ impl Looks<'_> {
         moved
     }
 
-    /// Where a pixel moves; as the last did nearby, from what inverse distance, if it can.
-    fn moves(&self, x: usize, y: usize, alike: &mut Option<(f64, Shown)>) -> Option<Moved> {
+    /// Where a pixel moves, if it does; as the last did nearby, from what inverse distance, if it can.
+    fn moves(&self, x: usize, y: usize, alike: &mut Option<(f64, Option<Shown>)>) -> Option<Moved> {
         let ((ray, s), asked) = (self.at(x, y)?, &self.asked);
         let before = alike.filter(|(other, _)| are_near(s, *other));
-        let before = before.map(|(_, shown)| shown);
-        let is_shown = |shown: &Shown| asked.shows(shown.view, ray, s * shown.times);
-        let from = before.map_or(1, |shown| (shown.step - 1).max(1));
-        let shown = before.filter(is_shown);
-        let shown = shown.or_else(|| asked.nearest_shown(self.near(x, y), ray, s, from))?;
+        let shown = match before {
+            Some((_, None)) => None,
+            _ => {
+                let before = before.and_then(|(_, shown)| shown);
+                let is_shown = |shown: &Shown| asked.shows(shown.view, ray, s * shown.times);
+                let from = before.map_or(1, |shown| (shown.step - 1).max(1));
+                let shown = before.filter(is_shown);
+                shown.or_else(|| asked.nearest_shown(self.near(x, y), ray, s, from))
+            }
+        };
         *alike = Some((s, shown));
+        let shown = shown?;
         Some(Moved {
             x,
             plane: ray * (s * shown.times / ray.length_squared()),
@@ -447,7 +454,7 @@ mod tests {
             let is_seen = all().any(|says| says == Says::Seen);
             (is_seen || !all().any(|says| says == Says::Hidden), s)
         };
-        let (mut count, mut nearest) = (0, 0);
+        let (mut count, mut nearest, mut stays) = (0, 0, 0);
         for (y, row) in moved.iter().enumerate() {
             for x in 0..SIZE.0 as usize {
                 let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
@@ -466,7 +473,10 @@ mod tests {
                 let shown = |s: f64| (0..sources.len()).find(|view| asked.shows(*view, ray, s));
                 let first = (1..=STEPS).find(|k| shown(s * factor(*k)).is_some());
                 let found = row.iter().find(|moved| moved.x == x);
-                assert_eq!(found.is_some(), !is_seen && first.is_some(), "{x} {y}");
+                let moves = !is_seen && first.is_some();
+                assert!(moves || found.is_none(), "{x} {y}");
+                // It may stay as one beside it does.
+                stays += usize::from(moves && found.is_none());
                 if let Some((moved, k)) = found.zip(first) {
                     // It may move as others beside it do.
                     let at = moved.plane.dot(ray);
@@ -481,5 +491,6 @@ mod tests {
             }
         }
         assert!(count > 100 && nearest > count * 3 / 4, "{count}, {nearest}");
+        assert!(stays < count / 50, "{count}, {stays}");
     }
 }
