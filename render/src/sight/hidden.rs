@@ -22,8 +22,14 @@ const SHOWN: f64 = 0.5;
 /// So much of a photo's weight is left within its border that those from which a point is hidden are nothing beside it.
 const COUNTS: f64 = 0.02;
 
-/// What is so many times as near is another thing, and not the same surface farther on.
+/// What is so many times as near is another thing, and not the same surface farther on. A texel beside it, where a photo
+/// has at least its blur, nothing else is seen.
 const NEARER: f64 = 1.5;
+
+/// But nothing is moved to where so large a part of a photo's longer side beside it there is something that is so many
+/// times as near: surfaces are not as exact along their rims, and what is there may still be the thing itself.
+const ASIDE: f64 = 1.0 / 160.0;
+const NEARER_ASIDE: f64 = 1.1;
 
 /// One pixel is asked of so many across and down. What is as far as that in the others is seen if it is, unless it is
 /// otherwise with the block to the right, below, or at the corner between.
@@ -59,8 +65,14 @@ impl<'a> Asked<'a> {
     }
 
     /// Where a source view has the point at ray / s in its image, if its mask does not ignore it there, and how much is
-    /// left of it: nothing on the rim of something much nearer, of which the photo has at least the blur there.
-    fn visible(&self, view: usize, ray: DVec3, s: f64) -> Option<(Pixel, f64)> {
+    /// left of it: nothing where it has something `nearer` times as near within so many pixels.
+    fn visible(
+        &self,
+        view: usize,
+        ray: DVec3,
+        s: f64,
+        (within_px, nearer): (f64, f64),
+    ) -> Option<(Pixel, f64)> {
         let source = &self.views.sources[view];
         let point = from_source(source, ray, s);
         let [width, height] = source.size;
@@ -71,16 +83,16 @@ impl<'a> Asked<'a> {
         }
         let (map, s) = (self.visibility.map(view), s / point.length());
         let left = visible(s, map.inverse_distance(pixel));
-        // A pixel around it has its texel and those beside that.
-        let around = [-1.0, 1.0].map(|by| [pixel.x + by, pixel.y + by]);
-        let is_on_rim = left >= SHOWN && map.largest_within(around[0], around[1]) > NEARER * s;
-        Some((pixel, if is_on_rim { 0.0 } else { left }))
+        let around = [-within_px, within_px].map(|by| [pixel.x + by, pixel.y + by]);
+        let is_beside = left >= SHOWN && map.largest_within(around[0], around[1]) > nearer * s;
+        Some((pixel, if is_beside { 0.0 } else { left }))
     }
 
     /// What one says of the point at ray / s.
     fn says(&self, view: usize, ray: DVec3, s: f64) -> Says {
         let counts = |pixel| self.views.sources[view].fov_blend(pixel) >= COUNTS;
-        match self.visible(view, ray, s) {
+        // A pixel around it has its texel and those beside that.
+        match self.visible(view, ray, s, (1.0, NEARER)) {
             Some((_, left)) if left < SHOWN => Says::Hidden,
             Some((pixel, _)) if counts(pixel) => Says::Seen,
             _ => Says::Nothing,
@@ -92,7 +104,9 @@ impl<'a> Asked<'a> {
     fn shows(&self, view: usize, ray: DVec3, s: f64) -> bool {
         let source = &self.views.sources[view];
         let counts = |(pixel, left): (Pixel, f64)| left * source.fov_blend(pixel) >= SHOWN;
-        self.visible(view, ray, s).is_some_and(counts) && sees_well(source, ray, s)
+        let aside = (ASIDE * source.size[0].max(source.size[1])).max(1.0);
+        let visible = self.visible(view, ray, s, (aside, NEARER_ASIDE));
+        visible.is_some_and(counts) && sees_well(source, ray, s)
     }
 
     /// The nearest place before the point at ray / s that one of some shows, from a step on.
@@ -412,6 +426,28 @@ mod tests {
         let (one, both) = (far(&[1.0]), far(&[1.0, -1.0]));
         // The board takes twelve of the 80, and hides as many from either photo.
         assert!(one < 58 && both == 68, "{one}, {both}");
+    }
+
+    #[test]
+    fn nothing_is_shown_right_beside_what_is_before_it() {
+        // Four pixels of the photo are 1/160 of it.
+        let mut lumigraph = board(&[1.0]);
+        lumigraph.sources[0].view = view(1.0).resized(640, 480);
+        let visibility = Visibility::of(&lumigraph.proxy, &lumigraph.sources).unwrap();
+        let desired = view(0.0);
+        let sources = [FrameSource::of(&lumigraph.sources[0].view, &desired)];
+        let asked = Asked::new(&sources, &visibility, &lumigraph.photos);
+        // Past the board's left edge by so many pixels, at some depth.
+        let at = |past_px: f64, z: f64| {
+            let tangent = (LEFT - 1.0) / BOARD - past_px / 320.0;
+            let point = DVec3::new(1.0 + tangent * z, 0.0, z);
+            desired.camera_from_world.rotation * point
+        };
+        let shows = |past_px: f64, z: f64| asked.shows(0, at(past_px, z), 1.0);
+        let seen = |past_px: f64, z: f64| asked.says(0, at(past_px, z), 1.0) == Says::Seen;
+        assert!(!shows(3.0, 2.4) && shows(12.0, 2.4));
+        // There it is seen, but nothing moves there. What is hardly farther than the board may be a part of it.
+        assert!(seen(3.0, 2.4) && shows(3.0, 2.1));
     }
 
     #[test]
