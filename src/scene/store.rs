@@ -11,6 +11,7 @@ use capture::without_byte_order_mark;
 use proxy::Proxy;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// The file that makes a folder a scene.
 const SCENE_FILE: &str = "scene.json";
@@ -300,12 +301,7 @@ impl Scene {
     ) -> Result<(), SceneError> {
         // 1. Everything into a folder within it, which goes away on errors.
         std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
-        let made = tempfile::Builder::new()
-            .prefix(WORK_PREFIX)
-            .tempdir_in(folder)
-            .map_err(|e| io(folder, "make a folder within", e))?;
-        let new = made.path().join("scene");
-        std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
+        let (made, new) = make_within(folder)?;
         fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
@@ -315,22 +311,15 @@ impl Scene {
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
         // 2. They take their places.
-        let old = made.path().join("old");
-        std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
-        let exchanged = exchange(&PARTS, &new, folder, &old);
-        if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
-            // It still holds what could not be put back.
-            let _ = made.keep();
-        }
-        exchanged.map_err(|e| io(folder, "replace the scene", e))?;
+        take_places(&PARTS, made, &new, folder)?;
         self.folder = Some(folder.to_owned());
         Ok(())
     }
 
-    /// Makes a proxy the scene's own, in its folder.
+    /// Makes a proxy the scene's own, in its folder, complete or not at all.
     ///
     /// # Errors
-    /// The scene has no folder; files that cannot be written.
+    /// The scene has no folder; files that cannot be written: then the scene has the proxy that it had.
     pub fn set_proxy(
         &mut self,
         proxy: Proxy,
@@ -341,13 +330,12 @@ impl Scene {
             return Err(SceneError::NoFolder(capture.join(SCENE_FILE)));
         };
         let name = proxy_file(&proxy);
-        let path = folder.join(name);
-        proxy::write(&path, &proxy, &[], &[])?;
+        let other = self.proxy.as_ref().map(|own| own.other.clone());
         let own = SceneProxy {
             proxy,
             file: name.to_owned(),
             fitted_without: fitted_without.map(|names| names.iter().cloned().collect()),
-            other: self.proxy.take().map(|own| own.other).unwrap_or_default(),
+            other: other.unwrap_or_default(),
         };
         // Only this key changes: photos left out today may be back tomorrow.
         let file = folder.join(SCENE_FILE);
@@ -361,9 +349,17 @@ impl Scene {
         let mut whole: Extra = serde_json::from_slice(text).map_err(json)?;
         let entry = serde_json::to_value(proxy_entry(&own)).map_err(json)?;
         whole.insert("proxy".to_owned(), entry);
-        write_json(&file, &whole)?;
+
+        // 1. Both files, as everything by `write_parts`.
+        let (made, new) = make_within(&folder)?;
+        proxy::write(&new.join(name), &own.proxy, &[], &[])?;
+        write_json(&new.join(SCENE_FILE), &whole)?;
+
+        // 2. They take their places. The proxy is the first to leave and the last to come: killed meanwhile, the
+        //    scene lacks it, but never says of one what holds of another.
+        take_places(&[SCENE_FILE, name], made, &new, &folder)?;
         self.proxy = Some(own);
-        Ok(path)
+        Ok(folder.join(name))
     }
 
     /// Writes `scene.json` to `path`, its paths relative to `folder`.
@@ -423,16 +419,38 @@ fn proxy_entry(own: &SceneProxy) -> ProxyEntry {
     }
 }
 
-/// Complete or not at all.
+/// Makes a folder within another, which goes away on errors, and one in it for what is new there.
+fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneError> {
+    let made = tempfile::Builder::new()
+        .prefix(WORK_PREFIX)
+        .tempdir_in(folder)
+        .map_err(|e| io(folder, "make a folder within", e))?;
+    let new = made.path().join("scene");
+    std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
+    Ok((made, new))
+}
+
+/// Has the parts of these names that are in `new` take their places in a scene's folder, all or none, as by
+/// [`exchange`]; both are of [`make_within`].
+fn take_places(parts: &[&str], made: TempDir, new: &Path, folder: &Path) -> Result<(), SceneError> {
+    let old = made.path().join("old");
+    std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
+    let exchanged = exchange(parts, new, folder, &old);
+    if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
+        // It still holds what could not be put back.
+        let _ = made.keep();
+    }
+    exchanged.map_err(|e| io(folder, "replace the scene", e))
+}
+
+/// Into a folder in the making.
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneError> {
     let text = serde_json::to_string_pretty(value).map_err(|source| SceneError::Json {
         path: path.to_owned(),
         expected: "writable as JSON",
         source,
     })?;
-    let temporary = path.with_extension("json.tmp");
-    std::fs::write(&temporary, text + "\n").map_err(|e| io(&temporary, "write", e))?;
-    std::fs::rename(&temporary, path).map_err(|e| io(path, "write", e))
+    std::fs::write(path, text + "\n").map_err(|e| io(path, "write", e))
 }
 
 /// Whether a folder holds a model as scenes have it, and nothing else.

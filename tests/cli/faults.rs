@@ -102,6 +102,35 @@ fn a_full_disk_is_told_and_leaves_nothing_half_written() {
     assert!(text.contains(said), "{text}");
 }
 
+/// Of what is written the proxy finds room, and `scene.json`, which says what it rests on, finds none.
+#[test]
+fn a_scene_keeps_its_proxy_where_there_is_no_room_for_another() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "proxy scene plane --hold-out wall/split.json").ok();
+    let path = here.join("scene/scene.json");
+    let mut file: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    file["later"] = serde_json::json!("x".repeat(2000));
+    fs::write(&path, file.to_string()).unwrap();
+    let before = files(here);
+    let names = names_in(&here.join("scene"));
+
+    let error = on_a_full_disk(here, "proxy scene plane").error(1);
+    assert!(
+        error.contains("scene.json: cannot write: File too large"),
+        "{error}"
+    );
+    assert!(files(here) == before);
+    assert_eq!(names_in(&here.join("scene")), names);
+    // With room again it is another.
+    lumigraph(here, "proxy scene plane").ok();
+    let own = lumigraph(here, "info scene --json").ok().json()["proxy"].clone();
+    assert_eq!(own["fitted_without"], serde_json::json!([]));
+    assert_eq!(names_in(&here.join("scene")), names);
+    lumigraph(here, "import wall -o scene --force").ok();
+}
+
 /// Runs the program with so many kilobytes to map.
 fn within_memory(folder: &Path, kilobytes: u64, line: &str) -> std::process::Output {
     let script = format!("ulimit -c 0; ulimit -v {kilobytes}; exec {PROGRAM} {line}");
