@@ -283,7 +283,7 @@ fn keep_hull(scene: &mut Scene) {
         Ok(fitted) => {
             say!("proxy: hull, {}", fitted.how);
             scene.proxy = Some(SceneProxy {
-                proxy: fitted.proxy,
+                proxy: Ok(fitted.proxy),
                 file: String::new(),
                 fitted_without: Some(Vec::new()),
                 other: Extra::new(),

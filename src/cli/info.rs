@@ -135,7 +135,10 @@ fn gather(scene: &Scene, weak: &[WeakGroup]) -> anyhow::Result<Value> {
     let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
     let cloud = proxy::statistics(&positions);
     let own = scene.proxy.as_ref().map(|own| {
-        let mut value = proxy_json(&own.proxy);
+        let mut value = match own.surface() {
+            Ok(proxy) => proxy_json(proxy),
+            Err(lost) => json!({"error": lost.to_string()}),
+        };
         value["file"] = json!(own.file);
         value["fitted_without"] = json!(own.fitted_without);
         value
@@ -227,7 +230,10 @@ fn text(scene: &Scene, info: &Value) -> String {
         text += &format!(", median spacing {spacing:.4} world units, {isolated} isolated");
     }
     text += &match &scene.proxy {
-        Some(own) => format!("\nproxy    {}\n", proxy_text(&own.proxy)),
+        Some(own) => match own.surface() {
+            Ok(proxy) => format!("\nproxy    {}\n", proxy_text(proxy)),
+            Err(_) => format!("\nproxy    {}, which cannot be read\n", own.file),
+        },
         None => "\nproxy    none of its own; one is chosen when needed\n".to_owned(),
     };
     let bytes = info["memory_bytes"].as_u64().unwrap_or_default();

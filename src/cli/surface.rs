@@ -76,7 +76,7 @@ impl ProxyArgs {
     /// no photo is held out.
     ///
     /// # Errors
-    /// It would, and that is of none of the scene's photos.
+    /// It would, and that is lost, or of none of the scene's photos.
     #[cfg(feature = "window")]
     pub(super) fn takes_own(
         &self,
@@ -94,7 +94,11 @@ impl ProxyArgs {
     pub(super) fn is_searched(&self, scene: &Scene, without: &BTreeSet<String>) -> bool {
         match (self.proxy.as_deref(), &scene.proxy) {
             (Some(asked), _) => asked == "auto",
-            (None, Some(own)) => seen_by(own, without).is_some() && kind_of(own, scene).is_none(),
+            // Of one that is lost no kind is known, and it is an error.
+            (None, Some(own)) => {
+                let is_another = own.surface().is_ok() && seen_by(own, without).is_some();
+                is_another && kind_of(own, scene).is_none()
+            }
             (None, None) => true,
         }
     }
@@ -148,6 +152,7 @@ impl ProxyArgs {
             .into()),
             None => match &scene.proxy {
                 Some(own) => {
+                    let proxy = own.surface()?;
                     if let Some(name) = seen_by(own, without) {
                         let kind = kind_of(own, scene);
                         let named = |kind: Kind| format!(" {}", kind.name());
@@ -160,7 +165,7 @@ impl ProxyArgs {
                     }
                     scene.check_own_proxy()?;
                     Ok(ChosenProxy {
-                        proxy: own.proxy.clone(),
+                        proxy: proxy.clone(),
                         origin: "the scene's own".to_owned(),
                         trials: Vec::new(),
                         left_out: BTreeMap::new(),
@@ -182,16 +187,20 @@ impl ProxyArgs {
 /// A photo among some that a scene's own proxy was fitted with, if there is one.
 pub(super) fn seen_by<'n>(own: &SceneProxy, names: &'n BTreeSet<String>) -> Option<&'n String> {
     // Of what the photos that are left see, for every view.
-    if matches!(own.proxy, Proxy::ViewPlane | Proxy::Points { within: None }) {
+    if matches!(
+        own.proxy,
+        Ok(Proxy::ViewPlane | Proxy::Points { within: None })
+    ) {
         return None;
     }
     let unseen = own.fitted_without.as_ref()?;
     names.iter().find(|name| !unseen.contains(name))
 }
 
-/// The kind that a scene's own proxy was fitted as; `None` where kinds are to be compared anew.
+/// The kind that a scene's own proxy was fitted as; `None` where kinds are to be compared anew, and of one that is
+/// lost.
 pub(super) fn kind_of(own: &SceneProxy, scene: &Scene) -> Option<Kind> {
-    match &own.proxy {
+    match own.surface().ok()? {
         // Two kinds are planes, and files do not say which: it is the one that gives this plane.
         Proxy::Plane(plane) => {
             let names = own.fitted_without.iter().flatten();
@@ -314,7 +323,7 @@ mod tests {
                     "points": [[0, 0, 1], [1, 0, 1], [0, 1, 1]], "seen_by": [[0], [0], [0]]}}"#
             );
             scene.proxy = Some(SceneProxy {
-                proxy: proxy::parse(Path::new("proxy.json"), text.as_bytes()).unwrap(),
+                proxy: Ok(proxy::parse(Path::new("proxy.json"), text.as_bytes()).unwrap()),
                 file: "proxy.json".to_owned(),
                 fitted_without: Some(Vec::new()),
                 other: Extra::new(),

@@ -248,7 +248,7 @@ impl Load {
         exposure.forget(&mut scene);
         let is_ready = proxy.takes_own(&scene, &without)?;
         let quick = match &scene.proxy {
-            Some(own) if is_ready => Some(own.proxy.clone()),
+            Some(own) if is_ready => Some(own.surface()?.clone()),
             _ => {
                 let quick = scene.fit(Kind::Points, &without);
                 let quick = quick.or_else(|_| scene.fit(Kind::Plane, &without));
@@ -277,7 +277,7 @@ impl Load {
             show(&scene, &fewer, chosen.proxy)?;
             teller.say(Progress::Note(format!("proxy: {text}")));
         } else if let (true, Some(own)) = (is_other, &scene.proxy) {
-            show(&scene, &fewer, own.proxy.clone())?;
+            show(&scene, &fewer, own.surface()?.clone())?;
         }
         Ok(())
     }

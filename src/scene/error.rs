@@ -105,6 +105,9 @@ pub enum SceneError {
     /// The scene's proxy cannot be read or written.
     #[error(transparent)]
     ProxyFile(#[from] proxy::FileError),
+    /// The scene's own proxy is lost or damaged.
+    #[error(transparent)]
+    LostProxy(#[from] super::LostProxy),
     /// Dense points that were found in none of the scene's photos.
     #[error(
         "{}: its points were found in {}, and the scene has none of these photos, but {}; find points in those with \

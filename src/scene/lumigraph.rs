@@ -154,13 +154,13 @@ impl Scene {
     /// As [`Self::check_proxy`], of the scene's own, if it has one.
     ///
     /// # Errors
-    /// It names photos, and none of the scene's.
+    /// It is lost or damaged; it names photos, and none of the scene's.
     pub fn check_own_proxy(&self) -> Result<(), SceneError> {
         let Some(own) = &self.proxy else {
             return Ok(());
         };
         let folder = self.folder.clone().unwrap_or_default();
-        self.check_proxy(&own.proxy, &folder.join(&own.file))
+        self.check_proxy(own.surface()?, &folder.join(&own.file))
     }
 
     /// The depth maps of the photos of [`Self::lumigraph`], decoded when they are asked for.

@@ -27,6 +27,7 @@ mod misfit;
 mod named;
 mod names;
 mod observed;
+mod own;
 mod relative;
 mod rooms;
 mod silhouettes;
@@ -50,6 +51,7 @@ pub use exposure::Matched;
 pub use fit::{Fitted, Kind};
 pub use import::ImportOptions;
 pub use names::{NameError, picture_files};
+pub use own::{LostProxy, SceneProxy};
 pub use relative::{relative, relative_lossy};
 pub use rooms::SceneSurface;
 pub use source::{calibration_in, other_models, unused_keys};
@@ -59,7 +61,6 @@ pub use truth::{Truth, TruthScore};
 
 use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{ExposureEntry, Extra, Settings};
-use proxy::Proxy;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -116,20 +117,6 @@ pub struct Photo {
     pub gain: Option<[f64; 3]>,
     /// The nearest and farthest depth along z that it shows, where the calibration says.
     pub depth_bounds: Option<[f64; 2]>,
-    /// What `scene.json` says beyond this version's keys.
-    pub other: Extra,
-}
-
-/// A scene's own proxy.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SceneProxy {
-    /// The surface.
-    pub proxy: Proxy,
-    /// Its file, relative to the scene's folder.
-    pub file: String,
-    /// For one fitted to the scene's points: the photos that were held out. `None` for one
-    /// given by hand.
-    pub fitted_without: Option<Vec<String>>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
 }

@@ -2,7 +2,7 @@
 
 use super::fit::{fuse_depth, unfit};
 use super::import::ENOUGH;
-use super::{Photo, Scene, SceneError};
+use super::{Photo, Scene, SceneError, SceneProxy};
 use calibrate::{Pixel, View};
 use capture::DepthMap;
 use glam::DVec3;
@@ -134,11 +134,9 @@ impl Scene {
 
     /// The mesh that was made for the scene without the photos of the given names.
     fn own_mesh(&self, without: &BTreeSet<String>) -> Result<&Solid, SceneError> {
-        let own = self
-            .proxy
-            .as_ref()
-            .map(|own| (&own.proxy, &own.fitted_without));
-        let Some((Proxy::Mesh(solid), fitted_without)) = own else {
+        let own = self.proxy.as_ref();
+        let surface = own.map(SceneProxy::surface).transpose()?;
+        let (Some(Proxy::Mesh(solid)), Some(own)) = (surface, own) else {
             return Err(unfit(
                 "the photos have no depth maps, which rooms are found in: give their folder with \
                  `import --depth`, or import them and make a mesh of the scene (`lumigraph proxy SCENE \
@@ -146,7 +144,8 @@ impl Scene {
             ));
         };
         // A mesh given by hand rests on no photo.
-        let knows = |name: &&String| fitted_without.as_ref().is_some_and(|n| !n.contains(*name));
+        let fitted_without = own.fitted_without.as_ref();
+        let knows = |name: &&String| fitted_without.is_some_and(|n| !n.contains(*name));
         if let Some(name) = without.iter().find(knows) {
             return Err(unfit(format!(
                 "the scene's mesh was made with the photo {name}, which is held out; make it anew with \

@@ -1,24 +1,24 @@
 //! A scene's folder.
 
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
-use super::file::{Extra, PhotoEntry, ProxyEntry, SceneFile};
+use super::file::{PhotoEntry, SceneFile};
+use super::own::proxy_file;
 use super::relative::relative;
 use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
 use capture::without_byte_order_mark;
-use proxy::Proxy;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// The file that makes a folder a scene.
-const SCENE_FILE: &str = "scene.json";
+pub(super) const SCENE_FILE: &str = "scene.json";
 const MODEL_FOLDER: &str = "model";
-const PROXY_FILE: &str = "proxy.json";
+pub(super) const PROXY_FILE: &str = "proxy.json";
 /// The same of one that is a mesh.
-const PROXY_MESH: &str = "proxy.ply";
+pub(super) const PROXY_MESH: &str = "proxy.ply";
 /// In the order in which they take their places: a folder without the last is no scene.
 const PARTS: [&str; 9] = [
     IMAGES_FOLDER,
@@ -121,15 +121,6 @@ impl Scene {
         if photos.is_empty() {
             return Err(inconsistent("no photo is listed".to_owned()));
         }
-        let proxy = match file.proxy {
-            Some(entry) => Some(SceneProxy {
-                proxy: proxy::read(&folder.join(&entry.file))?,
-                file: entry.file,
-                fitted_without: entry.fitted_without,
-                other: entry.other,
-            }),
-            None => None,
-        };
         // Images without a photo take no part, just as at the import.
         let listed: BTreeSet<&str> = photos.iter().map(|p| p.name.as_str()).collect();
         let unlisted: BTreeSet<String> = posed
@@ -144,7 +135,7 @@ impl Scene {
         Ok(Self {
             photos,
             reconstruction,
-            proxy,
+            proxy: file.proxy.map(|entry| SceneProxy::read(entry, folder)),
             exposure: file.exposure,
             capture: at(&file.settings.capture),
             calibration: at(&file.settings.calibration),
@@ -305,8 +296,8 @@ impl Scene {
         fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
-            own.file = proxy_file(&own.proxy).to_owned();
-            proxy::write(&new.join(&own.file), &own.proxy, &[], &[])?;
+            own.file = proxy_file(own.surface()?).to_owned();
+            proxy::write(&new.join(&own.file), own.surface()?, &[], &[])?;
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
@@ -314,52 +305,6 @@ impl Scene {
         take_places(&PARTS, made, &new, folder)?;
         self.folder = Some(folder.to_owned());
         Ok(())
-    }
-
-    /// Makes a proxy the scene's own, in its folder, complete or not at all.
-    ///
-    /// # Errors
-    /// The scene has no folder; files that cannot be written: then the scene has the proxy that it had.
-    pub fn set_proxy(
-        &mut self,
-        proxy: Proxy,
-        fitted_without: Option<&BTreeSet<String>>,
-    ) -> Result<PathBuf, SceneError> {
-        let Some(folder) = self.folder.clone() else {
-            let capture = self.capture.clone().unwrap_or_default();
-            return Err(SceneError::NoFolder(capture.join(SCENE_FILE)));
-        };
-        let name = proxy_file(&proxy);
-        let other = self.proxy.as_ref().map(|own| own.other.clone());
-        let own = SceneProxy {
-            proxy,
-            file: name.to_owned(),
-            fitted_without: fitted_without.map(|names| names.iter().cloned().collect()),
-            other: other.unwrap_or_default(),
-        };
-        // Only this key changes: photos left out today may be back tomorrow.
-        let file = folder.join(SCENE_FILE);
-        let json = |source| SceneError::Json {
-            path: file.clone(),
-            expected: "a scene",
-            source,
-        };
-        let bytes = std::fs::read(&file).map_err(|e| io(&file, "read the scene", e))?;
-        let text = without_byte_order_mark(&bytes);
-        let mut whole: Extra = serde_json::from_slice(text).map_err(json)?;
-        let entry = serde_json::to_value(proxy_entry(&own)).map_err(json)?;
-        whole.insert("proxy".to_owned(), entry);
-
-        // 1. Both files, as everything by `write_parts`.
-        let (made, new) = make_within(&folder)?;
-        proxy::write(&new.join(name), &own.proxy, &[], &[])?;
-        write_json(&new.join(SCENE_FILE), &whole)?;
-
-        // 2. They take their places. The proxy is the first to leave and the last to come: killed meanwhile, the
-        //    scene lacks it, but never says of one what holds of another.
-        take_places(&[SCENE_FILE, name], made, &new, &folder)?;
-        self.proxy = Some(own);
-        Ok(folder.join(name))
     }
 
     /// Writes `scene.json` to `path`, its paths relative to `folder`.
@@ -385,6 +330,7 @@ impl Scene {
             })
         };
         let photos: Result<Vec<PhotoEntry>, SceneError> = self.photos.iter().map(entry).collect();
+        let own = self.proxy.as_ref().map(SceneProxy::entry).transpose()?;
         let mut settings = self.settings.clone();
         settings.capture = from_here(&self.capture)?;
         settings.calibration = from_here(&self.calibration)?;
@@ -393,7 +339,7 @@ impl Scene {
             photos: photos?,
             left_out: self.left_out.clone(),
             model: MODEL_FOLDER.to_owned(),
-            proxy: self.proxy.as_ref().map(proxy_entry),
+            proxy: own,
             exposure: self.exposure.clone(),
             settings,
             other: self.other.clone(),
@@ -402,25 +348,8 @@ impl Scene {
     }
 }
 
-/// The name of the file that holds a proxy.
-fn proxy_file(proxy: &Proxy) -> &'static str {
-    match proxy {
-        Proxy::Mesh(_) => PROXY_MESH,
-        _ => PROXY_FILE,
-    }
-}
-
-fn proxy_entry(own: &SceneProxy) -> ProxyEntry {
-    ProxyEntry {
-        kind: own.proxy.kind().to_owned(),
-        file: own.file.clone(),
-        fitted_without: own.fitted_without.clone(),
-        other: own.other.clone(),
-    }
-}
-
 /// Makes a folder within another, which goes away on errors, and one in it for what is new there.
-fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneError> {
+pub(super) fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneError> {
     let made = tempfile::Builder::new()
         .prefix(WORK_PREFIX)
         .tempdir_in(folder)
@@ -432,7 +361,12 @@ fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneError> {
 
 /// Has the parts of these names that are in `new` take their places in a scene's folder, all or none, as by
 /// [`exchange`]; both are of [`make_within`].
-fn take_places(parts: &[&str], made: TempDir, new: &Path, folder: &Path) -> Result<(), SceneError> {
+pub(super) fn take_places(
+    parts: &[&str],
+    made: TempDir,
+    new: &Path,
+    folder: &Path,
+) -> Result<(), SceneError> {
     let old = made.path().join("old");
     std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
     let exchanged = exchange(parts, new, folder, &old);
@@ -444,7 +378,7 @@ fn take_places(parts: &[&str], made: TempDir, new: &Path, folder: &Path) -> Resu
 }
 
 /// Into a folder in the making.
-fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneError> {
+pub(super) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SceneError> {
     let text = serde_json::to_string_pretty(value).map_err(|source| SceneError::Json {
         path: path.to_owned(),
         expected: "writable as JSON",
@@ -468,7 +402,7 @@ fn holds_photos(folder: &Path) -> bool {
     serde_json::from_slice::<SceneFile>(text).is_ok_and(|file| file.settings.undistorted)
 }
 
-fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {
+pub(super) fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {
     SceneError::Io {
         path: path.to_owned(),
         doing,

@@ -76,6 +76,46 @@ fn a_scene_keeps_any_kind_and_draws_from_it() {
 }
 
 #[test]
+fn a_scene_whose_own_proxy_is_lost_or_damaged_takes_another() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "proxy scene plane").ok();
+    let file = here.join("scene/proxy.json");
+    let whole = std::fs::read(&file).unwrap();
+    let draw = "render scene --path sweep --frames 1 --size 24x18 -o out";
+    for (left, problem) in [
+        (None, "No such file"),
+        (Some(&whole[..20]), "not a proxy file: "),
+    ] {
+        match left {
+            None => std::fs::remove_file(&file).unwrap(),
+            Some(bytes) => std::fs::write(&file, bytes).unwrap(),
+        }
+        // 1. Who asks for it is told, and what to do.
+        let error = lumigraph(here, draw).error(1);
+        let said = format!("scene/proxy.json: {problem}");
+        assert!(error.starts_with(&said), "{error}");
+        let remedy = "; fit another with `lumigraph proxy scene KIND`";
+        assert!(error.ends_with(remedy), "{error}");
+        let ran = lumigraph(here, "info scene").ok();
+        let note = format!("note: {error}");
+        assert!(ran.stderr.contains(&note), "{}", ran.stderr);
+        let said = "\nproxy    proxy.json, which cannot be read\n";
+        assert!(ran.stdout.contains(said), "{}", ran.stdout);
+        let info = lumigraph(here, "info scene --json").ok().json();
+        assert_eq!(info["proxy"]["error"], error);
+        // 2. Who does not has all else.
+        lumigraph(here, &format!("{draw} --proxy plane")).ok();
+        lumigraph(here, "export scene --format transforms -o t.json").ok();
+        // 3. So it is mended.
+        lumigraph(here, "proxy scene plane").ok();
+        assert!(std::fs::read(&file).unwrap() == whole);
+        lumigraph(here, draw).ok();
+    }
+}
+
+#[test]
 fn photos_without_sparse_points_are_compared() {
     // 1. As nerfstudio's format has it: cameras and poses.
     let folder = with("shelf");

@@ -6,7 +6,7 @@ use super::settings::{Renderer, Setting};
 use anyhow::Context;
 use calibrate::View;
 use image::RgbaImage;
-use lumigraph::scene::{Kind, Scene, Truth};
+use lumigraph::scene::{Kind, Scene, SceneProxy, Truth};
 use proxy::Proxy;
 use render::{Engine, Frame, Lumigraph, RenderError, prepare_within};
 use std::collections::{BTreeMap, BTreeSet};
@@ -96,9 +96,11 @@ pub(super) fn default_proxy(
     thorough: bool,
 ) -> anyhow::Result<(Proxy, Option<String>, String)> {
     let own = scene.proxy.as_ref();
+    // Of one that is lost nobody knows the kind, to fit another of.
+    own.map(SceneProxy::surface).transpose()?;
     if let Some(own) = own.filter(|own| seen_by(own, without).is_none()) {
         scene.check_own_proxy()?;
-        return Ok((own.proxy.clone(), None, "the scene's own".to_owned()));
+        return Ok((own.surface()?.clone(), None, "the scene's own".to_owned()));
     }
     let again = own.and_then(|own| kind_of(own, scene));
     let fitted = if let Some(kind) = again {
