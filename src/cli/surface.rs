@@ -86,6 +86,9 @@ impl ProxyArgs {
         let is_taken = self.proxy.is_none() && scene.proxy.is_some() && without.is_empty();
         if is_taken {
             scene.check_own_proxy()?;
+            if let Some(own) = &scene.proxy {
+                say_lack(scene, own.surface()?, without)?;
+            }
         }
         Ok(is_taken)
     }
@@ -106,6 +109,20 @@ impl ProxyArgs {
     /// The proxy asked for. A fitted one rests on none of the photos in `without`. With `strict` a
     /// photo that fitting it finds damaged is an error.
     pub(super) fn choose(
+        &self,
+        scene: &Scene,
+        without: &BTreeSet<String>,
+        strict: bool,
+    ) -> anyhow::Result<ChosenProxy> {
+        let chosen = self.found(scene, without, strict)?;
+        let mut fewer = without.clone();
+        fewer.extend(chosen.left_out.keys().cloned());
+        say_lack(scene, &chosen.proxy, &fewer)?;
+        Ok(chosen)
+    }
+
+    /// The same, but for a note on what it is made of.
+    fn found(
         &self,
         scene: &Scene,
         without: &BTreeSet<String>,
@@ -182,6 +199,15 @@ impl ProxyArgs {
             },
         }
     }
+}
+
+/// Says so where a proxy is made of sparse points for every view, and the photos but those of the given names observe
+/// none.
+fn say_lack(scene: &Scene, proxy: &Proxy, without: &BTreeSet<String>) -> Result<(), SceneError> {
+    if let Some(note) = scene.note_of_lack(proxy, without)? {
+        say!("note: {note}");
+    }
+    Ok(())
 }
 
 /// A photo among some that a scene's own proxy was fitted with, if there is one.

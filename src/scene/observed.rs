@@ -4,8 +4,11 @@
 use super::fit::{Kind, unfit};
 use super::{Scene, SceneError};
 use calibrate::View;
-use proxy::SparsePoint;
+use proxy::{Proxy, SparsePoint};
 use std::collections::BTreeSet;
+
+/// What does without sparse points.
+const INSTEAD: &str = "try dense, carved-dense or plane";
 
 impl Kind {
     /// Whether observations of sparse points have a say in it.
@@ -50,18 +53,61 @@ impl Scene {
 
     /// Fails where there is nothing that a kind of proxy is made of: sparse points, and who observes them.
     pub(super) fn needs_observed(&self, kind: Kind) -> Result<(), SceneError> {
-        let name = kind.name();
-        let others = "try dense, carved-dense or plane";
-        match (self.reconstruction.points.len(), self.observed_count()) {
-            (0, _) => Err(unfit(format!(
-                "the scene has no sparse points, which the {name} proxy is made of; {others}"
-            ))),
-            (count, 0) => Err(unfit(format!(
-                "no photo observes any of the {count} sparse points (the calibration has no tracks of \
-                 them), and the {name} proxy is made of who observes which; {others}"
-            ))),
-            _ => Ok(()),
+        match self.lack_of_observed(kind.name(), &BTreeSet::new())? {
+            Some(lack) => Err(unfit(format!("{lack}; {INSTEAD}"))),
+            None => Ok(()),
         }
+    }
+
+    /// What people should know of a proxy that is made for every view of the sparse points which the photos but those
+    /// of the given names observe: that these observe none, and another surface is drawn.
+    ///
+    /// # Errors
+    /// A camera has no lens.
+    pub fn note_of_lack(
+        &self,
+        proxy: &Proxy,
+        without: &BTreeSet<String>,
+    ) -> Result<Option<String>, SceneError> {
+        if !matches!(proxy, Proxy::ViewPlane | Proxy::Points { .. }) {
+            return Ok(None);
+        }
+        let lack = self.lack_of_observed(proxy.kind(), without)?;
+        Ok(lack.map(|lack| {
+            format!(
+                "{lack}; in its place is the plane across what these photos look at, if they tell of one: \
+                 {INSTEAD}"
+            )
+        }))
+    }
+
+    /// Why a proxy of a kind's name cannot be made of the sparse points that the photos but those of the given names
+    /// observe, if these observe none.
+    fn lack_of_observed(
+        &self,
+        name: &str,
+        without: &BTreeSet<String>,
+    ) -> Result<Option<String>, SceneError> {
+        let observed = self.observed_count();
+        let left = match without.is_empty() {
+            true => observed,
+            false => self.observed(without)?.1.len(),
+        };
+        let lack = match (self.reconstruction.points.len(), observed, left) {
+            (0, ..) => {
+                format!("the scene has no sparse points, which the {name} proxy is made of")
+            }
+            (count, 0, _) => format!(
+                "no photo observes any of the {count} sparse points (the calibration has no tracks of \
+                 them), and the {name} proxy is made of who observes which"
+            ),
+            (count, _, 0) => format!(
+                "the photos that are left share none of the {count} sparse points, which the {name} \
+                 proxy is made of"
+            ),
+            _ => return Ok(None),
+        };
+        Ok(Some(lack))
     }
 
     /// What people should know of points that no photo observes, where they might expect a kind of proxy (`None`
@@ -82,4 +128,48 @@ impl Scene {
 fn observed(mut points: Vec<SparsePoint>) -> Vec<SparsePoint> {
     points.retain(|point| !point.seen_by.is_empty());
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use datasets::Options;
+
+    #[test]
+    fn photos_that_are_left_may_share_no_points() {
+        let options = Options {
+            size: Some((64, 48)),
+            views: Some(6),
+            samples_per_side: Some(1),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let capture = folder.path().join("wall");
+        let made = datasets::by_name("wall", &options).unwrap();
+        datasets::write(&made, &capture).unwrap();
+        let (scene, _) = Scene::open(&capture, false).unwrap();
+        let none = BTreeSet::new();
+        let all_but =
+            |count: usize| -> BTreeSet<String> { scene.names().into_iter().skip(count).collect() };
+        let lack = |without: &BTreeSet<String>| {
+            [Proxy::ViewPlane, Proxy::Points { within: None }]
+                .map(|proxy| scene.note_of_lack(&proxy, without).unwrap())
+        };
+
+        // 1. Two share some. Of one alone, nobody else saw any.
+        for without in [&none, &all_but(2)] {
+            assert_eq!(lack(without), [None, None]);
+        }
+        let count = scene.reconstruction.points.len();
+        let notes = ["view-plane", "points"].map(|name| {
+            Some(format!(
+                "the photos that are left share none of the {count} sparse points, which the {name} proxy is made of; \
+                 in its place is the plane across what these photos look at, if they tell of one: {INSTEAD}"
+            ))
+        });
+        assert_eq!(lack(&all_but(1)), notes);
+
+        // 2. Other kinds are made before there is a view.
+        let plane = scene.fit(Kind::Plane, &none).unwrap().proxy;
+        assert_eq!(scene.note_of_lack(&plane, &all_but(1)).unwrap(), None);
+    }
 }

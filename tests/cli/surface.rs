@@ -190,7 +190,11 @@ fn points_that_no_photo_observes_count_for_where_they_are_alone() {
         let number = |name: &str| mean[name].as_f64().unwrap();
         (number("psnr"), number("coverage"), ran.stderr)
     };
-    assert!(evaluate("views.json").1 > 0.8);
+    let (_, coverage, said) = evaluate("views.json");
+    assert!(coverage > 0.8);
+    let note = format!("note: no photo observes any of the {count} sparse points (");
+    assert!(said.contains(&note), "{said}");
+    assert!(said.contains("; in its place is the plane"), "{said}");
     // 4. Photos are compared as if there were no points.
     let (with, _, said) = evaluate("dense");
     let note = format!("note: no photo observes {count} of {count} sparse points");
@@ -199,6 +203,31 @@ fn points_that_no_photo_observes_count_for_where_they_are_alone() {
     let (without, _, said) = evaluate("dense");
     assert!(with == without && with > 30.0, "{with} {without}");
     assert!(!said.contains("no photo observes"), "{said}");
+}
+
+#[test]
+fn points_that_photos_left_do_not_share_are_told() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    lumigraph(here, "proxy scene points").ok();
+    lumigraph(here, "proxy wall points -o points.json").ok();
+    let names: Vec<String> = (1..9).map(|i| format!("{i:04}.png")).collect();
+    let split = serde_json::json!({"test": names}).to_string();
+    std::fs::write(here.join("all-but-one.json"), split).unwrap();
+    let draw = |options: &str| {
+        let line = format!("field scene --view 0000.png -o f.png{options}");
+        lumigraph(here, &line)
+    };
+    let told = "note: the photos that are left share none of the ";
+    for proxy in ["", " --proxy points.json", " --proxy points"] {
+        let held = " --hold-out all-but-one.json";
+        let said = draw(&format!("{held}{proxy}")).ok().stderr;
+        assert_eq!(said.matches(told).count(), 1, "{said}");
+        assert!(said.contains("; in its place is the plane"), "{said}");
+        let said = draw(proxy).ok().stderr;
+        assert!(!said.contains("in its place"), "{said}");
+    }
 }
 
 #[test]
