@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// A COLMAP model is a folder; transforms.json (nerfstudio) and OpenCV's calibration are a
 /// file, which names the photos by their paths from where it lies, transforms.json their ignore
-/// masks and depth maps, too. Photos are not copied.
+/// masks, depth maps and times, too. Photos are not copied.
 /// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
 /// all of them can. Tilted sensors and skewed fisheyes are OpenCV's alone.
 ///
@@ -40,11 +40,11 @@ pub(super) struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Format {
-    /// COLMAP's binary model: everything
+    /// COLMAP's binary model: cameras, poses, points and their tracks
     Colmap,
-    /// COLMAP's text model: everything, of photos without white space in their names
+    /// COLMAP's text model: the same, of photos without white space in their names
     ColmapText,
-    /// nerfstudio's transforms.json: cameras and poses
+    /// nerfstudio's transforms.json: cameras, poses and times
     Transforms,
     /// OpenCV's YAML: one camera and its poses; the corners of a board
     #[value(name = "opencv")]
@@ -144,7 +144,7 @@ fn check_model_folder<'a>(scene: &'a Scene, output: &Path) -> anyhow::Result<()>
     Ok(())
 }
 
-/// The files of a scene's photos by the photos' names, as seen from a file's folder.
+/// The files of a scene's photos by the photos' names, as seen from a file's folder, and their times.
 fn files<'a>(scene: &'a Scene, file: &Path) -> Result<BTreeMap<&'a str, FrameFiles>, SceneError> {
     let folder = match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -158,6 +158,7 @@ fn files<'a>(scene: &'a Scene, file: &Path) -> Result<BTreeMap<&'a str, FrameFil
             photo: relative(folder, &photo.path)?,
             mask: beside(photo.ignore_mask.as_deref())?,
             depth: beside(depth)?,
+            time_s: photo.time_s,
         };
         Ok((photo.name.as_str(), files))
     };
@@ -171,6 +172,7 @@ fn of(files: &BTreeMap<&str, FrameFiles>, image: &Image) -> FrameFiles {
         photo: image.name.clone(),
         mask: None,
         depth: None,
+        time_s: None,
     })
 }
 
@@ -212,12 +214,21 @@ fn say_beside(scene: &Scene, format: Format) {
              photos, all in the same steps"
         );
     }
-    // Of nerfstudio's, masks and depth maps are dealt with.
+    // Of nerfstudio's, masks, depth maps and times are dealt with.
     let has_place = |what: &str| is_transforms && ["ignore masks", "depth maps"].contains(&what);
     let others = counts
         .into_iter()
         .filter(|(what, n)| *n > 0 && !has_place(what));
-    let others: Vec<String> = others.map(|(what, n)| format!("{n} {what}")).collect();
+    let mut others: Vec<String> = others.map(|(what, n)| format!("{n} {what}")).collect();
+    let count = |has: fn(&Photo) -> bool| scene.photos.iter().filter(|p| has(p)).count();
+    for (what, n, has_place) in [
+        ("times", count(|p| p.time_s.is_some()), is_transforms),
+        ("gains", count(|p| p.gain.is_some()), false),
+    ] {
+        if n > 0 && !has_place {
+            others.push(format!("{what} of {n} photos"));
+        }
+    }
     if !others.is_empty() {
         let others = others.join(", ");
         say!("note: left out: {others}; the format has no place for them");

@@ -84,6 +84,50 @@ fn every_format_brings_back_the_cameras_and_the_pictures() {
 }
 
 #[test]
+fn times_go_out_where_they_have_a_place_and_are_told_elsewhere() {
+    let folder = with_wall();
+    let here = folder.path();
+    let lines: Vec<String> = (0..9)
+        .map(|i| format!("{i:04}.png,{}\n", 0.1 * f64::from(i)))
+        .collect();
+    fs::write(here.join("wall/times.csv"), lines.concat()).unwrap();
+    let run = |line: &str| lumigraph(here, line).ok();
+    let scene = |name: &str| -> serde_json::Value {
+        let file = here.join(name).join("scene.json");
+        serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
+    };
+    run("import wall -o scene");
+    let mut file = scene("scene");
+    file["photos"][3]["gain"] = json!([0.5, 0.5, 0.5]);
+    fs::write(here.join("scene/scene.json"), file.to_string()).unwrap();
+    let notes = |format: &str| {
+        let said = run(&format!("export scene --format {format} -o {format}")).stderr;
+        let left_out = |line: &&str| line.starts_with("note: left out: ");
+        said.lines().filter(left_out).collect::<String>()
+    };
+    let no_place = "the format has no place for them";
+    assert_eq!(
+        notes("transforms"),
+        format!("note: left out: gains of 1 photos; {no_place}")
+    );
+    for format in ["colmap", "colmap-text", "opencv"] {
+        assert_eq!(
+            notes(format),
+            format!(
+                "note: left out: 9 depth maps, times of 9 photos, gains of 1 photos; {no_place}"
+            )
+        );
+    }
+    run("import wall/images --calibration transforms -o back");
+    let back = scene("back");
+    for i in 0..9_usize {
+        let (was, is) = (&file["photos"][i], &back["photos"][i]);
+        assert!(was["time_s"].is_f64(), "{was}");
+        assert_eq!(was["time_s"], is["time_s"]);
+    }
+}
+
+#[test]
 fn what_a_format_lacks_is_said_and_undistorting_helps() {
     let folder = with_wall();
     let sparse = folder.path().join("wall/sparse/0");

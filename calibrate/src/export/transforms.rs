@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 
 const FORMAT: &str = "transforms.json";
 
-/// The files of a frame, by their paths from the folder that `transforms.json` lies in.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The files of a frame, by their paths from the folder that `transforms.json` lies in, and its time.
+#[derive(Clone, Debug, PartialEq)]
 pub struct FrameFiles {
     /// The photo.
     pub photo: String,
@@ -25,6 +25,8 @@ pub struct FrameFiles {
     /// Depth along z, 16-bit grey. nerfstudio takes 1000 steps for a unit, if it is not told
     /// otherwise.
     pub depth: Option<String>,
+    /// When the photo was taken, in seconds, where known.
+    pub time_s: Option<f64>,
 }
 
 /// The text of a `transforms.json`: a frame for each image, in the order of their ids.
@@ -80,7 +82,12 @@ pub fn transforms_json(
 
     // 3. The frames.
     let frame = |image: &Image| {
-        let FrameFiles { photo, mask, depth } = files_of(image);
+        let FrameFiles {
+            photo,
+            mask,
+            depth,
+            time_s,
+        } = files_of(image);
         let mut frame = Map::new();
         frame.insert("file_path".to_owned(), json!(photo));
         if let Some(mask) = mask {
@@ -88,6 +95,9 @@ pub fn transforms_json(
         }
         if let Some(depth) = depth {
             frame.insert("depth_file_path".to_owned(), json!(depth));
+        }
+        if let Some(time_s) = time_s {
+            frame.insert("time".to_owned(), json!(time_s));
         }
         if !shared {
             frame.extend(intrinsics[&image.camera_id].clone());

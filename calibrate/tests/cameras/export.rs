@@ -93,6 +93,7 @@ fn through_transforms(whole: &Reconstruction) -> Reconstruction {
         photo: image.name.clone(),
         mask: None,
         depth: None,
+        time_s: None,
     };
     fs::write(&path, transforms_json(whole, &files).unwrap()).unwrap();
     read_transforms(&path, &|name| panic!("{name}: the size is in the file")).unwrap()
@@ -279,6 +280,7 @@ fn the_keys_are_those_that_nerfstudio_reads() {
         photo: image.name.clone(),
         mask: (image.name.contains('1')).then(|| "m.png".to_owned()),
         depth: (image.name.contains('1')).then(|| "d.png".to_owned()),
+        time_s: (image.name.contains('1')).then_some(0.1),
     };
     let json = |cameras: &[Camera]| -> serde_json::Value {
         let whole = reconstruction(cameras, &[Rigid3::IDENTITY; 2]);
@@ -305,6 +307,8 @@ fn the_keys_are_those_that_nerfstudio_reads() {
     assert_eq!(shared["frames"][1]["mask_path"], "m.png");
     assert!(shared["frames"][0].get("depth_file_path").is_none());
     assert_eq!(shared["frames"][1]["depth_file_path"], "d.png");
+    assert!(shared["frames"][0].get("time").is_none());
+    assert_eq!(shared["frames"][1]["time"], 0.1);
 
     let own = json(&expressible()[1..3]);
     assert_eq!(own["camera_model"], "OPENCV");
@@ -322,6 +326,7 @@ fn what_cannot_be_expressed_is_named() {
             photo: image.name.clone(),
             mask: None,
             depth: None,
+            time_s: None,
         };
         transforms_json(&one(cameras), &files)
             .unwrap_err()
