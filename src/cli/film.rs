@@ -328,6 +328,11 @@ impl FilmArgs {
             .with_context(|| video.display().to_string())
     }
 
+    /// The film's file, if one is asked for.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.video.as_deref()
+    }
+
     /// The film as JSON names it, if one is asked for.
     pub(super) fn video(&self) -> Option<PathBuf> {
         self.video.as_deref().map(in_unicode)

@@ -193,6 +193,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     let (mut scene, warnings) = imported?;
+    scene.video = is_video.then(|| args.photos.clone());
     print_warnings(&warnings);
     if args.strict {
         check_photos(&scene)?;

@@ -26,10 +26,11 @@ pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
 }
 
 /// All files that belong to a scene or a capture, whether or not they decide any picture: its photos, those
-/// left out, too, its calibration, its splits.
+/// left out, too, the video that they were taken out of, its calibration, its splits.
 pub(super) fn files_behind_scene(given: &Path, scene: &Scene) -> Vec<PathBuf> {
     let mut all = files_of(scene);
     all.extend(files_of_places(given));
+    all.extend(video_of(given));
     let origin = scene.calibration.as_deref().or(scene.capture.as_deref());
     let origin = origin.and_then(calibration_in);
     all.extend(origin.iter().flat_map(|path| parts_of(path)));
@@ -99,12 +100,22 @@ pub(super) fn files_of_places(folder: &Path) -> Vec<PathBuf> {
 
 /// The model of a scene's folder, or the calibration of a capture.
 pub(super) fn calibration_of(folder: &Path) -> Option<PathBuf> {
-    let file = folder.join("scene.json");
-    let scene = std::fs::read(&file).ok();
-    match scene.and_then(|bytes| SceneFile::parse(&file, &bytes).ok()) {
+    match scene_file(folder) {
         Some(scene) => Some(folder.join(scene.model)),
         None => calibration_in(folder),
     }
+}
+
+/// The video that the photos of a scene's folder were taken out of, if they were.
+pub(super) fn video_of(folder: &Path) -> Option<PathBuf> {
+    Some(folder.join(scene_file(folder)?.settings.video?))
+}
+
+/// What makes a folder a scene, if it is one.
+fn scene_file(folder: &Path) -> Option<SceneFile> {
+    let file = folder.join("scene.json");
+    let bytes = std::fs::read(&file).ok()?;
+    SceneFile::parse(&file, &bytes).ok()
 }
 
 /// The calibration that `import` reads of a capture's folder, or is told by a file: a COLMAP model's folder or a

@@ -91,6 +91,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_folder(&args.output)?;
     args.film.check(&args.output)?;
     let scene = args.scene.open()?;
+    // Photos that are left out, too, are nobody's to replace, nor the video that they were taken out of.
+    let kept = files_behind_scene(&args.scene.scene, &scene);
+    check_inputs(args.film.file(), &kept)?;
     let without = args.hold_out.names(&scene)?;
     let asked = asked.in_scene(&scene);
     // What need not be derived is checked first: fitting a proxy may take long.
@@ -129,8 +132,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
     let all_files = all_files?;
     let files = chosen.of(all_files.clone())?;
-    // Photos that are left out, too, are nobody's to replace.
-    let kept = files_behind_scene(&args.scene.scene, &session.scene);
     check_inputs(all_files.iter().map(PathBuf::as_path), &kept)?;
     let kind_or_file = [&args.views.path, &args.proxy.proxy].into_iter().flatten();
     let named = [&args.views.views, &args.hold_out.hold_out].into_iter();

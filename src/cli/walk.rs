@@ -7,7 +7,7 @@ mod tour;
 use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::inputs::{files_behind, scenes_of};
+use super::inputs::{files_behind, scenes_of, video_of};
 use super::interior::check_holds_none;
 use super::made::{self, Made};
 use super::notes::Notes;
@@ -18,7 +18,7 @@ use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
 use super::shot::say_other_look;
-use super::targets::{check_folder, others};
+use super::targets::{check_folder, check_inputs, others};
 use super::took::Start;
 use anyhow::{Context, bail};
 use calibrate::View;
@@ -188,6 +188,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Some(_) => scenes_of(&opened.file, &opened.interior),
         None => Vec::new(),
     };
+    let videos: Vec<PathBuf> = scenes.iter().filter_map(|scene| video_of(scene)).collect();
+    check_inputs(args.film.file(), &videos)?;
     let named = args.path.iter().chain(args.nerfstudio.file()).cloned();
     inputs.extend(files_behind(named, &scenes));
     args.nerfstudio.say_unused(args.path.as_ref());

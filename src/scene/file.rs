@@ -144,6 +144,9 @@ pub struct Settings {
     /// The folder that was imported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capture: Option<String>,
+    /// The video that the photos were taken out of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub video: Option<String>,
     /// The calibration that was given beside it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<String>,

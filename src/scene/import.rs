@@ -218,6 +218,7 @@ impl Scene {
             },
             folder: None,
             capture: Some(capture.to_owned()),
+            video: None,
             calibration: options.calibration.clone(),
             left_out: Vec::new(),
             other: Extra::new(),

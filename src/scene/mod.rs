@@ -82,6 +82,8 @@ pub struct Scene {
     pub folder: Option<PathBuf>,
     /// The folder with the photos and their calibration, where known.
     pub capture: Option<PathBuf>,
+    /// The video that the photos were taken out of, if they were.
+    pub video: Option<PathBuf>,
     /// The calibration that was given beside it, if one was.
     pub calibration: Option<PathBuf>,
     /// Photos that are calibrated but missing or corrupt, now or at the import, or dropped as weakly

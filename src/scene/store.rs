@@ -138,6 +138,7 @@ impl Scene {
             proxy: file.proxy.map(|entry| SceneProxy::read(entry, folder)),
             exposure: file.exposure,
             capture: at(&file.settings.capture),
+            video: at(&file.settings.video),
             calibration: at(&file.settings.calibration),
             settings: file.settings,
             folder: Some(folder.to_owned()),
@@ -281,6 +282,7 @@ impl Scene {
             inputs.extend(beside.into_iter().flatten().cloned());
         }
         inputs.extend(self.capture.clone());
+        inputs.extend(self.video.clone());
         inputs
     }
 
@@ -334,6 +336,9 @@ impl Scene {
         let mut settings = self.settings.clone();
         settings.capture = from_here(&self.capture)?;
         settings.calibration = from_here(&self.calibration)?;
+        // Nothing is read of it again: where its path is one that no JSON holds, it is not named.
+        let video = self.video.as_ref();
+        settings.video = video.and_then(|video| relative(folder, video).ok());
         let file = SceneFile {
             version: 1,
             photos: photos?,

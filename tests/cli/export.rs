@@ -228,6 +228,16 @@ fn nothing_that_belongs_to_a_scene_is_written_over() {
             refused(&line, &format!("{folder}: {what} this very folder"));
         }
     }
+    // Nor the video that photos were taken out of.
+    let path = here.join("scene/scene.json");
+    let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    scene["settings"]["video"] = json!("../sweep.mp4");
+    fs::write(&path, scene.to_string()).unwrap();
+    fs::write(here.join("sweep.mp4"), "a video").unwrap();
+    refused(
+        "scene --format opencv -o sweep.mp4",
+        "sweep.mp4: the scene is made of this very",
+    );
     // What is nobody's is.
     for _ in 0..2 {
         lumigraph(here, "export scene --format transforms -o wall/t.json").ok();

@@ -230,6 +230,15 @@ fn a_video_becomes_a_scene_with_times() {
         assert_eq!(photo["path"], path.as_str());
     }
 
+    // The video is no film's to be.
+    assert_eq!(scene["settings"]["video"], "../sweep.mp4");
+    let before = fs::read(&video).unwrap();
+    let render = "render scene --proxy plane --path sweep --frames 2 --size 48x36 -o out --video";
+    let error = lumigraph(here.path(), &format!("{render} sweep.mp4")).error(1);
+    let said = "sweep.mp4: pictures are made of this very file";
+    assert!(error.starts_with(said), "{error}");
+    assert!(fs::read(&video).unwrap() == before && !here.path().join("out").exists());
+
     // Interrupted before the scene was written, and again with --force: the frames stay.
     let frames = files(&here.path().join("scene/photos"));
     fs::remove_file(here.path().join("scene/scene.json")).unwrap();
