@@ -18,7 +18,7 @@ pub(super) struct ExposureArgs {
 
 /// What became of the photos' exposures.
 pub(super) struct ExposureUsed {
-    /// Smallest and largest gain of all photos and channels; `None` where none is used.
+    /// Smallest and largest gain of all channels and photos that are not held out; `None` where none is used.
     range: Option<(f64, f64)>,
     how: How,
     seconds: f64,
@@ -59,7 +59,11 @@ impl ExposureArgs {
             left_out = matched.left_out;
             How::Matched(matched.verdict)
         };
-        let gains = scene.photos.iter().filter_map(|p| p.gain).flatten();
+        // Of photos that are drawn from one without a gain counts as if it were 1.
+        let drawn = || scene.photos.iter().filter(|p| !without.contains(&p.name));
+        let has_gains = drawn().any(|p| p.gain.is_some());
+        let gains = drawn().filter(|_| has_gains);
+        let gains = gains.flat_map(|p| p.gain.unwrap_or([1.0; 3]));
         let range = gains.fold(None, |range: Option<(f64, f64)>, gain| {
             let (low, high) = range.unwrap_or((gain, gain));
             Some((low.min(gain), high.max(gain)))

@@ -113,6 +113,33 @@ fn photos_of_one_exposure_are_drawn_as_they_are() {
 }
 
 #[test]
+fn photos_without_a_gain_beside_others_count_as_one() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall --no-exposure -o scene").ok();
+    let path = here.join("scene/scene.json");
+    let mut scene: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    scene["photos"][3]["gain"] = serde_json::json!([0.5, 0.5, 0.5]);
+    std::fs::write(&path, scene.to_string()).unwrap();
+    let exposure = evaluate(here, "scene --size 24x18")["exposure"].clone();
+    assert_eq!(exposure["how"], "the scene's own");
+    assert_eq!(exposure["range"], serde_json::json!([0.5, 1.0]));
+    let line = "evaluate scene --size 24x18 --proxy plane";
+    let said = lumigraph(here, line).ok().stderr;
+    let range = "exposure: gains 0.500 to 1.000 (the scene's own)";
+    assert!(said.contains(range), "{said}");
+    // One that is held out is not drawn from.
+    let every = "scene --every 2 --size 24x18";
+    scene["photos"][3]["gain"] = Value::Null;
+    scene["photos"][4]["gain"] = serde_json::json!([0.5, 0.5, 0.5]);
+    std::fs::write(&path, scene.to_string()).unwrap();
+    let held_out = evaluate(here, every);
+    let names = held_out["photos"].as_array().unwrap().iter();
+    assert!(names.map(|p| &p["name"]).any(|name| name == "0004.png"));
+    assert_eq!(held_out["exposure"]["used"], false);
+}
+
+#[test]
 fn held_out_photos_have_no_say() {
     let folder = with_wall();
     expose(folder.path(), gain);
