@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 use image::RgbaImage;
 use render::blend::Contributor;
 use render::field::FieldTriangle;
-use render::path::NerfstudioFrame;
+use render::path::{NerfstudioFrame, default_name};
 use render::picture::{contributors_exact, field_picture, palette};
 use render::triangulation::{Triangulation, to_svg};
 use render::{Frame, Method, Part, TriangulatedField};
@@ -106,7 +106,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let known = match asked.transpose()? {
         None => Ok((scene.view(&args.view)?, scene.time_s(&args.view))),
         Some(Asked::Read { views, .. }) => Ok(frame_of(views, &args.view)?),
-        Some(derived) => Err(derived),
+        Some(derived) => {
+            let names: Vec<String> = (0..args.frames as usize).map(default_name).collect();
+            frame_called(&args.view, &names)?;
+            Err(derived)
+        }
     };
     if args.proxy.is_searched(&scene, &without) {
         // Kinds are compared by what is drawn, which is exposed alike.
@@ -191,13 +195,17 @@ fn check_extensions(args: &Args) -> Result<(), Usage> {
 }
 
 /// The view of one frame of a path, and its time.
-fn frame_of(frames: Vec<NamedView>, name: &str) -> anyhow::Result<(View, Option<f64>)> {
-    let count = frames.len();
-    let names: Vec<String> = frames.iter().take(2).map(|f| f.name.clone()).collect();
-    let found = frames.into_iter().find(|f| f.name == name);
-    found.map(|f| (f.view, f.time_s)).ok_or_else(|| {
-        let names = names.join(", ");
-        anyhow!("--view {name}: the path has {count} frames of other names: {names}, …")
+fn frame_of(mut frames: Vec<NamedView>, name: &str) -> anyhow::Result<(View, Option<f64>)> {
+    let names: Vec<String> = frames.iter().map(|f| f.name.clone()).collect();
+    let found = frames.swap_remove(frame_called(name, &names)?);
+    Ok((found.view, found.time_s))
+}
+
+/// Which of a path's frames is called so.
+fn frame_called(name: &str, names: &[String]) -> anyhow::Result<usize> {
+    names.iter().position(|n| n == name).ok_or_else(|| {
+        let (count, first) = (names.len(), names[..names.len().min(2)].join(", "));
+        anyhow!("--view {name}: the path has {count} frames of other names: {first}, …")
     })
 }
 

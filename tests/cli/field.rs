@@ -155,4 +155,14 @@ fn unknown_views_are_named() {
         error,
         "no photo is called 4.png; the scene has 0000.png, 0001.png and 7 more"
     );
+    // Before a proxy is fitted, for which this scene has no silhouettes.
+    for (options, count) in [("", 30), (" --frames 12", 12)] {
+        let line =
+            format!("field wall --proxy hull --path orbit{options} --view frame_0030 -o f.png");
+        let error = lumigraph(folder.path(), &line).error(1);
+        let said = format!(
+            "--view frame_0030: the path has {count} frames of other names: frame_0000, frame_0001, …"
+        );
+        assert_eq!(error, said);
+    }
 }

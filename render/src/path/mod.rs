@@ -227,8 +227,8 @@ impl PathFrame {
     }
 }
 
-/// The name of a frame that was given none.
-pub(crate) fn default_name(index: usize) -> String {
+/// The name of a frame that was given none, as of all frames of derived paths.
+pub fn default_name(index: usize) -> String {
     format!("frame_{index:04}")
 }
 
