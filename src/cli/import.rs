@@ -195,6 +195,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut scene, warnings) = imported?;
     scene.video = is_video.then(|| args.photos.clone());
     print_warnings(&warnings);
+    let has_depth = scene.photos.iter().any(|photo| photo.depth_map.is_some());
+    if args.depth_scale != DEPTH_UNITS_PER_STEP && !has_depth {
+        say!("note: --depth-scale changes nothing: no photo has a depth map");
+    }
     if args.strict {
         check_photos(&scene)?;
     }

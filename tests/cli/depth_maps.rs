@@ -105,6 +105,22 @@ fn maps_that_a_transforms_file_names_as_well_are_told_once() {
 }
 
 #[test]
+fn a_scale_of_no_maps_is_told() {
+    let folder = with_wall();
+    let here = folder.path();
+    let note = "note: --depth-scale changes nothing: no photo has a depth map\n";
+    let said = |options: &str| {
+        let line = format!("import wall{options} --force -o scene");
+        lumigraph(here, &line).ok().stderr
+    };
+    assert!(!said(" --depth-scale 0.01").contains(note));
+    fs::remove_dir_all(here.join("wall/depth")).unwrap();
+    assert!(!said("").contains(note));
+    let said = said(" --depth-scale 0.01");
+    assert!(said.contains(note), "{said}");
+}
+
+#[test]
 fn maps_whose_largest_value_may_mean_none_are_told_once() {
     let folder = with_wall();
     let here = folder.path();
