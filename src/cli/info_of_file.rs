@@ -1,8 +1,9 @@
 //! `lumigraph info` of a calibration's file without photos.
 
 use super::output::{print, print_json, say};
+use anyhow::anyhow;
 use calibrate::colmap::{self, ColmapError};
-use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera};
+use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera, OpenCvError};
 use calibrate::{Camera, Reconstruction, formats};
 use lumigraph::scene::{self, Sizes};
 use serde_json::{Value, json};
@@ -35,7 +36,7 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
             of_reconstruction(&whole, Sizes::Known)
         }
         None => {
-            let calibration = opencv::read_calibration(path, keys)?;
+            let calibration = opencv::read_calibration(path, keys).map_err(unknown)?;
             for note in &calibration.notes {
                 say!("note: {note}");
             }
@@ -43,6 +44,23 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
         }
     };
     print_info(&info, as_json)
+}
+
+/// Of a file that is none of OpenCV's, as the last that it could be, what all of them are.
+fn unknown(error: OpenCvError) -> anyhow::Error {
+    match error {
+        OpenCvError::NotStorage { path, problem } => {
+            let remedy = scene::remedy_of_model(&path);
+            let remedy = remedy.map_or_else(String::new, |remedy| format!("; {remedy}"));
+            anyhow!(
+                "{}: no calibration that is known here: {problem}; expected a file of a COLMAP model, OpenCV's \
+                 (YAML, XML or JSON, gzip or not), a transforms.json, or Bundler's, VisualSFM's, LLFF's, \
+                 Meshroom's or OpenMVG's{remedy}",
+                path.display()
+            )
+        }
+        error => error.into(),
+    }
 }
 
 /// The same of the folder of a COLMAP model.

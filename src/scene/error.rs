@@ -2,7 +2,7 @@ use super::damaged::damaged_text;
 use capture::as_argument;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a scene cannot be made, read, written or rendered from.
 #[derive(Debug, thiserror::Error)]
@@ -127,6 +127,15 @@ pub enum SceneError {
     /// There is nothing at the given path.
     #[error("{}: there is no such folder; check the path", .0.display())]
     NoFolder(PathBuf),
+    /// There is a file at the given path.
+    #[error(
+        "{}: a file, and a folder is expected: a scene's, or that of photos and their calibration{}",
+        path.display(), more(remedy_of_model(path).as_deref())
+    )]
+    NotFolder {
+        /// The file.
+        path: PathBuf,
+    },
     /// The capture holds no photos.
     #[error(
         "{}: no photos here, neither in it nor in `images` or other folders within; give the folder \
@@ -256,6 +265,25 @@ pub enum SceneError {
     /// Every photo is held out or corrupt.
     #[error("no photo is left to render from: all {0} are held out or corrupt")]
     NothingLeft(usize),
+}
+
+impl SceneError {
+    /// Of what was to be a folder and is none.
+    pub(super) fn no_folder(path: &Path) -> Self {
+        let path = path.to_owned();
+        match path.is_file() {
+            true => Self::NotFolder { path },
+            false => Self::NoFolder(path),
+        }
+    }
+}
+
+/// What takes a file that is called like a model.
+pub fn remedy_of_model(path: &Path) -> Option<String> {
+    let end = path.extension().unwrap_or_default();
+    let argument = as_argument(path);
+    end.eq_ignore_ascii_case("glb")
+        .then(|| format!("`lumigraph interior {argument} -o INTERIOR` takes models"))
 }
 
 /// What else there is to say, after all.

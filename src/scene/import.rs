@@ -95,7 +95,7 @@ impl Scene {
         // 1. The calibration.
         let mut warnings = Vec::new();
         if !capture.is_dir() {
-            return Err(SceneError::NoFolder(capture.to_owned()));
+            return Err(SceneError::no_folder(capture));
         }
         let source = calibration::find(capture, options, &mut warnings)?;
 
@@ -167,7 +167,7 @@ impl Scene {
     /// There are none; a folder that cannot be listed; a name that is not UTF-8.
     pub fn photos_of(capture: &Path) -> Result<PhotoSet, SceneError> {
         if !capture.is_dir() {
-            return Err(SceneError::NoFolder(capture.to_owned()));
+            return Err(SceneError::no_folder(capture));
         }
         let folder = find_photos_within(capture, &beside::FOLDERS)
             .ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;

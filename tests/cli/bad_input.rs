@@ -94,6 +94,26 @@ fn no_model_and_no_photos() {
 }
 
 #[test]
+fn a_file_in_place_of_a_folder() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::write(here.join("house.glb"), b"glTF\x02\0\0\0").unwrap();
+    let takes_models = "; `lumigraph interior house.glb -o INTERIOR` takes models";
+    for (file, remedy) in [("house.glb", takes_models), ("wall/images/0000.png", "")] {
+        let line = format!("render {file} --path orbit -o out");
+        let expected = "a folder is expected: a scene's, or that of photos and their calibration";
+        assert_eq!(
+            lumigraph(here, &line).error(1),
+            format!("{file}: a file, and {expected}{remedy}")
+        );
+        let error = lumigraph(here, &format!("info {file}")).error(1);
+        let said = "no calibration that is known here: the file is binary; expected a file of a COLMAP model, ";
+        assert!(error.starts_with(&format!("{file}: {said}")), "{error}");
+        assert!(error.ends_with(&format!("OpenMVG's{remedy}")), "{error}");
+    }
+}
+
+#[test]
 fn a_photo_of_the_wrong_size() {
     let folder = with_wall();
     let path = folder.path().join("wall/images/0003.png");
