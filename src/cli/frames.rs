@@ -25,7 +25,7 @@ pub(super) struct ViewArgs {
 }
 
 /// The kind of derived path that has a name.
-fn derived(asked: &str) -> Option<Trajectory> {
+pub(super) fn derived(asked: &str) -> Option<Trajectory> {
     match asked {
         "orbit" => Some(Trajectory::Orbit),
         "dolly" => Some(Trajectory::Dolly),

@@ -1,12 +1,14 @@
 //! `lumigraph path`
 
+use super::Usage;
+use super::frames::derived;
 use super::output::{make_parent, print, say};
 use super::targets::{check_apart, check_file};
 use clap::ValueEnum;
 use render::path::{
     self, CameraPath, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Turn a camera path into nerfstudio's format, or into this program's
 ///
@@ -88,7 +90,19 @@ fn has_times(path: &CameraPath) -> bool {
     timed.any(|(index, time_s)| (time_s - index as f64 / path.fps).abs() > SAME_S)
 }
 
+/// Fails where what is given is the name of a path that is derived from photos.
+fn check_is_file(path: &Path) -> Result<(), Usage> {
+    match path.to_str() {
+        Some(kind) if derived(kind).is_some() && !path.exists() => Err(Usage(format!(
+            "{kind}: no file is called so; paths of that name are derived from a scene's photos, as by \
+             `lumigraph render SCENE --path {kind} -o FRAMES`; give a path's file"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    check_is_file(&args.path)?;
     check_file(&args.output, "-o")?;
     let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();

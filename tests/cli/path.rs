@@ -257,6 +257,20 @@ fn transforms_that_no_path_needs_are_told() {
 }
 
 #[test]
+fn derived_paths_are_no_files() {
+    let folder = with_wall();
+    for kind in ["orbit", "dolly", "sweep"] {
+        let line = format!("path {kind} --format nerfstudio -o theirs.json");
+        let error = lumigraph(folder.path(), &line).error(2);
+        let said = format!("{kind}: no file is called so; paths of that name are derived");
+        assert!(error.starts_with(&said), "{error}");
+        let remedy =
+            format!("`lumigraph render SCENE --path {kind} -o FRAMES`; give a path's file");
+        assert!(error.ends_with(&remedy), "{error}");
+    }
+}
+
+#[test]
 fn what_is_no_path_is_told_what_one_is() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
