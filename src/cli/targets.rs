@@ -55,6 +55,14 @@ pub(super) fn check_new_folder(
 
 /// `remedy` is what to do where that cannot be.
 fn check_writable(folder: &Path, remedy: &str) -> anyhow::Result<()> {
+    // In the place of a link that leads nowhere nothing can be made.
+    let mut missing = folder.ancestors().take_while(|path| !path.exists());
+    if let Some(link) = missing.find(|path| path.is_symlink()) {
+        bail!(
+            "{}: a link is where the folder was to be, and what it leads to is not there; {remedy}",
+            link.display()
+        );
+    }
     // The folder itself, or that which it would be made in.
     let there = folder.ancestors().find(|path| path.exists());
     let there = there.unwrap_or(Path::new("."));
@@ -143,6 +151,26 @@ fn others_in(folder: &Path, own: &BTreeSet<&Path>) -> anyhow::Result<Option<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_made_where_a_link_leads_nowhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::os::unix::fs::symlink("later", at("link")).unwrap();
+        let said = "link: a link is where the folder was to be, and what it leads to is not there; choose another ";
+        for (checked, option) in [
+            (check_folder(&at("link")), "-o"),
+            (check_folder(&at("link/scene")), "-o"),
+            (check_new_folder(&at("link"), |_| false), "-o"),
+            (check_file(&at("link/f.png"), "--video"), "--video"),
+        ] {
+            let error = checked.unwrap_err().to_string();
+            assert!(error.ends_with(&format!("{said}{option}")), "{error}");
+        }
+        std::fs::create_dir(at("later")).unwrap();
+        assert!(check_folder(&at("link/scene")).is_ok());
+    }
 
     #[test]
     fn what_is_read_is_not_written_over() {
