@@ -5,12 +5,15 @@
 //! from the other past the doorway's outline; a closed door beyond the middle of its wall is in the box of the room
 //! behind it alone. [`fit_to_sight`] lets boxes and outlines reach as far as is seen.
 
+#[cfg(test)]
+mod tests;
 mod within;
 
+use super::locate::tolerance;
 use super::seen::Seen;
 use super::visibility::all_around;
 use super::{
-    CellId, Content, Contents, Interior, InteriorError, InteriorWarning, Polygon, Portal,
+    CellId, Content, Contents, Interior, InteriorError, InteriorWarning, Polygon, Portal, RoomBox,
     Visibility,
 };
 use crate::mesh::Model;
@@ -89,11 +92,17 @@ pub fn strays(interior: &Interior, model: &Model) -> Result<Strays, InteriorErro
 }
 
 /// What needs so much of the reach is fitted first; then what needs twice as much, and so on.
-const LEAST_SHARE: f64 = 1.0 / 16.0;
+const SHARES: [f64; 5] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0];
 /// A box rather reaches so many times as far as a portal would have to.
 const BOXES_FIRST: f64 = 4.0;
 /// Beyond what was seen, in shares of the reach.
 const MARGIN: f64 = 0.05;
+/// What came to reach farther by no more than this, in margins, had what is seen well within it before: that is hidden for
+/// another reason, and asks for the same again and again, but for rounding.
+const SAME: f64 = 0.5;
+/// How often strays are fitted with the same share. Each asks for a portal or a box once, and so for about as many as it
+/// passes rooms, which are far fewer; more is rounding's doing, where it is coarser than margins are.
+const ROUNDS: usize = 256;
 /// How often it is looked from everywhere anew.
 const LOOKS: usize = 8;
 
@@ -111,28 +120,30 @@ pub fn fit_to_sight(
     let (mut contents, _) = Contents::new(interior, model)?;
     let mut seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
     let mut strays = look(interior, &contents, &seen);
+    let margin = MARGIN * reach;
     for _ in 1..LOOKS {
         let mut left = strays.found.clone();
-        let mut share = LEAST_SHARE;
         let mut is_fitted = false;
-        while !left.is_empty() && share <= 1.0 {
-            let fitted = |stray: &Stray| fit(interior, stray, share * reach, MARGIN * reach);
-            let fitted: Vec<Option<Fitted>> = left.iter().map(fitted).collect();
-            let grown = fitted.iter().filter_map(|fitted| match fitted {
-                Some(Fitted::Box(id)) => Some(*id),
-                _ => None,
-            });
-            let grown: BTreeSet<CellId> = grown.collect();
-            if !grown.is_empty() {
-                contents.refill(interior, model, &grown);
-                seen.regroup(&contents.triangles);
+        for share in SHARES {
+            for _ in 0..ROUNDS {
+                let fitted = left
+                    .iter()
+                    .filter_map(|stray| fit(interior, stray, share * reach, margin));
+                let fitted: Vec<Fitted> = fitted.collect();
+                if fitted.is_empty() {
+                    break;
+                }
+                is_fitted = true;
+                let grown: BTreeSet<CellId> = fitted.iter().filter_map(|one| one.cell).collect();
+                if !grown.is_empty() {
+                    contents.refill(interior, model, &grown);
+                    seen.regroup(&contents.triangles);
+                }
+                left = look_again(interior, &seen, &left);
+                if fitted.iter().all(|one| one.farther <= SAME * margin) {
+                    break;
+                }
             }
-            if fitted.iter().all(Option::is_none) {
-                share *= 2.0;
-                continue;
-            }
-            is_fitted = true;
-            left = look_again(interior, &seen, &left);
         }
         if !is_fitted {
             break;
@@ -143,21 +154,30 @@ pub fn fit_to_sight(
 }
 
 /// What reaches farther than before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fitted {
-    Box(CellId),
-    Portal,
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fitted {
+    /// Whose box it is; none of a portal.
+    cell: Option<CellId>,
+    /// By how much to one side at most, in world units; more than zero.
+    farther: f64,
 }
 
-/// Fits what a stray is nearest to, if that is no farther than said, with a margin.
+/// Fits what a stray is nearest to, if that is no farther than said, with a margin; `None` if nothing changes.
 fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Option<Fitted> {
-    // 1. Of what leads on from where it is shown, the outline that it passes nearest to.
+    // 1. Of what leads on from where it is shown, and not from behind, the outline that it passes nearest to.
     let ray = stray.seen - stray.eye;
     let leads_on = |portal: &Portal| {
-        let [front, back] = portal
+        let is_shown = portal
             .cells
             .map(|id| id.map(|id| stray.shown.contains(&id)));
-        front.zip(back).is_some_and(|(front, back)| front != back)
+        let shown = match is_shown {
+            [Some(true), Some(false)] => portal.cells[0],
+            [Some(false), Some(true)] => portal.cells[1],
+            _ => return false,
+        };
+        // Whoever is behind it, as seen from there, sees nothing through it, however far it reaches.
+        let from_center = stray.eye - portal.polygon.center();
+        from_center.dot(portal.normal_into(shown)) >= -tolerance(portal)
     };
     let portals = interior.portals.iter().enumerate();
     let portals = portals.filter(|(_, portal)| leads_on(portal));
@@ -178,22 +198,33 @@ fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Optio
     if let Some((distance, id)) = ended
         && distance <= least.min(reach)
     {
-        if let Content::Box(room)
+        let (Content::Box(room)
         | Content::Scene {
             room: Some(room), ..
-        } = &mut interior.cells[id.0 as usize].content
-        {
-            room.min = room.min.min(stray.seen - margin);
-            room.max = room.max.max(stray.seen + margin);
-        }
-        return Some(Fitted::Box(id));
+        }) = &mut interior.cells[id.0 as usize].content
+        else {
+            return None;
+        };
+        let min = room.min.min(stray.seen - margin);
+        let max = room.max.max(stray.seen + margin);
+        let farther = (room.min - min).max(max - room.max).max_element();
+        *room = RoomBox { min, max };
+        return (farther > 0.0).then_some(Fitted {
+            cell: Some(id),
+            farther,
+        });
     }
     let (_, i, at) = passed.filter(|_| least <= reach)?;
     let polygon = &mut interior.portals[i].polygon;
     let frame = Frame::of(polygon, interior.up);
-    let [low, high] = frame.span(polygon);
+    let before = frame.span(polygon);
     let place = frame.place(at);
-    let (low, high) = (low.min(place - margin), high.max(place + margin));
+    let (low, high) = (before[0].min(place - margin), before[1].max(place + margin));
+    let farther = (before[0] - low).max(high - before[1]).max_element();
+    // What is as it was is not written anew, which would round it.
+    if !(farther > 0.0) {
+        return None;
+    }
     let corners = [
         low,
         DVec2::new(high.x, low.y),
@@ -201,7 +232,10 @@ fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Optio
         DVec2::new(low.x, high.y),
     ];
     *polygon = Polygon::new(corners.map(|corner| frame.at(corner)).to_vec()).ok()?;
-    Some(Fitted::Portal)
+    Some(Fitted {
+        cell: None,
+        farther,
+    })
 }
 
 fn look(interior: &Interior, contents: &Contents, seen: &Seen) -> Strays {

@@ -5,7 +5,7 @@ use crate::common;
 use crate::find::{find, open_box};
 use crate::house::{self, small_house, view, viewpoint};
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use proxy::interior::find::FindOptions;
 use proxy::interior::{
     Contents, Interior, InteriorWarning, Polygon, compare, fit_to_sight, interior_from_nodes,
@@ -150,6 +150,32 @@ fn past_folded_leaves_a_modelled_house_is_seen_through_wider_openings() {
         let x = portal.polygon.center().x;
         let is_there = |p: &DVec3| p.z > -1.5 && p.z < 3.8;
         assert!((x + 2.5).abs() > 0.2 || portal.polygon.corners().iter().all(is_there));
+    }
+}
+
+/// A model so many times as large, and what is found in it as if its units were metres, as far as is seen.
+fn fitted_as_metres(mut model: Model, times: f64) -> (Interior, Vec<InteriorWarning>) {
+    let larger = DMat4::from_scale(DVec3::splat(times));
+    model.mesh.transform(&larger);
+    let found = find(&model.mesh, &FindOptions::default()).unwrap();
+    let mut fitted = found.interior;
+    let left = fit_to_sight(&mut fitted, &model, REACH).unwrap();
+    assert_eq!(left, strays(&fitted, &model).unwrap());
+    (fitted, found.warnings)
+}
+
+#[test]
+fn what_stays_hidden_of_a_house_whose_units_are_no_metres_ends_the_fitting() {
+    let (house, _) = small_house(2, 1);
+    let (in_feet, warnings) = fitted_as_metres(house.model, 3.28084);
+    in_feet.check().unwrap();
+    let told = InteriorWarning::TallWalls(6.0);
+    assert!(warnings.contains(&told), "{warnings:?}");
+    // A little larger than it is.
+    if let Some(folder) = common::find_capture("interior-house") {
+        let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
+        let (larger, _) = fitted_as_metres(model, 1.2);
+        larger.check().unwrap();
     }
 }
 

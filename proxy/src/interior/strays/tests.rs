@@ -1,0 +1,74 @@
+//! What of an interior one line of sight moves.
+
+use super::*;
+use crate::interior::parse_rooms;
+use std::path::Path;
+
+/// Two rooms, and a doorway in the wall between them.
+const ROOMS: &str = r#"{"version": 1, "rooms": [
+    {"name": "west", "min": [0, 0, 0], "max": [4, 2.5, 3]},
+    {"name": "east", "min": [4, 0, 0], "max": [8, 2.5, 3]}],
+    "openings": [{"name": "door", "between": ["west", "east"],
+        "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]]}]}"#;
+const WEST: CellId = CellId(0);
+const EAST: CellId = CellId(1);
+const REACH: f64 = 0.35;
+const WITH: f64 = MARGIN * REACH;
+
+fn rooms() -> Interior {
+    let read = parse_rooms(Path::new("rooms.json"), ROOMS.as_bytes(), "m.glb");
+    read.unwrap().0
+}
+
+/// A line of sight along x, where one room is all that is shown.
+fn stray(shown: CellId, x: [f64; 2], [y, z]: [f64; 2]) -> Stray {
+    let [eye, seen] = x.map(|x| DVec3::new(x, y, z));
+    Stray {
+        from: shown,
+        eye,
+        seen,
+        shown: vec![shown],
+    }
+}
+
+#[test]
+fn what_passes_beside_a_portal_widens_it_once() {
+    let mut interior = rooms();
+    let beside = stray(WEST, [2.0, 20.0], [1.0, 2.1]);
+    let fitted = fit(&mut interior, &beside, REACH, WITH).unwrap();
+    assert_eq!(fitted.cell, None);
+    assert!((fitted.farther - 0.1 - WITH).abs() < 1e-9, "{fitted:?}");
+    let high = interior.portals[0].polygon.corners().iter();
+    let high = high.fold(f64::MIN, |high, p| high.max(p.z));
+    assert!((high - 2.1 - WITH).abs() < 1e-9, "{high}");
+    // But for rounding that is all, whatever else hides it.
+    for _ in 0..10 {
+        let again = fit(&mut interior, &beside, REACH, WITH);
+        assert!(again.is_none_or(|one| one.farther < 1e-12), "{again:?}");
+    }
+    let before = interior.clone();
+    let within = stray(WEST, [2.0, 20.0], [1.0, 1.5]);
+    assert_eq!(fit(&mut interior, &within, REACH, WITH), None);
+    assert_eq!(interior, before);
+}
+
+#[test]
+fn a_portal_is_not_widened_for_who_is_behind_it() {
+    // The eye is in a part of the eastern room that lies around the western one.
+    for z in [1.5, 2.1] {
+        let mut interior = rooms();
+        let behind = stray(EAST, [2.0, 20.0], [1.0, z]);
+        assert_eq!(fit(&mut interior, &behind, REACH, WITH), None);
+        assert_eq!(interior, rooms());
+    }
+}
+
+#[test]
+fn what_ends_beside_a_box_makes_it_larger_once() {
+    let mut interior = rooms();
+    let ends = stray(WEST, [2.0, 4.2], [1.0, 0.5]);
+    let fitted = fit(&mut interior, &ends, REACH, WITH).unwrap();
+    assert_eq!(fitted.cell, Some(WEST));
+    assert!((fitted.farther - 0.2 - WITH).abs() < 1e-9, "{fitted:?}");
+    assert_eq!(fit(&mut interior, &ends, REACH, WITH), None);
+}
