@@ -213,3 +213,42 @@ fn units_that_are_no_metres_are_told() {
     );
     assert_eq!(find(&hall, &options).unwrap().warnings, []);
 }
+
+/// A hall of 56 × 56 m with three closets in it, so wide and 3.5 m long, each with a doorway.
+fn hall_with_closets(width: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+        let [min, max] = [min, max].map(DVec3::from_array);
+        mesh.append(&open_box(min, max, faces));
+    };
+    add([0.0; 3], [56.0, 3.0, 56.0], &[0, 1, 2, 3, 4, 5]);
+    for z in [28.0, 38.0, 48.0] {
+        add(
+            [28.0, 0.0, z],
+            [28.0 + width, 3.0, z + 3.5],
+            &[1, 2, 3, 4, 5],
+        );
+        for (low, from, to) in [(0.0, 0.0, 1.2), (2.1, 1.2, 2.1), (0.0, 2.1, 3.5)] {
+            add([28.0, low, z + from], [28.0, 3.0, z + to], &[0]);
+        }
+    }
+    mesh
+}
+
+#[test]
+fn narrow_rooms_keep_their_width_where_the_grid_is_coarse() {
+    // As coarse as it is where what stands there reaches over 700 m.
+    let options = FindOptions {
+        cell_size: 0.35,
+        ..FindOptions::default()
+    };
+    for width in [1.0, 1.2, 1.4] {
+        let found = find(&hall_with_closets(width), &options).unwrap();
+        look_at(&found, &format!("closets-{width}"));
+        for i in 0..found.interior.cells.len() {
+            let RoomBox { min, max } = bounds(&found, i);
+            let narrowest = (max - min).min_element();
+            assert!(narrowest > 0.1, "{width}: {min} {max}");
+        }
+    }
+}

@@ -232,7 +232,8 @@ const EYE_HEIGHT: f64 = 1.6;
 /// Boxes begin below the floor and end above the ceiling by this, in metres: surfaces are rough.
 const HEADROOM: f64 = 0.1;
 
-/// Cells and portals; and by label, less one, the room's cell. What no triangle is in is no room, and has none.
+/// Cells and portals; and by label, less one, the room's cell. What no triangle is in, or is as flat as a line on
+/// the plan, is no room, and has none.
 ///
 /// # Errors
 /// Most of what was found is no room.
@@ -261,7 +262,7 @@ fn interior(
             (l.min(p), h.max(p))
         });
         let room = RoomBox { min, max };
-        if !is_any_in(evidence.mesh, &room) {
+        if !min.cmplt(max).all() || !is_any_in(evidence.mesh, &room) {
             ids.push(None);
             continue;
         }

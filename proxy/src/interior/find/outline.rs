@@ -154,18 +154,30 @@ fn simplified(corners: &[[f64; 2]], within: f64) -> Vec<[f64; 2]> {
 }
 
 /// Makes what nearly lines up line up: sides of rooms with those of their neighbours, and
-/// with the openings between them.
+/// with the openings between them; but not both sides of a room that is narrower than that, which would be
+/// none any more.
 pub(super) fn snap(outlines: &mut [Vec<DVec2>], openings: &mut [Opening], within: f64) {
     for axis in 0..2 {
         let of_rooms = outlines.iter().flatten().map(|p| (p[axis], false));
         let of_openings = openings.iter().filter(|o| o.axis == axis);
         let mut all: Vec<(f64, bool)> = of_rooms.chain(of_openings.map(|o| (o.at, true))).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let spans: Vec<[f64; 2]> = outlines.iter().map(|o| span(o, axis)).collect();
+        // Whether a group from one place on has a narrow room's lesser side, and another is nearer to the greater.
+        let is_across = |start: f64, x: f64| {
+            let is_narrow = |[low, high]: [f64; 2]| low >= start && high - start <= within;
+            let mut narrow = spans.iter().filter(|span| is_narrow(**span));
+            narrow.any(|[low, high]| x - low > high - x)
+        };
         // From the first of a group to its last, and what takes their place.
         let mut groups: Vec<([f64; 2], f64)> = Vec::new();
         let mut start = 0;
         for i in 1..=all.len() {
-            if i < all.len() && all[i].0 - all[start].0 <= within {
+            let (from, next) = (all.get(start), all.get(i));
+            if let Some((from, next)) = from.zip(next)
+                && next.0 - from.0 <= within
+                && !is_across(from.0, next.0)
+            {
                 continue;
             }
             let Some(group) = all.get(start..i).filter(|g| !g.is_empty()) else {
@@ -193,10 +205,67 @@ pub(super) fn snap(outlines: &mut [Vec<DVec2>], openings: &mut [Opening], within
     }
 }
 
+/// The least and the greatest of an outline's places on an axis.
+fn span(outline: &[DVec2], axis: usize) -> [f64; 2] {
+    let places = outline.iter().map(|p| p[axis]);
+    places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(x), high.max(x)]
+    })
+}
+
 /// Removes corners that are the same or on a line.
 fn tidy(outline: &mut Vec<DVec2>) {
     thin(outline, |[a, b, c]| {
         (b - a).perp_dot(c - b).abs() < 1e-9 * (c - a).length_squared().max(1e-18)
             || a.distance(b) < 1e-9
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rectangle([x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) -> Vec<DVec2> {
+        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        corners.map(DVec2::from_array).to_vec()
+    }
+
+    #[test]
+    fn sides_of_neighbours_line_up_and_those_of_a_narrow_room_stay_apart() {
+        let doorway = |at: f64| Opening {
+            rooms: [3, 2],
+            axis: 0,
+            at,
+            from: 1.0,
+            to: 4.0,
+            sill: 0.0,
+            head: 2.0,
+            is_deep: false,
+        };
+        // Squares are one wide: a hall, a closet, and another hall behind its door.
+        for width in [1.0, 2.0, 2.5] {
+            let mut outlines = [
+                rectangle([-20.0, -9.0], [-1.0, 9.0]),
+                rectangle([0.0, 0.0], [width, 6.0]),
+                rectangle([width, -9.0], [30.0, 9.5]),
+            ];
+            let mut openings = [doorway(width - 0.25)];
+            snap(&mut outlines, &mut openings, 2.5);
+            let spans = outlines.each_ref().map(|outline| span(outline, 0));
+            let west = spans[0][1];
+            assert!((-1.0..=0.0).contains(&west), "{width}: {spans:?}");
+            let east = width - 0.25;
+            assert_eq!(openings[0].at, east);
+            assert_eq!(spans, [[-20.0, west], [west, east], [east, 30.0]]);
+            assert_eq!(outlines[1].len(), 4);
+        }
+        // As before where it is wide enough.
+        let mut outlines = [
+            rectangle([-20.0, -9.0], [-1.0, 9.0]),
+            rectangle([0.0, 0.0], [4.0, 6.0]),
+        ];
+        snap(&mut outlines, &mut [], 2.5);
+        let spans = outlines.each_ref().map(|outline| span(outline, 0));
+        assert_eq!(spans, [[-20.0, -0.5], [-0.5, 4.0]]);
+    }
 }
