@@ -207,6 +207,31 @@ fn what_is_no_room_is_told() {
 }
 
 #[test]
+fn how_to_say_the_scale_and_which_way_is_up_is_told_where_nothing_is_found() {
+    // A room in kilometres, in which somebody stood.
+    let size = DVec3::new(0.005, 0.0026, 0.004);
+    let room = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    let eye = DVec3::new(0.002, 0.0016, 0.002);
+    let evidence = Evidence {
+        mesh: &room,
+        cameras: &[(eye, DVec3::Y)],
+        sights: &[],
+    };
+    let error = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap_err();
+    assert_eq!(error, FindError::NoFloor(1.0));
+    assert_eq!(
+        error.to_string(),
+        "no floor: nothing level lies below; is the scale right (--meter says how many world units a metre is; now \
+         1), and which way is up (--up)? Else give the rooms by hand (--rooms)"
+    );
+    assert_eq!(
+        FindError::NoRooms(1.5, 0.001).to_string(),
+        "no rooms: over the floor nothing of 1.5 m² or more is free at eye height and enclosed; is the scale right \
+         (--meter says how many world units a metre is; now 0.001), and which way is up (--up)?"
+    );
+}
+
+#[test]
 fn rooms_of_a_modelled_house_are_where_its_description_says() {
     let Some(folder) = common::find_capture("interior-house") else {
         return;

@@ -108,7 +108,7 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Est
     let up = as_world_axis(up);
     let (height, has_floor) = floor(&facets, up, base, evidence, options);
     if !has_floor {
-        return Err(FindError::NoFloor);
+        return Err(FindError::NoFloor(options.meter));
     }
     let along = as_world_axis(wall_direction(&facets, up));
     let along = along.reject_from_normalized(up).normalize();

@@ -129,13 +129,17 @@ pub enum FindError {
     /// There is nothing.
     #[error("the surface has no triangles of any size; rooms are found in a mesh or depth maps")]
     NoSurface,
-    /// No floor.
-    #[error("no floor: nothing level lies below; say which way is up, or give the rooms by hand")]
-    NoFloor,
-    /// A floor, but nobody could stand there, or there is no surface around most places where one could.
+    /// No floor, where a metre is so many world units.
+    #[error(
+        "no floor: nothing level lies below; is the scale right (--meter says how many world units a metre is; now \
+         {0}), and which way is up (--up)? Else give the rooms by hand (--rooms)"
+    )]
+    NoFloor(f64),
+    /// A floor, but nobody could stand there, or there is no surface around most places where one could: the least
+    /// area of a room in square metres, and a metre in world units.
     #[error(
         "no rooms: over the floor nothing of {0} m² or more is free at eye height and enclosed; \
-         is the scale right (a metre is {1} world units), and which way is up?"
+         is the scale right (--meter says how many world units a metre is; now {1}), and which way is up (--up)?"
     )]
     NoRooms(f64, f64),
     /// An option is out of range.
