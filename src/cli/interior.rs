@@ -319,7 +319,7 @@ fn finish(
     let named = || args.model.display().to_string();
     let compared = known.map(|known| {
         let tolerance = SAME_PORTAL * args.meter;
-        compare(&known, &interior, tolerance).to_string()
+        compare(&known, &interior, tolerance, args.meter).to_string()
     });
     let (contents, more) = Contents::new(&interior, model).with_context(named)?;
     for warning in warnings.into_iter().chain(more) {

@@ -83,14 +83,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.json {
         return print_json(&poses);
     }
+    let digits = digits(interior.eye_height);
+    let width = digits.max(3) + 6;
     let mut text = format!(
-        "{:<20} {:<20} {:<20} {:>7} {:>9} {:>9} {:>9}\n",
+        "{:<20} {:<20} {:<20} {:>7} {:>width$} {:>width$} {:>width$}\n",
         "portal", "from", "into", "angle", "x", "y", "z"
     );
     for pose in &poses {
         let [x, y, z] = pose.center;
         text += &format!(
-            "{:<20} {:<20} {:<20} {:>6.1}° {x:>9.3} {y:>9.3} {z:>9.3}\n",
+            "{:<20} {:<20} {:<20} {:>6.1}° {x:>width$.digits$} {y:>width$.digits$} {z:>width$.digits$}\n",
             pose.portal,
             pose.from.unwrap_or("(outside)"),
             pose.into,
@@ -98,6 +100,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         );
     }
     print(&text)
+}
+
+/// How many digits after the point tell a thousandth of the eyes' height: of metres, three.
+fn digits(eye_height: f64) -> usize {
+    (3.0 - eye_height.log10()).ceil().clamp(0.0, 15.0) as usize
 }
 
 /// What to do about cameras that stand outside their cell, of which there are some.

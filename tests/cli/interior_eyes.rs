@@ -56,6 +56,37 @@ fn a_metre_says_how_high_eyes_are_in_given_rooms_that_do_not_say() {
 }
 
 #[test]
+fn where_cameras_stand_is_told_to_a_thousandth_of_the_eyes_height() {
+    let folder = tempfile::tempdir().unwrap();
+    for (unit, expected) in [
+        (1.0, ["2.500", "1.600", "1.500"]),
+        (0.001, ["0.002500", "0.001600", "0.001500"]),
+        (1000.0, ["2500", "1600", "1500"]),
+    ] {
+        let [eye, width, high, long] = [1.6, 1.0, 2.0, 4.0].map(|x| x * unit);
+        let [far, top, deep] = [8.0, 2.5, 3.0].map(|x| x * unit);
+        let text = format!(
+            r#"{{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": {eye},
+                "cells": [
+                    {{"name": "hall", "box": {{"min": [0, 0, 0], "max": [{long}, {top}, {deep}]}}}},
+                    {{"name": "study", "box": {{"min": [{long}, 0, 0], "max": [{far}, {top}, {deep}]}}}}],
+                "portals": [
+                    {{"name": "door", "cells": ["hall", "study"], "polygon": [[{long}, 0, {width}],
+                        [{long}, 0, {high}], [{long}, {high}, {high}], [{long}, {high}, {width}]]}}]}}"#
+        );
+        std::fs::write(folder.path().join("interior.json"), text).unwrap();
+        let told = lumigraph(folder.path(), "plan interior.json --views 3")
+            .ok()
+            .stdout;
+        let mut places = told.lines().map(|line| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            words[words.len() - 3..].to_vec()
+        });
+        assert!(places.any(|place| place == expected), "{told}");
+    }
+}
+
+#[test]
 fn a_portal_that_is_turned_round_is_to_be_reversed_and_no_smaller_semicircle_advised() {
     let folder = tempfile::tempdir().unwrap();
     let said = |door: &str, gap: &str| {

@@ -40,6 +40,8 @@ pub struct Comparison {
     pub portals: Vec<ComparedPortal>,
     /// Found portals that are none of them.
     pub extra_portals: Vec<String>,
+    /// A metre in world units: lengths are printed in metres.
+    pub meter: f64,
 }
 
 /// The side of squares of floor that are compared, in tolerances; and how many there are at most along
@@ -48,8 +50,9 @@ const STEP: f64 = 0.25;
 const MOST: f64 = 2000.0;
 
 /// Compares cells with boxes by the floor that they share, and portals by where their middles are.
-/// `tolerance` is in world units; of interiors without any box there is nothing to compare but portals.
-pub fn compare(known: &Interior, found: &Interior, tolerance: f64) -> Comparison {
+/// `tolerance` is in world units, of which a metre has so many; of interiors without any box there is nothing to
+/// compare but portals.
+pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -> Comparison {
     let shared = shared_floor(known, found, tolerance);
     let (n, m) = (known.cells.len(), found.cells.len());
     let iou = |t: usize, f: usize| {
@@ -116,6 +119,7 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64) -> Comparison
         extra_cells,
         portals,
         extra_portals: extra.map(|f| found.portals[f].name.clone()).collect(),
+        meter,
     }
 }
 
@@ -205,7 +209,7 @@ impl fmt::Display for Comparison {
                 None => write!(f, "{}: not found", cell.name)?,
             }
             match cell.apart {
-                Some(apart) => writeln!(f, ", sides {apart:.2} apart at most")?,
+                Some(apart) => writeln!(f, ", sides {:.2} m apart at most", apart / self.meter)?,
                 None => writeln!(f)?,
             }
         }
@@ -222,8 +226,8 @@ impl fmt::Display for Comparison {
             match &portal.nearest {
                 Some((name, apart, wider)) => {
                     let how = if *wider < 0.0 { "narrower" } else { "wider" };
-                    let by = wider.abs();
-                    writeln!(f, "; {name} is {apart:.2} off and {by:.2} {how}")?;
+                    let [apart, by] = [*apart, wider.abs()].map(|length| length / self.meter);
+                    writeln!(f, "; {name} is {apart:.2} m off and {by:.2} m {how}")?;
                 }
                 None => writeln!(f)?,
             }
@@ -245,24 +249,43 @@ impl fmt::Display for Comparison {
 mod tests {
     use super::*;
 
+    /// What is said of a room and a door in a world of which a metre has so many units; lengths are in metres.
+    fn said(wider: f64, meter: f64) -> String {
+        let cell = ComparedCell {
+            name: "hall".to_owned(),
+            found: Some("room 1".to_owned()),
+            iou: 0.97,
+            apart: Some(0.13 * meter),
+        };
+        let portal = ComparedPortal {
+            name: "door".to_owned(),
+            nearest: Some(("doorway 2".to_owned(), 0.65 * meter, wider * meter)),
+            is_found: false,
+        };
+        let comparison = Comparison {
+            cells: vec![cell],
+            extra_cells: Vec::new(),
+            portals: vec![portal],
+            extra_portals: Vec::new(),
+            meter,
+        };
+        comparison.to_string()
+    }
+
     #[test]
     fn a_portal_is_wider_or_narrower() {
-        let said = |wider: f64| {
-            let portal = ComparedPortal {
-                name: "door".to_owned(),
-                nearest: Some(("doorway 2".to_owned(), 0.65, wider)),
-                is_found: false,
-            };
-            let comparison = Comparison {
-                cells: Vec::new(),
-                extra_cells: Vec::new(),
-                portals: vec![portal],
-                extra_portals: Vec::new(),
-            };
-            comparison.to_string()
-        };
-        let narrow = "door: not found; doorway 2 is 0.65 off and 3.20 narrower\n";
-        assert!(said(-3.2).starts_with(narrow), "{}", said(-3.2));
-        assert!(said(0.1).contains(" off and 0.10 wider\n"));
+        let narrow = "\ndoor: not found; doorway 2 is 0.65 m off and 3.20 m narrower\n";
+        assert!(said(-3.2, 1.0).contains(narrow), "{}", said(-3.2, 1.0));
+        assert!(said(0.1, 1.0).contains(" m off and 0.10 m wider\n"));
+    }
+
+    #[test]
+    fn lengths_are_told_in_metres_whatever_the_units() {
+        let in_metres = said(0.1, 1.0);
+        let hall = "hall: room 1, IoU 0.970, sides 0.13 m apart at most\n";
+        assert!(in_metres.starts_with(hall), "{in_metres}");
+        for meter in [0.001, 1000.0] {
+            assert_eq!(said(0.1, meter), in_metres);
+        }
     }
 }

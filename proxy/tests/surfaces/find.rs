@@ -42,7 +42,7 @@ fn rooms_and_openings_of_procedural_houses_are_found() {
         let (house, _) = small_house(rooms, seed);
         let found = find(&house.model.mesh, &FindOptions::default()).unwrap();
         look_at(&found, &format!("house-{rooms}"));
-        let compared = compare(&house.interior, &found.interior, 0.2);
+        let compared = compare(&house.interior, &found.interior, 0.2, 1.0);
         let iou = || compared.cells.iter().map(|c| c.iou);
         let worst = iou().fold(1.0, f64::min);
         let mean = iou().sum::<f64>() / rooms as f64;
@@ -384,7 +384,7 @@ fn the_hall_of_an_office_is_found() {
     };
     let rooms = include_bytes!("../data/office-walk-rooms.json");
     let (truth, _) = parse_rooms("rooms.json".as_ref(), rooms, "model.glb").unwrap();
-    let compared = compare(&truth, &found.interior, 0.3);
+    let compared = compare(&truth, &found.interior, 0.3, 1.0);
     eprint!("office-walk\n{compared}");
     assert!(found.interior.up.dot(DVec3::Y) > 0.999);
     assert!(compared.cells[0].iou > 0.9 && compared.cells[1].iou > 0.6);
@@ -479,7 +479,7 @@ fn ground_around_a_house_takes_nothing_from_it() {
         let found = find(&mesh, &FindOptions::default()).unwrap();
         look_at(&found, &format!("ground-{reach}"));
         assert_eq!(found.warnings, []);
-        let compared = compare(&alone.interior, &found.interior, 0.1);
+        let compared = compare(&alone.interior, &found.interior, 0.1, 1.0);
         assert!(compared.cells.iter().all(|c| c.iou > 0.85), "{compared}");
         assert!(compared.portals.iter().all(|p| p.is_found), "{compared}");
         assert!(compared.extra_cells.is_empty(), "{compared}");

@@ -80,7 +80,7 @@ fn found_rooms_and_openings_reach_as_far_as_is_seen() {
         assert_eq!(left, strays(&fitted, &house.model).unwrap());
         assert_eq!(left.warning(&fitted), None);
         // By no more than they were off, and then next to nothing that is seen is left out.
-        let compared = compare(&house.interior, &fitted, 0.1);
+        let compared = compare(&house.interior, &fitted, 0.1, 1.0);
         assert!(compared.portals.iter().all(|p| p.is_found), "{compared}");
         let [before, after] = [&found, &fitted].map(|i| hidden_pixels(i, &house.model, 200));
         eprintln!("{rooms} rooms: {before} pixels of 200 views were hidden, {after} are");
@@ -126,7 +126,7 @@ fn what_a_portal_hides_is_told_and_one_that_is_too_narrow_widened() {
     assert_eq!(left.found, []);
     assert!(hidden_pixels(&narrow, &house.model, 100) > 0);
     assert_eq!(hidden_pixels(&wide, &house.model, 100), 0);
-    let compared = compare(&house.interior, &wide, 0.05);
+    let compared = compare(&house.interior, &wide, 0.05, 1.0);
     assert!(compared.portals.iter().all(|p| p.is_found), "{compared}");
 }
 
