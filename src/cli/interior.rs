@@ -249,9 +249,15 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
                 sights: &[],
             };
             let found = find_interior(&evidence, &file, options);
-            let fitted = found.map(|found| fitted(found, &model, options.meter));
             busy.finish_and_clear();
-            Rooms::found(fitted.with_context(named)?.with_context(named)?)?
+            let mut found = found.with_context(named)?;
+            // What may be wrong is said at once: where the scale is, the rest takes long.
+            let warnings = found.warnings.drain(..);
+            warnings.for_each(|warning| say!("warning: {warning}"));
+            let busy = spinner("fitting rooms to what is seen from them");
+            let fitted = fitted(found, &model, options.meter);
+            busy.finish_and_clear();
+            Rooms::found(fitted.with_context(named)?)?
         }
     };
     finish(args, &file, &bytes, &model, rooms, told.known)
