@@ -148,7 +148,12 @@ pub fn fit_to_sight(
         if !is_fitted {
             break;
         }
+        let before = strays.found.len();
         strays = look(interior, &contents, &seen);
+        // What is left is hidden for other reasons, as where rooms are none.
+        if strays.found.len() >= before {
+            break;
+        }
     }
     Ok(strays)
 }
