@@ -72,6 +72,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let inputs = files_behind_scene(&args.scene.scene, &scene);
     check_apart(
         "the scene is",
+        "-o",
         written.iter().map(PathBuf::as_path),
         &inputs,
     )?;

@@ -6,7 +6,7 @@ use super::Usage;
 use super::options::positive;
 use super::output::say;
 use super::stamp::in_unicode;
-use super::targets::{check_file, check_inputs};
+use super::targets::{check_file, check_film, check_inputs};
 use anyhow::Context;
 use calibrate::View;
 use image::{Rgba, RgbaImage};
@@ -236,8 +236,8 @@ impl FilmArgs {
         all: &[PathBuf],
         inputs: &[PathBuf],
     ) -> anyhow::Result<Vec<bool>> {
-        let video = self.video.iter();
-        check_inputs(all.iter().chain(video).map(PathBuf::as_path), inputs)?;
+        check_inputs(all.iter().map(PathBuf::as_path), inputs)?;
+        check_film(self.file(), inputs)?;
         if !self.resume {
             return Ok(vec![false; files.len()]);
         }

@@ -15,7 +15,7 @@ use capture::{as_argument, find_photos_folder};
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
     DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
-    relative,
+    relative, remedy_of_model,
 };
 use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
@@ -135,6 +135,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_no_interior(&args.photos)?;
     check_no_scene(&args.photos)?;
     let is_video = args.photos.is_file();
+    if let Some(remedy) = remedy_of_model(&args.photos).filter(|_| is_video) {
+        bail!(
+            "{}: expected photos or a video; {remedy}",
+            args.photos.display()
+        );
+    }
     if is_video {
         check_no_calibration(args)?;
     }

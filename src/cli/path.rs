@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_file(&args.output, "-o")?;
     let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();
-    check_apart("the path is", [args.output.as_path()], &inputs)?;
+    check_apart("the path is", "-o", [args.output.as_path()], &inputs)?;
     let frame = args.nerfstudio.frame()?;
     let read = read_in(&args.path, &frame)?;
     make_parent(&args.output)?;

@@ -140,7 +140,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let mut inputs = files_behind_scene(&args.scene.scene, &scene);
         let named = [&args.mesh, &args.hold_out.hold_out].into_iter();
         inputs.extend(named.flatten().cloned());
-        check_apart("the proxy is", [file.as_path()], &inputs)?;
+        check_apart("the proxy is", "-o", [file.as_path()], &inputs)?;
     } else if let Some(folder) = &scene.folder {
         check_scene_folder(folder)?;
     }

@@ -82,12 +82,18 @@ pub(super) fn check_inputs<'a>(
     files: impl IntoIterator<Item = &'a Path>,
     inputs: &[PathBuf],
 ) -> anyhow::Result<()> {
-    check_apart("pictures are", files, inputs)
+    check_apart("pictures are", "-o", files, inputs)
 }
 
-/// The same of whatever else is made: `what` begins the sentence, as in `the path is`.
+/// The same of the film that frames become.
+pub(super) fn check_film(file: Option<&Path>, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    check_apart("the film is", "--video", file, inputs)
+}
+
+/// The same of whatever else is made: `what` begins the sentence, as in `the path is`, and `option` names the file.
 pub(super) fn check_apart<'a>(
     what: &str,
+    option: &str,
     files: impl IntoIterator<Item = &'a Path>,
     inputs: &[PathBuf],
 ) -> anyhow::Result<()> {
@@ -101,7 +107,7 @@ pub(super) fn check_apart<'a>(
     match there.iter().find(is_input) {
         None => Ok(()),
         Some(file) => bail!(
-            "{}: {what} made of this very file; nothing was written: choose another -o",
+            "{}: {what} made of this very file; nothing was written: choose another {option}",
             file.display()
         ),
     }

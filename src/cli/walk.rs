@@ -18,7 +18,7 @@ use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
 use super::shot::say_other_look;
-use super::targets::{check_folder, check_inputs, others};
+use super::targets::{check_film, check_folder, others};
 use super::took::Start;
 use anyhow::{Context, bail};
 use calibrate::View;
@@ -188,8 +188,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Some(_) => scenes_of(&opened.file, &opened.interior),
         None => Vec::new(),
     };
-    let videos: Vec<PathBuf> = scenes.iter().filter_map(|scene| video_of(scene)).collect();
-    check_inputs(args.film.file(), &videos)?;
+    // Whether their photos are drawn or not.
+    let videos = scenes_of(&opened.file, &opened.interior).into_iter();
+    let videos: Vec<PathBuf> = videos.filter_map(|scene| video_of(&scene)).collect();
+    check_film(args.film.file(), &videos)?;
     let named = args.path.iter().chain(args.nerfstudio.file()).cloned();
     inputs.extend(files_behind(named, &scenes));
     args.nerfstudio.say_unused(args.path.as_ref());

@@ -73,10 +73,16 @@ impl Scene {
             return Ok(None);
         }
         let lack = self.lack_of_observed(proxy.kind(), without)?;
+        let left = self.photos.iter().filter(|p| !without.contains(&p.name));
+        // One alone agrees with none on what it looks at, whatever the kind.
+        let is_alone = left.count() < 2;
+        let instead = match is_alone {
+            true => String::new(),
+            false => format!(": {INSTEAD}"),
+        };
         Ok(lack.map(|lack| {
             format!(
-                "{lack}; in its place is the plane across what these photos look at, if they tell of one: \
-                 {INSTEAD}"
+                "{lack}; in its place is the plane across what these photos look at, if they tell of one{instead}"
             )
         }))
     }
@@ -163,7 +169,7 @@ mod tests {
         let notes = ["view-plane", "points"].map(|name| {
             Some(format!(
                 "the photos that are left share none of the {count} sparse points, which the {name} proxy is made of; \
-                 in its place is the plane across what these photos look at, if they tell of one: {INSTEAD}"
+                 in its place is the plane across what these photos look at, if they tell of one"
             ))
         });
         assert_eq!(lack(&all_but(1)), notes);

@@ -1,12 +1,13 @@
 //! The surface that was made for a scene, and that its folder holds.
 
 use super::file::{Extra, ProxyEntry};
-use super::store::{PROXY_FILE, PROXY_MESH, SCENE_FILE, io, make_within, take_places, write_json};
+use super::store::{PROXY_FILE, PROXY_MESH, SCENE_FILE, io, make_within, write_json};
 use super::{Scene, SceneError};
 use capture::{as_argument, without_byte_order_mark};
 use proxy::Proxy;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// A scene's own proxy.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,10 +119,39 @@ impl Scene {
         whole.insert("proxy".to_owned(), entry);
         write_json(&new.join(SCENE_FILE), &whole)?;
 
-        // 2. They take their places. The proxy is the first to leave and the last to come: killed meanwhile, the
-        //    scene lacks it, but never says of one what holds of another.
-        take_places(&[SCENE_FILE, name], made, &new, &folder)?;
+        // 2. They take their places.
+        let path = folder.join(name);
+        exchange(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
         self.proxy = Some(own);
-        Ok(folder.join(name))
+        Ok(path)
     }
+}
+
+/// Has a new proxy and a new `scene.json`, which lie in `new`, take the places of others, or neither.
+///
+/// The proxy is the first to leave and the last to come: killed meanwhile, the scene lacks it, but never says of one
+/// what holds of another.
+fn exchange(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Result<()> {
+    if proxy.is_dir() {
+        let text = "a folder is in its place: move it away";
+        return Err(std::io::Error::other(text));
+    }
+    let [old_proxy, old_scene] = ["old-proxy", "old-scene"].map(|name| made.path().join(name));
+    std::fs::copy(scene, &old_scene)?;
+    let is_replaced = proxy.symlink_metadata().is_ok();
+    if is_replaced {
+        std::fs::rename(proxy, &old_proxy)?;
+    }
+    let in_new = |path: &Path| new.join(path.file_name().unwrap_or_default());
+    let exchanged =
+        std::fs::rename(in_new(scene), scene).and_then(|()| std::fs::rename(in_new(proxy), proxy));
+    if exchanged.is_err() {
+        // The first error is the one to tell.
+        let _ = std::fs::rename(&old_scene, scene);
+        if is_replaced && std::fs::rename(&old_proxy, proxy).is_err() {
+            // It is all that is left of it.
+            let _ = made.keep();
+        }
+    }
+    exchanged
 }

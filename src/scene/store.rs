@@ -304,7 +304,14 @@ impl Scene {
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
         // 2. They take their places.
-        take_places(&PARTS, made, &new, folder)?;
+        let old = made.path().join("old");
+        std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
+        let exchanged = exchange(&PARTS, &new, folder, &old);
+        if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
+            // It still holds what could not be put back.
+            let _ = made.keep();
+        }
+        exchanged.map_err(|e| io(folder, "replace the scene", e))?;
         self.folder = Some(folder.to_owned());
         Ok(())
     }
@@ -362,24 +369,6 @@ pub(super) fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneErro
     let new = made.path().join("scene");
     std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
     Ok((made, new))
-}
-
-/// Has the parts of these names that are in `new` take their places in a scene's folder, all or none, as by
-/// [`exchange`]; both are of [`make_within`].
-pub(super) fn take_places(
-    parts: &[&str],
-    made: TempDir,
-    new: &Path,
-    folder: &Path,
-) -> Result<(), SceneError> {
-    let old = made.path().join("old");
-    std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
-    let exchanged = exchange(parts, new, folder, &old);
-    if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
-        // It still holds what could not be put back.
-        let _ = made.keep();
-    }
-    exchanged.map_err(|e| io(folder, "replace the scene", e))
 }
 
 /// Into a folder in the making.

@@ -110,6 +110,8 @@ fn a_file_in_place_of_a_folder() {
         let said = "no calibration that is known here: the file is binary; expected a file of a COLMAP model, ";
         assert!(error.starts_with(&format!("{file}: {said}")), "{error}");
         assert!(error.ends_with(&format!("OpenMVG's{remedy}")), "{error}");
+        let error = lumigraph(here, &format!("import {file} -o scene")).error(1);
+        assert!(error.ends_with(remedy), "{error}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Interiors: a house is generated, made an interior of anew, and planned.
 
 use crate::run::{files, lumigraph};
+use crate::uncalibrated::is_installed;
 use glam::{DQuat, DVec3};
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{read_interior, surface_of, write_interior};
@@ -497,6 +498,19 @@ fn a_capture_without_depth_needs_a_mesh() {
     lumigraph(here, "walk two --tour --frames 2 --size 48x32 -o walk").ok();
     let error = lumigraph(here, "walk two --held-out -o x").error(1);
     assert!(error.contains("no photos were held out"), "{error}");
+    // Of a video that the scene's photos were taken out of no film takes the place, whatever is drawn.
+    let path = here.join("scene/scene.json");
+    let mut scene: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    scene["settings"]["video"] = "../hall.mp4".into();
+    std::fs::write(&path, scene.to_string()).unwrap();
+    std::fs::write(here.join("hall.mp4"), "a video").unwrap();
+    let films = is_installed(&capture::video::ffmpeg());
+    for photos in ["", " --no-photos"].into_iter().filter(|_| films) {
+        let line = "walk two --tour --frames 2 --size 48x32 -o film --video hall.mp4";
+        let error = lumigraph(here, &format!("{line}{photos}")).error(1);
+        let said = "hall.mp4: the film is made of this very file; nothing was written: choose another --video";
+        assert_eq!(error, said);
+    }
     let line = "interior scene --hold-out hall/split.json -o other";
     let error = lumigraph(here, line).error(1);
     assert!(error.contains("which is held out"), "{error}");

@@ -212,6 +212,16 @@ fn points_that_photos_left_do_not_share_are_told() {
     lumigraph(here, "import wall -o scene").ok();
     lumigraph(here, "proxy scene points").ok();
     lumigraph(here, "proxy wall points -o points.json").ok();
+    // What lies where its file goes stays.
+    std::fs::remove_file(here.join("scene/proxy.json")).unwrap();
+    std::fs::create_dir(here.join("scene/proxy.json")).unwrap();
+    std::fs::write(here.join("scene/proxy.json/mine"), "").unwrap();
+    let error = lumigraph(here, "proxy scene points").error(1);
+    let said = "scene/proxy.json: cannot replace the proxy: a folder is in its place: move it away";
+    assert_eq!(error, said);
+    assert!(here.join("scene/proxy.json/mine").exists());
+    std::fs::remove_dir_all(here.join("scene/proxy.json")).unwrap();
+    lumigraph(here, "proxy scene points").ok();
     let names: Vec<String> = (1..9).map(|i| format!("{i:04}.png")).collect();
     let split = serde_json::json!({"test": names}).to_string();
     std::fs::write(here.join("all-but-one.json"), split).unwrap();

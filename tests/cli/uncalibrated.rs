@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Whether a program is installed; where it is not, says so, or fails if the environment
 /// has `LUMIGRAPH_REQUIRE_TOOLS=1`.
-fn is_installed(tool: &Tool) -> bool {
+pub(crate) fn is_installed(tool: &Tool) -> bool {
     match tool.text(&["-h"]) {
         Ok(_) => true,
         Err(error) if std::env::var("LUMIGRAPH_REQUIRE_TOOLS").as_deref() == Ok("1") => {
