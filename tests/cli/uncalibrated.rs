@@ -235,7 +235,7 @@ fn a_video_becomes_a_scene_with_times() {
     let before = fs::read(&video).unwrap();
     let render = "render scene --proxy plane --path sweep --frames 2 --size 48x36 -o out --video";
     let error = lumigraph(here.path(), &format!("{render} sweep.mp4")).error(1);
-    let said = "sweep.mp4: pictures are made of this very file";
+    let said = "sweep.mp4: the film is made of this very file";
     assert!(error.starts_with(said), "{error}");
     assert!(fs::read(&video).unwrap() == before && !here.path().join("out").exists());
 
