@@ -47,13 +47,24 @@ impl FacetTiles {
     /// The facet, or [`NO_FACET`], that all pixels of the tile around a pixel see; `None` where they may differ.
     #[inline]
     pub(crate) fn at(&self, column: usize, row: usize) -> Option<u32> {
-        let facet = self.facet_of[row / TILE * self.across + column / TILE];
-        of_whole(facet)
+        of_whole(self.facet_of[self.number(column, row)])
+    }
+
+    /// The number of the tile around a pixel, row by row.
+    #[inline]
+    pub(crate) fn number(&self, column: usize, row: usize) -> usize {
+        row / TILE * self.across + column / TILE
+    }
+
+    /// How many tiles there are.
+    pub(crate) fn count(&self) -> usize {
+        self.facet_of.len()
     }
 
     /// Takes note that a pixel sees another facet.
     pub(crate) fn mix(&mut self, column: usize, row: usize) {
-        self.facet_of[row / TILE * self.across + column / TILE] = MIXED;
+        let tile = self.number(column, row);
+        self.facet_of[tile] = MIXED;
     }
 
     /// Of the squares around a pixel, so many pixels to each side, the smallest in which a tile may see a facet; `None`

@@ -86,9 +86,6 @@ impl ProxyArgs {
         let is_taken = self.proxy.is_none() && scene.proxy.is_some() && without.is_empty();
         if is_taken {
             scene.check_own_proxy()?;
-            if let Some(own) = &scene.proxy {
-                say_lack(scene, own.surface()?, without)?;
-            }
         }
         Ok(is_taken)
     }
@@ -203,7 +200,11 @@ impl ProxyArgs {
 
 /// Says so where a proxy is made of sparse points for every view, and the photos but those of the given names observe
 /// none.
-fn say_lack(scene: &Scene, proxy: &Proxy, without: &BTreeSet<String>) -> Result<(), SceneError> {
+pub(super) fn say_lack(
+    scene: &Scene,
+    proxy: &Proxy,
+    without: &BTreeSet<String>,
+) -> Result<(), SceneError> {
     if let Some(note) = scene.note_of_lack(proxy, without)? {
         say!("note: {note}");
     }

@@ -10,7 +10,7 @@ use super::made::{self, Made};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
 use super::path::NerfstudioArgs;
-use super::surface::{ProxyArgs, proxy_text};
+use super::surface::{ProxyArgs, proxy_text, say_lack};
 use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
@@ -248,7 +248,10 @@ impl Load {
         exposure.forget(&mut scene);
         let is_ready = proxy.takes_own(&scene, &without)?;
         let quick = match &scene.proxy {
-            Some(own) if is_ready => Some(own.surface()?.clone()),
+            Some(own) if is_ready => {
+                say_lack(&scene, own.surface()?, &without)?;
+                Some(own.surface()?.clone())
+            }
             _ => {
                 let quick = scene.fit(Kind::Points, &without);
                 let quick = quick.or_else(|_| scene.fit(Kind::Plane, &without));

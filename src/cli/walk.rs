@@ -184,14 +184,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let views = way.frames.iter().map(|f| (f.name.as_str(), &f.view));
     args.film.check_sizes(views)?;
     let mut inputs = opened.files();
-    let scenes = match opened.photos {
-        Some(_) => scenes_of(&opened.file, &opened.interior),
-        None => Vec::new(),
-    };
-    // Whether their photos are drawn or not.
-    let videos = scenes_of(&opened.file, &opened.interior).into_iter();
-    let videos: Vec<PathBuf> = videos.filter_map(|scene| video_of(&scene)).collect();
+    let mut scenes = scenes_of(&opened.file, &opened.interior);
+    let videos: Vec<PathBuf> = scenes.iter().filter_map(|scene| video_of(scene)).collect();
     check_film(args.film.file(), &videos)?;
+    if opened.photos.is_none() {
+        scenes.clear();
+    }
     let named = args.path.iter().chain(args.nerfstudio.file()).cloned();
     inputs.extend(files_behind(named, &scenes));
     args.nerfstudio.say_unused(args.path.as_ref());

@@ -205,21 +205,13 @@ pub fn trials_text(trials: &[Trial]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests;
     use super::*;
-    use datasets::Options;
     use tempfile::TempDir;
 
     /// A scene of five photos of a wall, without depth maps.
     fn wall() -> (TempDir, Scene) {
-        let options = Options {
-            size: Some((64, 48)),
-            views: Some(5),
-            samples_per_side: Some(2),
-        };
-        let folder = tempfile::tempdir().unwrap();
-        let capture = folder.path().join("wall");
-        let made = datasets::by_name("wall", &options).unwrap();
-        datasets::write(&made, &capture).unwrap();
+        let (folder, capture) = tests::wall(5, 2);
         let (mut scene, _) = Scene::open(&capture, false).unwrap();
         for photo in &mut scene.photos {
             photo.depth_map = None;

@@ -138,20 +138,12 @@ fn observed(mut points: Vec<SparsePoint>) -> Vec<SparsePoint> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::wall;
     use super::*;
-    use datasets::Options;
 
     #[test]
     fn photos_that_are_left_may_share_no_points() {
-        let options = Options {
-            size: Some((64, 48)),
-            views: Some(6),
-            samples_per_side: Some(1),
-        };
-        let folder = tempfile::tempdir().unwrap();
-        let capture = folder.path().join("wall");
-        let made = datasets::by_name("wall", &options).unwrap();
-        datasets::write(&made, &capture).unwrap();
+        let (_folder, capture) = wall(6, 1);
         let (scene, _) = Scene::open(&capture, false).unwrap();
         let none = BTreeSet::new();
         let all_but =

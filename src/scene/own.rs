@@ -121,7 +121,7 @@ impl Scene {
 
         // 2. They take their places.
         let path = folder.join(name);
-        exchange(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
+        replace(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
         self.proxy = Some(own);
         Ok(path)
     }
@@ -130,8 +130,9 @@ impl Scene {
 /// Has a new proxy and a new `scene.json`, which lie in `new`, take the places of others, or neither.
 ///
 /// The proxy is the first to leave and the last to come: killed meanwhile, the scene lacks it, but never says of one
-/// what holds of another.
-fn exchange(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Result<()> {
+/// what holds of another. And there is a `scene.json` at every moment, which [`capture::folder::exchange`] takes away
+/// for one.
+fn replace(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Result<()> {
     if proxy.is_dir() {
         let text = "a folder is in its place: move it away";
         return Err(std::io::Error::other(text));

@@ -9,6 +9,20 @@ use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (8, 6);
 
+/// A capture of a wall in photos of 64 × 48, and the folder that it lies in.
+pub(super) fn wall(views: usize, samples_per_side: u32) -> (TempDir, PathBuf) {
+    let options = datasets::Options {
+        size: Some((64, 48)),
+        views: Some(views),
+        samples_per_side: Some(samples_per_side),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let capture = folder.path().join("wall");
+    let made = datasets::by_name("wall", &options).unwrap();
+    datasets::write(&made, &capture).unwrap();
+    (folder, capture)
+}
+
 /// A folder to put captures together in.
 struct Captures(TempDir);
 

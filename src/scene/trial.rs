@@ -378,21 +378,13 @@ impl<'a> Trials<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::wall;
     use super::*;
-    use datasets::Options;
     use image::Luma;
 
     #[test]
     fn what_masks_cover_does_not_judge() {
-        let options = Options {
-            size: Some((64, 48)),
-            views: Some(6),
-            samples_per_side: Some(1),
-        };
-        let folder = tempfile::tempdir().unwrap();
-        let capture = folder.path().join("wall");
-        let made = datasets::by_name("wall", &options).unwrap();
-        datasets::write(&made, &capture).unwrap();
+        let (_folder, capture) = wall(6, 1);
         let none = BTreeSet::new();
         let scores = |scene: &Scene| {
             let mut trials = Trials::new(scene, &none, 2).unwrap();

@@ -31,8 +31,8 @@ const NEARER: f64 = 1.5;
 const ASIDE: f64 = 1.0 / 160.0;
 const NEARER_ASIDE: f64 = 1.1;
 
-/// One pixel is asked of so many across and down. What is as far as that in the others is seen if it is, unless it is
-/// otherwise with the block to the right, below, or at the corner between.
+/// One pixel is asked of so many across and down. What the others see of the same facet, or as far, is seen if that is,
+/// unless it is otherwise with the block to the right, below, or at the corner between.
 const BLOCK: usize = 2;
 
 /// So many across and down, of what is as far, move alike if they can, or not much farther; where one is shown nowhere
@@ -176,7 +176,7 @@ pub(super) fn hidden(
         desired,
         rays,
         asked: Asked::new(sources, visibility, photos),
-        near: vec![OnceLock::new(); map.size[0].div_ceil(TILE as u32) as usize * map.tiles.down()],
+        near: vec![OnceLock::new(); map.tiles.count()],
     };
     let [width, height] = map.size.map(|side| side as usize);
     // 1. One pixel of each block.
@@ -214,9 +214,7 @@ impl Looks<'_> {
     /// Who is asked about the pixels of a tile, found when first asked for: as many as contribute to a pixel at most,
     /// those whose cameras are nearest. Others would need distance maps that nothing else in the picture does.
     fn near(&self, x: usize, y: usize) -> &[u32] {
-        let across = (self.map.size[0] as usize).div_ceil(TILE);
-        let tile = y / TILE * across + x / TILE;
-        self.near[tile].get_or_init(|| {
+        self.near[self.map.tiles.number(x, y)].get_or_init(|| {
             let looks = |x, y| self.at(x, y);
             let mut near = in_reach(self.map, &self.asked.views, &looks, x, y);
             near.sort_by_key(|view| self.asked.turn[*view as usize]);
@@ -272,8 +270,9 @@ impl Looks<'_> {
                             let both = first.zip(self.at(x, y));
                             both.is_some_and(|((_, a), (_, b))| are_near(a, b))
                         };
-                        let is_alike = facet_at(x, y) == facet || is_of_first();
-                        let is_seen = match (x, y) == (left, top) || (are_alike && is_alike) {
+                        // A facet is one surface; where they are small most pixels see one of their own.
+                        let mut is_alike = || facet_at(x, y) == facet || is_of_first();
+                        let is_seen = match (x, y) == (left, top) || (are_alike && is_alike()) {
                             true => first,
                             false => self.is_seen(x, y, &mut last),
                         };
