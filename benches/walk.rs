@@ -48,6 +48,9 @@ struct Args {
     /// How often each of the tour's frames is drawn; the least of its times counts
     #[arg(long, default_value_t = 3)]
     times: usize,
+    /// Only this of the tour's frames, from 0 on: for profiles
+    #[arg(long, value_name = "N")]
+    frame: Option<usize>,
     /// Draw the tour's geometry with whatever graphics driver there is
     #[arg(long)]
     gpu: bool,
@@ -152,7 +155,7 @@ fn tours(args: &Args) {
         start.elapsed().as_secs_f64()
     );
     let camera = Camera::of(&lens(), SIZE[0], SIZE[1]);
-    let path = Tour::new(
+    let mut path = Tour::new(
         &house.interior,
         &contents,
         &house.model,
@@ -162,11 +165,14 @@ fn tours(args: &Args) {
     )
     .expect("a tour")
     .path;
+    if let Some(frame) = args.frame {
+        path.frames = vec![path.frames[frame].clone()];
+    }
     let device = match args.gpu {
         true => DeviceChoice::Gpu,
         false => DeviceChoice::Cpu,
     };
-    if args.only.is_empty() {
+    if args.only.is_empty() && args.frame.is_none() {
         paced(device, &house, &contents, &path.frames);
     }
     println!(
@@ -247,7 +253,7 @@ fn tours(args: &Args) {
             format!("{median:.1} / {greatest:.1} / {:.1}", times[worst])
         };
         println!(
-            "           wall, median / worst / at worst: visible {}, fills {}, triangles {}, colours {}",
+            "           wall, median / worst / at worst (frame {worst}): visible {}, fills {}, triangles {}, colours {}",
             at(|c| c.visibility),
             at(|c| c.fill),
             at(|c| c.geometry),

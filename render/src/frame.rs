@@ -7,7 +7,7 @@ use crate::lumigraph::{Lumigraph, SourceView};
 use crate::options::{FieldOptions, Resolution, Skips};
 use crate::photos::PhotoError;
 use crate::planted::{Fault, is_planted};
-use crate::sight::within_sight;
+use crate::sight::{Views, within_sight};
 use crate::surface::{FacetMap, Surface};
 use crate::tally::{Scored, Tally};
 use crate::time::Moment;
@@ -318,7 +318,12 @@ impl<'a> Frame<'a> {
         let surface = match facets {
             Some(facets) => {
                 let rays = Rays::of(&desired.lens, (desired.width, desired.height));
-                Surface::Facets(within_sight(facets, &desired, rays.as_ref(), &sources))
+                Surface::Facets(within_sight(
+                    facets,
+                    &desired,
+                    rays.as_ref(),
+                    &Views::new(&sources),
+                ))
             }
             None => Surface::of(lumigraph, &desired, &sources),
         };

@@ -21,7 +21,7 @@ use proxy::Rays;
 use rayon::prelude::*;
 use reach::Beam;
 use std::ops::Range;
-use views::Views;
+pub(crate) use views::Views;
 
 /// The factor between inverse distances that are tried, and how many on either side.
 const STEP: f64 = 1.15;
@@ -149,9 +149,9 @@ pub(crate) fn within_sight(
     map: FacetMap,
     desired: &View,
     rays: Option<&Rays>,
-    sources: &[FrameSource],
+    views: &Views<'_>,
 ) -> FacetMap {
-    let moved = to_move(&map, desired, rays, &Views::new(sources));
+    let moved = to_move(&map, desired, rays, views);
     with_moved(map, moved)
 }
 
@@ -161,11 +161,11 @@ pub(crate) fn out_of_hiding(
     map: FacetMap,
     desired: &View,
     rays: Option<&Rays>,
-    sources: &[FrameSource],
+    views: &Views<'_>,
     visibility: &Visibility,
     photos: &PhotoStore,
 ) -> FacetMap {
-    let moved = hidden::hidden(&map, desired, rays, sources, visibility, photos);
+    let moved = hidden::hidden(&map, desired, rays, views, visibility, photos);
     with_moved(map, moved)
 }
 
@@ -221,7 +221,7 @@ fn guess_has_all<const N: usize>(
 /// The same of the first that sees the first of these points, which is the next guess: if any does, it is among some.
 fn first_has_all<const N: usize>(
     views: &Views<'_>,
-    among: &[u32],
+    among: impl IntoIterator<Item = u32>,
     guess: &mut usize,
     corners: &[(DVec3, f64); N],
 ) -> bool {
@@ -266,14 +266,13 @@ fn look(
     Some((ray, plane.dot(ray)))
 }
 
-/// The views that may see something of what the tile around a pixel looks at, wherever that is moved.
-fn in_reach(
+/// What the tile around a pixel looks at, wherever that is moved.
+fn beam_of_tile(
     map: &FacetMap,
-    views: &Views<'_>,
     looks: &impl Fn(usize, usize) -> Option<(DVec3, f64)>,
     x: usize,
     y: usize,
-) -> Vec<u32> {
+) -> Beam {
     let of_tile = |at: usize, side: u32| {
         let first = at / TILE * TILE;
         first..(first + TILE).min(side as usize)
@@ -287,7 +286,7 @@ fn in_reach(
             }
         }
     }
-    views.within(&beam.nearer(nearest_tried()))
+    beam.nearer(nearest_tried())
 }
 
 /// What is moved, row by row. What is known to be seen is skipped.
@@ -302,7 +301,9 @@ fn moved(
     let nearest_tried = nearest_tried();
     let is_straight = rays.is_some_and(Rays::are_straight);
     let looks = |x: usize, y: usize| look(map, desired, rays, x, y);
-    let in_reach = |x: usize, y: usize| in_reach(map, views, &looks, x, y);
+    let in_reach = |x: usize, y: usize| -> Vec<u32> {
+        views.within(&beam_of_tile(map, &looks, x, y)).collect()
+    };
     // What a run along straight rays sees lies on a line.
     let is_seen = |pixels: &Range<usize>, y: usize, last: &mut usize, near: &mut InReach| {
         let ends = || Some([looks(pixels.start, y)?, looks(pixels.end - 1, y)?]);
@@ -311,7 +312,7 @@ fn moved(
         };
         guess_has_all(views.sources, *last, &ends) || {
             let near = near[pixels.start / TILE].get_or_insert_with(|| in_reach(pixels.start, y));
-            first_has_all(views, near, last, &ends)
+            first_has_all(views, near.iter().copied(), last, &ends)
         }
     };
     let of_row = |y: usize, tiles: &[(Range<usize>, Option<u32>)], near: &mut InReach| {
@@ -337,7 +338,7 @@ fn moved(
                         continue;
                     }
                     let near = near[x / TILE].get_or_insert_with(|| in_reach(x, y));
-                    if let Some(found) = views.first(near, ray, s) {
+                    if let Some(found) = views.first(near.iter().copied(), ray, s) {
                         last = found;
                         continue;
                     }

@@ -2,7 +2,7 @@
 
 use crate::frame::FrameSource;
 use crate::lumigraph::Lumigraph;
-use crate::sight::{Seers, out_of_hiding, within_sight};
+use crate::sight::{Seers, Views, out_of_hiding, within_sight};
 use crate::spare::PixelNumbers;
 use crate::tiles::{FacetTiles, TILE};
 use calibrate::{Pixel, View};
@@ -88,18 +88,18 @@ impl Surface {
                         .map(|q| FacetMap::of_plane(q, desired, rays, proxy.within())),
                 };
                 map.map_or(Self::Nothing, |map| {
-                    Self::Facets(within_sight(map, desired, rays, sources))
+                    Self::Facets(within_sight(map, desired, rays, &Views::new(sources)))
                 })
             }
             Proxy::Mesh(solid) => {
-                let rays = rays();
+                let (rays, views) = (rays(), Views::new(sources));
                 let map = FacetMap::of_mesh(solid, desired, rays.as_ref());
-                let map = within_sight(map, desired, rays.as_ref(), sources);
+                let map = within_sight(map, desired, rays.as_ref(), &views);
                 Self::Facets(match &lumigraph.visibility {
                     None => map,
                     Some(seen) => {
                         let photos = &lumigraph.photos;
-                        out_of_hiding(map, desired, rays.as_ref(), sources, seen, photos)
+                        out_of_hiding(map, desired, rays.as_ref(), &views, seen, photos)
                     }
                 })
             }

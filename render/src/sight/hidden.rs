@@ -2,9 +2,8 @@
 
 use super::views::Views;
 use super::{
-    HALVINGS, Moved, STEPS, factor, from_source, in_reach, look, nearest_tried, sees_well,
+    HALVINGS, Moved, STEPS, beam_of_tile, factor, from_source, look, nearest_tried, sees_well,
 };
-use crate::frame::FrameSource;
 use crate::options::MAX_CONTRIBUTORS;
 use crate::photos::PhotoStore;
 use crate::surface::FacetMap;
@@ -41,26 +40,24 @@ const ALIKE: usize = 4;
 
 /// The source views, and their distance maps.
 struct Asked<'a> {
-    views: Views<'a>,
+    views: &'a Views<'a>,
     visibility: &'a Visibility,
     photos: &'a PhotoStore,
-    /// By source view: how many cameras are nearer.
-    turn: Vec<usize>,
+    /// The source views, the nearest camera first.
+    nearest: Vec<u32>,
 }
 
 impl<'a> Asked<'a> {
-    fn new(sources: &'a [FrameSource], visibility: &'a Visibility, photos: &'a PhotoStore) -> Self {
-        let mut nearest: Vec<usize> = (0..sources.len()).collect();
-        let distance = |i: &usize| sources[*i].center.length_squared();
-        nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let mut turn = vec![0; sources.len()];
-        let nearest = nearest.into_iter().enumerate();
-        nearest.for_each(|(k, view)| turn[view] = k);
+    fn new(views: &'a Views<'a>, visibility: &'a Visibility, photos: &'a PhotoStore) -> Self {
+        // Worked out once, not at each comparison.
+        let distances = views.sources.iter().map(|s| s.center.length_squared());
+        let mut nearest: Vec<(f64, u32)> = distances.zip(0..).collect();
+        nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         Self {
-            views: Views::new(sources),
+            views,
             visibility,
             photos,
-            turn,
+            nearest: nearest.into_iter().map(|(_, view)| view).collect(),
         }
     }
 
@@ -167,7 +164,7 @@ pub(super) fn hidden(
     map: &FacetMap,
     desired: &View,
     rays: Option<&Rays>,
-    sources: &[FrameSource],
+    views: &Views<'_>,
     visibility: &Visibility,
     photos: &PhotoStore,
 ) -> Vec<Vec<Moved>> {
@@ -175,7 +172,7 @@ pub(super) fn hidden(
         map,
         desired,
         rays,
-        asked: Asked::new(sources, visibility, photos),
+        asked: Asked::new(views, visibility, photos),
         near: vec![OnceLock::new(); map.tiles.count()],
     };
     let [width, height] = map.size.map(|side| side as usize);
@@ -215,11 +212,9 @@ impl Looks<'_> {
     /// those whose cameras are nearest. Others would need distance maps that nothing else in the picture does.
     fn near(&self, x: usize, y: usize) -> &[u32] {
         self.near[self.map.tiles.number(x, y)].get_or_init(|| {
-            let looks = |x, y| self.at(x, y);
-            let mut near = in_reach(self.map, &self.asked.views, &looks, x, y);
-            near.sort_by_key(|view| self.asked.turn[*view as usize]);
-            near.truncate(MAX_CONTRIBUTORS);
-            near
+            let beam = beam_of_tile(self.map, &|x, y| self.at(x, y), x, y);
+            let Asked { views, nearest, .. } = &self.asked;
+            views.first_within(nearest, &beam, MAX_CONTRIBUTORS)
         })
     }
 
@@ -314,7 +309,7 @@ impl Looks<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Frame;
+    use crate::frame::{Frame, FrameSource};
     use crate::lumigraph::{Lumigraph, SourceView};
     use crate::options::FieldOptions;
     use crate::surface::Surface;
@@ -435,7 +430,8 @@ mod tests {
         let visibility = Visibility::of(&lumigraph.proxy, &lumigraph.sources).unwrap();
         let desired = view(0.0);
         let sources = [FrameSource::of(&lumigraph.sources[0].view, &desired)];
-        let asked = Asked::new(&sources, &visibility, &lumigraph.photos);
+        let views = Views::new(&sources);
+        let asked = Asked::new(&views, &visibility, &lumigraph.photos);
         // Past the board's left edge by so many pixels, at some depth.
         let at = |past_px: f64, z: f64| {
             let tangent = (LEFT - 1.0) / BOARD - past_px / 320.0;
@@ -481,8 +477,9 @@ mod tests {
         let rays = Rays::of(&desired.lens, SIZE);
         let map = FacetMap::of_mesh(solid, &desired, rays.as_ref());
         let photos = &lumigraph.photos;
-        let asked = Asked::new(&sources, visibility, photos);
-        let moved = hidden(&map, &desired, rays.as_ref(), &sources, visibility, photos);
+        let views = Views::new(&sources);
+        let asked = Asked::new(&views, visibility, photos);
+        let moved = hidden(&map, &desired, rays.as_ref(), &views, visibility, photos);
         let is_seen = |x: usize, y: usize| {
             let (ray, s) = look(&map, &desired, rays.as_ref(), x, y).unwrap();
             let all = || (0..sources.len()).map(|view| asked.says(view, ray, s));

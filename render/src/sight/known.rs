@@ -146,8 +146,9 @@ fn tiles_seen_whole_or_never(map: &FacetMap, rays: &Rays, views: &Views<'_>) -> 
             *whole = guess_has_all(views.sources, last, &corners) || {
                 let beam = Beam::NONE.with(least.extend(1.0), near);
                 let beam = beam.with(most.extend(1.0), near);
-                let in_reach = views.within(&beam.nearer(nearest_tried()));
-                in_reach.is_empty() || first_has_all(views, &in_reach, &mut last, &corners)
+                let beam = beam.nearer(nearest_tried());
+                let mut in_reach = views.within(&beam).peekable();
+                in_reach.peek().is_none() || first_has_all(views, in_reach, &mut last, &corners)
             };
         }
     };
@@ -235,13 +236,14 @@ pub(super) fn facets_seen_whole(
                 continue;
             };
             *whole = guess_has_all(views.sources, last, &corners) || {
-                let near = near.get_or_insert_with(|| {
+                let near: &mut Vec<u32> = near.get_or_insert_with(|| {
                     let all = boxes.iter().zip(planes);
                     let all = all.filter_map(|(seen, plane)| corners_of(seen, *plane));
                     let with = |beam: Beam, (ray, s): (DVec3, f64)| beam.with(ray, s);
-                    views.within(&all.flatten().fold(Beam::NONE, with))
+                    let beam = all.flatten().fold(Beam::NONE, with);
+                    views.within(&beam).collect()
                 });
-                first_has_all(views, near, &mut last, &corners)
+                first_has_all(views, near.iter().copied(), &mut last, &corners)
             };
         }
     });

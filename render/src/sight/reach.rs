@@ -60,6 +60,32 @@ impl Shows {
     }
 }
 
+/// The same by the inward normals of a pyramid's sides, in the camera's frame, of unit length.
+enum Pyramid {
+    Within([DVec3; 4]),
+    Beyond([DVec3; 4]),
+    Anything,
+}
+
+impl Pyramid {
+    fn of(shows: Shows) -> Self {
+        let normals = |least: DVec2, most: DVec2| {
+            let normals = [
+                DVec3::new(1.0, 0.0, -least.x),
+                DVec3::new(-1.0, 0.0, most.x),
+                DVec3::new(0.0, 1.0, -least.y),
+                DVec3::new(0.0, -1.0, most.y),
+            ];
+            normals.map(DVec3::normalize)
+        };
+        match shows {
+            Shows::Within(least, most) => Self::Within(normals(least, most)),
+            Shows::Beyond(side) => Self::Beyond(normals(DVec2::splat(side), DVec2::splat(-side))),
+            Shows::Anything => Self::Anything,
+        }
+    }
+}
+
 /// A side of a pyramid: the point at ray / s is inside where normal · ray + offset · s is positive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
@@ -84,57 +110,51 @@ pub(super) enum Reach {
 
 /// Of each source view.
 pub(super) fn reaches(sources: &[FrameSource]) -> Vec<Reach> {
-    let mut last: Option<(Lens, [f64; 2], Shows)> = None;
+    let mut last: Option<(Lens, [f64; 2], Pyramid)> = None;
     let of_source = |source: &FrameSource| {
         if !source.takes_part() {
             return Reach::Nowhere;
         }
         // Most photos share their lens.
-        let shows = match last {
-            Some((lens, size, shows)) if lens == source.lens && size == source.size => shows,
-            _ => Shows::of(&source.lens, source.size),
-        };
-        last = Some((source.lens, source.size, shows));
-        Reach::of(source, shows)
+        match &last {
+            Some((lens, size, pyramid)) if *lens == source.lens && *size == source.size => {
+                Reach::of(source, pyramid)
+            }
+            _ => {
+                let pyramid = Pyramid::of(Shows::of(&source.lens, source.size));
+                let reach = Reach::of(source, &pyramid);
+                last = Some((source.lens, source.size, pyramid));
+                reach
+            }
+        }
     };
     sources.iter().map(of_source).collect()
 }
 
-/// The source views, by their index, that may see something within a beam: all that do are among them; in order.
-pub(super) fn within(reaches: &[Reach], beam: &Beam) -> Vec<u32> {
+/// Whether a source view may see something within a beam: all that do may.
+pub(super) fn may_within(beam: &Beam) -> impl Fn(&Reach) -> bool {
     let slack = SLACK * beam.least.abs().max(beam.most.abs()).length();
-    let numbered = reaches.iter().zip(0..);
-    let may = numbered.filter(|(reach, _)| reach.may_within(beam, slack));
-    may.map(|(_, i)| i).collect()
+    move |reach| reach.may_within(beam, slack)
 }
 
 impl Reach {
-    fn of(source: &FrameSource, shows: Shows) -> Self {
-        let (least, most, slack) = match shows {
-            Shows::Within(least, most) => (least, most, SLACK),
-            Shows::Beyond(side) => (DVec2::splat(side), DVec2::splat(-side), -SLACK),
-            Shows::Anything => return Self::Anywhere,
+    fn of(source: &FrameSource, pyramid: &Pyramid) -> Self {
+        let (normals, slack) = match pyramid {
+            Pyramid::Within(normals) => (normals, SLACK),
+            Pyramid::Beyond(normals) => (normals, -SLACK),
+            Pyramid::Anything => return Self::Anywhere,
         };
-        let normals = [
-            DVec3::new(1.0, 0.0, -least.x),
-            DVec3::new(-1.0, 0.0, most.x),
-            DVec3::new(0.0, 1.0, -least.y),
-            DVec3::new(0.0, -1.0, most.y),
-        ];
         let to_desired = source.rotation.transpose();
-        let sides = normals.map(|normal| {
-            let normal = normal.normalize();
-            let slack = slack * source.translation.length();
-            Side {
-                normal: to_desired * normal,
-                offset: normal.dot(source.translation) + slack,
-            }
+        let slack = slack * source.translation.length();
+        let sides = normals.map(|normal| Side {
+            normal: to_desired * normal,
+            offset: normal.dot(source.translation) + slack,
         });
         let is_known = |side: &Side| side.normal.is_finite() && side.offset.is_finite();
-        match shows {
+        match pyramid {
             _ if !sides.iter().all(is_known) => Self::Anywhere,
-            Shows::Within(..) => Self::Within(sides),
-            Shows::Beyond(_) | Shows::Anything => Self::Beyond(sides),
+            Pyramid::Within(_) => Self::Within(sides),
+            Pyramid::Beyond(_) | Pyramid::Anything => Self::Beyond(sides),
         }
     }
 
@@ -298,7 +318,7 @@ mod tests {
                 assert!(may || !sees, "{i}: {reach:?}, {ray} at {s}");
                 assert!(!may || reach.along(ray).has_any(s), "{i}: {ray} at {s}");
                 let beam = Beam::NONE.with(ray, s).with(last, last_s);
-                let is_within = within(from_ref(reach), &beam) == [0];
+                let is_within = may_within(&beam)(reach);
                 assert!(is_within || !(sees || last_sees), "{i}: {beam:?}");
                 unseen += u32::from(!sees);
                 beyond_reach += u32::from(!may);
@@ -315,6 +335,6 @@ mod tests {
         let reach = reaches(from_ref(&source))[0];
         assert!(!reach.along(DVec3::Z).has_any(1.0));
         let beam = Beam::NONE.with(DVec3::Z, 1.0);
-        assert!(within(from_ref(&reach), &beam).is_empty());
+        assert!(!may_within(&beam)(&reach));
     }
 }

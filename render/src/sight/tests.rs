@@ -20,7 +20,7 @@ fn view(x: f64) -> View {
 
 fn within_sight(map: FacetMap, desired: &View, sources: &[FrameSource]) -> FacetMap {
     let rays = Rays::of(&desired.lens, (desired.width, desired.height));
-    super::within_sight(map, desired, rays.as_ref(), sources)
+    super::within_sight(map, desired, rays.as_ref(), &Views::new(sources))
 }
 
 /// Every pixel sees the plane at a depth of 2.
@@ -151,7 +151,7 @@ proptest! {
         let facet_of: Vec<u32> = (0..1600).map(|i| i % 40 / 8 + i / 40 / 7 * 5).collect();
         let map = FacetMap::of_pixels(planes.iter().map(q).collect(), facet_of, &desired);
         if let Some(rays) = Rays::of(&desired.lens, (40, 40)) {
-            let all = super::within_sight(map.clone(), &desired, Some(&rays), &sources);
+            let all = super::within_sight(map.clone(), &desired, Some(&rays), &Views::new(&sources));
             let views = Views::new(&sources);
             let known = Known::of(&map, &rays, &views);
             let (facets, _) = facets_seen_whole(&map, &rays, &views, &Known::default());

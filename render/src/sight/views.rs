@@ -1,6 +1,6 @@
 //! Source views that are asked only about what they may see.
 
-use super::reach::{Beam, Reach, Stretch, reaches, within};
+use super::reach::{Beam, Reach, Stretch, may_within, reaches};
 use super::{sees, sees_well};
 use crate::frame::FrameSource;
 use glam::DVec3;
@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A frame's source views.
-pub(super) struct Views<'a> {
+pub(crate) struct Views<'a> {
     pub(super) sources: &'a [FrameSource],
     /// Made when first asked for.
     reaches: OnceLock<Vec<Reach>>,
@@ -19,7 +19,7 @@ pub(super) struct Views<'a> {
 }
 
 impl<'a> Views<'a> {
-    pub(super) fn new(sources: &'a [FrameSource]) -> Self {
+    pub(crate) fn new(sources: &'a [FrameSource]) -> Self {
         Self {
             sources,
             reaches: OnceLock::new(),
@@ -34,8 +34,18 @@ impl<'a> Views<'a> {
     }
 
     /// Those that may see something within a beam: all that do are among them; in order.
-    pub(super) fn within(&self, beam: &Beam) -> Vec<u32> {
-        within(self.reaches(), beam)
+    pub(super) fn within(&self, beam: &Beam) -> impl Iterator<Item = u32> {
+        let numbered = (0..).zip(self.reaches());
+        let may = may_within(beam);
+        numbered.filter_map(move |(i, reach)| may(reach).then_some(i))
+    }
+
+    /// The first so many of some of which that is true.
+    pub(super) fn first_within(&self, among: &[u32], beam: &Beam, most: usize) -> Vec<u32> {
+        let reaches = self.reaches();
+        let may = may_within(beam);
+        let may = among.iter().filter(|i| may(&reaches[**i as usize]));
+        may.take(most).copied().collect()
     }
 
     /// Those of some that may see something along a ray, up to an inverse distance; and where on it; in order.
@@ -63,9 +73,14 @@ impl<'a> Views<'a> {
     }
 
     /// The first of some that sees the point at ray / s, where s is zero or more.
-    pub(super) fn first(&self, among: &[u32], ray: DVec3, s: f64) -> Option<usize> {
+    pub(super) fn first(
+        &self,
+        among: impl IntoIterator<Item = u32>,
+        ray: DVec3,
+        s: f64,
+    ) -> Option<usize> {
         let reaches = self.reaches();
-        let mut views = among.iter().map(|i| *i as usize);
+        let mut views = among.into_iter().map(|i| i as usize);
         views.find(|&i| reaches[i].along(ray).has(s) && self.sees(i, ray, s))
     }
 
