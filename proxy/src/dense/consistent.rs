@@ -1,6 +1,7 @@
 //! The points that depths of several photos agree on.
 
 use super::DepthMap;
+use super::objections::Objectors;
 use super::small::SmallPhoto;
 use crate::SparsePoint;
 use glam::DVec3;
@@ -10,9 +11,6 @@ use rayon::prelude::*;
 const AGREE: f64 = 0.012;
 /// The same in steps between the depths tried, which tell more where photos lie close together.
 const AGREE_STEPS: f64 = 1.0;
-const BLOCKS_STEPS: f64 = 4.0;
-/// By how much nearer, relatively, a point must be than what a photo sees to be in its way.
-const BLOCKS: f64 = 0.03;
 /// So many times as many photos must find a point in their way as agree on it before it goes.
 const OUTVOTED: usize = 3;
 /// How many others must agree, where there are so many.
@@ -46,10 +44,12 @@ pub(super) fn points(
         of.sort_unstable();
         of.dedup();
     }
-    let agreed: Vec<Vec<Agreed>> = (0..photos.len())
-        .into_par_iter()
-        .map(|i| of_photo(i, photos, maps, measured[i], &related[i], spacing))
-        .collect();
+    let objectors = Objectors::new(photos, maps);
+    let of_photo = |i: usize| {
+        let (measured, related) = (measured[i], &related[i]);
+        of_photo(i, photos, maps, measured, related, &objectors, spacing)
+    };
+    let agreed: Vec<Vec<Agreed>> = (0..photos.len()).into_par_iter().map(of_photo).collect();
 
     // Of points that several photos have only the first stays.
     let columns = |photo: &SmallPhoto| photo.width.div_ceil(spacing);
@@ -126,6 +126,7 @@ fn of_photo(
     maps: &[Option<&DepthMap>],
     measured: Option<&[f32]>,
     related: &[usize],
+    objectors: &Objectors<'_>,
     spacing: usize,
 ) -> Vec<Agreed> {
     let Some(photo) = &photos[i] else {
@@ -148,21 +149,6 @@ fn of_photo(
         let off = (inverse - 1.0 / depth).abs();
         // Unknown is 0, which lies within a step of what is far.
         (inverse > 0.0 && off <= near(inverse, map.step)).then_some(inverse)
-    };
-    // Photos near or far that see something behind it, and should not (Merrell et al. 2007).
-    let objects = |position: DVec3, other: &SmallPhoto, map: &DepthMap| {
-        let (at, depth) = other.project(position)?;
-        let inverse = f64::from(map.inverse_depths[other.index(at)?]);
-        let behind = 1.0 / depth - inverse;
-        let clear = (BLOCKS / depth).max(BLOCKS_STEPS * map.step);
-        (inverse > 0.0 && behind > clear).then_some(())
-    };
-    let objections = |position: DVec3| {
-        let all = photos.iter().zip(maps);
-        let with_maps = all.filter_map(|(photo, map)| Some((photo.as_ref()?, (*map)?)));
-        with_maps
-            .filter(|(other, map)| objects(position, other, map).is_some())
-            .count()
     };
     let middle = spacing / 2;
     let mut order: Vec<(usize, usize)> = (0..spacing)
@@ -201,7 +187,7 @@ fn of_photo(
             if seen_by.len() < needed || !position.is_finite() {
                 return None;
             }
-            if objections(position) > OUTVOTED * (seen_by.len() + own) {
+            if objectors.are_more_than(OUTVOTED * (seen_by.len() + own), position) {
                 return None;
             }
             seen_by.push(i as u32);

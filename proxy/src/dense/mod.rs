@@ -11,6 +11,7 @@
 mod consistent;
 mod measured;
 mod neighbours;
+mod objections;
 mod small;
 mod smooth;
 mod supposed;
