@@ -159,6 +159,7 @@ pub fn surface(
     let (mut mesh, index) = boundary(&delaunay, &is_free, &scene.positions);
     // 5. A view beyond the cameras may stand in what nothing carved, and look out of the shell.
     mesh.append(&scene.beyond);
+    let mesh = mesh.along_a_curve();
     let is_on = |site: &Option<u32>| site.is_some_and(|site| index[site as usize] != u32::MAX);
     Ok(Surface {
         mesh,

@@ -4,7 +4,7 @@
 //! where the ray enters. That holds on edges, too, where a ray meets both neighbours, which counting
 //! sides does not. A point outside goes to the nearest side; what sees no side sees nothing.
 
-use super::{BAND, Prepared, Sides, Threads, by_bands};
+use super::{BAND, Prepared, Threads, by_bands};
 use crate::{Rays, Solid};
 use calibrate::View;
 use glam::{DMat3, DVec3};
@@ -100,10 +100,13 @@ impl Solid {
         let center = view.center();
         let prepare = |i: usize| {
             let corners = self.mesh().corners(i);
-            let sides = Sides::new(corners.map(|p| plane_from_world * (p - center)));
-            let inverse_depth = (sides.of[0] + sides.of[1] + sides.of[2]) / sides.volume;
-            let prepared = Prepared::new(i as u32, &sides, inverse_depth, rays)?;
-            Some((prepared, sides.volume < 0.0))
+            let corners = corners.map(|p| plane_from_world * (p - center));
+            let mut enters = false;
+            let prepared = Prepared::new(i as u32, corners, rays, |sides| {
+                enters = sides.volume < 0.0;
+                Some(sides.inverse_depth())
+            })?;
+            Some((prepared, enters))
         };
         let triangles = (0..self.mesh().triangles.len()).into_par_iter();
         let triangles = triangles.with_min_len(threads.at_least(256));

@@ -12,9 +12,10 @@
 mod kept;
 mod rays;
 
+use crate::solid::Sight;
 use crate::{Facets, Solid};
 use calibrate::{Lens, View};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 pub use kept::Kept;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -101,7 +102,7 @@ impl Solid {
         }
     }
 
-    /// The triangles that rays may meet.
+    /// The triangles that rays may meet, in order.
     fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> Vec<Prepared> {
         let plane_from_world =
             rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
@@ -109,15 +110,16 @@ impl Solid {
         let front_only = self.kind().has_front_sides_only();
         let prepare = |i: usize| {
             let corners = self.mesh().corners(i);
-            let sides = Sides::new(corners.map(|p| plane_from_world * (p - center)));
-            // 1/z = q·(x, y, 1)
-            let inverse_depth = (sides.of[0] + sides.of[1] + sides.of[2]) / sides.volume;
-            let is_seen = !(front_only && sides.volume >= 0.0);
-            is_seen.then(|| Prepared::new(i as u32, &sides, inverse_depth, rays))?
+            let corners = corners.map(|p| plane_from_world * (p - center));
+            Prepared::new(i as u32, corners, rays, |sides| {
+                let is_seen = !(front_only && sides.volume >= 0.0);
+                is_seen.then(|| sides.inverse_depth())
+            })
         };
-        let triangles = (0..self.mesh().triangles.len()).into_par_iter();
-        let triangles = triangles.with_min_len(threads.at_least(256));
-        triangles.filter_map(prepare).collect()
+        // Most of a large mesh is out of sight. What is near in space is near in memory, too.
+        let runs = self.in_sight(&rays.sight(center, plane_from_world));
+        let runs = runs.into_par_iter().with_min_len(threads.at_least(4));
+        runs.flat_map_iter(|run| run.filter_map(prepare)).collect()
     }
 }
 
@@ -148,8 +150,10 @@ impl Facets {
         let of_planes = plane_from_camera.inverse().transpose();
         let prepare = |i: usize| {
             let corners = self.triangles[i].map(|c| self.directions[c as usize]);
-            let sides = Sides::new(corners.map(|corner| plane_from_camera * corner));
-            Prepared::new(i as u32, &sides, of_planes * self.planes[i], rays)
+            let corners = corners.map(|corner| plane_from_camera * corner);
+            Prepared::new(i as u32, corners, rays, |_| {
+                Some(of_planes * self.planes[i])
+            })
         };
         let facets = (0..self.triangles.len()).into_par_iter();
         let facets = facets.with_min_len(256).filter_map(prepare).collect();
@@ -158,6 +162,44 @@ impl Facets {
 }
 
 impl Rays {
+    /// What they may meet, of a camera there.
+    fn sight(&self, center: DVec3, plane_from_world: DMat3) -> Sight {
+        let [least, most] = match &self.bent {
+            None => [DVec2::ZERO, DVec2::from(self.size.map(|side| side as f64))],
+            Some(bent) => [bent.all.least, bent.all.most],
+        };
+        let world_from_plane = plane_from_world.transpose();
+        let normals = [
+            DVec3::new(1.0, 0.0, -least.x),
+            DVec3::new(-1.0, 0.0, most.x),
+            DVec3::new(0.0, 1.0, -least.y),
+            DVec3::new(0.0, -1.0, most.y),
+            DVec3::Z,
+        ];
+        Sight {
+            center,
+            normals: normals.map(|normal| world_from_plane * normal),
+        }
+    }
+
+    /// Columns and rows whose pixels may see a triangle of corners that are all ahead.
+    fn around(&self, corners: [DVec3; 3]) -> [Range<usize>; 2] {
+        let [a, b, c] = corners.map(|p| p.truncate() / p.z);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let room = SLACK * (least.abs() + most.abs());
+        match &self.bent {
+            None => [0, 1].map(|axis| {
+                // Of pixels whose centres may be between the two.
+                let room = room[axis] + 1e-6;
+                let side = self.size[axis] as f64;
+                let within = |at: f64| at.clamp(0.0, side) as usize;
+                within((least[axis] - 0.5 - room).ceil())
+                    ..within((most[axis] - 0.5 + room).floor() + 1.0)
+            }),
+            Some(bent) => bent.within(least - room - 1e-9, most + room + 1e-9),
+        }
+    }
+
     /// To where a ray is (x, y, 1): a pinhole's pixels, or the plane z = 1.
     fn plane_from_camera(&self) -> DMat3 {
         let Lens {
@@ -313,9 +355,8 @@ fn by_bands<'a>(rows: impl Iterator<Item = &'a Range<usize>>, height: usize) -> 
     bands
 }
 
-/// A triangle's corners where a pixel's ray is (x, y, 1), and its sides.
+/// A triangle's sides, where a pixel's ray is (x, y, 1).
 struct Sides {
-    corners: [DVec3; 3],
     /// Each opposite a corner, positive on that corner's side if the volume is.
     of: [DVec3; 3],
     /// Of the corners' directions.
@@ -326,20 +367,42 @@ impl Sides {
     fn new([a, b, c]: [DVec3; 3]) -> Self {
         let of = [b.cross(c), c.cross(a), a.cross(b)];
         Self {
-            corners: [a, b, c],
             volume: a.dot(of[0]),
             of,
         }
     }
+
+    /// 1/z: times (x, y, 1).
+    fn inverse_depth(&self) -> DVec3 {
+        (self.of[0] + self.of[1] + self.of[2]) / self.volume
+    }
 }
 
 impl Prepared {
-    /// `None` for one that no pixel sees. Its 1/z is that times (x, y, 1).
-    fn new(triangle_idx: u32, sides: &Sides, inverse_depth: DVec3, rays: &Rays) -> Option<Self> {
-        let [a, b, c] = sides.corners;
-        // Edge on, or not a number: it is seen nowhere.
-        let is_flat = sides.volume == 0.0 || !inverse_depth.is_finite();
-        if is_flat || [a, b, c].iter().all(|p| p.z <= 0.0) {
+    /// Of corners where a pixel's ray is (x, y, 1); 1/z is what its sides say, times that. `None` for one that no pixel
+    /// sees.
+    fn new(
+        triangle_idx: u32,
+        corners: [DVec3; 3],
+        rays: &Rays,
+        inverse_depth: impl FnOnce(&Sides) -> Option<DVec3>,
+    ) -> Option<Self> {
+        // 1. Most triangles of a fine mesh have no pixel's centre, which needs no sides.
+        let ahead = corners.map(|p| p.z > 0.0);
+        if ahead == [false; 3] {
+            return None;
+        }
+        let [columns, rows] = match ahead {
+            [true, true, true] => rays.around(corners),
+            _ => rays.size.map(|side| 0..side),
+        };
+        if rows.is_empty() || columns.is_empty() {
+            return None;
+        }
+        // 2. Edge on, or not a number: it is seen nowhere.
+        let sides = Sides::new(corners);
+        let inverse_depth = inverse_depth(&sides)?;
+        if sides.volume == 0.0 || !inverse_depth.is_finite() {
             return None;
         }
         let of = sides.of.map(|side| side * sides.volume.signum());
@@ -349,28 +412,13 @@ impl Prepared {
             Some(bent) => bent.all.least.abs().max(bent.all.most.abs()).extend(1.0),
         };
         let slack = of.map(|side| SLACK * side.abs().dot(reach));
-        let (mut columns, mut rows) = (0..width, 0..height);
-        if [a, b, c].iter().all(|p| p.z > 0.0) {
-            let [a, b, c] = [a, b, c].map(|p| p.truncate() / p.z);
-            let (least, most) = (a.min(b).min(c), a.max(b).max(c));
-            let room = SLACK * (least.abs() + most.abs());
-            [columns, rows] = match &rays.bent {
-                None => [0, 1].map(|axis| {
-                    // Of pixels whose centres may be between the two.
-                    let room = room[axis] + 1e-6;
-                    let side = rays.size[axis] as f64;
-                    let within = |at: f64| at.clamp(0.0, side) as usize;
-                    within((least[axis] - 0.5 - room).ceil())
-                        ..within((most[axis] - 0.5 + room).floor() + 1.0)
-                }),
-                Some(bent) => bent.within(least - room - 1e-9, most + room + 1e-9),
-            };
-        } else if let Some(bent) = &rays.bent
+        if let Some(bent) = &rays.bent
+            && ahead != [true; 3]
             && (0..3).any(|k| bent.all.most_of(of[k]) < -slack[k])
         {
             return None;
         }
-        (!rows.is_empty() && !columns.is_empty()).then_some(Self {
+        Some(Self {
             triangle_idx,
             slack,
             sides: of,

@@ -159,6 +159,40 @@ fn neighbours_leave_no_gap() {
     assert_eq!(compare(&solid, &view, 1), 96 * 96);
 }
 
+/// Small boxes all around, along a curve through space.
+#[test]
+fn what_is_out_of_sight_is_passed_over() {
+    let around = |i: u32| {
+        let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
+        let y = f64::from(i) / 200.0 - 1.0;
+        let level = (1.0 - y * y).sqrt();
+        let center = 5.0 * DVec3::new(level * sin, y, level * cos);
+        (center - 0.2, center + 0.2)
+    };
+    let all: Vec<(DVec3, DVec3)> = (0..400).map(around).collect();
+    let mesh = boxes(&all).along_a_curve();
+    let count = mesh.triangles.len();
+    let solid = Solid::new(MeshKind::Mesh, mesh);
+    for k1 in [0.0, -0.05] {
+        for turn in [0.0, 1.3, 3.1] {
+            let turn = DQuat::from_scaled_axis(DVec3::new(0.3, turn, -0.2));
+            let mut view = view(DVec3::new(0.2, -0.1, 0.3), turn, (64, 48), 50.0);
+            let bent = Distortion::Rational {
+                k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0],
+                p: [0.0; 2],
+            };
+            view.lens = Lens::new(view.lens.focal, view.lens.principal, bent);
+            assert!(compare(&solid, &view, 1) > 200);
+            let rays = Rays::reduced(&view, 1).unwrap();
+            let plane_from_world =
+                rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
+            let sight = rays.sight(view.center(), plane_from_world);
+            let tried: usize = solid.in_sight(&sight).iter().map(Range::len).sum();
+            assert!(tried > 0 && tried < count / 4, "{tried} of {count}");
+        }
+    }
+}
+
 /// Two boxes, one before the other: as a hull, whose back sides do not count, and as any mesh.
 #[test]
 fn from_outside_a_closed_surface_back_sides_change_nothing() {

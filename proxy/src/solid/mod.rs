@@ -1,5 +1,7 @@
 //! A mesh as a proxy: its kind, and rays that meet it.
 
+mod runs;
+
 use crate::{Kept, Mesh};
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -8,8 +10,11 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
+use runs::Runs;
+pub(crate) use runs::Sight;
 use std::collections::HashSet;
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -77,6 +82,7 @@ pub struct Solid {
     within: Option<Arc<Solid>>,
     bvh: Bvh2,
     boxed: Boxed,
+    runs: Runs,
     /// Where the hierarchy's origin lies in the world: f32 has digits only around it.
     origin: DVec3,
 }
@@ -196,6 +202,7 @@ impl Solid {
         Self {
             kind,
             occludes: kind.can_occlude_itself(),
+            runs: Runs::new(&mesh),
             mesh,
             within: None,
             bvh,
@@ -249,6 +256,11 @@ impl Solid {
     /// The mesh itself, without what bounds it.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
+    }
+
+    /// Those of its own triangles that may be in sight, in order.
+    pub(crate) fn in_sight(&self, sight: &Sight) -> Vec<Range<usize>> {
+        self.runs.in_sight(self.mesh.triangles.len(), sight)
     }
 
     /// The first triangle that a ray from a point meets, from either side but for kinds that
