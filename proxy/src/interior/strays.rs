@@ -93,7 +93,8 @@ pub fn strays(interior: &Interior, model: &Model) -> Result<Strays, InteriorErro
 
 /// What needs so much of the reach is fitted first; then what needs twice as much, and so on.
 const SHARES: [f64; 5] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0];
-/// A box rather reaches so many times as far as a portal would have to.
+/// A box rather reaches so many times as far as a portal would have to; and in all so many times the reach beyond where
+/// it was at first: floor and ceiling that are seen through an opening that is no portal would carry it on, step by step.
 const BOXES_FIRST: f64 = 4.0;
 /// Beyond what was seen, in shares of the reach.
 const MARGIN: f64 = 0.05;
@@ -107,8 +108,9 @@ const ROUNDS: usize = 256;
 const LOOKS: usize = 8;
 
 /// Lets cells' boxes, and portals that are upright rectangles, reach as far as lines of sight show that they
-/// must: what needs the least first, by at most about `reach` beyond what they reached before, in world
-/// units, again and again. What portals hide all the same is left over.
+/// must: what needs the least first, portals by at most about `reach` at once, in world units, again and again, and
+/// sides of boxes by at most about four times as much in all. What portals hide all the same is left over, as what is
+/// seen through openings that are no portals.
 ///
 /// # Errors
 /// A cell shows a node that the model does not have.
@@ -121,6 +123,7 @@ pub fn fit_to_sight(
     let mut seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
     let mut strays = look(interior, &contents, &seen);
     let margin = MARGIN * reach;
+    let widest = widest(interior, reach);
     for _ in 1..LOOKS {
         let mut left = strays.found.clone();
         let mut is_fitted = false;
@@ -128,7 +131,7 @@ pub fn fit_to_sight(
             for _ in 0..ROUNDS {
                 let fitted = left
                     .iter()
-                    .filter_map(|stray| fit(interior, stray, share * reach, margin));
+                    .filter_map(|stray| fit(interior, &widest, stray, share * reach, margin));
                 let fitted: Vec<Fitted> = fitted.collect();
                 if fitted.is_empty() {
                     break;
@@ -167,8 +170,26 @@ struct Fitted {
     farther: f64,
 }
 
-/// Fits what a stray is nearest to, if that is no farther than said, with a margin; `None` if nothing changes.
-fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Option<Fitted> {
+/// By cell, what its box may take in at most, if it has one: as much around as boxes may reach farther.
+fn widest(interior: &Interior, reach: f64) -> Vec<Option<RoomBox>> {
+    let farther = BOXES_FIRST * reach;
+    let around = |room: RoomBox| RoomBox {
+        min: room.min - farther,
+        max: room.max + farther,
+    };
+    let cells = interior.cells.iter();
+    cells.map(|cell| cell.content.room().map(around)).collect()
+}
+
+/// Fits what a stray is nearest to, if that is no farther than said, with a margin, and of boxes if the stray ends in
+/// the widest of that cell; `None` if nothing changes.
+fn fit(
+    interior: &mut Interior,
+    widest: &[Option<RoomBox>],
+    stray: &Stray,
+    reach: f64,
+    margin: f64,
+) -> Option<Fitted> {
     // 1. Of what leads on from where it is shown, and not from behind, the outline that it passes nearest to.
     let ray = stray.seen - stray.eye;
     let leads_on = |portal: &Portal| {
@@ -192,10 +213,11 @@ fn fit(interior: &mut Interior, stray: &Stray, reach: f64, margin: f64) -> Optio
         (along > 0.0 && along <= 1.0).then(|| (portal.polygon.distance(at), i, at))
     });
     let passed = passed.min_by(|a, b| a.0.total_cmp(&b.0));
-    // 2. The box that it ends nearest to.
+    // 2. The box that it ends nearest to, of those that may reach there.
     let boxes = stray.shown.iter().filter_map(|id| {
         let room = interior.cell(*id).content.room()?;
-        Some((room.distance(stray.seen) / BOXES_FIRST, *id))
+        let may_reach = widest[id.0 as usize]?.contains(stray.seen);
+        may_reach.then(|| (room.distance(stray.seen) / BOXES_FIRST, *id))
     });
     let ended = boxes.min_by(|a, b| a.0.total_cmp(&b.0));
     // 3. Whichever is nearer.

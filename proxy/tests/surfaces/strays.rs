@@ -179,15 +179,25 @@ fn what_stays_hidden_of_a_house_whose_units_are_no_metres_ends_the_fitting() {
     }
 }
 
+/// Least and greatest coordinates of a block.
+type Block = ([f64; 3], [f64; 3]);
+
+fn built_of(blocks: &[Block]) -> Model {
+    let mut mesh = Mesh::default();
+    for (min, max) in blocks {
+        let [min, max] = [*min, *max].map(DVec3::from_array);
+        mesh.append(&open_box(min, max, &[0, 1, 2, 3, 4, 5]));
+    }
+    Model {
+        mesh,
+        ..Model::default()
+    }
+}
+
 /// Two rooms of 5 × 5 m, and in the wall of 0.15 m between them a doorway, which may be walled up, and a closed
 /// door whose leaf lies so along x; the middle of the wall is at 5.
 fn rooms_with_leaf([from, to]: [f64; 2], is_open: bool) -> Model {
-    let mut mesh = Mesh::default();
-    let mut block = |min: [f64; 3], max: [f64; 3]| {
-        let [min, max] = [min, max].map(DVec3::from_array);
-        mesh.append(&open_box(min, max, &[0, 1, 2, 3, 4, 5]));
-    };
-    for (min, max) in [
+    let mut blocks = vec![
         ([-0.1, -0.1, -0.1], [10.1, 0.0, 5.1]),
         ([-0.1, 2.5, -0.1], [10.1, 2.6, 5.1]),
         ([-0.1, 0.0, -0.1], [0.0, 2.5, 5.1]),
@@ -200,16 +210,11 @@ fn rooms_with_leaf([from, to]: [f64; 2], is_open: bool) -> Model {
         ([4.925, 2.0, 3.2], [5.075, 2.5, 4.1]),
         ([4.925, 0.0, 4.1], [5.075, 2.5, 5.0]),
         ([from, 0.0, 3.2], [to, 2.0, 4.1]),
-    ] {
-        block(min, max);
-    }
+    ];
     if !is_open {
-        block([4.925, 0.0, 0.5], [5.075, 2.0, 1.4]);
+        blocks.push(([4.925, 0.0, 0.5], [5.075, 2.0, 1.4]));
     }
-    Model {
-        mesh,
-        ..Model::default()
-    }
+    built_of(&blocks)
 }
 
 #[test]
@@ -246,6 +251,55 @@ fn closed_doors_beyond_the_middle_of_their_walls_are_seen_from_both_rooms() {
         eprintln!("{leaf:?}: {before} pixels of 150 views were hidden, {after} are");
         assert!(!is_past || before > 100, "{before}");
         assert!(100 * after <= before, "{before} {after}");
+    }
+}
+
+/// Two rooms of 5 × 5 m with a doorway in the wall of 0.15 m between them, and a hatch of 2 m that is too low to be found
+/// as an opening, which may be walled up. Floors, ceilings and walls are of strips of 0.5 m.
+fn rooms_with_hatch(is_open: bool) -> Model {
+    let mut blocks = vec![
+        ([-0.1, 0.0, 0.0], [0.0, 2.5, 5.0]),
+        ([10.0, 0.0, 0.0], [10.1, 2.5, 5.0]),
+        ([4.925, -0.1, 0.0], [5.075, 0.0, 5.0]),
+        ([4.925, 0.0, 0.0], [5.075, 2.5, 0.5]),
+        ([4.925, 2.0, 0.5], [5.075, 2.5, 1.4]),
+        ([4.925, 0.0, 1.4], [5.075, 2.5, 2.8]),
+        ([4.925, 0.0, 2.8], [5.075, 1.0, 4.8]),
+        ([4.925, 1.25, 2.8], [5.075, 2.5, 4.8]),
+        ([4.925, 0.0, 4.8], [5.075, 2.5, 5.0]),
+    ];
+    if !is_open {
+        blocks.push(([4.925, 1.0, 2.8], [5.075, 1.25, 4.8]));
+    }
+    for first in [-0.1, 5.075] {
+        for strip in 0..10 {
+            let [from, to] = [strip, strip + 1].map(|n| first + 0.5025 * f64::from(n));
+            blocks.extend([
+                ([from, -0.1, -0.1], [to, 0.0, 5.1]),
+                ([from, 2.5, -0.1], [to, 2.6, 5.1]),
+                ([from, 0.0, -0.1], [to, 2.5, 0.0]),
+                ([from, 0.0, 5.0], [to, 2.5, 5.1]),
+            ]);
+        }
+    }
+    built_of(&blocks)
+}
+
+#[test]
+fn rooms_do_not_creep_over_each_other_through_what_is_no_portal() {
+    for (is_open, farthest) in [(false, 0.1), (true, 4.05 * REACH)] {
+        let model = rooms_with_hatch(is_open);
+        let found = find(&model.mesh, &FindOptions::default()).unwrap().interior;
+        assert_eq!((found.cells.len(), found.portals.len()), (2, 1));
+        let mut fitted = found.clone();
+        let left = fit_to_sight(&mut fitted, &model, REACH).unwrap();
+        for (before, after) in found.cells.iter().zip(&fitted.cells) {
+            let [before, after] = [before, after].map(|cell| cell.content.room().unwrap());
+            let farther = (before.min - after.min).max(after.max - before.max);
+            assert!(farther.max_element() < farthest + 0.01, "{after:?}");
+        }
+        // What is seen through it is told.
+        assert_eq!(left.warning(&fitted).is_some(), is_open);
     }
 }
 
