@@ -36,6 +36,9 @@ pub struct Comparison {
     pub cells: Vec<ComparedCell>,
     /// Found cells that are matched with none.
     pub extra_cells: Vec<String>,
+    /// Cells of the known one, and of the found one, that are in neither list: without a box, as nodes of a model, or
+    /// matched with none where the other interior has cells without.
+    pub not_compared: [Vec<String>; 2],
     /// By portal of the known one.
     pub portals: Vec<ComparedPortal>,
     /// Found portals that are none of them.
@@ -70,15 +73,28 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
             is_matched[f] = true;
         }
     }
+    let has_box = |cell: &Cell| cell.content.room().is_some();
+    let [is_all_known, is_all_found] = [known, found].map(|i| i.cells.iter().all(has_box));
     let name = |f: usize| found.cells[f].name.clone();
-    let cells = (0..n).map(|t| ComparedCell {
-        name: known.cells[t].name.clone(),
+    let name_of_known = |t: usize| known.cells[t].name.clone();
+    // What is matched with none may be one of those without a box.
+    let (told, untold): (Vec<usize>, Vec<usize>) =
+        (0..n).partition(|t| of_known[*t].is_some() || (is_all_found && has_box(&known.cells[*t])));
+    let unmatched = (0..m).filter(|f| !is_matched[*f]);
+    let (extra, uncertain): (Vec<usize>, Vec<usize>) =
+        unmatched.partition(|f| is_all_known && has_box(&found.cells[*f]));
+    let cells = told.into_iter().map(|t| ComparedCell {
+        name: name_of_known(t),
         found: of_known[t].map(name),
         iou: of_known[t].map_or(0.0, |f| iou(t, f)),
         apart: of_known[t].and_then(|f| apart(&known.cells[t], &found.cells[f])),
     });
     let cells = cells.collect();
-    let extra_cells = (0..m).filter(|f| !is_matched[*f]).map(name).collect();
+    let extra_cells = extra.into_iter().map(name).collect();
+    let not_compared = [
+        untold.into_iter().map(name_of_known).collect(),
+        uncertain.into_iter().map(name).collect(),
+    ];
     // 2. Portals, the nearest first.
     let off = |t: usize, f: usize| {
         let [a, b] = [&known.portals[t], &found.portals[f]];
@@ -117,6 +133,7 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
     Comparison {
         cells,
         extra_cells,
+        not_compared,
         portals,
         extra_portals: extra.map(|f| found.portals[f].name.clone()).collect(),
         meter,
@@ -216,6 +233,15 @@ impl fmt::Display for Comparison {
         for name in &self.extra_cells {
             writeln!(f, "{name}: no such room")?;
         }
+        for (whose, names) in ["known", "found"].into_iter().zip(&self.not_compared) {
+            if !names.is_empty() {
+                let names = names.join(", ");
+                writeln!(
+                    f,
+                    "{whose} rooms that are not compared, as nodes have no boxes: {names}"
+                )?;
+            }
+        }
         for portal in &self.portals {
             let said = if portal.is_found {
                 "found"
@@ -248,6 +274,47 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interior::{Content, parse_rooms};
+    use std::path::Path;
+
+    /// Two rooms, and a doorway in the wall between them; those that are asked for are nodes.
+    fn rooms(nodes: &[usize]) -> Interior {
+        let text = r#"{"version": 1, "rooms": [
+            {"name": "hall", "min": [0, 0, 0], "max": [4, 2.5, 3]},
+            {"name": "study", "min": [4, 0, 0], "max": [8, 2.5, 3]}],
+            "openings": [{"name": "door", "between": ["hall", "study"],
+                "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]]}]}"#;
+        let read = parse_rooms(Path::new("rooms.json"), text.as_bytes(), "m.glb");
+        let mut interior = read.unwrap().0;
+        for i in nodes {
+            let cell = &mut interior.cells[*i];
+            cell.content = Content::Nodes(vec![format!("cell:{}", cell.name)]);
+            cell.floor = None;
+        }
+        interior
+    }
+
+    #[test]
+    fn rooms_that_are_nodes_are_told_and_not_counted() {
+        let said = |known: &[usize], found: &[usize]| {
+            compare(&rooms(known), &rooms(found), 0.3, 1.0).to_string()
+        };
+        let door = "door: found; door is 0.00 m off and 0.00 m wider\n";
+        let left_out = |whose: &str, names: &str| {
+            format!("{whose} rooms that are not compared, as nodes have no boxes: {names}\n")
+        };
+        let [known, found] = ["known", "found"].map(|whose| left_out(whose, "hall, study"));
+        let neither = format!("{known}{found}{door}0 of 0 rooms, 1 of 1 portals found\n");
+        // What has a box may be what has none.
+        assert_eq!(said(&[0, 1], &[]), neither);
+        assert_eq!(said(&[], &[0, 1]), neither);
+        assert_eq!(said(&[0, 1], &[0, 1]), neither);
+        let study = "study: study, IoU 1.000, sides 0.00 m apart at most\n";
+        let [known, found] = ["known", "found"].map(|whose| left_out(whose, "hall"));
+        let one = format!("{study}{known}{found}{door}1 of 1 rooms, 1 of 1 portals found\n");
+        assert_eq!(said(&[0], &[]), one);
+        assert_eq!(said(&[], &[0]), one);
+    }
 
     /// What is said of a room and a door in a world of which a metre has so many units; lengths are in metres.
     fn said(wider: f64, meter: f64) -> String {
@@ -265,6 +332,7 @@ mod tests {
         let comparison = Comparison {
             cells: vec![cell],
             extra_cells: Vec::new(),
+            not_compared: [Vec::new(), Vec::new()],
             portals: vec![portal],
             extra_portals: Vec::new(),
             meter,
