@@ -93,6 +93,51 @@ fn doorways_in_thick_walls_are_found_and_hollows_are_no_rooms() {
 }
 
 #[test]
+fn windows_in_thick_walls_are_found_though_no_floor_runs_on_below_them() {
+    for (thick, head, width) in [
+        (0.3, 1.9, 0.9),
+        (0.5, 1.9, 0.9),
+        (0.6, 1.8, 0.9),
+        (0.6, 1.9, 3.4),
+        (0.8, 1.9, 0.9),
+    ] {
+        let mut mesh = Mesh::default();
+        let [from, to] = [4.0 - 0.5 * thick, 4.0 + 0.5 * thick];
+        let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+            let [min, max] = [min, max].map(DVec3::from_array);
+            mesh.append(&open_box(min, max, faces));
+        };
+        add([0.0, 0.0, 0.0], [from, 2.5, 5.0], &[0, 2, 3, 4, 5]);
+        add([to, 0.0, 0.0], [8.0, 2.5, 5.0], &[1, 2, 3, 4, 5]);
+        add([from, 0.0, 0.0], [to, 2.5, 1.0], &[0, 1, 5]);
+        let end = 1.0 + width;
+        add([from, head, 1.0], [to, 2.5, end], &[0, 1, 2]);
+        add([from, 0.0, 1.0], [to, 1.0, end], &[0, 1, 3]);
+        add([from, 0.0, end], [to, 2.5, 5.0], &[0, 1, 4]);
+        let found = find(&mesh, &FindOptions::default()).unwrap();
+        look_at(&found, &format!("thick-window-{thick}-{head}-{width}"));
+        assert_eq!(found.interior.cells.len(), 2, "{thick} {head} {width}");
+        assert_eq!(found.interior.portals.len(), 1, "{thick} {head} {width}");
+        let window = &found.interior.portals[0];
+        assert_eq!(window.name, "window 1");
+        let middle = DVec3::new(4.0, 0.5 * (1.0 + head), 0.5 * (1.0 + end));
+        let off = window.polygon.center() - middle;
+        assert!(
+            off.abs().max_element() < 0.1,
+            "{thick} {head} {width}: {off}"
+        );
+        assert!(
+            (window.width(DVec3::Y) - width).abs() < 0.15,
+            "{thick} {head} {width}"
+        );
+        // Both rooms reach to it.
+        let x = window.polygon.center().x;
+        assert!(bounds(&found, 0).max.x > x - 0.03, "{thick} {head} {width}");
+        assert!(bounds(&found, 1).min.x < x + 0.03, "{thick} {head} {width}");
+    }
+}
+
+#[test]
 fn another_storey_is_told() {
     let size = DVec3::new(6.0, 2.5, 4.0);
     let lower = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);

@@ -2,7 +2,7 @@
 
 use super::columns::{Columns, band, bin_at, height_of};
 use super::regions::Grown;
-use super::thick::THICKEST;
+use super::thick::{SILLS, THICKEST};
 use glam::DVec2;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -338,11 +338,14 @@ fn side(
     let (mut open_count, mut lintel_count) = (0, 0);
     let top = columns.lintel_band().unwrap_or(0);
     let range = band([ROUGH, columns.ceiling.unwrap_or(NO_CEILING)]);
+    let sills = band(SILLS);
     for along in &alongs {
         let all = across.clone().map(|at| index(at, *along));
         let taken = all.clone().fold(0, |t, i| t | columns.taken[i]);
         let mut free = !taken & range;
         let mut is_open = columns.is_open_at_eye(taken);
+        // All that there is of deep sides is openings, and however wide windows are, no beam alone parts the rooms.
+        is_open &= !(is_deep && taken & sills != 0);
         if columns.seen.is_some() {
             // Someone saw through all of its thickness.
             let inner = low..high.max(low + 1);

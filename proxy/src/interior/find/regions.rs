@@ -29,7 +29,7 @@ pub(super) struct Labels {
 pub(super) struct Grown {
     pub(super) labels: Vec<u32>,
     pub(super) count: u32,
-    /// What is of a doorway in a thick wall.
+    /// What is of a doorway or window in a thick wall.
     pub(super) is_doorway: Vec<bool>,
 }
 
@@ -222,9 +222,9 @@ pub(super) fn grown(columns: &Columns, found: &Labels) -> Grown {
         false => 0,
     };
     let mut labels: Vec<u32> = (0..columns.count()).map(label).collect();
-    // 3. Below the lintels of thick walls: there they meet in the middle, too.
+    // 3. In doorways and windows of thick walls: there they meet in the middle, too.
     let doorways = match columns.seen {
-        None => thick::doorways(columns, &known, &labels),
+        None => thick::passages(columns, &known, &labels),
         Some(_) => vec![0; labels.len()],
     };
     for (label, doorway) in labels.iter_mut().zip(&doorways) {
