@@ -138,6 +138,25 @@ fn windows_in_thick_walls_are_found_though_no_floor_runs_on_below_them() {
 }
 
 #[test]
+fn doorways_of_less_than_half_a_metre_are_found_wherever_they_lie_on_the_grid() {
+    for off in [0.01, 0.02, 0.03, 0.04] {
+        let mut mesh = Mesh::default();
+        let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
+            let [min, max] = [min, max].map(DVec3::from_array);
+            mesh.append(&open_box(min, max, faces));
+        };
+        let [from, to] = [2.0 + off, 2.4 + off];
+        add([0.0, 0.0, 0.0], [8.0, 2.5, 5.0], &[0, 1, 2, 3, 4, 5]);
+        add([3.95, 0.0, 0.0], [4.05, 2.5, from], &[0, 1, 5]);
+        add([3.95, 2.0, from], [4.05, 2.5, to], &[0, 1, 2]);
+        add([3.95, 0.0, to], [4.05, 2.5, 5.0], &[0, 1, 4]);
+        let found = find(&mesh, &FindOptions::default()).unwrap();
+        assert_eq!(found.interior.cells.len(), 2, "{off}");
+        assert_eq!(found.interior.portals.len(), 1, "{off}");
+    }
+}
+
+#[test]
 fn another_storey_is_told() {
     let size = DVec3::new(6.0, 2.5, 4.0);
     let lower = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);

@@ -93,7 +93,8 @@ const SAME_PLANE: f64 = 0.2;
 const REACH: f64 = 0.35;
 /// Openings that end within this of each other, and of a wall between the rooms beyond, end there; metres.
 const SAME_END: f64 = 0.35;
-/// Openings' least width, height and area; metres.
+/// Openings' least width, height and area; metres. Of squares that are free: jambs take one on each side, so that
+/// openings of 0.4 m are found wherever the grid's lines are.
 const LEAST: f64 = 0.35;
 const LEAST_AREA: f64 = 0.15;
 /// Floors are rough: an opening that begins lower begins at the floor; metres.
