@@ -55,7 +55,8 @@ pub(super) struct Args {
     /// Find the rooms even where nodes name them
     #[arg(long, conflicts_with = "rooms")]
     find: bool,
-    /// Which way is up in the world [default: as cameras had it, else the way the floor says]
+    /// Which way is up in the world; rooms are found then, even where nodes name them [default: as cameras had
+    /// it, else the way the floor says]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true,
         conflicts_with = "rooms")]
     up: Option<DVec3>,
@@ -223,10 +224,16 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     };
     let given = match told.rooms {
         rooms @ Some(_) => rooms,
-        None if args.find || args.up.is_some() => None,
-        None => match interior_from_nodes(&model, &file, args.meter) {
-            Err(InteriorError::NoCellNodes) => None,
-            told => Some(told.with_context(named)?),
+        None if args.find => None,
+        None => match (interior_from_nodes(&model, &file, args.meter), args.up) {
+            (Err(InteriorError::NoCellNodes), _) => None,
+            (_, Some(_)) => {
+                say!(
+                    "note: with --up rooms are found; those that the model's nodes name are not taken"
+                );
+                None
+            }
+            (told, None) => Some(told.with_context(named)?),
         },
     };
     let rooms = match given {

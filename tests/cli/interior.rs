@@ -291,6 +291,18 @@ fn a_metre_says_how_high_eyes_are_where_nodes_name_the_rooms() {
         let (made, _) = read_interior(&here.join("made/interior.json")).unwrap();
         assert_eq!(made.eye_height, eye_height);
     }
+    // Which way is up they do not say: with that they are found, which is told where nobody asked for it.
+    let note = "note: with --up rooms are found; those that the model's nodes name are not taken";
+    for (model, more, is_told) in [
+        ("cells.glb", "", false),
+        ("cells.glb", " --up 0,1,0", true),
+        ("cells.glb", " --up 0,1,0 --find", false),
+        ("house/house.glb", " --up 0,1,0", false),
+    ] {
+        let said = lumigraph(here, &format!("interior {model} -o made --force{more}"));
+        let said = said.ok().stderr;
+        assert_eq!(said.lines().any(|line| line == note), is_told, "{said}");
+    }
 }
 
 /// How far a box's or a polygon's sides are from another's, at most.
