@@ -17,8 +17,8 @@ use image::ImageFormat;
 use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, Interior, InteriorError, InteriorFileError, InteriorWarning, compare, fit_to_sight,
-    interior_from_nodes, read_interior, strays, surface_of, write_interior,
+    Contents, EYE_HEIGHT, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
+    fit_to_sight, interior_from_nodes, read_interior, strays, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
 use std::ffi::OsString;
@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Before what may take long.
     check_free(args)?;
     let told = Told::read(args)?;
-    say_unused(args);
+    say_unused(args, &told);
     match args.model.is_dir() {
         true => run_scene(args, &options, told),
         false => run_model(args, &options, told),
@@ -108,7 +108,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Says where an option was given for nothing.
-fn say_unused(args: &Args) {
+fn say_unused(args: &Args, told: &Told) {
+    if let (Some(file), Some((rooms, _))) = (&args.rooms, &told.rooms)
+        && args.meter != 1.0
+        && rooms.eye_height != EYE_HEIGHT * args.meter
+    {
+        let file = file.display();
+        say!("note: --meter changes nothing: {file} says how high eyes are (\"eye_height\")");
+    }
     let why = match (args.model.is_dir(), args.up) {
         (true, _) => "photos have no nodes that name rooms",
         (false, Some(_)) => "with --up rooms are found anyway",

@@ -52,6 +52,10 @@ fn a_metre_says_how_high_eyes_are_in_given_rooms_that_do_not_say() {
         // In millimetres eyes in metres are on the floor.
         let is_told = said.contains("`eye_height` is 1.6, and");
         assert_eq!(is_told, expected < 2.0, "{said}");
+        let idle =
+            "note: --meter changes nothing: own.json says how high eyes are (\"eye_height\")";
+        let is_idle = said.lines().any(|line| line == idle);
+        assert_eq!(is_idle, file == "own.json", "{said}");
     }
 }
 

@@ -41,8 +41,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Where eyes are over the floor, in metres.
-const EYE_HEIGHT: f64 = 1.6;
+/// Where eyes are over the floor where nothing else is said, in metres.
+pub const EYE_HEIGHT: f64 = 1.6;
 
 #[derive(Deserialize)]
 struct Rooms {
