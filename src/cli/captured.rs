@@ -177,9 +177,18 @@ impl Photos {
             .iter()
             .filter(|name| known.contains(*name));
         let held_out: BTreeSet<String> = held_out.cloned().collect();
-        if held_out.len() < interior.held_out.len() {
-            let gone = interior.held_out.len() - held_out.len();
-            say!("warning: {gone} of the held-out photos are not in the scene");
+        let gone = interior.held_out.iter();
+        let gone: Vec<&String> = gone.filter(|name| !known.contains(*name)).collect();
+        if let [first, more @ ..] = &gone[..] {
+            let more = match more.len() {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            say!(
+                "warning: {}: its `held_out` has {first}{more}, which the scene of its cells does not; correct or \
+                 remove what is not there",
+                file.display()
+            );
         }
         let exposure = exposure.choose(&mut scene, &held_out);
         let mut without = held_out.clone();

@@ -483,6 +483,24 @@ fn a_captures_rooms_are_drawn_from_its_photos() {
         let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
         assert!(read("a") == read("b"), "{file}");
     }
+    // Held-out photos that the scene does not have are told by name, with the file to correct.
+    let path = here.join("two/interior.json");
+    let held_out = file["held_out"].as_array().unwrap();
+    for (gone, named) in [
+        (&["nope.jpg"][..], "nope.jpg"),
+        (&["nope.jpg", "lost.jpg"][..], "nope.jpg and 1 more"),
+    ] {
+        let mut changed = file.clone();
+        let mut all = held_out.clone();
+        all.extend(gone.iter().map(|name| Value::from(*name)));
+        changed["held_out"] = Value::from(all);
+        std::fs::write(&path, changed.to_string()).unwrap();
+        let said = lumigraph(here, "walk two --tour --frames 1 --size 48x32 -o told").ok();
+        let warning = format!("warning: two/interior.json: its `held_out` has {named}, which ");
+        let is_told = said.stderr.lines().any(|line| line.starts_with(&warning));
+        assert!(is_told, "{}", said.stderr);
+    }
+    std::fs::write(&path, file.to_string()).unwrap();
     // Photos that are gone are missed by name.
     std::fs::rename(here.join("hall"), here.join("gone")).unwrap();
     let error = lumigraph(here, "walk two --tour --frames 1 -o c").error(1);
