@@ -566,6 +566,10 @@ fn usage_errors_exit_with_2() {
             "interior house.glb --rooms rooms.json --up 0,1,0 -o x",
             "cannot be used with",
         ),
+        (
+            "walk house --held-out --persist -o x",
+            "cannot be used with",
+        ),
         ("plan house --views 4", "an odd number"),
         ("plan house --span 180", "less than 180"),
         (
