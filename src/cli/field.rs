@@ -50,7 +50,7 @@ pub(super) struct Args {
     path: Option<String>,
     /// Frames of a derived path
     #[arg(long, value_name = "N", default_value_t = 30, requires = "path",
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        conflicts_with = "without_view", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
     #[command(flatten)]
     hold_out: HoldOutArgs,

@@ -205,6 +205,52 @@ mod tests {
         command().debug_assert();
     }
 
+    /// What an option requires nobody asks for where it conflicts with another that is given: the option itself
+    /// is to conflict with that.
+    #[test]
+    fn no_option_goes_without_what_it_requires() {
+        let parsed = |line: &str| {
+            let words = ["lumigraph"].into_iter().chain(line.split(' '));
+            command().try_get_matches_from(words)
+        };
+        let through = "--through 0,0,4 --through 1,0,4 --through 0,1,4";
+        for (line, option) in [
+            ("bench scene".to_owned(), "--seed 4"),
+            ("bench --quick".to_owned(), "--seed 4"),
+            ("bench --full".to_owned(), "--seed 4"),
+            ("bench --scaling".to_owned(), "--seed 4"),
+            ("bench --long-side 480".to_owned(), "--seed 4"),
+            ("walk house --held-out -o out".to_owned(), "--fps 10"),
+            (
+                "field scene --view a.jpg --without-view -o f.png".to_owned(),
+                "--frames 5",
+            ),
+            (
+                "proxy scene plane --focus a.jpg:9,9".to_owned(),
+                "--normal 0,0,1",
+            ),
+            (
+                "proxy scene plane --focus a.jpg:9,9".to_owned(),
+                "--point 0,0,4",
+            ),
+            (format!("proxy scene plane {through}"), "--normal 0,0,1"),
+            (format!("proxy scene plane {through}"), "--point 0,0,4"),
+        ] {
+            assert!(parsed(&line).is_ok(), "{line}");
+            let line = format!("{line} {option}");
+            let error = parsed(&line).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::ArgumentConflict, "{line}: {error}");
+        }
+        for line in [
+            "bench --stress 1 --seed 4",
+            "walk house --video film.mp4 --fps 10 -o out",
+            "field scene --view frame_0000 --path sweep --frames 5 -o f.png",
+            "proxy scene plane --point 0,0,4 --normal 0,0,1",
+        ] {
+            assert!(parsed(line).is_ok(), "{line}");
+        }
+    }
+
     #[test]
     fn as_many_threads_are_started_as_have_work() {
         assert_eq!(threads("1"), Ok(NonZero::<usize>::MIN));

@@ -50,7 +50,7 @@ pub(super) struct Args {
     point: Option<DVec3>,
     /// The plane's normal, of any length
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, requires = "point",
-        allow_hyphen_values = true)]
+        conflicts_with_all = ["through", "focus"], allow_hyphen_values = true)]
     normal: Option<DVec3>,
     /// One of three points on the plane, in the world
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true,

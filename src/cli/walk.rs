@@ -58,7 +58,10 @@ pub(super) struct Args {
     #[arg(long)]
     tour: bool,
     /// Draw and score the photos that were held out when the interior was made
-    #[arg(long, conflicts_with_all = ["tour", "path", "frames", "video", "resume", "persist"])]
+    #[arg(
+        long,
+        conflicts_with_all = ["tour", "path", "frames", "video", "fps", "resume", "persist"]
+    )]
     held_out: bool,
     /// Frames of a tour [default: 520]; or which of a path's are drawn, counted from 0, so that several
     /// runs share a film: 120..240, or 120..240/300 of a tour

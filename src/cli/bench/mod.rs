@@ -71,7 +71,8 @@ pub(super) struct Args {
         conflicts_with_all = ["scenes", "quick", "full", "scaling", "long_side"])]
     stress: Option<f64>,
     /// The number of the first of these scenes
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "stress")]
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "stress",
+        conflicts_with_all = ["scenes", "quick", "full", "scaling", "long_side"])]
     seed: u64,
     /// Pixels along the longer side of the pictures [default: 480, with --full 960]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(32..=8192))]
