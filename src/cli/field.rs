@@ -4,7 +4,7 @@ use super::Usage;
 use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
 use super::film::write_picture;
-use super::frames::{Asked, NamedView};
+use super::frames::{Asked, FRAMES, NamedView};
 use super::inputs::files_behind_scene;
 use super::npz::{Weights, npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
@@ -48,10 +48,10 @@ pub(super) struct Args {
     /// file
     #[arg(long, value_name = "KIND|FILE")]
     path: Option<String>,
-    /// Frames of a derived path
-    #[arg(long, value_name = "N", default_value_t = 30, requires = "path",
-        conflicts_with = "without_view", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
+    /// Frames of a derived path [default: 30]
+    #[arg(long, value_name = "N", requires = "path", conflicts_with = "without_view",
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: Option<u32>,
     #[command(flatten)]
     hold_out: HoldOutArgs,
     #[command(flatten)]
@@ -102,12 +102,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let path = args.path.as_deref();
     let asked = path.map(|path| Asked::path(path, &NerfstudioFrame::default()));
+    let count = args.frames.unwrap_or(FRAMES);
     // What need not be derived is found first: fitting a proxy may take long.
     let known = match asked.transpose()? {
         None => Ok((scene.view(&args.view)?, scene.time_s(&args.view))),
-        Some(Asked::Read { views, .. }) => Ok(frame_of(views, &args.view)?),
+        Some(Asked::Read { views, .. }) => {
+            check_no_count(args)?;
+            Ok(frame_of(views, &args.view)?)
+        }
         Some(derived) => {
-            let names: Vec<String> = (0..args.frames as usize).map(default_name).collect();
+            let names: Vec<String> = (0..count as usize).map(default_name).collect();
             frame_called(&args.view, &names)?;
             Err(derived)
         }
@@ -124,7 +128,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Ok(known) => known,
         Err(derived) => {
             let points = || points(&scene, &without);
-            let (views, _) = derived.frames(args.frames, &lumigraph, points)?;
+            let (views, _) = derived.frames(count, &lumigraph, points)?;
             frame_of(views, &args.view)?
         }
     };
@@ -192,6 +196,15 @@ fn check_extensions(args: &Args) -> Result<(), Usage> {
         }
     }
     Ok(())
+}
+
+/// Fails where so many frames are asked for of a path that has its own.
+fn check_no_count(args: &Args) -> Result<(), Usage> {
+    let Some(count) = args.frames else {
+        return Ok(());
+    };
+    let text = format!("--frames {count}: the path has its own frames; leave it out");
+    Err(Usage(text))
 }
 
 /// The view of one frame of a path, and its time.

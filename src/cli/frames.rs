@@ -181,6 +181,9 @@ pub(super) fn note_of_still(frames: &[NamedView], photos: usize) -> Option<&'sta
     })
 }
 
+/// Frames of a derived path where nobody says.
+pub(super) const FRAMES: u32 = 30;
+
 /// Frames a second where no path says. Only a film made of the frames would show it.
 const FPS: f64 = 30.0;
 

@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::frames::{Asked, NamedView, ViewArgs, note_of_still};
+use super::frames::{Asked, FRAMES, NamedView, ViewArgs, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
 use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
@@ -69,9 +69,6 @@ pub(super) struct Args {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
-
-/// Frames of a derived path where nobody says.
-const FRAMES: u32 = 30;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Start::now();

@@ -166,3 +166,20 @@ fn unknown_views_are_named() {
         assert_eq!(error, said);
     }
 }
+
+#[test]
+fn a_path_with_frames_of_its_own_takes_no_number_of_them() {
+    let folder = with_wall();
+    let path = r#"{"version": 1, "fps": 30, "frames": [{"name": "first", "camera_from_world":
+        [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+        "width": 32, "height": 24, "model": "PINHOLE", "params": [30, 30, 16, 12]}]}"#;
+    std::fs::write(folder.path().join("path.json"), path).unwrap();
+    let line = "field wall --proxy plane --path path.json --view first -o f.png";
+    let error = lumigraph(folder.path(), &format!("{line} --frames 5")).error(2);
+    assert_eq!(
+        error,
+        "--frames 5: the path has its own frames; leave it out"
+    );
+    assert!(!folder.path().join("f.png").exists());
+    lumigraph(folder.path(), line).ok();
+}
