@@ -26,6 +26,10 @@ pub(super) fn say_unused(command: &str, given: &ArgMatches) {
         let why = "--stress writes no report, and draws by all that there is";
         say_idle(&["device", "output"], is_given, why);
     }
+    if command == "proxy" && ["point", "through", "mesh"].into_iter().any(is_given) {
+        let why = "a surface that is given by hand rests on no photos";
+        say_idle(&["hold_out"], is_given, why);
+    }
     let renderer = given.try_get_one::<Renderer>("renderer");
     // A triangulation that is drawn has a grid, whatever renders.
     if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {

@@ -92,6 +92,22 @@ fn options_that_change_nothing_are_said_to() {
         let stderr = said(&line);
         assert_eq!(stderr.contains(grid), is_idle, "{line}: {stderr}");
     }
+    let held_out =
+        "note: --hold-out changes nothing: a surface that is given by hand rests on no photos\n";
+    let through = "--through 0,0,4 --through 1,0,4 --through 0,1,4";
+    said("proxy wall tunnel -o tunnel.ply");
+    for (surface, is_idle) in [
+        ("plane --point 0,0,4 --normal 0,0,1".to_owned(), true),
+        (format!("plane {through}"), true),
+        ("mesh tunnel.ply".to_owned(), true),
+        ("plane --focus 0004.png:48,36".to_owned(), false),
+        ("plane".to_owned(), false),
+    ] {
+        let line = format!("proxy wall {surface} -o p.glb");
+        assert!(!said(&line).contains("--hold-out"), "{line}");
+        let line = format!("{line} --hold-out wall/split.json");
+        assert_eq!(said(&line).contains(held_out), is_idle, "{line}");
+    }
     let gpu = "note: --gpu-memory changes nothing: no graphics processor draws";
     let stderr = said(&format!("{evaluate} --gpu-memory 1GB"));
     assert!(stderr.contains(gpu), "{stderr}");
