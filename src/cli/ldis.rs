@@ -77,6 +77,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         library: references.options(opened.photos.is_some()),
         ..WalkOptions::default()
     };
+    references.say_unused_views(&options.library, &painter);
     // 2. What was made before.
     let photos = opened.photos.as_ref();
     let made = Made::new(&opened.file, &files, &options.library, &painter, photos)?;

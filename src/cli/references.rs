@@ -3,7 +3,9 @@
 use super::Usage;
 use super::exposure::ExposureArgs;
 use super::options::{bytes, size};
+use super::output::say;
 use super::took::megabytes;
+use super::unused::note_of_ldi_views;
 use clap::ValueEnum;
 use render::DeviceChoice;
 use render::interior::{CAPTURED_REFERENCE_SIZE, LdiSource, LibraryOptions, Painter};
@@ -75,6 +77,13 @@ impl ReferenceArgs {
             Device::Auto => DeviceChoice::Auto,
             Device::Gpu => DeviceChoice::Gpu,
             Device::Cpu => DeviceChoice::Cpu,
+        }
+    }
+
+    /// Says so where `--ldi-views` was given for nothing, as LDIs are made of the photos of a painter.
+    pub(super) fn say_unused_views(&self, options: &LibraryOptions, painter: &Painter) {
+        if let Some(note) = note_of_ldi_views(options, painter) {
+            say!("note: {note} (--ldi-from views)");
         }
     }
 

@@ -5,7 +5,7 @@ use super::options::Renderer;
 use super::output::say;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
-use render::interior::PortalFill;
+use render::interior::{LibraryOptions, Painter, PortalFill};
 use std::path::{Path, PathBuf};
 
 /// Says which of a command's options were given for nothing, as another, or what is opened, leaves them
@@ -103,6 +103,17 @@ fn say_unused_of_model(interior: &Path, is_given: impl Fn(&str) -> bool) {
         let why = format!("{} is of a model, not of photos", interior.display());
         say_idle(&of_photos, is_given, &why);
     }
+}
+
+/// What to say of `--ldi-views` where what draws makes LDIs of photos: each is of all of them. Which it does only the
+/// opened photos tell.
+pub(super) fn note_of_ldi_views(
+    options: &LibraryOptions,
+    painter: &Painter,
+) -> Option<&'static str> {
+    let of_all = options.with_photos(painter.captured()).ldi_views.is_none();
+    (options.ldi_views.is_some() && of_all)
+        .then_some("--ldi-views changes nothing: LDIs are made of photos")
 }
 
 /// Of `view`, by what is opened, where there is something.

@@ -12,6 +12,7 @@ use super::output::say;
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text, say_lack};
 use super::time::{AtArgs, Clock, TimeArgs};
+use super::unused::note_of_ldi_views;
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
 use render::DeviceChoice;
@@ -209,6 +210,9 @@ impl Load {
                 let (device, budget) = (self.device, self.budget);
                 house = house.with_photos(|interior, contents, model| {
                     let painter = photos.painter(device, budget, interior, contents, model)?;
+                    if let Some(note) = note_of_ldi_views(&self.library, &painter) {
+                        teller.say(Progress::Note(note.to_owned()));
+                    }
                     folder = ldis(&painter, Some(photos))?;
                     anyhow::Ok(painter)
                 })?;

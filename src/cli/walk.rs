@@ -206,6 +206,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut painter = opened.painter(references.device(), references.cpu_memory)?;
     let mut notes = Notes::default();
     notes.keep(opened.photos.iter().flat_map(Photos::left_out));
+    if fills.contains(&PortalFill::Ldi) {
+        references.say_unused_views(&options.library, &painter);
+    }
     let ldis = match fills.contains(&PortalFill::Ldi) && !args.no_ldi_files {
         true => ldi_files(&opened, &options, &painter, &mut notes)?,
         false => None,

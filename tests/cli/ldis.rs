@@ -256,6 +256,38 @@ fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
 }
 
 #[test]
+fn options_that_change_nothing_of_a_captures_rooms_are_said_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::write(here.join("halves.json"), crate::interior::HALVES).unwrap();
+    lumigraph(here, "interior hall --rooms halves.json -o house").ok();
+    let walk = WALK.replace("--frames 8", "--frames 1");
+    // Of one view, so that they are made at once.
+    let small = "--reference-views 1";
+    let of_photos = "note: --ldi-views changes nothing: LDIs are made of photos (--ldi-from views)";
+    for (line, expected) in [
+        (format!("{walk} --ldi-views 3 -o made"), Some(of_photos)),
+        (format!("{MAKE} --ldi-views 3"), Some(of_photos)),
+        // With those files, too.
+        (format!("{walk} --ldi-views 3 -o read"), Some(of_photos)),
+        (format!("{walk} -o all"), None),
+        (
+            format!("{walk} {small} --ldi-from views --ldi-views 3 -o views"),
+            None,
+        ),
+        (
+            format!("{walk} {small} --no-photos --ldi-views 3 -o plain"),
+            None,
+        ),
+    ] {
+        let said = lumigraph(here, &line).ok().stderr;
+        let notes: Vec<&str> = said.lines().filter(|l| l.contains("nothing: ")).collect();
+        assert_eq!(notes, Vec::from_iter(expected), "{line}");
+    }
+}
+
+#[test]
 fn that_making_one_takes_more_than_the_budget_is_told() {
     let folder = with_house();
     let here = folder.path();
