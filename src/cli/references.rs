@@ -21,8 +21,9 @@ pub(super) struct ReferenceArgs {
     reference_views: usize,
     /// What LDIs of a capture's rooms are made of: its photos with depth maps themselves, wherever they
     /// were taken (views where none sees the portal), or views that photos are blended into
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "photos")]
-    ldi_from: LdiFrom,
+    /// [default: photos]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    ldi_from: Option<LdiFrom>,
     /// Make LDIs of views of the N views nearest to the viewer, and the middle one; a walk makes what has no file
     /// ahead of need, by a thread of low priority; frames go from one to the next by where they are drawn from, so
     /// they are the same in whatever order [default: all views make one]
@@ -69,6 +70,10 @@ impl ReferenceArgs {
             let text = "--reference-size: expected sides of up to 4096";
             return Err(Usage(text.to_owned()));
         }
+        if self.no_photos && matches!(self.ldi_from, Some(LdiFrom::Photos)) {
+            let text = "--ldi-from photos: with --no-photos there are none; leave out one of them";
+            return Err(Usage(text.to_owned()));
+        }
         Ok(())
     }
 
@@ -92,7 +97,7 @@ impl ReferenceArgs {
         let mut options = LibraryOptions {
             ldi_views: self.ldi_views.map(usize::from),
             budget: self.cpu_memory,
-            ldi_of: match self.ldi_from {
+            ldi_of: match self.ldi_from.unwrap_or(LdiFrom::Photos) {
                 LdiFrom::Views => LdiSource::Views,
                 LdiFrom::Photos => LdiSource::Photos,
             },

@@ -96,12 +96,18 @@ fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
     }
 }
 
-/// Of what draws interiors, where one has no photos.
+/// Of what draws interiors, where one has no photos, or they are not to be drawn.
 fn say_unused_of_model(interior: &Path, is_given: impl Fn(&str) -> bool) {
     let of_photos = ["no_photos", "no_exposure", "ldi_from"];
     if of_photos.iter().any(|id| is_given(id)) && is_without_photos(interior) {
         let why = format!("{} is of a model, not of photos", interior.display());
         say_idle(&of_photos, is_given, &why);
+    } else if is_given("no_photos") {
+        say_idle(
+            &of_photos[1..],
+            is_given,
+            "--no-photos draws the model's own colours",
+        );
     }
 }
 

@@ -266,6 +266,7 @@ fn options_that_change_nothing_of_a_captures_rooms_are_said_to() {
     // Of one view, so that they are made at once.
     let small = "--reference-views 1";
     let of_photos = "note: --ldi-views changes nothing: LDIs are made of photos (--ldi-from views)";
+    let without = "note: --no-exposure and --ldi-from change nothing: --no-photos draws the model's own colours";
     for (line, expected) in [
         (format!("{walk} --ldi-views 3 -o made"), Some(of_photos)),
         (format!("{MAKE} --ldi-views 3"), Some(of_photos)),
@@ -280,10 +281,22 @@ fn options_that_change_nothing_of_a_captures_rooms_are_said_to() {
             format!("{walk} {small} --no-photos --ldi-views 3 -o plain"),
             None,
         ),
+        (
+            format!("{walk} {small} --no-photos --no-exposure --ldi-from views -o plain"),
+            Some(without),
+        ),
     ] {
         let said = lumigraph(here, &line).ok().stderr;
         let notes: Vec<&str> = said.lines().filter(|l| l.contains("nothing: ")).collect();
         assert_eq!(notes, Vec::from_iter(expected), "{line}");
+    }
+    for line in [walk.as_str(), MAKE] {
+        let out = if line == MAKE { "" } else { " -o none" };
+        let ran = lumigraph(here, &format!("{line} --no-photos --ldi-from photos{out}"));
+        assert_eq!(
+            ran.error(2),
+            "--ldi-from photos: with --no-photos there are none; leave out one of them"
+        );
     }
 }
 
