@@ -15,7 +15,8 @@ pub struct Score {
     #[serde(serialize_with = "capped")]
     pub psnr: f64,
     /// PSNR in dB over the whole picture when it is first given the photo's exposure: red,
-    /// green and blue are each multiplied by the factor that fits the covered pixels best.
+    /// green and blue are each multiplied by the factor that fits the covered pixels best, and not
+    /// rounded again.
     #[serde(serialize_with = "capped")]
     pub psnr_exposed: f64,
     /// Structural similarity over the whole picture; 1 where it is identical.
@@ -114,14 +115,17 @@ pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreErro
         let pairs = covered().map(|(i, _)| (ours[i][c], theirs[i][c]));
         best_gain(pairs)
     });
-    let exposed = |i: usize, c: usize| (f64::from(ours[i][c]) * gain[c]).round() as u8;
-    let exposed_error =
-        |i: usize| -> u64 { (0..3).map(|c| squared(exposed(i, c), theirs[i][c])).sum() };
+    // Not rounded: where gains are near one that would cost more than they bring.
+    let exposed = |i: usize, c: usize| (f64::from(ours[i][c]) * gain[c]).min(255.0);
+    let exposed_error = |i: usize| -> f64 {
+        let difference = |c: usize| exposed(i, c) - f64::from(theirs[i][c]);
+        (0..3).map(|c| difference(c).powi(2)).sum()
+    };
     Ok(Score {
-        psnr: psnr(total, count),
+        psnr: psnr(total as f64, count),
         psnr_exposed: psnr((0..count).map(exposed_error).sum(), count),
         ssim: ssim(&ours, &theirs, width as usize, |_| true).unwrap_or(f64::NAN),
-        psnr_covered: (covered_count > 0).then(|| psnr(covered_total, covered_count)),
+        psnr_covered: (covered_count > 0).then(|| psnr(covered_total as f64, covered_count)),
         coverage: alpha_sum as f64 / (255.0 * count as f64),
     })
 }
@@ -154,7 +158,7 @@ pub fn score_masked(
         |i: usize| -> u64 { (0..3).map(|c| squared(ours[i][c], theirs[i][c])).sum() };
     let alpha = |i: usize| u64::from(rendered.as_raw()[4 * i + 3]);
     Ok(Some(MaskedScore {
-        psnr_masked: psnr(indices().map(squared_error).sum(), count),
+        psnr_masked: psnr(indices().map(squared_error).sum::<u64>() as f64, count),
         ssim_masked: ssim(&ours, &theirs, rendered.width() as usize, inside),
         coverage_masked: indices().map(alpha).sum::<u64>() as f64 / (255.0 * count as f64),
     }))
@@ -251,8 +255,8 @@ fn squared(a: u8, b: u8) -> u64 {
 }
 
 /// In dB, from the sum of squared differences of `count` pixels' three channels.
-fn psnr(sum: u64, count: usize) -> f64 {
-    let mean_squared_error = sum as f64 / (3.0 * count as f64);
+fn psnr(sum: f64, count: usize) -> f64 {
+    let mean_squared_error = sum / (3.0 * count as f64);
     10.0 * (255.0 * 255.0 / mean_squared_error).log10()
 }
 
@@ -416,7 +420,7 @@ mod tests {
             let [r, _, b, _] = p.0.map(u64::from);
             r * r + b * b
         });
-        assert_eq!(s.psnr, psnr(off.sum(), 40 * 23));
+        assert_eq!(s.psnr, psnr(off.sum::<u64>() as f64, 40 * 23));
         assert_eq!(s.psnr_exposed, f64::INFINITY);
         // What is not covered has no say.
         let mut half = darker.clone();
@@ -435,6 +439,34 @@ mod tests {
         let black = RgbaImage::from_pixel(40, 23, Rgba([0, 0, 0, 255]));
         let s = score(&black, &photo).unwrap();
         assert_eq!(s.psnr, s.psnr_exposed);
+    }
+
+    #[test]
+    fn a_fitted_exposure_is_not_rounded() {
+        // 39 of 49 columns of one grey, and the rest of another.
+        let greys = |dark: u8, bright: u8| {
+            RgbaImage::from_fn(49, 12, |x, _| {
+                let v = if x < 39 { dark } else { bright };
+                Rgba([v, v, v, 255])
+            })
+        };
+        let db = |off: f64| 10.0 * (255.0 * 255.0 / (off / 49.0)).log10();
+        // What is 100, and right, would be 101: worse than before.
+        let s = score(&greys(100, 200), &greys(100, 202)).unwrap();
+        let gain: f64 = (390_000.0 + 404_000.0) / (390_000.0 + 400_000.0);
+        assert!(gain * 100.0 > 100.5);
+        let (dark, bright) = (gain * 100.0 - 100.0, gain * 200.0 - 202.0);
+        let expected = db(39.0 * dark * dark + 10.0 * bright * bright);
+        assert!((s.psnr_exposed - expected).abs() < 1e-9, "{s:?}");
+        assert!(s.psnr_exposed > s.psnr + 3.0, "{s:?}");
+        // Nothing is brighter than white.
+        let s = score(&greys(100, 255), &greys(200, 255)).unwrap();
+        let gain: f64 = (780_000.0 + 650_250.0) / (390_000.0 + 650_250.0);
+        let dark = gain * 100.0 - 200.0;
+        assert!(
+            (s.psnr_exposed - db(39.0 * dark * dark)).abs() < 1e-9,
+            "{s:?}"
+        );
     }
 
     #[test]
