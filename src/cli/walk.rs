@@ -204,6 +204,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         say!("exposure: {}", photos.exposure.text());
     }
     let mut painter = opened.painter(references.device(), references.cpu_memory)?;
+    if let Some(file) = &args.path {
+        let ldi_views = options.library.with_photos(painter.captured()).ldi_views;
+        let drawn: Vec<String> = fills.iter().map(|fill| fill.spelled(ldi_views)).collect();
+        say_other_look(file, &drawn);
+    }
     let mut notes = Notes::default();
     notes.keep(opened.photos.iter().flat_map(Photos::left_out));
     if fills.contains(&PortalFill::Ldi) {
@@ -472,9 +477,7 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
 fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
     let (path, tour) = match &args.path {
         Some(file) => {
-            let fills = fills(&args.portals)?.into_iter();
             let read = path::read_in(file, &args.nerfstudio.frame()?)?;
-            say_other_look(file, &fills.map(PortalFill::spelled).collect::<Vec<_>>());
             (read, None)
         }
         None => {

@@ -114,7 +114,7 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
     assert_eq!(again.frames[0].view, *view);
     // What it shows and is not drawn is told.
     let notes = |output: &str| {
-        let line = format!("walk house --path shot_0001.png -o {output}");
+        let line = format!("walk house --path shot_0001.png --reference-size 8x8 -o {output}");
         let said = lumigraph(here, &line).ok().stderr;
         let of_shot = said
             .lines()
@@ -127,6 +127,15 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
         notes("geometry"),
         [
             "note: shot_0001.png: it was drawn with --portals texture; with default options the \
+          picture is another"
+        ]
+    );
+    shoot("picture", "--portals ldi --ldi-views 3");
+    assert!(notes("views --portals ldi --ldi-views 3").is_empty());
+    assert_eq!(
+        notes("ldi --portals ldi"),
+        [
+            "note: shot_0001.png: it was drawn with --portals ldi --ldi-views 3; with --portals ldi the \
           picture is another"
         ]
     );

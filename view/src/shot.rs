@@ -15,6 +15,15 @@ pub struct Shot {
     pub note: String,
 }
 
+/// What a screenshot is of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Subject {
+    /// A scene.
+    Scene,
+    /// An interior, whose LDIs are made of so many views, or of all that there are.
+    Interior { ldi_views: Option<usize> },
+}
+
 /// Writes a picture as files have it, with its view and how it was drawn, to the next free name in a
 /// folder, which is made where it is missing.
 ///
@@ -24,36 +33,39 @@ pub(crate) fn write(
     folder: &Path,
     request: &Request,
     picture: &RgbaImage,
-    is_interior: bool,
+    subject: Subject,
 ) -> Result<Shot, String> {
     let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
     std::fs::create_dir_all(folder).map_err(failed)?;
     let file = free_name(folder);
     let look = &request.look;
     let time_s = look.moment.map(|moment| moment.time_s);
-    let kept = kept(look, is_interior);
+    let kept = kept(look, subject);
     write_shot(&file, picture, &request.view, time_s, &kept).map_err(|error| error.to_string())?;
-    let note = note(look, &kept, is_interior);
+    let note = note(look, &kept, subject);
     Ok(Shot { file, note })
 }
 
 /// What of a look the file knows.
-fn kept(look: &Look, is_interior: bool) -> ShotLook {
+fn kept(look: &Look, subject: Subject) -> ShotLook {
     ShotLook {
         // What no photo covers is marked on the screen only.
         layer: match look.layer {
             Layer::Coverage => Layer::Picture.name().to_owned(),
             layer => layer.name().to_owned(),
         },
-        options: match is_interior {
-            true => look.portals.spelled(),
-            false => look.options.spelled(look.method),
+        options: match subject {
+            Subject::Interior { ldi_views } => look.portals.spelled(ldi_views),
+            Subject::Scene => look.options.spelled(look.method),
         },
     }
 }
 
-fn note(look: &Look, kept: &ShotLook, is_interior: bool) -> String {
-    let command = if is_interior { "walk" } else { "render" };
+fn note(look: &Look, kept: &ShotLook, subject: Subject) -> String {
+    let command = match subject {
+        Subject::Interior { .. } => "walk",
+        Subject::Scene => "render",
+    };
     let mut note = String::new();
     if look.exposure_stops != 0.0 {
         note += ", without the exposure";
@@ -97,18 +109,20 @@ mod tests {
             is_moving: false,
             hover: None,
         };
-        let mut told = |change: &dyn Fn(&mut Look), is_interior: bool| {
+        let (scene, all) = (Subject::Scene, Subject::Interior { ldi_views: None });
+        let three = Subject::Interior { ldi_views: Some(3) };
+        let mut told = |change: &dyn Fn(&mut Look), subject: Subject| {
             request.look = Look::default();
             change(&mut request.look);
             let picture = RgbaImage::new(8, 8);
-            let shot = write(folder.path(), &request, &picture, is_interior).unwrap();
+            let shot = write(folder.path(), &request, &picture, subject).unwrap();
             let kept = read_shot_look(&shot.file).unwrap();
             (kept.layer, kept.options, shot.note)
         };
         let texts = |layer: &str, options: &str, note: &str| {
             (layer.to_owned(), options.to_owned(), note.to_owned())
         };
-        assert_eq!(told(&|_| {}, false), texts("picture", "", ""));
+        assert_eq!(told(&|_| {}, scene), texts("picture", "", ""));
         let panel = |look: &mut Look| {
             look.options.k = 11;
             look.options.beta = 0.05;
@@ -118,20 +132,25 @@ mod tests {
         };
         let options = "--k 11 --beta 0.05 --grid 64";
         let note = format!(", without the exposure; `render` draws it with {options}");
-        assert_eq!(told(&panel, false), texts("picture", options, &note));
+        assert_eq!(told(&panel, scene), texts("picture", options, &note));
         let note = ", without the exposure; `walk` draws it with --portals ldi";
-        assert_eq!(told(&panel, true), texts("picture", "--portals ldi", note));
+        assert_eq!(told(&panel, all), texts("picture", "--portals ldi", note));
+        let options = "--portals ldi --ldi-views 3";
+        let note = format!(", without the exposure; `walk` draws it with {options}");
+        assert_eq!(told(&panel, three), texts("picture", options, &note));
+        // Of what has no LDIs there are no views of any.
+        assert_eq!(told(&|_| {}, three), texts("picture", "", ""));
         let exact = |look: &mut Look| {
             look.layer = Layer::Field;
             look.method = Method::Exact;
         };
         let note = "; of its view `render` draws the picture";
         assert_eq!(
-            told(&exact, false),
+            told(&exact, scene),
             texts("field", "--renderer exact", note)
         );
         let coverage = |look: &mut Look| look.layer = Layer::Coverage;
-        assert_eq!(told(&coverage, false), texts("picture", "", ""));
-        assert!(folder.path().join("shot_0005.png").is_file());
+        assert_eq!(told(&coverage, scene), texts("picture", "", ""));
+        assert!(folder.path().join("shot_0007.png").is_file());
     }
 }

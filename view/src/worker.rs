@@ -5,7 +5,7 @@ use crate::content::{Content, House, Space};
 use crate::draw_house::draw_house;
 use crate::draw_scene::{Drawn, SceneDrawer};
 use crate::picture::{Request, Shown};
-use crate::shot::{self, Shot};
+use crate::shot::{self, Shot, Subject};
 use image::RgbaImage;
 use render::interior::{CAPTURED_REFERENCE_SIZE, Painter, Walk, WalkOptions};
 use render::{DeviceChoice, Engine, Lumigraph};
@@ -223,7 +223,7 @@ struct Desk<'s> {
     options: &'s WorkerOptions,
     tell: &'s dyn Fn(News),
     revision: u64,
-    is_interior: bool,
+    subject: Subject,
     /// What was asked for last, by whichever content it was drawn.
     last: &'s mut Option<Request>,
     reduction: u32,
@@ -242,7 +242,7 @@ impl<'s> Desk<'s> {
             options,
             tell,
             revision,
-            is_interior: false,
+            subject: Subject::Scene,
             last,
             reduction: 1,
         }
@@ -281,7 +281,6 @@ impl<'s> Desk<'s> {
     }
 
     fn serve_house(&mut self, house: &House) -> Option<Given> {
-        self.is_interior = true;
         let mut options = self.options.walk;
         let painter = match house.take_photos() {
             Some(photos) => {
@@ -290,6 +289,8 @@ impl<'s> Desk<'s> {
             }
             None => Painter::open(self.options.device, &house.model),
         };
+        let ldi_views = options.library.with_photos(painter.captured()).ldi_views;
+        self.subject = Subject::Interior { ldi_views };
         let (interior, contents, model) = (&house.interior, &house.contents, &house.model);
         std::thread::scope(|scope| {
             let mut walk = Walk::with(painter, interior, contents, model, options);
@@ -356,7 +357,7 @@ impl<'s> Desk<'s> {
                     }
                     if let Some((_, picture)) = &kept {
                         let folder = &self.options.output;
-                        let written = shot::write(folder, &request, picture, self.is_interior);
+                        let written = shot::write(folder, &request, picture, self.subject);
                         (self.tell)(News::Shot(written));
                     }
                 }

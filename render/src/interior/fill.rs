@@ -39,11 +39,13 @@ impl PortalFill {
         }
     }
 
-    /// This where it is not the default, as the command line spells it: `--portals ldi`; else empty.
-    pub fn spelled(self) -> String {
-        match self {
-            Self::Geometry => String::new(),
-            other => format!("--portals {}", other.name()),
+    /// This where it is not the default, as the command line spells it: `--portals ldi`; else empty. With how many
+    /// of their views LDIs are made of, if not of all: `--portals ldi --ldi-views 3`.
+    pub fn spelled(self, ldi_views: Option<usize>) -> String {
+        match (self, ldi_views) {
+            (Self::Geometry, _) => String::new(),
+            (Self::Ldi, Some(views)) => format!("--portals ldi --ldi-views {views}"),
+            (other, _) => format!("--portals {}", other.name()),
         }
     }
 
