@@ -5,6 +5,7 @@ use anyhow::anyhow;
 use calibrate::colmap::{self, ColmapError};
 use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvCamera, OpenCvError};
 use calibrate::{Camera, Reconstruction, formats};
+use capture::as_argument;
 use lumigraph::scene::{self, Sizes};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -36,7 +37,8 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
             of_reconstruction(&whole, Sizes::Known)
         }
         None => {
-            let calibration = opencv::read_calibration(path, keys).map_err(unknown)?;
+            let calibration = opencv::read_calibration(path, keys);
+            let calibration = calibration.map_err(|error| unknown(path, error))?;
             for note in &calibration.notes {
                 say!("note: {note}");
             }
@@ -46,8 +48,20 @@ pub(super) fn run(path: &Path, keys: &Keys, as_json: bool) -> anyhow::Result<()>
     print_info(&info, as_json)
 }
 
-/// Of a file that is none of OpenCV's, as the last that it could be, what all of them are.
-fn unknown(error: OpenCvError) -> anyhow::Error {
+/// Of a file that is none of OpenCV's, as the last that it could be, what all of them are; and of a camera path that
+/// it is one.
+fn unknown(path: &Path, error: OpenCvError) -> anyhow::Error {
+    if let Ok(read) = render::path::read(path) {
+        let frames = match read.frames.len() {
+            1 => "one frame".to_owned(),
+            count => format!("{count} frames"),
+        };
+        let (named, argument) = (path.display(), as_argument(path));
+        return anyhow!(
+            "{named}: a camera path of {frames}, no calibration; `lumigraph render SCENE --path {argument} -o \
+             FRAMES` draws it, or of an interior `lumigraph walk INTERIOR --path {argument} -o FRAMES`"
+        );
+    }
     match error {
         OpenCvError::NotStorage { path, problem } => {
             let remedy = scene::remedy_of_model(&path);

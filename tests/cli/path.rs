@@ -112,6 +112,22 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
     }
     let again = read(&here.join("lumigraph.json")).unwrap();
     assert_eq!(again.frames[0].view, *view);
+    // Which is no calibration.
+    for (file, frames) in [
+        ("shot_0001.png", "one frame"),
+        ("lumigraph.json", "one frame"),
+        ("nerfstudio.json", "one frame"),
+        ("tour/path.json", "2 frames"),
+    ] {
+        let error = lumigraph(here, &format!("info {file}")).error(1);
+        assert_eq!(
+            error,
+            format!(
+                "{file}: a camera path of {frames}, no calibration; `lumigraph render SCENE --path {file} -o \
+                 FRAMES` draws it, or of an interior `lumigraph walk INTERIOR --path {file} -o FRAMES`"
+            )
+        );
+    }
     // What it shows and is not drawn is told.
     let notes = |output: &str| {
         let line = format!("walk house --path shot_0001.png --reference-size 8x8 -o {output}");
