@@ -266,8 +266,12 @@ impl Scene {
     /// Nothing to fit to.
     pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
         let rest = self.reconstruction.without_images(without);
-        match proxy::fit_plane(&rest) {
-            Err(FitError::NoPoints) => Ok(proxy::plane_across_axes(&rest, &self.depth_bounds())?),
+        let fitted = match proxy::fit_plane(&rest) {
+            Err(FitError::NoPoints) => proxy::plane_across_axes(&rest, &self.depth_bounds()),
+            fit => fit,
+        };
+        match fitted {
+            Err(FitError::NoPoints) => Err(self.lack_of_plane(&rest)),
             fit => Ok(fit?),
         }
     }

@@ -3,8 +3,8 @@
 
 use super::fit::{Kind, unfit};
 use super::{Scene, SceneError};
-use calibrate::View;
-use proxy::{Proxy, SparsePoint};
+use calibrate::{Reconstruction, View};
+use proxy::{FitError, Proxy, SparsePoint};
 use std::collections::BTreeSet;
 
 /// What does without sparse points.
@@ -57,6 +57,22 @@ impl Scene {
             Some(lack) => Err(unfit(format!("{lack}; {INSTEAD}"))),
             None => Ok(()),
         }
+    }
+
+    /// Why no plane can be fitted to those photos that are left in a part of the reconstruction: that of the points
+    /// which they saw with others they share none, or that there is nothing to fit to.
+    pub(super) fn lack_of_plane(&self, rest: &Reconstruction) -> SceneError {
+        let is_observed = rest.points.values().any(|point| !point.track.is_empty());
+        if is_observed || self.observed_count() == 0 {
+            return FitError::NoPoints.into();
+        }
+        let [all, left] = [&self.reconstruction, rest].map(|some| some.images.len());
+        let count = self.reconstruction.points.len();
+        unfit(format!(
+            "the photos that are left ({left} of {all}) share none of the {count} sparse points to fit a plane to, and \
+             their optical axes do not meet; leave out fewer, or give the plane by hand (`proxy SCENE plane \
+             --point X,Y,Z --normal X,Y,Z`)"
+        ))
     }
 
     /// What people should know of a proxy that is made for every view of the sparse points which the photos but those
@@ -169,5 +185,25 @@ mod tests {
         // 2. Other kinds are made before there is a view.
         let plane = scene.fit(Kind::Plane, &none).unwrap().proxy;
         assert_eq!(scene.note_of_lack(&plane, &all_but(1)).unwrap(), None);
+
+        // 3. If they can be: of one alone there is nothing to fit to, though the scene has points.
+        let others = all_but(1);
+        let fitted = [scene.fit(Kind::Plane, &others), scene.fit_best(&others)];
+        let said = format!(
+            "the photos that are left (1 of 6) share none of the {count} sparse points to fit a plane to, and their \
+             optical axes do not meet; leave out fewer, or give the plane by hand"
+        );
+        for fitted in fitted {
+            let error = fitted.unwrap_err().to_string();
+            assert!(error.starts_with(&said), "{error}");
+        }
+        // Where it has none, that is why.
+        let mut bare = scene;
+        bare.reconstruction.points.clear();
+        let error = bare.fit(Kind::Plane, &others).unwrap_err().to_string();
+        assert!(
+            error.contains("cameras observe no sparse points"),
+            "{error}"
+        );
     }
 }
