@@ -14,6 +14,9 @@ pub struct Exif {
     /// When the photo was taken, in seconds since the year 1970 by the camera's clock,
     /// which knows no time zone: DateTimeOriginal and SubSecTimeOriginal.
     pub taken_s: Option<f64>,
+    /// How what is stored is to be shown, 1 to 8: 1 as it is, 3 turned by a half, 6 by a quarter clockwise, 8 by one
+    /// counter-clockwise; 2, 4, 5 and 7 are mirrored. It is not applied.
+    pub orientation: Option<u8>,
 }
 
 /// Reads a photo's EXIF data. A photo without has none of them.
@@ -39,6 +42,9 @@ pub fn read_exif(path: &Path) -> Result<Exif, CaptureError> {
     Ok(Exif {
         focal_length_mm: focal_length_mm.filter(|mm| mm.is_finite() && *mm > 0.0),
         taken_s: whole.map(|whole| whole + fraction(digits.trim())),
+        orientation: value(Tag::Orientation)
+            .and_then(|value| u8::try_from(value.get_uint(0)?).ok())
+            .filter(|orientation| (1..=8).contains(orientation)),
     })
 }
 

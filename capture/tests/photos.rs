@@ -1,10 +1,10 @@
 //! Listing, decoding, reducing and writing photos.
 
 #[cfg(unix)]
-use capture::{Beside, check_beside, decode_mask, read_exif};
+use capture::{Beside, check_beside, decode_mask};
 use capture::{
     CaptureError, PhotoSet, decode, decode_reduced, find_photos_folder, find_photos_within,
-    photo_size, reduced_size, resize, write_png,
+    photo_size, read_exif, reduced_size, resize, write_png,
 };
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgba, RgbaImage};
@@ -314,6 +314,8 @@ fn exif_orientation_is_not_applied() {
     let turned = put(&folder, "turned.jpg", &turned);
     let plain = put(&folder, "plain.jpg", &jpeg_bytes(40, 24));
     assert_eq!(photo_size(&turned).unwrap(), (40, 24));
+    let orientations = [&turned, &plain].map(|photo| read_exif(photo).unwrap().orientation);
+    assert_eq!(orientations, [Some(6), None]);
     assert_eq!(
         decode(&turned, None).unwrap(),
         decode(&plain, None).unwrap()

@@ -79,12 +79,14 @@ pub enum SceneError {
         expected: (u32, u32),
     },
     /// The photos' silhouettes fit no turntable.
-    #[error("{}: no turntable's cameras: {source}", folder.display())]
+    #[error("{}: no turntable's cameras: {source}{}", folder.display(), upright(turned.as_deref()))]
     Turntable {
         /// The folder of the photos.
         folder: PathBuf,
         /// What does not fit.
         source: proxy::hull::TurntableError,
+        /// Which photos are stored turned, if any are.
+        turned: Option<String>,
     },
     /// A kind of proxy does not suit the scene.
     #[error("{0}")]
@@ -284,6 +286,13 @@ pub fn remedy_of_model(path: &Path) -> Option<String> {
     let argument = as_argument(path);
     end.eq_ignore_ascii_case("glb")
         .then(|| format!("`lumigraph interior {argument} -o INTERIOR` takes models"))
+}
+
+/// What to do where photos are stored turned, after all.
+fn upright(turned: Option<&str>) -> String {
+    turned.map_or_else(String::new, |turned| {
+        format!("; {turned}: photos must stand upright, as `mogrify -auto-orient` makes them")
+    })
 }
 
 /// What else there is to say, after all.

@@ -8,6 +8,7 @@ use super::meant::Meant;
 use super::misfit;
 use super::named::Named;
 use super::times::{Clues, TimeSource, set_times};
+use super::turned;
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
@@ -141,7 +142,8 @@ impl Scene {
             meant: &meant,
             named: named.as_ref(),
         };
-        set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        warnings.extend(turned::note(&scene.photos, &taken));
 
         // 3. Are they what was calibrated?
         warnings.extend(misfit::of(&scene.reconstruction));

@@ -40,6 +40,7 @@ mod tests;
 mod times;
 mod trial;
 mod truth;
+mod turned;
 mod turntable;
 mod undistort;
 

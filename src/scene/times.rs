@@ -3,7 +3,7 @@
 use super::meant::Meant;
 use super::named::Named;
 use super::{Photo, SceneError, Warning};
-use capture::{PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
+use capture::{Exif, PhotoSet, Times, from_earliest, number_in_name, read_exif, read_times};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -34,13 +34,15 @@ pub(super) struct Clues<'a> {
     pub(super) named: Option<&'a Named>,
 }
 
-/// Gives the photos their times. Where some have none, a note says so: at a moment they take no part.
+/// Gives the photos their times. Where some have none, a note says so: at a moment they take no part. What cameras wrote
+/// into the photos comes back, where that had to be read, in their order; else nothing.
 pub(super) fn set_times(
     photos: &mut [Photo],
     source: &TimeSource,
     clues: &Clues<'_>,
     warnings: &mut Vec<Warning>,
-) -> Result<(), SceneError> {
+) -> Result<Vec<Exif>, SceneError> {
+    let mut taken = Vec::new();
     let own = clues.capture.join(TIMES_FILE);
     let times: Times = match source {
         TimeSource::List(file) => from_list(photos, file, clues, warnings)?,
@@ -48,13 +50,19 @@ pub(super) fn set_times(
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
         TimeSource::Found => match from_calibration(photos, clues, warnings) {
             Some(times) => times,
-            None => from_photos(photos, warnings),
+            None => {
+                let read = photos.iter();
+                taken = read
+                    .map(|p| read_exif(&p.path).unwrap_or_default())
+                    .collect();
+                from_photos(photos, &taken, warnings)
+            }
         },
     };
     for (photo, time_s) in photos.iter_mut().zip(times) {
         photo.time_s = time_s;
     }
-    Ok(())
+    Ok(taken)
 }
 
 /// Those that the calibration says, unless it has one time for all.
@@ -82,14 +90,10 @@ fn from_calibration(
 }
 
 /// Those that cameras wrote into the photos, or their names if these tell more.
-fn from_photos(photos: &[Photo], warnings: &mut Vec<Warning>) -> Times {
+fn from_photos(photos: &[Photo], taken: &[Exif], warnings: &mut Vec<Warning>) -> Times {
     let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
     let by_name = capture::times_of_names(&names);
-    let by_camera = photos
-        .iter()
-        .map(|p| read_exif(&p.path).ok()?.taken_s)
-        .collect();
-    let by_camera = from_earliest(by_camera);
+    let by_camera = from_earliest(taken.iter().map(|exif| exif.taken_s).collect());
     let count = |times: &Times| times.iter().flatten().count();
     let (times, told_by) = if count(&by_name) > count(&by_camera) {
         (by_name, "the photos' names")

@@ -3,6 +3,7 @@
 
 use super::meant::Meant;
 use super::times::{Clues, set_times};
+use super::turned;
 use super::{ImportOptions, Photo, Scene, SceneError, Warning, calibration};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3};
 use capture::{CaptureError, PhotoSet, photo_size};
@@ -56,7 +57,9 @@ impl Scene {
             meant: &meant,
             named: None,
         };
-        set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        let turned = turned::text(&scene.photos, &taken);
+        warnings.extend(turned::note(&scene.photos, &taken));
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);
         scene.find_beside(capture, &meant, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);
@@ -71,6 +74,7 @@ impl Scene {
         let failed = |source| SceneError::Turntable {
             folder: found.root.clone(),
             source,
+            turned,
         };
         let circle = turntable(&silhouettes, step_degrees).map_err(failed)?;
         warnings.push(Warning::Note(format!(

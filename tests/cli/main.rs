@@ -39,6 +39,7 @@ mod scene;
 mod shape;
 mod surface;
 mod time;
+mod turned;
 mod turntable;
 mod uncalibrated;
 mod undistort;

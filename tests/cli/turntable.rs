@@ -1,6 +1,7 @@
 //! Photos of a turntable's object, without a calibration.
 
 use crate::run::{files, lumigraph, with_wall};
+use crate::turned::turn;
 use datasets::{Dataset, Options, by_name, render_view};
 use image::{DynamicImage, Rgb, RgbImage};
 use std::fs;
@@ -135,7 +136,10 @@ fn a_plain_background_will_do_and_the_table_may_turn_either_way() {
     assert!(error.contains("p7.png"), "{error}");
     fs::write(photos.join("p7.png"), bytes).unwrap();
 
-    // What is no such circle is told, with a remedy, and leaves nothing.
+    // What is no such circle is told, with a remedy, and leaves nothing; and what may be why.
+    turn(&photos.join("p1.png"));
+    let turned = "; 1 of 24 photos are stored turned or mirrored (EXIF orientation; 6 in p1.png, for one): \
+                  photos must stand upright, as `mogrify -auto-orient` makes them";
     for (step, said) in [("-11", "the step"), ("15", "turn the step's sign")] {
         let error = lumigraph(folder, &format!("import photos --turntable {step} -o no")).error(1);
         assert!(
@@ -143,6 +147,7 @@ fn a_plain_background_will_do_and_the_table_may_turn_either_way() {
             "{error}"
         );
         assert!(error.contains(said), "{step}: {error}");
+        assert!(error.ends_with(turned), "{error}");
         assert!(!folder.join("no").exists());
     }
     // Another size; then too few.

@@ -1,0 +1,56 @@
+//! Photos that are to be shown turned, as cameras that were held upright or upside down write beside them: their
+//! pixels are used as stored, of which calibrations speak.
+
+use super::{Photo, Warning};
+use capture::Exif;
+
+/// Says which photos are stored turned or mirrored, for people; `None` where none is known to be. `taken` is what
+/// cameras wrote into each of them, or nothing where that was not read.
+pub(super) fn text(photos: &[Photo], taken: &[Exif]) -> Option<String> {
+    let mut turned = photos.iter().zip(taken).filter_map(|(photo, exif)| {
+        let orientation = exif.orientation.filter(|o| *o != 1)?;
+        Some((photo.name.as_str(), orientation))
+    });
+    let (name, orientation) = turned.next()?;
+    let count = 1 + turned.count();
+    Some(format!(
+        "{count} of {} photos are stored turned or mirrored (EXIF orientation; {orientation} in {name}, for one)",
+        photos.len()
+    ))
+}
+
+/// The same, with what comes of it and what to do.
+pub(super) fn note(photos: &[Photo], taken: &[Exif]) -> Option<Warning> {
+    let text = text(photos, taken)?;
+    Some(Warning::Note(format!(
+        "{text}: their pixels are used as stored, so that what is upright may lie on its side; `mogrify -auto-orient`, \
+         before they are calibrated, stands them upright"
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Scene;
+    use super::super::tests::wall;
+    use super::*;
+
+    #[test]
+    fn photos_that_are_stored_turned_are_counted_and_one_is_named() {
+        let (_folder, capture) = wall(3, 1);
+        let (scene, _) = Scene::open(&capture, false).unwrap();
+        let said = |orientations: &[Option<u8>]| {
+            let of = |orientation: &Option<u8>| Exif {
+                orientation: *orientation,
+                ..Exif::default()
+            };
+            let taken: Vec<Exif> = orientations.iter().map(of).collect();
+            text(&scene.photos, &taken)
+        };
+        assert_eq!(said(&[]), None);
+        assert_eq!(said(&[None, Some(1), None]), None);
+        assert_eq!(
+            said(&[Some(1), Some(8), Some(6)]).unwrap(),
+            "2 of 3 photos are stored turned or mirrored (EXIF orientation; 8 in 0001.png, for one)"
+        );
+    }
+}
