@@ -116,9 +116,27 @@ pub(crate) fn decode_any(
     }
 
     // 3. The pixels.
-    ImageReader::with_format(Cursor::new(bytes), format)
+    let picture = ImageReader::with_format(Cursor::new(bytes), format)
         .decode()
-        .map_err(|error| decode_failed(path, &error, Some(size)))
+        .map_err(|error| decode_failed(path, &error, Some(size)))?;
+
+    // 4. It makes something of damaged data, too.
+    if format == ImageFormat::Jpeg
+        && let Some(share) = jpeg::damage(bytes)
+    {
+        return Err(decode_error(path, damaged(share)));
+    }
+    Ok(picture)
+}
+
+/// What is wrong with a JPEG that shows damage after a share of the picture.
+fn damaged(share: f64) -> String {
+    match (100.0 * share).floor() {
+        percent if percent < 100.0 => format!(
+            "the JPEG data are damaged, at most the first {percent} % of the picture are whole"
+        ),
+        _ => "the JPEG data are damaged, they do not end with the picture".to_owned(),
+    }
 }
 
 /// Decodes a photo and reduces it so that its longer side is at most `max_side` pixels;

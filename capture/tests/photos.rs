@@ -283,6 +283,30 @@ fn every_truncation_of_a_jpeg_is_an_error() {
     assert_eq!(decode(&path, None).unwrap(), decode(&whole, None).unwrap());
 }
 
+/// What a card or a disk lost of a photo reads as zeros. The decoder makes something of it.
+#[test]
+fn a_jpeg_that_is_damaged_in_the_middle_is_an_error() {
+    let folder = folder();
+    let bytes = jpeg_bytes(400, 300);
+    let whole = put(&folder, "whole.jpg", &bytes);
+    assert_eq!(decode(&whole, None).unwrap().dimensions(), (400, 300));
+    let (half, last) = (bytes.len() / 2, bytes.len() - 2);
+    let mut lost = bytes.clone();
+    lost[half..half + 4096].fill(0);
+    let error = refusal(&put(&folder, "lost.jpg", &lost));
+    let problem = error.strip_prefix("cannot decode lost.jpg: the JPEG data are damaged, ");
+    let remedy = "; the file may be truncated: copy it again or leave it out";
+    assert!(problem.is_some_and(|p| p.ends_with(remedy)), "{error}");
+    // Cut short, and given an end.
+    let ended = [&bytes[..half], &bytes[last..]].concat();
+    let error = refusal(&put(&folder, "ended.jpg", &ended));
+    let share = error
+        .strip_prefix("cannot decode ended.jpg: the JPEG data are damaged, at most the first ")
+        .and_then(|rest| rest.split_once(" % of the picture are whole; "));
+    let percent: u32 = share.expect(&error).0.parse().unwrap();
+    assert!((20..80).contains(&percent), "{error}");
+}
+
 #[test]
 fn a_truncated_png_is_an_error_unless_its_pixels_are_complete() {
     let folder = folder();
