@@ -12,7 +12,8 @@
 //!   [`crate::ModelKind::InverseRadial`].
 //! - With `NVM_V3 FixedK fx cx fy cy` all cameras share that calibration.
 //!
-//! A file may hold several models, largest first; the first one is read.
+//! A file may hold several models, which are not in one frame; then photos that are in none,
+//! as a model without points. The model with the most photos is read.
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
@@ -24,11 +25,14 @@ use std::path::Path;
 
 /// How far from 1 a quaternion's length may be.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
+/// Of how many of the models that are not taken a note tells the photos.
+const SHOWN: usize = 5;
 
-/// Reads the first model of an `.nvm` file. Images and points are numbered from 0, as in
-/// the file; keypoints are in the order of the points that they observe. `size_of` is
-/// asked for every image. Where measurements do not count from the images' centres, `notes`
-/// say so.
+/// Reads the model of an `.nvm` file that has the most images, of equal ones the first.
+/// Images and points are numbered from 0, as in the file; keypoints are in the order of the
+/// points that they observe. `size_of` is asked for every image of the model, and of the
+/// file's first. Where there are other models, or measurements do not count from the images'
+/// centres, `notes` say so.
 ///
 /// # Errors
 /// An unreadable file, another version, a quaternion that is no rotation, a camera
@@ -54,19 +58,121 @@ pub fn parse_nvm(
     let mut words = Words::new(path, build::text(path, bytes)?);
     let header = words.line().unwrap_or_default();
     let shared = fixed_calibration(header).map_err(|problem| words.error("header", problem))?;
-    let image_count: u32 = words.parse("header", "the number of images")?;
+    let mut whole = read_model(path, &mut words, shared, size_of)?;
 
+    // How many photos all models have, how many the largest, and where that begins.
+    let mut images = vec![whole.images.len() as u64];
+    let mut largest = (images[0], None);
+    loop {
+        let begin = words.clone();
+        match pass_model(&mut words) {
+            Next::End => break,
+            Next::Model { points: 0, .. } => {}
+            Next::Model { images: count, .. } => {
+                images.push(count.into());
+                if u64::from(count) > largest.0 {
+                    largest = (count.into(), Some(begin));
+                }
+            }
+            Next::Broken => {
+                notes.push(format!(
+                    "{}: models from {} on are not used: it cannot be read",
+                    path.display(),
+                    words.place(&format!("model {}", images.len()))
+                ));
+                break;
+            }
+        }
+    }
+    if let (_, Some(mut begin)) = largest {
+        whole = read_model(path, &mut begin, shared, size_of)?;
+    }
+    notes.extend(of_several(path, images, largest.0));
+    notes.extend(place_keypoints(path, &mut whole));
+    Ok(whole)
+}
+
+/// What to say where there are several models, by how many photos they and the one that is
+/// taken have.
+fn of_several(path: &Path, mut images: Vec<u64>, taken: u64) -> Option<String> {
+    let count = images.len();
+    images.remove(images.iter().position(|&images| images == taken)?);
+    let others: Vec<String> = images.iter().take(SHOWN).map(u64::to_string).collect();
+    let more = if images.len() > SHOWN { ", …" } else { "" };
+    (count > 1).then(|| {
+        format!(
+            "{}: holds {count} models that VisualSFM could not join; the one with {taken} photos \
+             is taken, and not those with {}{more}",
+            path.display(),
+            others.join(", ")
+        )
+    })
+}
+
+/// What comes after a model.
+enum Next {
+    /// Another one, or photos that are in none.
+    Model {
+        images: u32,
+        points: u64,
+    },
+    /// The end of the models.
+    End,
+    Broken,
+}
+
+/// Passes over a model without reading it.
+fn pass_model(words: &mut Words<'_>) -> Next {
+    // Behind the models' end comes what concerns PLY files, and comments.
+    let images = match words.next().map(str::parse::<u32>) {
+        Some(Ok(images)) if images > 0 => images,
+        _ => return Next::End,
+    };
+    match pass_content(words, images) {
+        Some(points) => Next::Model { images, points },
+        None => Next::Broken,
+    }
+}
+
+/// Passes over images and points: how many points.
+fn pass_content(words: &mut Words<'_>, images: u32) -> Option<u64> {
+    for _ in 0..images {
+        while words.line()?.trim().is_empty() {}
+    }
+    let points: u64 = words.next()?.parse().ok()?;
+    for _ in 0..points {
+        let position_and_color = 6;
+        for _ in 0..position_and_color {
+            words.next()?;
+        }
+        let measurements: u64 = words.next()?.parse().ok()?;
+        for _ in 0..measurements {
+            let measurement = 4;
+            for _ in 0..measurement {
+                words.next()?;
+            }
+        }
+    }
+    Some(points)
+}
+
+/// Reads a model.
+fn read_model(
+    path: &Path,
+    words: &mut Words<'_>,
+    shared: Option<(DVec2, DVec2)>,
+    size_of: SizeOf<'_>,
+) -> Result<Reconstruction, FormatError> {
+    let image_count: u32 = words.parse("header", "the number of images")?;
     let mut builder = Builder::new(path);
     for index in 0..image_count {
-        read_image(&mut words, &mut builder, index, shared, size_of)?;
+        read_image(words, &mut builder, index, shared, size_of)?;
     }
     let point_count: u64 = words.parse("points", "the number of points")?;
     for id in 0..point_count {
-        read_point(&mut words, &mut builder, id, image_count)?;
+        read_point(words, &mut builder, id, image_count)?;
     }
-    let mut whole = builder.finish("images")?;
-    notes.extend(place_keypoints(path, &mut whole));
-    Ok(whole)
+    builder.finish("images")
 }
 
 /// Moves measurements to where they count from, and says so where that is not as VisualSFM

@@ -11,6 +11,7 @@ pub(super) const WORD: usize = 40;
 pub(super) const LINE: usize = 80;
 
 /// The words that have not been read yet.
+#[derive(Clone)]
 pub(super) struct Words<'a> {
     path: &'a Path,
     lines: std::iter::Enumerate<capture::Lines<'a>>,

@@ -104,6 +104,43 @@ fn measurements_from_the_corner_are_told_by_where_points_project_to() {
     assert!(notes.is_empty(), "{notes:?}");
 }
 
+/// VisualSFM writes every model that it could not join with another, then the photos that are
+/// in none, then files of points.
+#[test]
+fn of_several_models_the_one_with_the_most_photos_is_read() {
+    let model = |names: &[&str]| {
+        let mut text = format!("{}\n", names.len());
+        for name in names {
+            text += &format!("{name} 100 1 0 0 0 1 2 3 0 0\n");
+        }
+        text + "\n1\n2 4 13 10 20 30 1 0 5 9.5 19\n\n"
+    };
+    let unregistered = "3\nx.jpg 0 0 0 0 0 0 0 0 0 0\ny.jpg 0 0 0 0 0 0 0 0 0 0\n\
+                        z.jpg 0 0 0 0 0 0 0 0 0 0\n\n0\n\n0\n\n# 1 file\n1 0\n";
+    let read = |text: &str| {
+        let mut notes = Vec::new();
+        let whole = parse_nvm(Path::new("m.nvm"), text.as_bytes(), &size_of, &mut notes).unwrap();
+        let mut names = whole.images.into_values().map(|image| image.name);
+        (names.next().unwrap(), names.count() + 1, notes)
+    };
+    let (small, large) = (model(&["a.jpg"]), model(&["b.jpg", "c.jpg"]));
+    let holds = "m.nvm: holds 3 models that VisualSFM could not join; the one with 2 photos is \
+                 taken, and not those with";
+    let broken = "m.nvm: models from line 10 (model 1) on are not used: it cannot be read";
+    let expected = |text: &str, name: &str, count: usize, notes: Vec<String>| {
+        let text = format!("NVM_V3\n\n{text}");
+        assert_eq!(read(&text), (name.to_owned(), count, notes), "{text}");
+    };
+    expected(&format!("{large}{unregistered}"), "b.jpg", 2, Vec::new());
+    let notes = vec![format!("{holds} 1, 2")];
+    expected(&format!("{small}{large}{large}0\n"), "b.jpg", 2, notes);
+    let notes = vec![format!("{holds} 2, 1")];
+    let text = format!("{large}{large}{small}{unregistered}");
+    expected(&text, "b.jpg", 2, notes);
+    let notes = vec![broken.to_owned()];
+    expected(&format!("{small}4\nd.jpg 1 1 0"), "a.jpg", 1, notes);
+}
+
 #[test]
 fn measurement_distortion_is_undone() {
     for r in [-0.6, -0.05, 1e-7, 0.3, 4.0] {
