@@ -162,3 +162,28 @@ fn mistakes_in_lists_are_told_by_line() {
         "{error}"
     );
 }
+
+/// Spreadsheets write semicolons where numbers have decimal commas, and tabs.
+#[test]
+fn other_separators_than_commas_are_named() {
+    let remedy = "; expected a comma, and a point in numbers, as in a.jpg,12.5: save the list anew, \
+                  or replace them";
+    for (text, line, separator) in [
+        ("a.jpg;1\n", 1, "semicolon"),
+        ("a.jpg;1,5\n", 1, "semicolon"),
+        ("Name;Zeit, s\n\"b/b.jpg\";1,5\n", 2, "semicolon"),
+        ("a.jpg\t1.5\n", 1, "tab"),
+        ("c,d.jpg \t1.5\n", 1, "tab"),
+    ] {
+        let expected = format!(
+            "times.csv, line {line}: name and seconds are separated by a {separator}{remedy}"
+        );
+        assert_eq!(read(text).unwrap_err(), expected, "{text}");
+    }
+    // Names may have them.
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("times.csv");
+    fs::write(&path, "a.jpg;1.jpg,2\n").unwrap();
+    let times = read_times(&path, |name| ["a.jpg", "a.jpg;1.jpg"].contains(&name)).unwrap();
+    assert_eq!(times, BTreeMap::from([("a.jpg;1.jpg".to_owned(), 2.0)]));
+}

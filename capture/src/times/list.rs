@@ -64,14 +64,20 @@ pub fn read_times(
             line,
             problem,
         };
-        let Some((name, seconds)) = content.rsplit_once(',') else {
+        let fields = content.rsplit_once(',');
+        let fields = fields.map(|(name, seconds)| (unquoted(name), seconds.trim()));
+        if !fields.as_ref().is_some_and(|(name, _)| is_photo(name))
+            && let Some(separator) = other_separator(content, &is_photo)
+        {
+            return Err(refuse(format!(
+                "name and seconds are separated by a {separator}; expected a comma, and a point in \
+                 numbers, as in a.jpg,12.5: save the list anew, or replace them"
+            )));
+        }
+        let Some((name, seconds)) = fields else {
             let problem = format!("found {content:?}; expected name,seconds, as in a.jpg,12.5");
             return Err(refuse(problem));
         };
-        let name = name.trim();
-        let unquoted = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
-        let name = unquoted.map_or_else(|| name.to_owned(), |n| n.replace("\"\"", "\""));
-        let seconds = seconds.trim();
         let time_s = match seconds.parse::<f64>() {
             Ok(time_s) if time_s.is_finite() => time_s,
             Err(_) if may_be_header && !is_photo(&name) => continue,
@@ -95,4 +101,25 @@ pub fn read_times(
         return Err(TimeListError::Empty(path.to_owned()));
     }
     Ok(times)
+}
+
+/// A field without blanks around it and the quotes that it may be in.
+fn unquoted(field: &str) -> String {
+    let field = field.trim();
+    let within = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
+    within.map_or_else(|| field.to_owned(), |f| f.replace("\"\"", "\""))
+}
+
+/// What a line has between a photo's name and the rest if that is no comma: spreadsheets write
+/// semicolons where numbers have decimal commas, or tabs.
+fn other_separator(line: &str, is_photo: &impl Fn(&str) -> bool) -> Option<&'static str> {
+    let others = [(';', "semicolon"), ('\t', "tab")];
+    let stands_behind_name = |separator: char| {
+        let fields = line.split_once(separator);
+        fields.is_some_and(|(name, _)| is_photo(&unquoted(name)))
+    };
+    let found = others
+        .into_iter()
+        .find(|(separator, _)| stands_behind_name(*separator));
+    found.map(|(_, name)| name)
 }
