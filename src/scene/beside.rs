@@ -243,7 +243,9 @@ impl Scene {
                 let checked = check_beside(kind, path, &photo.name, size);
                 checked.map_err(|error| match kind {
                     Beside::DepthMap => SceneError::DepthMap(error),
-                    _ => SceneError::Capture(error),
+                    // Mattes are asked for.
+                    _ if photo.object_matte.as_ref() == Some(path) => SceneError::Capture(error),
+                    _ => SceneError::Mask(error),
                 })?;
             }
         }

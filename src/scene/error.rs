@@ -63,6 +63,9 @@ pub enum SceneError {
     /// A depth map that was asked for, or that a scene names, cannot be used.
     #[error("{0}; `import --no-depth` does without any")]
     DepthMap(capture::CaptureError),
+    /// An ignore mask or a silhouette cannot be used.
+    #[error("{0}; `import --no-masks` does without any")]
+    Mask(capture::CaptureError),
     /// A turntable's photos are not all of one size.
     #[error(
         "{}: the photo has {} × {} pixels and {other} {} × {}; a turntable's photos come from one \

@@ -303,7 +303,8 @@ fn masks_that_do_not_fit_or_cannot_be_read_are_errors() {
         assert_eq!(
             lumigraph(folder.path(), line).error(1),
             "wall/masks/0003.png.png: the ignore mask has 72 × 96 pixels and its photo 0003.png \
-             96 × 72; make it as large as the photo, or leave it out"
+             96 × 72; make it as large as the photo, or leave it out; `import --no-masks` does \
+             without any"
         );
     }
     for (bytes, problem) in [

@@ -114,6 +114,17 @@ fn what_a_transforms_file_names_and_cannot_be_used_is_told() {
         assert!(ran.stderr.contains(note), "{}", ran.stderr);
     }
 
+    // Of another size than their photos masks are an error, which says how to do without.
+    let small = GrayImage::from_pixel(48, 36, Luma([255]));
+    small.save(at("wall/msk/0005.png.png")).unwrap();
+    let error = lumigraph(here, "import wall -o small").error(1);
+    let told = "wall/msk/0005.png.png: the ignore mask has 48 × 36 pixels and its photo 0005.png \
+                96 × 72; make it as large as the photo, or leave it out; `import --no-masks` does \
+                without any";
+    assert_eq!(error, told);
+    let ran = run("import wall --no-masks -o unmasked");
+    assert!(!ran.stdout.contains("ignore masks"), "{}", ran.stdout);
+
     // Silhouettes are taken for what they are, wherever they lie.
     save_masks(&at("wall/msk"), 9, 64);
     let ran = run("import wall -o object");
