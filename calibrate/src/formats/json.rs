@@ -7,10 +7,73 @@ use std::path::Path;
 
 /// Parses a file's content.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Value, FormatError> {
-    serde_json::from_str(build::text(path, bytes)?).map_err(|error| {
+    let text = build::text(path, bytes)?;
+    serde_json::from_str(text).map_err(|error| {
         let place = format!("line {} column {}", error.line(), error.column());
-        Problem::broken(format!("not JSON: {error}")).at(path, place)
+        let said = error.to_string();
+        let said = said.strip_suffix(&format!(" at {place}")).unwrap_or(&said);
+        let problem = no_number(text);
+        let problem = problem.unwrap_or_else(|| Problem::broken(format!("not JSON: {said}")));
+        problem.at(path, place)
     })
+}
+
+/// What Python's json module writes where a number is none.
+const NO_NUMBERS: [&str; 3] = ["NaN", "Infinity", "-Infinity"];
+/// What they begin with once they are texts, as hardly another text does.
+const MARK: char = '\u{1}';
+
+/// What to say of a text that is JSON but for such words: where the first of them is.
+fn no_number(text: &str) -> Option<Problem> {
+    let value: Value = serde_json::from_str(&with_texts(text)).ok()?;
+    let (record, word) = marked(&value, String::new())?;
+    Some(Problem::new(
+        format!("not JSON: {record} is {word}, expected a finite number"),
+        "remove what has it, as a frame without a pose, or export it again from the program it is from",
+    ))
+}
+
+/// The text with such words as texts, marked.
+fn with_texts(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    let (mut is_text, mut is_escaped) = (false, false);
+    while let Some(next) = rest.chars().next() {
+        let word = NO_NUMBERS.into_iter().find(|word| rest.starts_with(word));
+        if let Some(word) = word.filter(|_| !is_text) {
+            out += &format!("\"\\u0001{word}\"");
+            rest = &rest[word.len()..];
+            continue;
+        }
+        is_text ^= next == '"' && !is_escaped;
+        is_escaped = is_text && next == '\\' && !is_escaped;
+        out.push(next);
+        rest = &rest[next.len_utf8()..];
+    }
+    out
+}
+
+/// The first marked text in a value, without the mark, and the way there: objects are called by
+/// their photo's name, too.
+fn marked(value: &Value, record: String) -> Option<(String, String)> {
+    match value {
+        Value::String(text) => Some((record, text.strip_prefix(MARK)?.to_owned())),
+        Value::Array(items) => items
+            .iter()
+            .enumerate()
+            .find_map(|(index, item)| marked(item, format!("{record}[{index}]"))),
+        Value::Object(fields) => {
+            let dot = if record.is_empty() { "" } else { "." };
+            let (found, word) = fields
+                .iter()
+                .find_map(|(key, item)| marked(item, format!("{record}{dot}{key}")))?;
+            let name = fields.get("file_path").and_then(Value::as_str);
+            let name = name.and_then(|name| build::name(name).ok());
+            let called = name.map(|name| format!("{found} ({name})"));
+            Some((called.unwrap_or(found), word))
+        }
+        _ => None,
+    }
 }
 
 /// A value, the file it is in, and the way there: `frames[3].transform_matrix`.

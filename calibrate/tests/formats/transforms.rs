@@ -281,6 +281,20 @@ fn errors_name_the_frame_and_a_remedy() {
     );
     let nan = error(shared, &FRAME.replace("[1, 0, 0, 1]", "[NaN, 0, 0, 1]"));
     assert!(nan.starts_with("line 2 column 7: not JSON"), "{nan}");
+    let place = ": not JSON: frames[0].transform_matrix[0][0] (a/b c.jpg) is NaN, expected a finite \
+                 number; remove what has it, as a frame without a pose, or export it again from the \
+                 program it is from";
+    assert!(nan.ends_with(place), "{nan}");
+    // A name may be called so; and what is wrong besides comes first.
+    let infinite = format!("\"note\": \"not \\\" NaN\", {shared}, \"k1\": -Infinity");
+    let infinite = error(&infinite, FRAME);
+    let expected = ": not JSON: k1 is -Infinity, expected";
+    assert!(infinite.contains(expected), "{infinite}");
+    let broken = error(&format!("{shared}, \"k1\": NaN, k2"), FRAME);
+    assert!(
+        broken.contains(": not JSON: expected value; copy"),
+        "{broken}"
+    );
     assert!(error(shared, "").starts_with("frames: the file holds no image with a pose"));
 }
 
