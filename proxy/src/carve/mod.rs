@@ -159,7 +159,6 @@ pub fn surface(
     let (mut mesh, index) = boundary(&delaunay, &is_free, &scene.positions);
     // 5. A view beyond the cameras may stand in what nothing carved, and look out of the shell.
     mesh.append(&scene.beyond);
-    let mesh = mesh.along_a_curve();
     let is_on = |site: &Option<u32>| site.is_some_and(|site| index[site as usize] != u32::MAX);
     Ok(Surface {
         mesh,
@@ -388,8 +387,8 @@ fn energy<'a>(delaunay: &'a Delaunay, scene: &Scene, options: &Options) -> Graph
 /// The facets between free and solid, counter-clockwise from the free side, and by site which of
 /// their vertices it is: `u32::MAX` for none.
 fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> (Mesh, Vec<u32>) {
-    let mut mesh = Mesh::default();
-    let mut index = vec![u32::MAX; positions.len()];
+    // 1. The facets.
+    let mut facets = Vec::new();
     for t in (0..delaunay.finite).filter(|&t| is_free[t]) {
         for k in 0..4 {
             let next = delaunay.across[t][k] >> 2;
@@ -397,15 +396,23 @@ fn boundary(delaunay: &Delaunay, is_free: &[bool], positions: &[DVec3]) -> (Mesh
                 continue;
             }
             let [a, b, c] = OTHERS[k].map(|i| delaunay.tetrahedra[t][i]);
-            mesh.triangles.push([a, c, b].map(|v| {
-                let index = &mut index[v as usize];
-                if *index == u32::MAX {
-                    *index = mesh.positions.len() as u32;
-                    mesh.positions.push(positions[v as usize]);
-                }
-                *index
-            }));
+            facets.push([a, c, b]);
         }
+    }
+    // 2. As sites lie along a curve through space, so do facets in the order of theirs: what is near is near in memory, and
+    // facets that follow one another are in sight together, or not.
+    facets.sort_by_key(|facet: &[u32; 3]| facet.iter().copied().min());
+    let mut mesh = Mesh::default();
+    let mut index = vec![u32::MAX; positions.len()];
+    for facet in facets {
+        mesh.triangles.push(facet.map(|v| {
+            let index = &mut index[v as usize];
+            if *index == u32::MAX {
+                *index = mesh.positions.len() as u32;
+                mesh.positions.push(positions[v as usize]);
+            }
+            *index
+        }));
     }
     (mesh, index)
 }

@@ -10,7 +10,6 @@ mod look;
 mod model;
 mod model_glb;
 mod obj;
-mod order;
 mod paint;
 mod pieces;
 mod ply;

@@ -7,7 +7,7 @@
 use super::{BAND, Prepared, Threads, by_bands};
 use crate::{Rays, Solid};
 use calibrate::View;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Where a pixel's point belongs, given a mesh that it has to be within.
@@ -95,22 +95,14 @@ impl Solid {
         rays: &Rays,
         inverse_depth: &[f64],
     ) -> Vec<Kept> {
-        let plane_from_world =
-            rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
-        let center = view.center();
-        let prepare = |i: usize| {
-            let corners = self.mesh().corners(i);
-            let corners = corners.map(|p| plane_from_world * (p - center));
+        let triangles = self.in_sight_of(threads, view, rays, |i, corners| {
             let mut enters = false;
-            let prepared = Prepared::new(i as u32, corners, rays, |sides| {
+            let prepared = Prepared::new(i, corners, rays, |sides| {
                 enters = sides.volume < 0.0;
                 Some(sides.inverse_depth())
             })?;
             Some((prepared, enters))
-        };
-        let triangles = (0..self.mesh().triangles.len()).into_par_iter();
-        let triangles = triangles.with_min_len(threads.at_least(256));
-        let triangles: Vec<(Prepared, bool)> = triangles.filter_map(prepare).collect();
+        });
         let [width, height] = rays.size;
         let bands = by_bands(triangles.iter().map(|(triangle, _)| &triangle.rows), height);
         let band = |(band_idx, (points, band)): (usize, (&[f64], &Vec<u32>))| {

@@ -104,22 +104,35 @@ impl Solid {
 
     /// The triangles that rays may meet, in order.
     fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> Vec<Prepared> {
-        let plane_from_world =
-            rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
-        let center = view.center();
         let front_only = self.kind().has_front_sides_only();
-        let prepare = |i: usize| {
-            let corners = self.mesh().corners(i);
-            let corners = corners.map(|p| plane_from_world * (p - center));
-            Prepared::new(i as u32, corners, rays, |sides| {
+        self.in_sight_of(threads, view, rays, |i, corners| {
+            Prepared::new(i, corners, rays, |sides| {
                 let is_seen = !(front_only && sides.volume >= 0.0);
                 is_seen.then(|| sides.inverse_depth())
             })
+        })
+    }
+
+    /// What `prepare` makes of triangles that rays may meet, in order: of each one's number, and its corners where a
+    /// pixel's ray is (x, y, 1). Much of a large mesh is out of sight.
+    fn in_sight_of<T: Send>(
+        &self,
+        threads: Threads,
+        view: &View,
+        rays: &Rays,
+        prepare: impl Fn(u32, [DVec3; 3]) -> Option<T> + Sync,
+    ) -> Vec<T> {
+        let plane_from_world =
+            rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
+        let center = view.center();
+        let of_triangle = |i: usize| {
+            let corners = self.mesh().corners(i);
+            prepare(i as u32, corners.map(|p| plane_from_world * (p - center)))
         };
-        // Most of a large mesh is out of sight. What is near in space is near in memory, too.
         let runs = self.in_sight(&rays.sight(center, plane_from_world));
         let runs = runs.into_par_iter().with_min_len(threads.at_least(4));
-        runs.flat_map_iter(|run| run.filter_map(prepare)).collect()
+        runs.flat_map_iter(|run| run.filter_map(of_triangle))
+            .collect()
     }
 }
 

@@ -159,7 +159,7 @@ fn neighbours_leave_no_gap() {
     assert_eq!(compare(&solid, &view, 1), 96 * 96);
 }
 
-/// Small boxes all around, along a curve through space.
+/// Small boxes all around.
 #[test]
 fn what_is_out_of_sight_is_passed_over() {
     let around = |i: u32| {
@@ -170,7 +170,7 @@ fn what_is_out_of_sight_is_passed_over() {
         (center - 0.2, center + 0.2)
     };
     let all: Vec<(DVec3, DVec3)> = (0..400).map(around).collect();
-    let mesh = boxes(&all).along_a_curve();
+    let mesh = boxes(&all);
     let count = mesh.triangles.len();
     let solid = Solid::new(MeshKind::Mesh, mesh);
     for k1 in [0.0, -0.05] {

@@ -105,6 +105,30 @@ fn a_room_of_exact_points_is_that_room() {
 }
 
 #[test]
+fn triangles_follow_one_another_as_they_lie_in_space() {
+    let room = Room::new(16);
+    let mesh = carved(&room.views, &room.points(3000, 0.0, &mut Random(1)));
+    let count = mesh.triangles.len();
+    let middle = |i: usize| mesh.corners(i).into_iter().sum::<DVec3>() / 3.0;
+    // A few far ones, of the dome, are apart anyhow.
+    let median = |mut apart: Vec<f64>| {
+        apart.sort_by(f64::total_cmp);
+        apart[count / 2]
+    };
+    let next = median(
+        (1..=count)
+            .map(|i| middle(i - 1).distance(middle(i % count)))
+            .collect(),
+    );
+    let any = median(
+        (0..count)
+            .map(|i| middle(i).distance(middle(i * 7919 % count)))
+            .collect(),
+    );
+    assert!(next < 0.1 * any, "{next} {any}");
+}
+
+#[test]
 fn a_view_from_what_nothing_carved_looks_out_of_the_shell() {
     let room = Room::new(16);
     let solid = Solid::new(
