@@ -325,7 +325,7 @@ impl Scene {
     fn dense_surface(&self, without: &BTreeSet<String>) -> Result<CarvedPoints, SceneError> {
         let (views, sparse) = self.observed(without)?;
         let (matching, note) = self.matching(without)?;
-        let points = matching.points(&sparse, None);
+        let points = matching.points(&sparse, &[]);
         Ok(CarvedPoints::of_all(&views, points, sparse.len())?.with_note(note))
     }
 

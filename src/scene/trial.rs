@@ -8,7 +8,7 @@ use super::{Scene, SceneError};
 use calibrate::View;
 use image::{GrayImage, RgbaImage};
 use proxy::dense::{DensePoints, Matching};
-use proxy::{Proxy, Solid};
+use proxy::{Proxy, Solid, SparsePoint};
 use rayon::prelude::*;
 use render::score::PSNR_CAP_DB;
 use render::{FieldOptions, Frame, Lumigraph, Method, Part, RenderError, Visibility, cpu, score};
@@ -19,9 +19,10 @@ use std::sync::Arc;
 const LONG_SIDE: u32 = 400;
 /// And of the photos that they are painted from.
 const PHOTO_SIDE: u32 = 640;
-/// What is fitted to photos is fitted without so large a share of them at a time, at most.
-/// (What is made of points is made without each alone.)
+/// What is fitted to photos is fitted without one of so many of them at a time, at most.
 const FOLD: usize = 6;
+/// And what is made of points, which gaps between photos cost more.
+const FOLD_OF_POINTS: usize = 24;
 /// Of a photo of which a mask leaves less than this share, that would say too little, and all judges.
 const LEAST_USED: f64 = 0.05;
 /// A kind that is so far behind after so many judges is not tried on the rest.
@@ -48,7 +49,7 @@ pub(super) struct Trials<'a> {
     lumigraph: Lumigraph,
     /// With what is to be said of depth maps that it cannot use.
     matching: Option<(Matching, Option<String>)>,
-    /// Of dense points, without each judge.
+    /// Of dense points, without the judges of each fold.
     dense: Vec<CarvedPoints>,
     /// The hull that bounds points, of all photos, where they are cut out; found when asked for.
     cutout: Option<Option<Cutout>>,
@@ -170,11 +171,14 @@ impl<'a> Trials<'a> {
             kind,
             Kind::Points | Kind::ViewPlane | Kind::Dense | Kind::CarvedDense
         );
-        let folds = if of_points { count } else { self.folds() };
+        let folds = if of_points {
+            self.folds_of_points()
+        } else {
+            self.folds()
+        };
         let mut plain = Scores(vec![None; count]);
         let mut occluding = plain.clone();
-        for fold in 0..folds {
-            let members: Vec<usize> = (fold..count).step_by(folds).collect();
+        for members in self.members(folds) {
             self.prepare(kind, &members)?;
             let visibility = self.lumigraph.visibility.take();
             for &judge in &members {
@@ -217,38 +221,49 @@ impl<'a> Trials<'a> {
         let sparse = self.scene.observed_points(self.without, &self.names);
         let taken = self.take_matching()?;
         let (matching, note) = self.matching.insert(taken);
-        let (points, note) = (matching.points(&sparse, None), note.clone());
-        Ok(CarvedPoints::of_all(&self.views(None), points, sparse.len())?.with_note(note))
+        let (points, note) = (matching.points(&sparse, &[]), note.clone());
+        Ok(CarvedPoints::of_all(&self.views(&[]), points, sparse.len())?.with_note(note))
     }
 
-    /// Dense points without each judge, all found at once: much of it takes one thread each.
+    /// Dense points without the judges of a judge's fold, those of all folds found at once: much of it takes one
+    /// thread each.
     fn dense_without(&mut self, judge: usize) -> Result<&CarvedPoints, SceneError> {
+        let folds = self.folds_of_points();
         if self.dense.is_empty() {
-            let judges: Vec<usize> = self.judges.iter().map(|j| j.source_idx).collect();
             let (mut matching, note) = self.take_matching()?;
-            matching.compare(&judges);
-            let find = |judge: &Judge| {
-                let (gone, mut fewer) = (judge.source_idx, self.without.clone());
-                fewer.insert(judge.name.clone());
-                let sparse = self.scene.observed_points(&fewer, &self.names);
-                let points = matching.points(&sparse, Some(gone));
-                CarvedPoints::new(&self.views(Some(gone)), points, sparse.len())
+            let members = self.members(folds);
+            let gone: Vec<Vec<usize>> = members.iter().map(|m| self.sources(m)).collect();
+            matching.compare(&gone);
+            let find = |(members, gone): (&Vec<usize>, &Vec<usize>)| {
+                let sparse = self.sparse_without(members);
+                let points = matching.points(&sparse, gone);
+                CarvedPoints::new(&self.views(gone), points, sparse.len())
             };
-            self.dense = self.judges.par_iter().map(find).collect();
+            self.dense = members.par_iter().zip(&gone).map(find).collect();
             self.matching = Some((matching, note));
         }
-        Ok(&self.dense[judge])
+        Ok(&self.dense[judge % folds])
     }
 
-    /// The photos' views. That of one which was never taken is where another is: a camera's place
+    /// The sparse points, as all but some judges observe them.
+    fn sparse_without(&self, judges: &[usize]) -> Vec<SparsePoint> {
+        let mut fewer = self.without.clone();
+        fewer.extend(judges.iter().map(|&j| self.judges[j].name.clone()));
+        self.scene.observed_points(&fewer, &self.names)
+    }
+
+    /// The judges' source views.
+    fn sources(&self, judges: &[usize]) -> Vec<usize> {
+        judges.iter().map(|&j| self.judges[j].source_idx).collect()
+    }
+
+    /// The photos' views. Those of photos that were never taken are where another is: a camera's place
     /// is known to be free.
-    fn views(&self, gone: Option<usize>) -> Vec<View> {
+    fn views(&self, gone: &[usize]) -> Vec<View> {
         let sources = &self.lumigraph.sources;
-        let mut views: Vec<View> = sources.iter().map(|s| s.view.clone()).collect();
-        if let Some(gone) = gone {
-            views[gone] = views[usize::from(gone == 0)].clone();
-        }
-        views
+        let other = (0..sources.len()).find(|i| !gone.contains(i)).unwrap_or(0);
+        let view = |i: usize| &sources[if gone.contains(&i) { other } else { i }].view;
+        (0..sources.len()).map(|i| view(i).clone()).collect()
     }
 
     /// The sparse points of all photos.
@@ -261,6 +276,22 @@ impl<'a> Trials<'a> {
     fn folds(&self) -> usize {
         let at_once = (self.names.len() / FOLD).max(1);
         self.judges.len().div_ceil(at_once)
+    }
+
+    /// And what is made of points: a multiple of that, so that each of these folds lies within one of those.
+    fn folds_of_points(&self) -> usize {
+        let at_once = (self.names.len() / FOLD_OF_POINTS).max(1);
+        self.judges
+            .len()
+            .div_ceil(at_once)
+            .next_multiple_of(self.folds())
+    }
+
+    /// The judges of each fold; there may be more folds than judges.
+    fn members(&self, folds: usize) -> Vec<Vec<usize>> {
+        let count = self.judges.len();
+        let of_fold = |fold: usize| (fold..count).step_by(folds).collect();
+        (0..folds.min(count)).map(of_fold).collect()
     }
 
     fn cutout(&mut self) -> Result<&Option<Cutout>, SceneError> {
@@ -303,14 +334,13 @@ impl<'a> Trials<'a> {
             Kind::Points | Kind::Dense | Kind::CarvedDense => self.bound(judges[0])?,
             _ => None,
         };
-        let sparse = || self.scene.observed_points(&fewer, &self.names);
         let (proxy, points) = match kind {
             Kind::Points => {
-                let gone = self.judges[judges[0]].source_idx;
-                let points = on_surface(&self.views(Some(gone)), sparse());
+                let views = self.views(&self.sources(judges));
+                let points = on_surface(&views, self.sparse_without(judges));
                 (Proxy::Points { within }, points)
             }
-            Kind::ViewPlane => (Proxy::ViewPlane, sparse()),
+            Kind::ViewPlane => (Proxy::ViewPlane, self.sparse_without(judges)),
             Kind::Dense => {
                 let points = self.dense_without(judges[0])?.points.clone();
                 let dense = DensePoints {
@@ -381,6 +411,30 @@ mod tests {
     use super::super::tests::wall;
     use super::*;
     use image::Luma;
+
+    #[test]
+    fn the_more_photos_there_are_the_more_judges_share_what_is_made_without_them() {
+        let none = BTreeSet::new();
+        for photos in [6, 9, 24, 47, 48, 100, 250] {
+            let (_folder, capture) = wall(photos, 1);
+            let (scene, _) = Scene::open(&capture, false).unwrap();
+            let trials = Trials::new(&scene, &none, photos.min(8)).unwrap();
+            let (coarse, fine) = (trials.folds(), trials.folds_of_points());
+            let members = trials.members(fine);
+            // 1. Each judges once, and never too many of the photos are missing.
+            let mut all = members.concat();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..trials.judges.len()), "{photos}");
+            let most = members.iter().map(Vec::len).max();
+            assert!(most <= Some((photos / FOLD_OF_POINTS).max(1)), "{photos}");
+            assert_eq!(members.len() == 1, photos >= 8 * FOLD_OF_POINTS);
+            // 2. What bounds points is made without any that judges them.
+            for members in members {
+                let fold = members[0] % coarse;
+                assert!(members.iter().all(|m| m % coarse == fold), "{photos}");
+            }
+        }
+    }
 
     #[test]
     fn what_masks_cover_does_not_judge() {

@@ -84,7 +84,7 @@ pub fn densify(
 ) -> Vec<SparsePoint> {
     let mut matching = Matching::new(views, sparse, photo, depth, options);
     matching.compare(&[]);
-    matching.points(sparse, None)
+    matching.points(sparse, &[])
 }
 
 /// Photos made ready to be compared, and the depths found so far: to ask for the points that
@@ -159,7 +159,7 @@ impl Matching {
         self.ranges = tried.map(|(p, range)| p.as_ref().map(|_| *range)).collect();
         // 2. By what they agree on.
         self.compare(&[]);
-        let found = self.points(&[], None);
+        let found = self.points(&[], &[]);
         self.go_together(views, &found);
         self.maps.iter_mut().for_each(Vec::clear);
     }
@@ -171,18 +171,18 @@ impl Matching {
         self.ranges = neighbours::depth_ranges(&self.photos, points);
     }
 
-    /// Finds the depths of all photos, and what they would be without one of the given ones or
-    /// another: together they take less than one after the other, and points can be asked for
+    /// Finds the depths of all photos, and what they would be without the photos of one of the given
+    /// sets or another: together they take less than one after the other, and points can be asked for
     /// at once.
-    pub fn compare(&mut self, without: &[usize]) {
-        let gone: Vec<(usize, Vec<Vec<usize>>)> = without
+    pub fn compare(&mut self, without: &[Vec<usize>]) {
+        let gone: Vec<(&Vec<usize>, Vec<Vec<usize>>)> = without
             .iter()
-            .map(|&gone| (gone, self.neighbours_without(gone)))
+            .map(|gone| (gone, self.neighbours_without(gone)))
             .collect();
         let of_photo = |i: usize| {
             let mut choices = vec![self.neighbours[i].clone()];
             for (gone, neighbours) in &gone {
-                if *gone != i && !choices.contains(&neighbours[i]) {
+                if !gone.contains(&i) && !choices.contains(&neighbours[i]) {
                     choices.push(neighbours[i].clone());
                 }
             }
@@ -192,21 +192,22 @@ impl Matching {
         self.maps = photos.map(of_photo).collect();
     }
 
-    /// The given points, and those that the photos agree on between them, or that all but
-    /// one of them do, with what sensors measured where they don't. Without it, only the range of
-    /// depths that are tried remembers it.
-    pub fn points(&self, sparse: &[SparsePoint], without: Option<usize>) -> Vec<SparsePoint> {
+    /// The given points, and those that the photos agree on between them, or that all without some
+    /// of them do, with what sensors measured where they don't. Of those left out only the range of
+    /// depths that are tried knows.
+    pub fn points(&self, sparse: &[SparsePoint], without: &[usize]) -> Vec<SparsePoint> {
         // 1. Which photos to compare.
-        let neighbours = match without {
-            Some(gone) => Cow::Owned(self.neighbours_without(gone)),
-            None => Cow::Borrowed(&self.neighbours),
+        let neighbours = if without.is_empty() {
+            Cow::Borrowed(&self.neighbours)
+        } else {
+            Cow::Owned(self.neighbours_without(without))
         };
 
         // 2. Their depths.
         let maps: Vec<Option<Cow<'_, DepthMap>>> = (0..self.photos.len())
             .into_par_iter()
             .map(|i| {
-                if without == Some(i) {
+                if without.contains(&i) {
                     return None;
                 }
                 let known = self.maps[i].iter().find(|f| f.neighbours == neighbours[i]);
@@ -220,7 +221,11 @@ impl Matching {
             })
             .collect();
         let maps: Vec<Option<&DepthMap>> = maps.iter().map(|map| map.as_deref()).collect();
-        let measured = |i: usize| self.measured[i].as_deref().filter(|_| without != Some(i));
+        let measured = |i: usize| {
+            self.measured[i]
+                .as_deref()
+                .filter(|_| !without.contains(&i))
+        };
         let measured: Vec<Option<&[f32]>> = (0..self.photos.len()).map(measured).collect();
 
         // 3. What they agree on.
@@ -235,8 +240,8 @@ impl Matching {
         points
     }
 
-    fn neighbours_without(&self, gone: usize) -> Vec<Vec<usize>> {
-        let usable = |i: usize| self.photos[i].is_some() && i != gone;
+    fn neighbours_without(&self, gone: &[usize]) -> Vec<Vec<usize>> {
+        let usable = |i: usize| self.photos[i].is_some() && !gone.contains(&i);
         self.affinity.neighbours(usable)
     }
 
