@@ -1,6 +1,7 @@
 //! Which source views see a proxy point, and which have something before it.
 
 use crate::lumigraph::SourceView;
+use crate::pyramid::MAX_LEVELS;
 use calibrate::{Pixel, View};
 use half::f16;
 use proxy::{Proxy, Rays, Solid};
@@ -37,14 +38,20 @@ const MOST: f64 = 6e4;
 /// What is more than so many times as near as what is a texel beside it takes that texel, too.
 const MUCH_NEARER: f32 = 2.5;
 
-/// Photo pixels a texel of a map, across and down.
-pub(crate) const REDUCTION: u32 = 2;
+/// Photo pixels a texel of a map, across and down, at least.
+const REDUCTION: u32 = 2;
+
+/// Twice as many where maps would have more texels along their longer side, and so on: surfaces are no finer
+/// than the reduced photos that they were found from.
+const LARGEST_SIDE: u32 = 1536;
 
 /// How far the proxy is in each direction that a source view sees: a texel for some pixels.
 #[derive(Clone, PartialEq)]
 pub struct DistanceMap {
     /// In texels.
     pub size: [u32; 2],
+    /// Photo pixels a texel, across and down: a power of two.
+    pub reduction: u32,
     /// Row by row, 1/distance over [`Self::unit`]; zero where there is nothing. They fit 16 bits:
     /// at most one as a rule, and 6e4 where something all but touches the camera.
     ///
@@ -68,6 +75,8 @@ pub struct Visibility {
     id: u64,
     solid: Arc<Solid>,
     views: Vec<View>,
+    /// [`DistanceMap::reduction`] of all.
+    reduction: u32,
     /// Those of the first view, which as a rule has the lens that all have.
     rays: Option<Rays>,
     maps: Vec<OnceLock<DistanceMap>>,
@@ -83,15 +92,26 @@ impl Visibility {
     pub fn of(proxy: &Proxy, sources: &[SourceView]) -> Option<Self> {
         static NEXT_ID: AtomicU64 = AtomicU64::new(0);
         match proxy {
-            Proxy::Mesh(solid) if solid.occludes() => Some(Self {
-                id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
-                solid: Arc::clone(solid),
-                views: sources.iter().map(|s| s.view.clone()).collect(),
-                rays: sources.first().and_then(|s| DistanceMap::rays(&s.view)),
-                maps: sources.iter().map(|_| OnceLock::new()).collect(),
-            }),
+            Proxy::Mesh(solid) if solid.occludes() => {
+                let views: Vec<View> = sources.iter().map(|s| s.view.clone()).collect();
+                let reduction = reduction_of(&views);
+                let rays = |view| Rays::reduced(view, reduction);
+                Some(Self {
+                    id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+                    solid: Arc::clone(solid),
+                    reduction,
+                    rays: views.first().and_then(rays),
+                    views,
+                    maps: sources.iter().map(|_| OnceLock::new()).collect(),
+                })
+            }
             _ => None,
         }
+    }
+
+    /// Photo pixels a texel of the maps, across and down.
+    pub(crate) fn reduction(&self) -> u32 {
+        self.reduction
     }
 
     /// The map of a source view. It is made by the thread that first asks for it, alone, while others wait.
@@ -100,10 +120,10 @@ impl Visibility {
             let (view, first) = (&self.views[source_idx], &self.views[0]);
             let alike = |view: &View| (view.lens, view.width, view.height);
             if alike(view) == alike(first) {
-                DistanceMap::new(&self.solid, view, self.rays.as_ref())
+                DistanceMap::new(&self.solid, view, self.rays.as_ref(), self.reduction)
             } else {
-                let rays = Rays::reduced_alone(view, REDUCTION);
-                DistanceMap::new(&self.solid, view, rays.as_ref())
+                let rays = Rays::reduced_alone(view, self.reduction);
+                DistanceMap::new(&self.solid, view, rays.as_ref(), self.reduction)
             }
         })
     }
@@ -117,14 +137,10 @@ impl fmt::Debug for Visibility {
 }
 
 impl DistanceMap {
-    /// The rays of a view's texels, where they all look ahead.
-    pub fn rays(view: &View) -> Option<Rays> {
-        Rays::reduced(view, REDUCTION)
-    }
-
-    /// Finds what each texel sees, on this thread alone: by scanning along the [`Self::rays`], else ray by ray.
-    pub fn new(solid: &Solid, view: &View, rays: Option<&Rays>) -> Self {
-        let size = [view.width, view.height].map(|side| side.div_ceil(REDUCTION));
+    /// Finds what each texel, so many pixels across and down, sees, on this thread alone: by scanning along their
+    /// rays, else ray by ray.
+    fn new(solid: &Solid, view: &View, rays: Option<&Rays>, reduction: u32) -> Self {
+        let size = [view.width, view.height].map(|side| side.div_ceil(reduction));
         let [width, height] = size.map(|side| side as usize);
         let scan = rays.map(|rays| (rays, solid.scan_alone(view, rays)));
         let center = view.center();
@@ -134,7 +150,7 @@ impl DistanceMap {
                 let ray = rays.at(x, y)?.extend(1.0);
                 return Some(scan.inverse_depth[y * width + x] / ray.length());
             }
-            let at = |i: usize| (i as f64 + 0.5) * f64::from(REDUCTION);
+            let at = |i: usize| (i as f64 + 0.5) * f64::from(reduction);
             let ray = view.lens.unproject(Pixel::new(at(x), at(y)))?;
             let hit = solid.first_hit(center, world_from_camera * ray)?;
             Some(1.0 / (hit.along * ray.length()))
@@ -145,11 +161,11 @@ impl DistanceMap {
         };
         let rows: Vec<Vec<f64>> = (0..height).map(row).collect();
 
-        Self::of(size, &rows)
+        Self::of(size, &rows, reduction)
     }
 
     /// Of the inverse distances of texels, row by row.
-    fn of(size: [u32; 2], rows: &[Vec<f64>]) -> Self {
+    fn of(size: [u32; 2], rows: &[Vec<f64>], reduction: u32) -> Self {
         // The unit keeps the values within what 16 bits hold.
         let unit = unit_of(rows);
         let stored = |value: &f64| f16::from_f64((value / unit).min(MOST)).to_f32();
@@ -157,6 +173,7 @@ impl DistanceMap {
         let values = with_rims(&values, size[0] as usize);
         Self {
             size,
+            reduction,
             largest: largest_of(&values, size[0] as usize),
             values,
             unit,
@@ -168,7 +185,7 @@ impl DistanceMap {
     pub(crate) fn largest_within(&self, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) -> f64 {
         // Filtering takes in the texels beside.
         let texel = |at: f64, beside: f64, side: u32| {
-            (at / f64::from(REDUCTION) + beside).clamp(0.0, f64::from(side - 1)) as usize
+            (at / f64::from(self.reduction) + beside).clamp(0.0, f64::from(side - 1)) as usize
         };
         let [width, height] = self.size;
         let (mut x0, mut x1) = (texel(left, -0.5, width), texel(right, 0.5, width));
@@ -188,7 +205,7 @@ impl DistanceMap {
 
     /// The inverse distance in a direction, given by a pixel of the photo; bilinear.
     pub(crate) fn inverse_distance(&self, pixel: Pixel) -> f64 {
-        let reduction = f64::from(REDUCTION);
+        let reduction = f64::from(self.reduction);
         self.unit
             * f64::from(self.sample((pixel.x / reduction) as f32, (pixel.y / reduction) as f32))
     }
@@ -209,6 +226,18 @@ impl DistanceMap {
         let (upper, lower) = (across(y0), across(y1));
         upper + fy * (lower - upper)
     }
+}
+
+/// How many pixels a texel has, across and down, in the maps of these views: the same for all, as devices sample
+/// them by their photos' places, and by the smallest, whose texels are then none too large.
+fn reduction_of(views: &[View]) -> u32 {
+    let sides = views.iter().map(|view| view.width.max(view.height));
+    let least = sides.min().unwrap_or(0);
+    let mut reduction = REDUCTION;
+    while least.div_ceil(reduction) > LARGEST_SIDE && reduction < 1 << (MAX_LEVELS - 1) {
+        reduction *= 2;
+    }
+    reduction
 }
 
 /// The values of a map that is so wide, where something much nearer is beside them, that. Nothing stays nothing.
@@ -291,9 +320,6 @@ pub(crate) fn visible(inverse_distance: f64, nearest: f64) -> f64 {
     (root * root) * (root * root)
 }
 
-/// The reduction, for the twins that sample the maps by pixels of the photo.
-pub(crate) const TEXEL_PER_PIXEL: f32 = 1.0 / REDUCTION as f32;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,7 +332,7 @@ mod tests {
         };
         let row = |y| (0..32).map(|x| at(x, y)).collect();
         let rows: Vec<Vec<f64>> = (0..24).map(row).collect();
-        DistanceMap::of([32, 24], &rows)
+        DistanceMap::of([32, 24], &rows, REDUCTION)
     }
 
     #[test]
@@ -321,7 +347,31 @@ mod tests {
         // Nor does a speck at the horizon change it.
         let map = map(5.0, 1, 1e-9);
         assert_eq!(map.unit, 0.2);
-        assert_eq!(DistanceMap::of([2, 1], &[vec![0.0; 2]]).unit, 1.0);
+        assert_eq!(
+            DistanceMap::of([2, 1], &[vec![0.0; 2]], REDUCTION).unit,
+            1.0
+        );
+    }
+
+    #[test]
+    fn maps_of_large_photos_have_larger_texels() {
+        let view = |width: u32, height: u32| View {
+            lens: calibrate::Lens::pinhole(glam::DVec2::splat(100.0), glam::DVec2::splat(50.0)),
+            width,
+            height,
+            camera_from_world: calibrate::Rigid3::IDENTITY,
+        };
+        let of = |sizes: &[(u32, u32)]| {
+            let views: Vec<View> = sizes.iter().map(|&(w, h)| view(w, h)).collect();
+            reduction_of(&views)
+        };
+        assert_eq!(of(&[]), 2);
+        assert_eq!([of(&[(3072, 64)]), of(&[(64, 3073)])], [2, 4]);
+        assert_eq!([of(&[(6144, 4096)]), of(&[(6145, 4096)])], [4, 8]);
+        // As the smallest ask for.
+        assert_eq!(of(&[(8000, 6000), (640, 480)]), 2);
+        // The coarsest that devices have.
+        assert_eq!(of(&[(u32::MAX, 1)]), 64);
     }
 
     #[test]

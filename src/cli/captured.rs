@@ -1,5 +1,6 @@
 //! An interior opened, with the photos that show its cells.
 
+use super::budget;
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::inputs::{files_of, files_of_mesh};
@@ -246,7 +247,7 @@ impl Photos {
         let mut lumigraph = self
             .scene
             .lumigraph(&self.without, Proxy::Mesh(Arc::new(solid)))?;
-        lumigraph.photos.set_budget(budget);
+        lumigraph.photos.set_budget(budget::of_photos(budget));
         let captured = Captured::new(
             lumigraph,
             Engine::open(device)?,

@@ -2,6 +2,7 @@
 //! else; results go to stdout, all else to stderr.
 
 mod bench;
+mod budget;
 mod captured;
 mod damaged;
 mod demo;

@@ -240,7 +240,7 @@ pub(super) struct DrawArgs {
         value_delimiter = ',', default_missing_value = "all")]
     no_skip: Vec<NoSkip>,
     /// What decoded photos may take in memory, as in 512MiB or 1.5GB: those used last stay.
-    /// Too little for one frame draws it from coarser mip levels [default: no limit]
+    /// Too little for one frame draws it from coarser mip levels [default: half of the machine's memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     pub(super) cpu_memory: Option<u64>,
     /// The same for photos on the graphics processor [default: no limit]

@@ -2,6 +2,7 @@
 
 mod in_order;
 
+use super::budget;
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::ledger::Ledger;
@@ -104,7 +105,9 @@ impl Session {
         let mut left_out = exposure.left_out.clone();
         left_out.extend(proxy.left_out.clone());
         let mut lumigraph = scene.lumigraph(&without, proxy.proxy.clone())?;
-        lumigraph.photos.set_budget(draw.cpu_memory);
+        lumigraph
+            .photos
+            .set_budget(budget::of_photos(draw.cpu_memory));
         let clock = Clock::of(time, time_s, &lumigraph)?;
         Ok(Self {
             scene,

@@ -1,6 +1,7 @@
 //! `lumigraph view`
 
 use super::Usage;
+use super::budget;
 use super::captured::{Opened, Photos};
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::ExposureArgs;
@@ -236,7 +237,7 @@ impl Load {
         let mut clock = None;
         let mut show = |scene: &Scene, without: &BTreeSet<String>, proxy: proxy::Proxy| {
             let mut lumigraph = scene.lumigraph(without, proxy)?;
-            lumigraph.photos.set_budget(self.budget);
+            lumigraph.photos.set_budget(budget::of_photos(self.budget));
             // Looking for a period takes a while.
             let clock = match &clock {
                 Some(clock) => *clock,

@@ -48,7 +48,11 @@ fn a_path_is_drawn_within_the_budget_and_the_report_says_how() {
         };
         let (report, expected) = render("", &format!("{renderer}-free"));
         let took = &report["cpu_memory"];
-        assert!(took["budget_bytes"].is_null() && report["gpu_memory"].is_null());
+        // Half of the machine's memory, where that is known: enough for all.
+        let budget = took["budget_bytes"].as_u64();
+        assert!(budget.is_none_or(|bytes| bytes > 100 * PHOTO), "{took}");
+        assert_eq!(budget.is_some(), cfg!(target_os = "linux"));
+        assert!(report["gpu_memory"].is_null());
         assert_eq!(
             (&took["evictions"], &took["level_cap"]),
             (&0.into(), &0.into())

@@ -5,7 +5,7 @@ use super::source::Sight;
 use crate::frame::{SHOULDER, TRANSPARENT};
 use crate::mask::{IGNORED, Mask};
 use crate::pyramid::Pyramid;
-use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TEXEL_PER_PIXEL, TOLERANCE};
+use crate::visibility::{DistanceMap, FADE, HIDDEN_ROOT, TOLERANCE};
 use glam::Vec4;
 use image::{ImageBuffer, Pixel};
 use std::ops::{Add, Mul, Sub};
@@ -202,13 +202,14 @@ pub(super) fn visible(map: &DistanceMap, sight: &Sight) -> Lane {
 #[inline(always)]
 fn nearest(map: &DistanceMap, sight: &Sight) -> Lane {
     let [width, height] = map.size.map(|side| side as i32);
+    let texel_per_pixel = 1.0 / map.reduction as f32;
     let (mut at, mut shares) = ([[0; LANES]; 4], [[0.0; LANES]; 2]);
     // What is not in the photo may be anywhere, and no number. (From the texel before the first on, so that
     // no number is negative.)
     let within = |at: f32, side: i32| at.max(0.0).min((side + 1) as f32);
     for k in 0..LANES {
-        let x = within(sight.u[k] * TEXEL_PER_PIXEL + 0.5, width);
-        let y = within(sight.v[k] * TEXEL_PER_PIXEL + 0.5, height);
+        let x = within(sight.u[k] * texel_per_pixel + 0.5, width);
+        let y = within(sight.v[k] * texel_per_pixel + 0.5, height);
         let ((left, right), (top, bottom)) = (whole(x), whole(y));
         (shares[0][k], shares[1][k]) = (x - left, y - top);
         let (left, top) = (right - 1, bottom - 1);

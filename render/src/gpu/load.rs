@@ -259,7 +259,8 @@ impl Gpu {
             let mut layers = slot(self);
             let count = wanted.len() as u32;
             let brought = if there {
-                let room = Room::of(content, array_size(frame), count, None, &self.limits);
+                let size = content.layer_size(frame);
+                let room = Room::of(content, size, count, None, &self.limits);
                 room.map_err(Shortage::Render).and_then(|room| {
                     let none = &mut Residency::default();
                     let maker = self.maker();

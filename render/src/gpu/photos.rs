@@ -1,6 +1,6 @@
 //! The photos and the masks on the device: a texture array each, filled as frames ask.
 
-use super::room::{Content, Room, array_size};
+use super::room::{Content, Room};
 use crate::RenderError;
 use crate::frame::Frame;
 use crate::pyramid::MAX_LEVELS;
@@ -134,7 +134,7 @@ impl Layers {
             return Ok(());
         }
         let mut most = room.most.min(frame.lumigraph.sources.len().max(1) as u32);
-        let size = content.layer_size(array_size(frame));
+        let size = content.layer_size(frame);
         if wanted.len() < most as usize && maker.layers_of_array(most, size[0] == size[1]) > most {
             // One less rather than one that nothing is in.
             most -= 1;
@@ -227,7 +227,7 @@ impl Layers {
             Content::Masks => ("masks", wgpu::TextureFormat::R8Unorm),
             Content::Distances => ("distances", wgpu::TextureFormat::R16Float),
         };
-        let size = content.layer_size(array_size(frame));
+        let size = content.layer_size(frame);
         let [width, height] = size.map(|side| side >> finest);
         let short = |why: &str| Shortage::Memory {
             count: capacity,

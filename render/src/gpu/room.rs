@@ -3,7 +3,6 @@
 use crate::RenderError;
 use crate::frame::Frame;
 use crate::pyramid::MAX_LEVELS;
-use crate::visibility::REDUCTION;
 
 /// What a texture array holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,10 +34,13 @@ impl Content {
     }
 
     /// Of a layer in texels.
-    pub(super) fn layer_size(self, photo_size: [u32; 2]) -> [u32; 2] {
-        match self {
-            Self::Photos | Self::Masks => photo_size,
-            Self::Distances => photo_size.map(|side| side / REDUCTION),
+    pub(super) fn layer_size(self, frame: &Frame<'_>) -> [u32; 2] {
+        let photo_size = array_size(frame);
+        match (self, &frame.lumigraph.visibility) {
+            (Self::Distances, Some(visibility)) => {
+                photo_size.map(|side| side / visibility.reduction())
+            }
+            _ => photo_size,
         }
     }
 
@@ -103,18 +105,17 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// For the `count` layers of a frame: from the finest mip level on from which they fit the
+    /// For the `count` layers of a frame, of so many texels in full: from the finest mip level on from which they fit the
     /// budget and textures of the device, else the coarsest. It depends on nothing else, so that
     /// a frame looks the same whatever was drawn before. Layers may be fewer than `count`: then
     /// the frame is drawn in groups.
     pub(super) fn of(
         content: Content,
-        photo_size: [u32; 2],
+        size: [u32; 2],
         count: u32,
         budget: Option<u64>,
         limits: &wgpu::Limits,
     ) -> Result<Self, RenderError> {
-        let size = content.layer_size(photo_size);
         let [side, layers] = [
             limits.max_texture_dimension_2d,
             limits.max_texture_array_layers,

@@ -3,7 +3,7 @@
 use super::interval::Interval;
 use crate::cpu::scalar::Scalar;
 use crate::pyramid::Pyramid;
-use crate::visibility::{DistanceMap, FADE, REDUCTION, TOLERANCE, visible};
+use crate::visibility::{DistanceMap, FADE, TOLERANCE, visible};
 
 /// Texels across and down that are looked at singly; a larger part may be anything.
 const MOST_CELLS: f64 = 6.0;
@@ -107,7 +107,7 @@ pub(super) fn shown<const N: u32>(
     filter: Filter,
 ) -> Interval<N> {
     let [width, height] = map.size;
-    let scale = Interval::rounded(1.0 / f64::from(REDUCTION));
+    let scale = Interval::rounded(1.0 / f64::from(map.reduction));
     let texel = |x: u32, y: u32| [f64::from(map.values[(y * width + x) as usize])];
     let nearest = bilinear((width, height), [u * scale, v * scale], filter, texel);
     let nearest = nearest.map_or_else(

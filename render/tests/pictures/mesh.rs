@@ -161,9 +161,26 @@ fn desired_views() -> Vec<(&'static str, View)> {
 
 #[test]
 fn every_engine_draws_the_same_picture() {
-    let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    engines_agree(&lumigraph(pillar(), MeshKind::Mesh));
+}
+
+/// Of photos so large that a texel of their distance maps is four pixels across.
+#[test]
+fn every_engine_draws_the_same_picture_of_large_photos() {
+    let solid = Arc::new(Solid::new(MeshKind::Mesh, pillar()));
+    let large = |view: View| View {
+        lens: Lens::pinhole(DVec2::new(2200.0, 44.0), DVec2::new(1600.0, 24.0)),
+        width: 3200,
+        height: 48,
+        ..view
+    };
+    let views = views().into_iter().step_by(2).map(large).collect();
+    engines_agree(&lumigraph_from(&solid, views, |view| photo(&solid, view)));
+}
+
+fn engines_agree(lumigraph: &Lumigraph) {
     for (name, desired) in desired_views() {
-        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
+        let frame = Frame::new(lumigraph, desired, FieldOptions::default());
         let exact = reference::render_exact(&frame).unwrap();
         for (engine, picture) in by_all(&frame, Method::Exact) {
             assert_close(&picture.unwrap(), &exact, &format!("{name}, {engine}"));
