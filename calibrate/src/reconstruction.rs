@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// So many observations, spread over all images, tell how well a model fits its photos.
 const JUDGED: usize = 500;
+/// So many observations of one image tell how well its pose fits.
+const JUDGED_OF_EACH: usize = 50;
 
 /// The id of an image in a reconstruction: sparse, chosen by whoever made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -149,6 +151,29 @@ impl Reconstruction {
         errors.get(errors.len() / 2).copied()
     }
 
+    /// The median of the distances of each image's own keypoints likewise, the lower of two, judged by some
+    /// tens of them spread evenly. Images with fewer observations than `fewest` are left out, and those of cameras
+    /// without a lens.
+    pub fn median_errors_px(&self, fewest: usize) -> BTreeMap<ImageId, f64> {
+        let mut lenses: BTreeMap<CameraId, Option<Lens>> = BTreeMap::new();
+        let median = |(id, image): (&ImageId, &Image)| {
+            let camera = self.cameras.get(&image.camera_id)?;
+            let lens = lenses.entry(image.camera_id);
+            let lens = lens.or_insert_with(|| camera.lens().ok()).as_ref()?;
+            let observing = || image.keypoints.iter().filter(|k| k.point.is_some());
+            let count = observing().count();
+            if count < fewest {
+                return None;
+            }
+            let step = count.div_ceil(JUDGED_OF_EACH).max(1);
+            let error = |keypoint| self.error_px(image, lens, keypoint, DVec2::ZERO);
+            let mut errors: Vec<f64> = observing().step_by(step).filter_map(error).collect();
+            errors.sort_by(f64::total_cmp);
+            Some((*id, *errors.get(errors.len().checked_sub(1)? / 2)?))
+        };
+        self.images.iter().filter_map(median).collect()
+    }
+
     /// How far a keypoint, counted from `origin`, is from the projection of the sparse point that it
     /// observes, in pixels; infinite where that lies behind the camera, `None` where there is none.
     fn error_px(
@@ -271,6 +296,22 @@ mod tests {
         assert_eq!(whole.median_error_px(), Some(f64::INFINITY));
         whole.points.clear();
         assert_eq!(whole.median_error_px(), None);
+    }
+
+    #[test]
+    fn each_image_has_a_median_error_of_its_own() {
+        let mut whole = three_images();
+        for image in whole.images.values_mut().skip(2) {
+            image.camera_from_world.translation.x += 5.0;
+        }
+        let errors = whole.median_errors_px(2);
+        assert_eq!(errors.len(), 3);
+        assert!(errors[&ImageId(10)] < 1e-12 && errors[&ImageId(11)] < 1e-12);
+        assert!((errors[&ImageId(12)] - 50.0).abs() < 0.01, "{errors:?}");
+        // A sees three points, the others two.
+        assert_eq!(whole.median_errors_px(3).len(), 1);
+        whole.points.clear();
+        assert!(whole.median_errors_px(0).is_empty());
     }
 
     /// Where there are many, those that are judged are of all images.

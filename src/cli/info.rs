@@ -3,7 +3,9 @@
 use super::import::check_photos;
 use super::info_of_file;
 use super::interior::check_no_interior;
-use super::options::{KeyArgs, SceneArgs, beside_counts, beside_text, print_warnings, tie_text};
+use super::options::{
+    KeyArgs, SceneArgs, beside_counts, beside_text, misplaced_text, print_warnings, tie_text,
+};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use super::surface::{proxy_json, proxy_text};
@@ -59,7 +61,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         say!("note: {error}");
     }
     let weak = scene.reconstruction.weakly_tied(TRUSTED_TIE);
-    let info = gather(&scene, &weak)?;
+    let misplaced = scene.misplaced();
+    let info = gather(&scene, &weak, &misplaced)?;
     if args.json {
         return print_json(&info);
     }
@@ -69,6 +72,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             "note: {}; what draws leaves them out, unless --keep-weak",
             tie_text(group)
         );
+    }
+    if let Some(misplaced) = misplaced_text(&misplaced) {
+        say!("note: {misplaced}; what draws leaves them out, unless --keep-weak");
     }
     Ok(())
 }
@@ -97,7 +103,7 @@ fn open(args: &Args) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-fn gather(scene: &Scene, weak: &[WeakGroup]) -> anyhow::Result<Value> {
+fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Result<Value> {
     let reconstruction = &scene.reconstruction;
     let mut cameras = Vec::new();
     let mut photo_bytes = 0.0;
@@ -160,6 +166,7 @@ fn gather(scene: &Scene, weak: &[WeakGroup]) -> anyhow::Result<Value> {
             "photos": group.names,
             "shared_points": group.shared_points,
         })).collect::<Vec<_>>(),
+        "misplaced": misplaced,
         "cameras": cameras,
         "points": positions.len(),
         "spacing": cloud.map(|c| c.spacing),

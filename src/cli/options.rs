@@ -8,7 +8,7 @@ use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use lumigraph::scene::{Photo, Scene, Warning};
+use lumigraph::scene::{DOUBTFUL_PX, Photo, Scene, Warning};
 use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
 
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ pub(super) struct SceneArgs {
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     pub(super) strict: bool,
-    /// Use photos, too, that share too few points with the rest to be placed surely
+    /// Use photos, too, that share too few points with the rest to be placed surely, or see most of theirs far off
     #[arg(long)]
     pub(super) keep_weak: bool,
 }
@@ -78,6 +78,26 @@ fn drop_weak_saying(scene: &mut Scene, remedy: &str) {
     for group in scene.drop_weak() {
         let tie = tie_text(&group);
         say!("note: left out, as they may be misplaced: {tie}{remedy}");
+    }
+    if let Some(misplaced) = misplaced_text(&scene.drop_misplaced()) {
+        say!("note: left out, as misplaced: {misplaced}{remedy}");
+    }
+}
+
+/// What tells that these photos are misplaced; `None` of none.
+pub(super) fn misplaced_text(names: &[String]) -> Option<String> {
+    match names {
+        [] => None,
+        [name] => Some(format!(
+            "photo {name} sees most of its sparse points behind it or more than {DOUBTFUL_PX} pixels from where \
+             the calibration has them"
+        )),
+        _ => Some(format!(
+            "{} photos see most of their sparse points behind them or more than {DOUBTFUL_PX} pixels from where \
+             the calibration has them: {}",
+            names.len(),
+            names.join(", ")
+        )),
     }
 }
 

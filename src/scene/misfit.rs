@@ -1,11 +1,11 @@
-//! Whether a calibration fits its photos at all.
+//! Whether a calibration fits its photos at all, and each of them.
 
 use super::Warning;
-use calibrate::Reconstruction;
+use calibrate::{Reconstruction, TRUSTED_TIE};
 
 /// Structure from motion misses what it measured by a pixel or less. What misses it by so many belongs to other
 /// photos, or counts pixels another way than was read.
-const DOUBTFUL_PX: f64 = 10.0;
+pub const DOUBTFUL_PX: f64 = 10.0;
 
 /// Says so where sparse points are seen far from where the cameras have them: nothing else tells of poses whose
 /// pixels, axes or lenses were taken for what they are not.
@@ -25,6 +25,25 @@ pub(super) fn of(whole: &Reconstruction) -> Option<Warning> {
         "{problem}: pictures will be wrong; check that the calibration belongs to these photos, or export it \
          again in another format"
     )))
+}
+
+/// The names of photos that see most of their own sparse points behind them, or so far from where the calibration
+/// has them, while most photos do not; sorted. They are misplaced: an unaligned photo of a model far from the
+/// world's origin has no pose, for one, and lies there. They are fewer than the others.
+pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
+    // 1. What photos usually miss, by the upper of two: nothing says which of two photos is the wrong one.
+    let errors_px = whole.median_errors_px(TRUSTED_TIE);
+    let mut sorted: Vec<f64> = errors_px.values().copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    let Some(usual_px) = sorted.get(sorted.len() / 2) else {
+        return Vec::new();
+    };
+    // 2. Where all are a little off, some are by more.
+    let limit_px = DOUBTFUL_PX * usual_px.max(1.0);
+    let wrong = errors_px.iter().filter(|(_, px)| **px > limit_px);
+    let mut names: Vec<String> = wrong.map(|(id, _)| whole.images[id].name.clone()).collect();
+    names.sort();
+    names
 }
 
 #[cfg(test)]
@@ -82,5 +101,37 @@ mod tests {
             behind.starts_with("most sparse points lie behind"),
             "{behind}"
         );
+    }
+
+    /// Photos that each see the point in their middle so often, and miss it by so many pixels.
+    fn photos(misses: &[(usize, f64)]) -> Reconstruction {
+        let mut whole = seen(2.0, 0.0);
+        let image = whole.images[&ImageId(1)].clone();
+        whole.images.clear();
+        for (i, (count, off_px)) in misses.iter().enumerate() {
+            let mut one = image.clone();
+            one.name = format!("{i}.jpg");
+            one.keypoints = vec![image.keypoints[0]; *count];
+            one.keypoints.iter_mut().for_each(|k| k.x += off_px);
+            whole.images.insert(ImageId(i as u32), one);
+        }
+        whole
+    }
+
+    #[test]
+    fn photos_that_miss_what_they_see_while_others_do_not_are_misplaced() {
+        let mut whole = photos(&[0.5, 40.0, 1.0, 9.0, 0.1, 0.2, 0.3].map(|px| (20_usize, px)));
+        assert_eq!(misplaced(&whole), ["1.jpg"]);
+        // Turned away from it.
+        let away = glam::DQuat::from_rotation_y(std::f64::consts::PI);
+        let turned = whole.images.get_mut(&ImageId(4)).unwrap();
+        turned.camera_from_world.rotation = away;
+        assert_eq!(misplaced(&whole), ["1.jpg", "4.jpg"]);
+        // Too few observations say nothing.
+        assert!(misplaced(&photos(&[(20, 0.5), (5, 40.0), (20, 1.0)])).is_empty());
+        // Nor do two photos say which is wrong, nor such as are all off.
+        assert!(misplaced(&photos(&[(20, 0.5), (20, 40.0)])).is_empty());
+        assert!(misplaced(&photos(&[(20, 30.0), (20, 40.0), (20, 25.0)])).is_empty());
+        assert!(misplaced(&Reconstruction::default()).is_empty());
     }
 }

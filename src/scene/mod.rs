@@ -51,6 +51,7 @@ pub use error::{SceneError, Warning, remedy_of_model};
 pub use exposure::Matched;
 pub use fit::{Fitted, Kind};
 pub use import::ImportOptions;
+pub use misfit::DOUBTFUL_PX;
 pub use names::{NameError, picture_files};
 pub use own::{LostProxy, SceneProxy};
 pub use relative::{relative, relative_lossy};
@@ -88,7 +89,7 @@ pub struct Scene {
     /// The calibration that was given beside it, if one was.
     pub calibration: Option<PathBuf>,
     /// Photos that are calibrated but missing or corrupt, now or at the import, or dropped as weakly
-    /// tied; by what the capture calls them.
+    /// tied or misplaced; by what the capture calls them.
     pub left_out: Vec<String>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
@@ -132,6 +133,21 @@ impl Scene {
         let names: BTreeSet<String> = weak.iter().flat_map(|g| g.names.iter().cloned()).collect();
         self.take_out(&names);
         weak
+    }
+
+    /// The names of photos that are misplaced, as they see most of their own sparse points behind them or more than
+    /// [`DOUBTFUL_PX`] from where the calibration has them, while most photos do not; sorted.
+    pub fn misplaced(&self) -> Vec<String> {
+        misfit::misplaced(&self.reconstruction)
+    }
+
+    /// Leaves out the photos that are [misplaced](Self::misplaced), and returns their names.
+    pub fn drop_misplaced(&mut self) -> Vec<String> {
+        let names = self.misplaced();
+        if !names.is_empty() {
+            self.take_out(&names.iter().cloned().collect::<BTreeSet<String>>());
+        }
+        names
     }
 
     /// Takes photos out of the scene, and notes that they were left out.

@@ -182,6 +182,42 @@ fn pixels_that_count_from_elsewhere_are_told() {
     assert!(wrong.contains(note) && !wrong.contains(corner), "{wrong}");
 }
 
+/// As one that was never aligned, in a model that lies far from the world's origin.
+#[test]
+fn a_photo_that_is_misplaced_is_named_and_harms_no_others() {
+    let folder = with_wall();
+    let here = folder.path();
+    let model_folder = here.join("wall/sparse/0");
+    let scored = |more: &str| -> (f64, String) {
+        let ran = lumigraph(here, &format!("evaluate wall --proxy points --json{more}"));
+        let ran = ran.ok();
+        (ran.json()["mean"]["psnr"].as_f64().unwrap(), ran.stderr)
+    };
+    let (usual, said) = scored("");
+    let named = "photo 0003.png sees most of its sparse points behind it or more than 10 pixels";
+    assert!(!said.contains(named), "{said}");
+    let mut model = colmap::read_model(&model_folder).unwrap();
+    let mut images = model.images.values_mut();
+    let stray = images.find(|image| image.name == "0003.png").unwrap();
+    stray.camera_from_world.translation.x += 1e5;
+    fs::remove_dir_all(&model_folder).unwrap();
+    colmap::write_text(&model, &model_folder).unwrap();
+    let info = lumigraph(here, "info wall").ok();
+    assert!(info.stderr.contains(named), "{}", info.stderr);
+    // Left out, and used: where it is says nothing of how large the scene is.
+    let (without, said) = scored("");
+    assert!(
+        said.contains(named) && said.contains("; --keep-weak uses them"),
+        "{said}"
+    );
+    let (with, said) = scored(" --keep-weak");
+    assert!(!said.contains(named), "{said}");
+    assert!(
+        without > usual - 1.0 && with > usual - 1.0,
+        "{usual} dB, {without} without it, {with} with it"
+    );
+}
+
 /// Of formats that leave sizes to the photos.
 #[test]
 fn photos_that_are_missing_or_corrupt_are_left_out_whatever_the_format() {

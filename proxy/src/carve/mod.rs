@@ -180,7 +180,7 @@ struct Scene {
     sightings: Vec<Sighting>,
     /// The cameras' centres, in lattice steps.
     cameras: Vec<DVec3>,
-    /// Where they are on the lattice.
+    /// Where they are on the lattice, but for those beyond the dome.
     camera_sites: Vec<Site>,
 }
 
@@ -214,12 +214,15 @@ impl Scene {
             let of_shell = |(_, _, i): &&(DVec3, Vec<u32>, usize)| *i < options.shell_points;
             used.iter().filter(of_shell).map(|(p, ..)| *p)
         });
-        for (position, ..) in &mut used {
+        // Lines of sight from beyond the dome are those of misplaced cameras.
+        let holds: Vec<bool> = sources.iter().map(|v| around.holds(v.center())).collect();
+        for (position, seen_by, _) in &mut used {
             *position = around.within(*position);
+            seen_by.retain(|i| holds[*i as usize]);
         }
         // A camera on the surface would be neither here nor there.
         let clear = clearance(sources, TOO_NEAR * around.radius);
-        used.retain(|(position, ..)| clear(*position));
+        used.retain(|(position, seen_by, _)| !seen_by.is_empty() && clear(*position));
 
         // 2. Snapped. Along a curve through space what is near in the world is near in memory.
         let lattice = Lattice::around(around.center, around.radius);
@@ -262,6 +265,7 @@ impl Scene {
             positions.push(position);
         }
         let centers: Vec<DVec3> = sources.iter().map(View::center).collect();
+        let within = centers.iter().zip(&holds).filter(|(_, holds)| **holds);
         Ok(Self {
             sites,
             positions,
@@ -270,7 +274,7 @@ impl Scene {
             site_of,
             sightings,
             cameras: centers.iter().map(|c| lattice.steps(*c)).collect(),
-            camera_sites: centers.iter().map(|c| lattice.snap(*c)).collect(),
+            camera_sites: within.map(|(c, _)| lattice.snap(*c)).collect(),
         })
     }
 }

@@ -12,6 +12,10 @@ use glam::DVec3;
 const DOME: f64 = 10.0;
 /// The share of points that are nearly all.
 const NEARLY_ALL: f64 = 0.95;
+/// A camera farther from the middle than this many times most cameras and nearly all points is
+/// misplaced and says nothing of how far a capture reaches: by its measure all others would be in
+/// one place, with the points on them.
+const STRAY: f64 = 30.0;
 /// Points are brought within this share of the dome's radius: its flat facets lie within.
 const WITHIN: f64 = 0.8;
 /// What is beyond even that, as a multiple of its radius.
@@ -24,8 +28,8 @@ const SPLITS: u32 = 5;
 /// (a plane that many points lie on, few below, and all cameras above) it is the whole dome.
 ///
 /// Counter-clockwise from within. Every ray from a camera meets it. Cameras and points that
-/// are not finite do not count; with nothing left it is a dome of radius 10 around the world's
-/// origin.
+/// are not finite do not count, nor do cameras that are misplaced by far, which may lie beyond
+/// it; with nothing left it is a dome of radius 10 around the world's origin.
 pub fn shell(views: &[View], points: &[SparsePoint]) -> Mesh {
     let around = Surroundings::of(views, points.iter().map(|p| p.position));
     let (directions, triangles) = icosphere(SPLITS);
@@ -49,9 +53,9 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     /// Of what is finite among cameras and points.
     pub(crate) fn of(views: &[View], points: impl Iterator<Item = DVec3>) -> Self {
-        // 1. The cameras' middle and reach.
+        // 1. The cameras' middle.
         let finite = |v: &&View| v.center().is_finite();
-        let views: Vec<View> = views.iter().filter(finite).cloned().collect();
+        let mut views: Vec<View> = views.iter().filter(finite).cloned().collect();
         let points: Vec<DVec3> = points.filter(|p| p.is_finite()).collect();
         let isolated = isolated_points(&points);
         let kept = points.iter().zip(&isolated).filter(|(_, alone)| !**alone);
@@ -63,25 +67,38 @@ impl Surroundings {
             &centers
         };
         let center = middle(of).unwrap_or(DVec3::ZERO);
-        let farthest = centers
-            .iter()
-            .map(|c| c.distance(center))
-            .fold(0.0, f64::max);
 
-        // 2. The dome beyond both cameras and points.
+        // 2. How far nearly all points are from it, and the cameras that are not misplaced.
+        let from_center = || centers.iter().map(|c| c.distance(center));
+        let mut reach = 0.0;
+        let mut limit = f64::INFINITY;
         let mut distances: Vec<f64> = points.iter().map(|p| p.distance(center)).collect();
-        let mut reach = 2.0 * farthest;
         if !distances.is_empty() {
             let nearly_all = ((distances.len() - 1) as f64 * NEARLY_ALL) as usize;
-            let (_, far, _) = distances.select_nth_unstable_by(nearly_all, f64::total_cmp);
-            reach = reach.max(*far);
+            reach = *distances
+                .select_nth_unstable_by(nearly_all, f64::total_cmp)
+                .1;
+            if !centers.is_empty() {
+                limit = STRAY * median(from_center().collect()).max(reach);
+            }
         }
+        let counting = from_center().filter(|distance| *distance <= limit);
+        reach = reach.max(2.0 * counting.fold(0.0, f64::max));
+
+        // 3. The dome beyond both.
         let is_length = reach > 0.0 && (DOME * reach).is_finite();
+        let radius = DOME * if is_length { reach } else { 1.0 };
+        views.retain(|v| v.center().distance(center) <= radius);
         Self {
             center,
-            radius: DOME * if is_length { reach } else { 1.0 },
+            radius,
             ground: ground::ground(&views, &points, center),
         }
+    }
+
+    /// Whether a camera stands within the dome; one that does not is misplaced.
+    pub(crate) fn holds(&self, camera_in_world: DVec3) -> bool {
+        camera_in_world.distance(self.center) <= self.radius
     }
 
     /// A point, or where the line from the middle to it comes close to the dome.

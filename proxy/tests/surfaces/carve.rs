@@ -179,6 +179,30 @@ fn noise_and_mismatches_do_little_harm() {
     );
 }
 
+/// As one that nothing placed is at the world's origin, a continent away.
+#[test]
+fn a_camera_that_is_misplaced_by_far_harms_nothing() {
+    let mut room = Room::new(16);
+    let points = room.points(1500, 0.0, &mut Random(8));
+    let usual = shell(&room.views, &points);
+    for far in [1e5, 1e12] {
+        room.views[3].camera_from_world.translation = DVec3::new(far, 0.0, 0.0);
+        let surface = carve::surface(&room.views, &points, &Options::default()).unwrap();
+        let on = surface.on_surface.iter().filter(|on| **on).count();
+        assert!(on > 1000, "{far:e}: {on} of 1500 points");
+        let others: Vec<View> = [&room.views[..3], &room.views[4..]].concat();
+        assert_closed(&surface.mesh);
+        assert_covers(&surface.mesh, &others, 4);
+        // Nor does what is around it all move away.
+        let around = shell(&room.views, &points);
+        for ray in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+            let [now, before] =
+                [&around, &usual].map(|mesh| hit(mesh, room.views[0].center(), ray).unwrap().0);
+            assert!((now / before - 1.0).abs() < 0.2, "{ray}: {now} {before}");
+        }
+    }
+}
+
 #[test]
 fn the_order_of_photos_and_the_number_of_threads_change_nothing() {
     let room = Room::new(6);
