@@ -75,6 +75,31 @@ fn neighbour_distances(points_in_world: &[DVec3], count: usize) -> Option<Vec<f6
     Some(finite.iter().map(mean_distance).collect())
 }
 
+/// The point of least summed distance, by Weiszfeld's iteration; a few of the points may be anywhere. Not finite
+/// of none.
+pub fn geometric_median(points: &[DVec3]) -> DVec3 {
+    let mut at = points.iter().sum::<DVec3>() / points.len() as f64;
+    if points.is_empty() {
+        return at;
+    }
+    for _ in 0..50 {
+        // Of most, as what is near is not to be told by what is farthest.
+        let scale = median(points.iter().map(|p| p.distance(at)).collect());
+        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+        for p in points {
+            let weight = 1.0 / p.distance(at).max(1e-6 * scale).max(f64::MIN_POSITIVE);
+            sum += weight * *p;
+            weights += weight;
+        }
+        let next = sum / weights;
+        if !next.is_finite() {
+            break;
+        }
+        at = next;
+    }
+    at
+}
+
 /// The middle value (the upper of two). The slice must not be empty.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
@@ -96,6 +121,24 @@ mod tests {
             }
         }
         points
+    }
+
+    #[test]
+    fn the_geometric_median_is_where_most_are_and_turns_with_them() {
+        let mut points: Vec<DVec3> = lattice().iter().map(|p| *p - DVec3::splat(1.25)).collect();
+        assert!(geometric_median(&points).length() < 1e-9);
+        for far in [1e3, 1e7, 1e14] {
+            points.push(far * DVec3::new(1.0, -0.3, 0.2));
+            let median = geometric_median(&points);
+            assert!(median.length() < 0.1, "{far:e}: {median}");
+        }
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 2.1, -0.4, 0.9);
+        points.truncate(100);
+        let turned: Vec<DVec3> = points.iter().map(|p| turn * *p).collect();
+        let expected = turn * geometric_median(&points);
+        assert!(geometric_median(&turned).distance(expected) < 1e-9);
+        assert_eq!(geometric_median(&[DVec3::X; 9]), DVec3::X);
+        assert!(!geometric_median(&[]).is_finite());
     }
 
     #[test]

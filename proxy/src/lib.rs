@@ -29,7 +29,7 @@ pub mod tunnel;
 use std::sync::Arc;
 
 pub use axes::plane_across_axes;
-pub use cloud::{CloudStatistics, isolated_points, statistics};
+pub use cloud::{CloudStatistics, geometric_median, isolated_points, statistics};
 pub use condition::ILL_CONDITIONED;
 pub use dense::DensePoints;
 pub use facets::Facets;

@@ -1,6 +1,6 @@
 //! Points as whole numbers, so that every predicate about them is exact.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Bits an axis. With 24 the in-sphere determinant stays below 2^126 and fits an `i128`.
 pub(super) const BITS: u32 = 24;
@@ -11,24 +11,28 @@ pub(super) type Site = [i32; 3];
 /// A cube of lattice places around a ball of the world.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
-    corner_in_world: DVec3,
+    center_in_world: DVec3,
+    /// A rotation.
+    lattice_from_world: DMat3,
     step: f64,
 }
 
 impl Lattice {
-    /// The lattice whose cube just holds the ball.
-    pub(super) fn around(center_in_world: DVec3, radius: f64) -> Self {
+    /// The lattice along these axes, the columns of a rotation, whose cube just holds the ball.
+    pub(super) fn around(center_in_world: DVec3, radius: f64, axes_in_world: DMat3) -> Self {
         // One place is left free on each side, for rounding.
-        let step = 2.0 * radius / f64::from((1 << BITS) - 3);
         Self {
-            corner_in_world: center_in_world - DVec3::splat(radius + step),
-            step,
+            center_in_world,
+            lattice_from_world: axes_in_world.transpose(),
+            step: 2.0 * radius / f64::from((1 << BITS) - 3),
         }
     }
 
     /// A point in lattice steps, not rounded.
     pub(super) fn steps(&self, point_in_world: DVec3) -> DVec3 {
-        (point_in_world - self.corner_in_world) / self.step
+        let middle = 0.5 * f64::from((1 << BITS) - 1);
+        let offset = self.lattice_from_world * (point_in_world - self.center_in_world);
+        offset / self.step + DVec3::splat(middle)
     }
 
     /// The nearest place; what lies outside the cube goes to its border.

@@ -225,7 +225,7 @@ impl Scene {
         used.retain(|(position, seen_by, _)| !seen_by.is_empty() && clear(*position));
 
         // 2. Snapped. Along a curve through space what is near in the world is near in memory.
-        let lattice = Lattice::around(around.center, around.radius);
+        let lattice = Lattice::around(around.center, around.radius, around.axes);
         let mut snapped: Vec<(u64, Site, usize)> = used
             .iter()
             .enumerate()

@@ -2,10 +2,11 @@
 
 mod ground;
 
-use crate::cloud::{isolated_points, median};
+use crate::cloud::{geometric_median, isolated_points, median};
 use crate::{Mesh, Plane, SparsePoint};
 use calibrate::View;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen};
 
 /// The dome's radius as a multiple of how far nearly all points are from the cameras'
 /// middle: what lies there moves against the horizon by 6° at most between any two of them.
@@ -32,7 +33,7 @@ const SPLITS: u32 = 5;
 /// it; with nothing left it is a dome of radius 10 around the world's origin.
 pub fn shell(views: &[View], points: &[SparsePoint]) -> Mesh {
     let around = Surroundings::of(views, points.iter().map(|p| p.position));
-    let (directions, triangles) = icosphere(SPLITS);
+    let (directions, triangles) = around.icosphere(SPLITS);
     Mesh {
         positions: directions.into_iter().map(|d| around.shell(d)).collect(),
         triangles,
@@ -42,10 +43,13 @@ pub fn shell(views: &[View], points: &[SparsePoint]) -> Mesh {
 /// How far a capture reaches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings {
-    /// The cameras' middle.
+    /// The cameras' middle, their geometric median.
     pub(crate) center: DVec3,
     /// The dome's.
     pub(crate) radius: f64,
+    /// A rotation whose columns follow the capture, however its world lies; what is made around it stands
+    /// along them.
+    pub(crate) axes: DMat3,
     /// Its normal upwards; below the middle.
     pub(crate) ground: Option<Plane>,
 }
@@ -66,7 +70,7 @@ impl Surroundings {
         } else {
             &centers
         };
-        let center = middle(of).unwrap_or(DVec3::ZERO);
+        let center = middle(of.clone()).unwrap_or(DVec3::ZERO);
 
         // 2. How far nearly all points are from it, and the cameras that are not misplaced.
         let from_center = || centers.iter().map(|c| c.distance(center));
@@ -92,6 +96,7 @@ impl Surroundings {
         Self {
             center,
             radius,
+            axes: axes(center, if points.is_empty() { &centers } else { &points }),
             ground: ground::ground(&views, &points, center),
         }
     }
@@ -105,10 +110,8 @@ impl Surroundings {
     pub(crate) fn within(&self, point_in_world: DVec3) -> DVec3 {
         let offset = point_in_world - self.center;
         let farthest = WITHIN * self.radius;
-        // Divided first: offsets may be too long to square.
-        let direction = (offset / offset.abs().max_element()).normalize_or_zero();
         if offset.abs().max_element() > farthest || offset.length() > farthest {
-            return self.center + direction * farthest;
+            return self.center + direction(offset) * farthest;
         }
         point_in_world
     }
@@ -125,7 +128,7 @@ impl Surroundings {
 
     /// A dome beyond the shell, counter-clockwise from within.
     pub(crate) fn beyond(&self) -> Mesh {
-        let (directions, triangles) = icosphere(3);
+        let (directions, triangles) = self.icosphere(3);
         let place = |d: DVec3| self.center + BEYOND * self.radius * d;
         Mesh {
             positions: directions.into_iter().map(place).collect(),
@@ -135,15 +138,56 @@ impl Surroundings {
 
     /// Vertices spread over the shell, about 9° apart.
     pub(crate) fn vertices(&self) -> Vec<DVec3> {
-        let (directions, _) = icosphere(3);
+        let (directions, _) = self.icosphere(3);
         directions.into_iter().map(|d| self.shell(d)).collect()
+    }
+
+    /// An [`icosphere`] that stands as the capture does.
+    fn icosphere(&self, splits: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let (mut directions, triangles) = icosphere(splits);
+        directions.iter_mut().for_each(|d| *d = self.axes * *d);
+        (directions, triangles)
     }
 }
 
-/// The median of each coordinate.
-fn middle(points: &[DVec3]) -> Option<DVec3> {
-    let axis = |k: usize| median(points.iter().map(|p| p[k]).collect());
-    (!points.is_empty()).then(|| DVec3::new(axis(0), axis(1), axis(2)))
+/// The geometric median, the same in whatever order points come; `None` without any.
+fn middle(mut points: Vec<DVec3>) -> Option<DVec3> {
+    points.sort_by(|a, b| {
+        let plan = a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+        plan.then(a.z.total_cmp(&b.z))
+    });
+    // From one of them, so that far from the world's origin no digits are lost.
+    let origin = *points.get(points.len() / 2)?;
+    points.iter_mut().for_each(|p| *p -= origin);
+    let place = origin + geometric_median(&points);
+    Some(if place.is_finite() { place } else { origin })
+}
+
+/// Principal axes of the directions from a place to points, as columns, the longest first and right-handed;
+/// the first two have the directions' mean on their side. Of directions, as a few far points would have it all
+/// their way.
+fn axes(center: DVec3, points: &[DVec3]) -> DMat3 {
+    let (mut spread, mut mean) = (DMat3::ZERO, DVec3::ZERO);
+    for point in points {
+        let d = direction(*point - center);
+        spread += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        mean += d;
+    }
+    let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&spread.to_cols_array()));
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let [x, y] = [order[0], order[1]].map(|k| {
+        let axis = eigen.eigenvectors.column(k);
+        let axis = DVec3::new(axis[0], axis[1], axis[2]);
+        if axis.dot(mean) < 0.0 { -axis } else { axis }
+    });
+    DMat3::from_cols(x, y, x.cross(y))
+}
+
+/// The unit vector along an offset; zero of none.
+fn direction(offset: DVec3) -> DVec3 {
+    // Divided first: offsets may be too long to square.
+    (offset / offset.abs().max_element()).normalize_or_zero()
 }
 
 /// Unit vectors and triangles, counter-clockwise from within; each split takes every side in

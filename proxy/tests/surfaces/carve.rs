@@ -4,11 +4,12 @@
 use crate::room;
 
 use calibrate::{Pixel, Rigid3, View, colmap};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use proxy::carve::{self, CarveError, Options};
 use proxy::{Mesh, MeshKind, Solid, SparsePoint, shell};
 use room::{Random, Room};
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 use std::path::Path;
 
 fn carved(views: &[View], points: &[SparsePoint]) -> Mesh {
@@ -220,43 +221,76 @@ fn the_order_of_photos_and_the_number_of_threads_change_nothing() {
     assert_eq!(carved(&backwards, &turned), mesh);
 }
 
+/// The same in a world that is scaled, turned and moved.
+fn elsewhere(
+    views: &[View],
+    points: &[SparsePoint],
+    (scale, turn, shift): (f64, DQuat, DVec3),
+) -> (Vec<View>, Vec<SparsePoint>) {
+    let place = |p: DVec3| turn * (p * scale) + shift;
+    let view = |view: &View| {
+        let rotation = view.camera_from_world.rotation * turn.conjugate();
+        let center = place(view.center());
+        View {
+            camera_from_world: Rigid3::new(rotation, -(rotation * center)),
+            ..view.clone()
+        }
+    };
+    let point = |p: &SparsePoint| SparsePoint {
+        position: place(p.position),
+        ..p.clone()
+    };
+    (
+        views.iter().map(view).collect(),
+        points.iter().map(point).collect(),
+    )
+}
+
+/// It leaves none of the world's axes where it was.
+fn some_turn() -> DQuat {
+    DQuat::from_euler(glam::EulerRot::XYZ, 2.1, -0.4, 0.9)
+}
+
 #[test]
-fn moving_and_scaling_the_world_moves_and_scales_the_surface() {
+fn turning_the_world_turns_the_shell() {
+    let room = Room::new(12);
+    let points = room.points(900, 0.002, &mut Random(9));
+    let around = shell(&room.views, &points);
+    for turn in [
+        some_turn(),
+        DQuat::from_rotation_z(0.3),
+        DQuat::from_rotation_x(PI),
+    ] {
+        let (views, turned) = elsewhere(&room.views, &points, (1.0, turn, DVec3::ZERO));
+        let other = shell(&views, &turned);
+        assert_eq!(other.triangles, around.triangles);
+        for (there, here) in other.positions.iter().zip(&around.positions) {
+            let expected = turn * *here;
+            assert!(there.distance(expected) < 1e-6, "{there} {expected}");
+        }
+    }
+}
+
+#[test]
+fn moving_scaling_and_turning_the_world_does_the_same_to_the_surface() {
     let room = Room::new(8);
     let points = room.points(800, 0.0, &mut Random(4));
     let mesh = carved(&room.views, &points);
-    for (scale, shift) in [
-        (1.0, DVec3::new(5e5, 5.4e6, 300.0)),
-        (1e-6, DVec3::ZERO),
-        (1e6, DVec3::ZERO),
+    for (scale, turn, shift) in [
+        (1.0, DQuat::IDENTITY, DVec3::new(5e5, 5.4e6, 300.0)),
+        (1e-6, DQuat::IDENTITY, DVec3::ZERO),
+        (1e6, DQuat::IDENTITY, DVec3::ZERO),
+        (1.0, some_turn(), DVec3::ZERO),
+        (3.0, some_turn(), DVec3::new(-70.0, 20.0, 5.0)),
     ] {
-        let views: Vec<View> = room
-            .views
-            .iter()
-            .map(|view| {
-                let rotation = view.camera_from_world.rotation;
-                let center = view.center() * scale + shift;
-                let camera_from_world = Rigid3::new(rotation, -(rotation * center));
-                View {
-                    camera_from_world,
-                    ..view.clone()
-                }
-            })
-            .collect();
-        let moved: Vec<SparsePoint> = points
-            .iter()
-            .map(|p| SparsePoint {
-                position: p.position * scale + shift,
-                ..p.clone()
-            })
-            .collect();
+        let (views, moved) = elsewhere(&room.views, &points, (scale, turn, shift));
         let other = carved(&views, &moved);
         assert_closed(&other);
         // Rounding to the lattice may differ, and with it a few facets.
         let mut same = 0;
         for ray in rays(&room.views[0], 12) {
             let here = hit(&mesh, room.views[0].center(), ray).unwrap().0;
-            let there = hit(&other, views[0].center(), ray).unwrap().0 / scale;
+            let there = hit(&other, views[0].center(), turn * ray).unwrap().0 / scale;
             same += usize::from((there / here - 1.0).abs() < 1e-3);
         }
         assert!(same > 160, "{same} of 169");

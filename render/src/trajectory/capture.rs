@@ -6,7 +6,7 @@ use crate::path::mean_rotation;
 use calibrate::Rigid3;
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
-use proxy::Proxy;
+use proxy::{Proxy, geometric_median};
 
 /// Positions here are relative to the reference camera's centre, axes are the world's.
 pub(super) struct Capture {
@@ -317,26 +317,6 @@ fn eigenvectors(m: DMat3) -> [(f64, DVec3); 3] {
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
-/// The point of least summed distance, by Weiszfeld's iteration.
-fn geometric_median(points: &[DVec3]) -> DVec3 {
-    let mut at = points.iter().sum::<DVec3>() / points.len() as f64;
-    let scale = points.iter().map(|p| p.distance(at)).fold(0.0, f64::max);
-    for _ in 0..50 {
-        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
-        for p in points {
-            let weight = 1.0 / p.distance(at).max(1e-6 * scale).max(f64::MIN_POSITIVE);
-            sum += weight * *p;
-            weights += weight;
-        }
-        let next = sum / weights;
-        if !next.is_finite() {
-            break;
-        }
-        at = next;
-    }
-    at
 }
 
 /// The distance to the third-nearest point elsewhere, in the median: cameras of a rig, and photos of one
