@@ -3,7 +3,7 @@
 use super::{PI, Standing};
 use crate::lumigraph::SourceView;
 use crate::path::mean_rotation;
-use calibrate::Rigid3;
+use calibrate::{Rigid3, View};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use proxy::{Proxy, geometric_median};
@@ -52,13 +52,7 @@ impl Capture {
         // 1. The middle, robustly, and the camera nearest to it.
         let first = sources[0].view.center();
         let centers: Vec<DVec3> = sources.iter().map(|s| s.view.center() - first).collect();
-        let middle = geometric_median(&centers);
-        let from_middle = || centers.iter().map(|c| c.distance(middle));
-        let nearest = from_middle().fold(f64::INFINITY, f64::min);
-        // The first of those that are equally near but for rounding.
-        let reference_idx = from_middle()
-            .position(|d| d <= nearest * (1.0 + 1e-6))
-            .unwrap_or(0);
+        let reference_idx = nearest(&centers, geometric_median(&centers));
         let reference = &sources[reference_idx].view;
         let origin_in_world = reference.center();
         let centers: Vec<DVec3> = sources
@@ -93,22 +87,7 @@ impl Capture {
         let rounding = 1e-10 * origin_in_world.length();
 
         // 3. How far the scene is ahead of the reference camera.
-        let depth = |p: &DVec3| {
-            let pixel = reference.project(*p)?;
-            let depth = forward.dot(*p - origin_in_world);
-            (p.is_finite() && reference.contains(pixel)).then_some(depth)
-        };
-        let to_points = median(points_in_world.iter().filter_map(depth).collect());
-        let hit = match proxy {
-            Proxy::Plane(plane) => plane.intersect(origin_in_world, forward),
-            // Made of points, it lies where they do.
-            Proxy::ViewPlane | Proxy::Points { .. } | Proxy::Dense(_) => None,
-            Proxy::Mesh(solid) => {
-                let hit = solid.first_hit(origin_in_world, forward);
-                hit.map(|hit| origin_in_world + forward * hit.along)
-            }
-        };
-        let to_proxy = hit.map(|p| p.distance(origin_in_world));
+        let (to_points, to_proxy) = distances_ahead(reference, forward, points_in_world, proxy);
         // With nothing ahead, as far as the capture is wide.
         let unknown = if farthest > rounding {
             2.0 * farthest
@@ -301,6 +280,43 @@ impl Ring {
         let direction = level * elevation.cos() + self.up * elevation.sin();
         self.focus + direction * (distance / sum)
     }
+}
+
+/// How far the scene is ahead of a camera that looks along a direction: the median depth of the points in its
+/// photo, and the distance to the proxy; each where there is one.
+pub(super) fn distances_ahead(
+    view: &View,
+    forward: DVec3,
+    points_in_world: &[DVec3],
+    proxy: &Proxy,
+) -> (Option<f64>, Option<f64>) {
+    let center = view.center();
+    let depth = |p: &DVec3| {
+        let pixel = view.project(*p)?;
+        let depth = forward.dot(*p - center);
+        (p.is_finite() && view.contains(pixel)).then_some(depth)
+    };
+    let to_points = median(points_in_world.iter().filter_map(depth).collect());
+    let hit = match proxy {
+        Proxy::Plane(plane) => plane.intersect(center, forward),
+        // Made of points, it lies where they do.
+        Proxy::ViewPlane | Proxy::Points { .. } | Proxy::Dense(_) => None,
+        Proxy::Mesh(solid) => {
+            let hit = solid.first_hit(center, forward);
+            hit.map(|hit| center + forward * hit.along)
+        }
+    };
+    (to_points, hit.map(|p| p.distance(center)))
+}
+
+/// The camera nearest to a place, by index.
+pub(super) fn nearest(centers: &[DVec3], to: DVec3) -> usize {
+    let distances = || centers.iter().map(|c| c.distance(to));
+    let nearest = distances().fold(f64::INFINITY, f64::min);
+    // The first of those that are equally near but for rounding.
+    distances()
+        .position(|d| d <= nearest * (1.0 + 1e-6))
+        .unwrap_or(0)
 }
 
 /// Eigenvalues and vectors of a symmetric matrix, the largest first.

@@ -5,6 +5,7 @@
 //! its paths moved, turned and scaled.
 
 mod capture;
+mod stray;
 mod upright;
 
 pub use upright::{Standing, Upright, upright};
@@ -16,6 +17,7 @@ use capture::{Capture, Ring};
 use glam::DVec3;
 use proxy::Proxy;
 use std::f64::consts::{PI, TAU};
+use stray::without_strays;
 
 /// The kinds of path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +64,7 @@ const ORBIT_POINTS: usize = 720;
 /// pinhole with the median focal length of the source views, their most common image
 /// size, and the principal point in its centre. The path of a capture of one place, or of one photo, stands
 /// still. Photos that were taken with the camera turned count as if they stood as most do; see [`upright()`].
+/// Photos whose cameras are misplaced by far do not count.
 ///
 /// # Errors
 /// No source views, a pose that is not finite, no frames, a frame rate that is not positive.
@@ -81,16 +84,17 @@ pub fn derive(
         return Err(TrajectoryError::NotFinite(source.name.clone()));
     }
 
+    let sources = without_strays(sources, points_in_world, proxy);
     let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
     let standing = upright(&views);
-    let capture = Capture::new(sources, &standing, points_in_world, proxy);
+    let capture = Capture::new(&sources, &standing, points_in_world, proxy);
     let poses: Vec<Rigid3> = match kind {
         Trajectory::Orbit => orbit(&capture, frames),
         Trajectory::Dolly => dolly(&capture, frames),
         Trajectory::Sweep => sweep(&capture, frames),
     };
 
-    let camera = typical_camera(sources, &standing.photos);
+    let camera = typical_camera(&sources, &standing.photos);
     let frame = |(index, pose): (usize, &Rigid3)| {
         // The capture's poses are relative to its reference camera's centre.
         let center = pose.center() + capture.origin_in_world;

@@ -84,6 +84,19 @@ fn angle_off(frame: &PathFrame, target: DVec3) -> f64 {
         .angle_between(target - frame.view.center())
 }
 
+/// The poses of two paths are the same but for rounding.
+#[track_caller]
+fn assert_same_poses(found: &CameraPath, expected: &CameraPath, what: &str) {
+    assert_eq!(found.frames.len(), expected.frames.len(), "{what}");
+    for (a, b) in found.frames.iter().zip(&expected.frames) {
+        let off = a.view.center().distance(b.view.center());
+        assert!(off < 1e-6, "{what}: {off}");
+        let (a, b) = (a.view.camera_from_world, b.view.camera_from_world);
+        let turn = a.rotation.dot(b.rotation).abs();
+        assert!((turn - 1.0).abs() < 1e-9, "{what}: {turn}");
+    }
+}
+
 #[test]
 fn steps_are_even_and_paths_closed() {
     for s in [grid(), ring(360), ring(200), walk()] {
@@ -388,13 +401,9 @@ fn few_photos_that_are_rolled_change_no_path() {
         for kind in ALL {
             let what = format!("{kind:?}, {case}, {quarters}");
             let (expected, found) = (path(kind, straight), path(kind, &mixed));
+            assert_same_poses(&found, &expected, &what);
             for (a, b) in expected.frames.iter().zip(&found.frames) {
                 assert_eq!(a.camera, b.camera, "{what}");
-                let off = a.view.center().distance(b.view.center());
-                assert!(off < 1e-6, "{what}: {off}");
-                let (a, b) = (a.view.camera_from_world, b.view.camera_from_world);
-                let turn = a.rotation.dot(b.rotation).abs();
-                assert!((turn - 1.0).abs() < 1e-9, "{what}: {turn}");
             }
         }
     }
@@ -411,6 +420,51 @@ fn photos_that_are_all_rolled_have_paths_that_are() {
             assert_eq!((frame.camera.width, frame.camera.height), (480, 640));
         }
     }
+}
+
+/// Moves a camera that stays turned as it is.
+fn moved(source: &SourceView, by: DVec3) -> SourceView {
+    let mut moved = source.clone();
+    let pose = &mut moved.view.camera_from_world;
+    *pose = Rigid3::new(
+        pose.rotation,
+        -(pose.rotation * (source.view.center() + by)),
+    );
+    moved
+}
+
+#[test]
+fn cameras_that_are_misplaced_by_far_change_no_path() {
+    let captures: [fn() -> Scene; 4] = [grid, || ring(360), || ring(200), walk];
+    for made in captures {
+        for which in [vec![4], vec![0, 7, 9]] {
+            for by in [300.0, 5e6] {
+                let (mut without, mut with) = (made(), made());
+                for &i in which.iter().rev() {
+                    without.sources.remove(i);
+                    let by = DVec3::new(0.8, 0.1 * i as f64, -0.6) * by;
+                    with.sources[i] = moved(&with.sources[i], by);
+                }
+                for kind in ALL {
+                    let what = format!("{kind:?}, {which:?}, {by}");
+                    assert_same_poses(&path(kind, &with), &path(kind, &without), &what);
+                }
+            }
+        }
+    }
+}
+
+/// Most photos of one place, and a few of another: those are no strays.
+#[test]
+fn photos_beside_a_tripod_count() {
+    let poses = (0..12).map(|i| {
+        let aside = if i < 10 { 1e-5 * f64::from(i) } else { 2.0 };
+        Rigid3::looking_at(DVec3::X * aside, DVec3::Z * 12.0, DVec3::NEG_Y)
+    });
+    let s = scene(poses.collect(), Vec::new(), DVec3::Z * 12.0);
+    let places = centers(&path(Trajectory::Sweep, &s));
+    let most = places.iter().map(|c| c.x).fold(0.0, f64::max);
+    assert!(most > 1.5, "{most}");
 }
 
 #[test]
