@@ -15,7 +15,7 @@ pub(super) struct Capture {
     pub(super) centers: Vec<DVec3>,
     /// Where most photos have it in the world; see [`Standing`].
     up: Option<DVec3>,
-    /// `camera_from_world`, as they stand upright.
+    /// `camera_from_world`, as they stand upright, their z axes what photos have in the middle.
     rotations: Vec<DQuat>,
     /// The camera nearest to the middle of them all.
     reference_idx: usize,
@@ -60,7 +60,7 @@ impl Capture {
             .map(|s| s.view.center() - origin_in_world)
             .collect();
         let rotation = standing.photos[reference_idx].rotation;
-        let forward = reference.forward();
+        let forward = rotation.conjugate() * DVec3::Z;
 
         // 2. Principal axes. Ties are broken in favour of the reference camera's x axis,
         // signs by it and by its y axis.

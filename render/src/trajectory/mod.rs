@@ -5,6 +5,7 @@
 //! its paths moved, turned and scaled.
 
 mod capture;
+mod gaze;
 mod stray;
 mod upright;
 
@@ -64,6 +65,7 @@ const ORBIT_POINTS: usize = 720;
 /// pinhole with the median focal length of the source views, their most common image
 /// size, and the principal point in its centre. The path of a capture of one place, or of one photo, stands
 /// still. Photos that were taken with the camera turned count as if they stood as most do; see [`upright()`].
+/// What a photo looks at is in its middle, wherever its principal point is.
 /// Photos whose cameras are misplaced by far do not count.
 ///
 /// # Errors
@@ -86,7 +88,10 @@ pub fn derive(
 
     let sources = without_strays(sources, points_in_world, proxy);
     let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
-    let standing = upright(&views);
+    let mut standing = upright(&views);
+    for (photo, view) in standing.photos.iter_mut().zip(&views) {
+        photo.rotation = gaze::centered(view, photo.rotation);
+    }
     let capture = Capture::new(&sources, &standing, points_in_world, proxy);
     let poses: Vec<Rigid3> = match kind {
         Trajectory::Orbit => orbit(&capture, frames),
@@ -331,7 +336,7 @@ fn typical_camera(sources: &[SourceView], upright: &[Upright]) -> Camera {
     }
     let (width, height) = common.0;
     let relative =
-        |s: &SourceView| s.view.lens.mean_focal() / f64::from(s.view.width.max(s.view.height));
+        |s: &SourceView| gaze::mean_focal(&s.view) / f64::from(s.view.width.max(s.view.height));
     let focal = capture::median(sources.iter().map(relative).collect())
         .map_or(1.0, |f| f * f64::from(width.max(height)));
     Camera {

@@ -1,6 +1,7 @@
 //! Cameras that are misplaced by far.
 
 use super::capture::{distances_ahead, nearest};
+use super::gaze;
 use crate::lumigraph::SourceView;
 use glam::DVec3;
 use proxy::{Proxy, geometric_median};
@@ -34,7 +35,7 @@ pub(super) fn without_strays<'a>(
         .1;
 
     let view = &sources[nearest(&centers, middle)].view;
-    let (to_points, to_proxy) = distances_ahead(view, view.forward(), points_in_world, proxy);
+    let (to_points, to_proxy) = distances_ahead(view, gaze::ahead(view), points_in_world, proxy);
     let Some(to_scene) = to_points.or(to_proxy) else {
         return Cow::Borrowed(sources);
     };

@@ -467,6 +467,53 @@ fn photos_beside_a_tripod_count() {
     assert!(most > 1.5, "{most}");
 }
 
+/// A photo that shows much the same through a part of the lens aside of its axis: that is turned away by as much.
+fn shifted(source: &SourceView, ray: DVec3) -> SourceView {
+    let mut shifted = source.clone();
+    let view = &mut shifted.view;
+    let middle = DVec2::new(f64::from(view.width), f64::from(view.height)) * 0.5;
+    view.lens.principal = middle - view.lens.focal * ray.truncate() / ray.z;
+    let turn = DQuat::from_rotation_arc(DVec3::Z, ray.normalize());
+    view.camera_from_world = Rigid3::new(turn, DVec3::ZERO) * view.camera_from_world;
+    shifted
+}
+
+#[test]
+fn photos_with_principal_points_off_the_middle_have_the_same_paths() {
+    for ray in [
+        DVec3::new(0.3, -0.2, 1.0),
+        DVec3::new(0.6, 0.0, 1.0),
+        DVec3::new(0.0, -0.4, 1.0),
+    ] {
+        for made in [grid(), walk()] {
+            let off = made.sources.iter().enumerate().map(|(i, source)| {
+                let quarters = u8::from([0, 3, 5].contains(&i));
+                rolled(&shifted(source, ray), quarters)
+            });
+            let off = Scene {
+                sources: off.collect(),
+                points: made.points.clone(),
+                proxy: made.proxy.clone(),
+            };
+            for kind in ALL {
+                let what = format!("{kind:?}, {ray}");
+                let (expected, found) = (path(kind, &made), path(kind, &off));
+                assert_same_poses(&found, &expected, &what);
+                let camera = &found.frames[0].camera;
+                assert_eq!((camera.width, camera.height), (640, 480), "{what}");
+                assert_eq!(camera.params[2..], [320.0, 240.0], "{what}");
+                let focal = 500.0 * ray.length().powf(1.5);
+                assert!((camera.params[0] - focal).abs() < 1e-6, "{what}");
+            }
+        }
+        let mut around = ring(360);
+        around.sources = around.sources.iter().map(|s| shifted(s, ray)).collect();
+        for frame in &path(Trajectory::Orbit, &around).frames {
+            assert!(angle_off(frame, DVec3::ZERO) < 1e-6, "{ray}");
+        }
+    }
+}
+
 #[test]
 fn what_has_no_path_is_an_error() {
     let s = grid();
