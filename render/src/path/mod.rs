@@ -11,7 +11,7 @@ pub use file::{
 };
 pub use nerfstudio::{NerfstudioFrame, write_nerfstudio};
 pub use shot::{SHOT_KEYWORD, ShotLook, read_shot_look, write_shot};
-pub(crate) use spline::{Curve, mean_rotation};
+pub(crate) use spline::{Curve, fitted_rotation, mean_rotation};
 
 use calibrate::{Camera, CameraError, ModelKind, Rigid3, View};
 use glam::DQuat;

@@ -206,6 +206,32 @@ pub(crate) fn mean_rotation(weighted: &[(f64, DQuat)]) -> Option<DQuat> {
     Some(mean)
 }
 
+/// The rotation at place 0 by a line fitted to rotations at places along a way, (weight, place, rotation): as their
+/// weighted mean is at their mean place, and as they turn from there on. Weights are not negative; `None` where
+/// they are all zero.
+pub(crate) fn fitted_rotation(placed: &[(f64, f64, DQuat)]) -> Option<DQuat> {
+    // Farther from the mean place than so many standard deviations they do not tell how to turn on.
+    const REACH: f64 = 2.0;
+    let weighted: Vec<(f64, DQuat)> = placed.iter().map(|&(w, _, q)| (w, q)).collect();
+    let mean = mean_rotation(&weighted)?;
+    let sum: f64 = placed.iter().map(|one| one.0).sum();
+    let middle = placed.iter().map(|one| one.0 * one.1).sum::<f64>() / sum;
+    let (mut turn, mut squares) = (DVec3::ZERO, 0.0);
+    for &(weight, place, rotation) in placed {
+        let off = place - middle;
+        turn += log(rotation * mean.conjugate()) * (weight * off);
+        squares += weight * off * off;
+    }
+    let reach = REACH * (squares / sum).sqrt();
+    let slope = turn / squares;
+    // All at one place they do not tell, either.
+    if !(slope.is_finite() && reach.is_finite()) {
+        return Some(mean);
+    }
+    let step = slope * (-middle).clamp(-reach, reach);
+    Some((exp(step) * mean).normalize())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -313,5 +339,19 @@ mod tests {
         assert_eq!(mean_rotation(&[(0.0, about(1.0))]), None);
         let opposite = mean_rotation(&[(1.0, about(0.0)), (1.0, about(PI))]).unwrap();
         assert!(opposite.is_finite());
+    }
+
+    #[test]
+    fn a_fit_of_rotations_that_turn_evenly_is_exact() {
+        let at = |place: f64| exp(DVec3::new(0.1, 0.4, -0.2) * place) * exp(DVec3::X);
+        let placed = [(0.5, 1.0), (2.0, 1.5), (1.0, -0.2), (0.1, 2.0)];
+        let placed = placed.map(|(weight, place)| (weight, place, at(place)));
+        let fitted = fitted_rotation(&placed).unwrap();
+        assert!(log(fitted * at(0.0).conjugate()).length() < 1e-12);
+        // At one place, the mean.
+        let one = [(1.0, 0.7, at(0.2)), (1.0, 0.7, at(0.4))];
+        let fitted = fitted_rotation(&one).unwrap();
+        assert!(log(fitted * at(0.3).conjugate()).length() < 1e-12);
+        assert_eq!(fitted_rotation(&[]), None);
     }
 }

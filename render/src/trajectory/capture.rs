@@ -1,8 +1,8 @@
 //! What a path needs to know of a capture's geometry.
 
-use super::{PI, Standing};
+use super::{PI, Standing, gaze};
 use crate::lumigraph::SourceView;
-use crate::path::mean_rotation;
+use crate::path::{fitted_rotation, mean_rotation};
 use calibrate::{Rigid3, View};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -25,6 +25,8 @@ pub(super) struct Capture {
     pub(super) half_extents: [f64; 3],
     /// Whether they lie further apart than rounding errors, and than the scene would show.
     has_extent: bool,
+    /// Whether the lenses are long; see [`LONG`].
+    is_long: bool,
     /// Distance to the third-nearest camera, in the median.
     pub(super) spacing: f64,
     /// What the reference camera looks at.
@@ -39,6 +41,10 @@ const SAME_PLACE: f64 = 1e-4;
 /// So are all of them where half of their range is no more than this, in shares of the distance to the scene: in
 /// a picture of 1000 pixels that is a thousandth of one.
 const ONE_PLACE: f64 = 1e-6;
+/// Lenses whose focal length is so many times the photos' longer side, or more, are long: they see 23° or less.
+/// The mean rotation of cameras about a place near the end of a row is that of a place farther in, which may differ by
+/// more than they see. Wider ones show much the same, and the mean is smoother than a fit.
+const LONG: f64 = 2.5;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
 
@@ -104,6 +110,7 @@ impl Capture {
             axes,
             half_extents,
             has_extent: half_extents[0] > rounding.max(ONE_PLACE * distance) && farthest > 0.0,
+            is_long: relative_focal(sources).is_some_and(|focal| focal >= LONG),
             spacing: spacing(&centers),
             focus: forward * distance,
             nearest_scene: to_proxy.map_or(distance, |d| d.min(distance)),
@@ -153,7 +160,7 @@ impl Capture {
     }
 
     /// The mean rotation of the cameras about a place that look much the same way as
-    /// `like` does.
+    /// `like` does; of long lenses as it is at that place along the longest axis.
     pub(super) fn mean_rotation(&self, at: DVec3, like: DQuat) -> DQuat {
         let forward = |q: DQuat| q.conjugate() * DVec3::Z;
         let ahead = forward(like);
@@ -163,7 +170,14 @@ impl Capture {
             .zip(&self.rotations)
             .map(|(w, &q)| (w * (4.0 * (forward(q).dot(ahead) - 1.0)).exp(), q))
             .collect();
-        mean_rotation(&weighted).unwrap_or(like)
+        let mean = if self.is_long {
+            let along = self.centers.iter().map(|c| (*c - at).dot(self.axes[0]));
+            let placed = weighted.iter().zip(along).map(|(&(w, q), x)| (w, x, q));
+            fitted_rotation(&placed.collect::<Vec<_>>())
+        } else {
+            mean_rotation(&weighted)
+        };
+        mean.unwrap_or(like)
     }
 
     /// The ring of cameras around an object, if that is what they are: most look at one
@@ -307,6 +321,13 @@ pub(super) fn distances_ahead(
         }
     };
     (to_points, hit.map(|p| p.distance(center)))
+}
+
+/// The median focal length, in shares of the photos' longer sides.
+pub(super) fn relative_focal(sources: &[SourceView]) -> Option<f64> {
+    let relative =
+        |s: &SourceView| gaze::mean_focal(&s.view) / f64::from(s.view.width.max(s.view.height));
+    median(sources.iter().map(relative).collect())
 }
 
 /// The camera nearest to a place, by index.

@@ -335,10 +335,7 @@ fn typical_camera(sources: &[SourceView], upright: &[Upright]) -> Camera {
         }
     }
     let (width, height) = common.0;
-    let relative =
-        |s: &SourceView| gaze::mean_focal(&s.view) / f64::from(s.view.width.max(s.view.height));
-    let focal = capture::median(sources.iter().map(relative).collect())
-        .map_or(1.0, |f| f * f64::from(width.max(height)));
+    let focal = capture::relative_focal(sources).map_or(1.0, |f| f * f64::from(width.max(height)));
     Camera {
         model: ModelKind::Pinhole,
         width,

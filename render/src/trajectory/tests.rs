@@ -211,6 +211,35 @@ fn a_sweep_covers_the_longest_direction() {
     assert!((walked[60].distance(walked[0]) - 0.8 * 19.5).abs() < 1.0);
 }
 
+/// 4.6° wide: neighbours are turned by more.
+#[test]
+fn a_sweep_of_long_lenses_looks_where_its_photos_do() {
+    for count in [5, 7, 15] {
+        for (aim, is_shared) in [(DVec3::ZERO, true), (DVec3::NEG_Z, false)] {
+            let target = |center: DVec3| if is_shared { aim } else { center + aim };
+            let poses = (0..count).map(|i| {
+                let center = DVec3::new(
+                    60.0 * f64::from(i) / f64::from(count - 1) - 30.0,
+                    0.0,
+                    100.0,
+                );
+                Rigid3::looking_at(center, target(center), DVec3::NEG_Y)
+            });
+            let mut s = scene(poses.collect(), Vec::new(), DVec3::ZERO);
+            for source in &mut s.sources {
+                source.view.lens = Lens::pinhole(DVec2::splat(8000.0), DVec2::new(320.0, 240.0));
+            }
+            let path = path(Trajectory::Sweep, &s);
+            let off = |frame: &PathFrame| angle_off(frame, target(frame.view.center()));
+            // A tenth of the view.
+            let most = path.frames.iter().map(off).fold(0.0, f64::max);
+            assert!(most < 0.008, "{count} {is_shared}: {most}");
+            let places = centers(&path);
+            assert!((places[0].x.abs() - 24.0).abs() < 1e-6, "{}", places[0]);
+        }
+    }
+}
+
 #[test]
 fn a_dolly_keeps_its_distance_from_the_scene() {
     let mut s = grid();
