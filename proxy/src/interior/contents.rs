@@ -13,6 +13,11 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// What f32 rounds coordinates by, in shares of the greatest; and how far a box takes in what lies beyond
+/// it at most, in shares of its size: far from the origin models may have a frame that keeps their digits.
+const ROUNDING: f64 = f32::EPSILON as f64;
+const WIDEST: f64 = 1e-5;
+
 /// The triangles of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contents {
@@ -185,11 +190,19 @@ fn openings(model: &Model) -> Vec<bool> {
     is_opening
 }
 
-/// The triangles that touch a box, without what stands for openings.
+/// The triangles that touch a box, without what stands for openings. Models have f32: what lies in the plane of a
+/// side touches it, however that is rounded.
 fn touching(model: &Model, room: &RoomBox, is_opening: &[bool]) -> Vec<u32> {
+    let farthest = room.min.abs().max(room.max.abs()).max_element();
+    let size = (room.max - room.min).max_element();
+    let margin = (ROUNDING * farthest).min(WIDEST * size);
+    let room = RoomBox {
+        min: room.min - margin,
+        max: room.max + margin,
+    };
     let is_in = |i: &u32| {
         let idx = *i as usize;
-        triangle_touches_box(model.mesh.corners(idx), room) && !is_opening[idx]
+        triangle_touches_box(model.mesh.corners(idx), &room) && !is_opening[idx]
     };
     let all = 0..model.mesh.triangles.len() as u32;
     all.into_par_iter().filter(is_in).collect()
@@ -288,6 +301,30 @@ mod tests {
             assert_eq!(contents.triangles, [[0]]);
             assert_eq!(contents.bounds, [Some(bounds)]);
             assert_eq!((contents.elsewhere.len(), odd.len()), (0, 0));
+        }
+    }
+
+    #[test]
+    fn a_wall_where_boxes_meet_is_in_both_cells_however_f32_rounds_its_plane() {
+        // As f32 the first is less, the second more.
+        for side in [4.1_f64, 4.3] {
+            let x = f64::from(side as f32);
+            let corners = [[x, 0.0, 0.0], [x, 2.5, 0.0], [x, 0.0, 3.0]];
+            let model = Model {
+                mesh: Mesh {
+                    positions: corners.map(DVec3::from_array).to_vec(),
+                    triangles: vec![[0, 1, 2]],
+                },
+                ..Model::default()
+            };
+            let room = |from: f64, to: f64| RoomBox {
+                min: DVec3::new(from, 0.0, 0.0),
+                max: DVec3::new(to, 2.5, 3.0),
+            };
+            for (from, to, count) in [(0.0, side, 1), (side, 8.0, 1), (side + 1e-5, 8.0, 0)] {
+                let found = touching(&model, &room(from, to), &[false]);
+                assert_eq!(found.len(), count, "{from} to {to}");
+            }
         }
     }
 
