@@ -222,6 +222,18 @@ fn bad_gltf_files_say_where() {
 }
 
 #[test]
+fn nodes_may_repeat_a_mesh_in_a_small_file() {
+    // As rows of seats: the mesh takes some 100 times what the file does.
+    let children: Vec<String> = (1..=500).map(|i| i.to_string()).collect();
+    let nodes = vec![r#"{"mesh": 0}"#; 500].join(",");
+    let nodes = format!(r#"[{{"children": [{}]}}, {nodes}]"#, children.join(","));
+    let file = gltf(4, None, &[[0.0, 1.0, 2.0]; 300], &nodes);
+    let mesh = parse("a.gltf", &file).unwrap();
+    assert_eq!(mesh.triangles.len(), 500 * 100);
+    assert!(24 * mesh.positions.len() > 100 * file.len());
+}
+
+#[test]
 fn nodes_cannot_repeat_a_mesh_without_end() {
     let children: Vec<String> = (1..5000).map(|i| i.to_string()).collect();
     let nodes = vec![r#"{"mesh": 0}"#; 4999].join(",");

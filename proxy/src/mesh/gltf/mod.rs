@@ -81,8 +81,11 @@ const HARMLESS: [&str; 6] = [
     nodes::INSTANCING,
 ];
 
-/// Bytes of mesh for each byte of the file, where nodes repeat meshes.
+/// Bytes of mesh for each byte of the file, where nodes repeat meshes; and what any file's may take: rows of
+/// seats are a small file. Transforms of copies, which are numbers of the file, grow less.
 const MAX_GROWTH: usize = 64;
+const ANY_MESH: usize = 256 << 20;
+const ANY_COPIES: usize = 64 << 10;
 
 /// Who wants to know more of the file than where its triangles are.
 trait Visitor {
@@ -282,22 +285,22 @@ impl Reader<'_> {
         let name = format!("node {number}");
         let count = copies.count(&mut self.accessors, &name)?;
         self.copies += count;
-        self.check_size(size_of::<DMat4>() * self.copies, &name)?;
+        self.check_size(size_of::<DMat4>() * self.copies, ANY_COPIES, &name)?;
         copies.transforms(&mut self.accessors, &name, vec![world_from_node; count])
     }
 
-    /// Whether a file of this size may become so many bytes.
-    fn check_size(&self, bytes: usize, name: &str) -> Result<(), MeshFileError> {
+    /// Whether a file of this size may become so many bytes, where any file may become some.
+    fn check_size(&self, bytes: usize, any: usize, name: &str) -> Result<(), MeshFileError> {
         let size = self.file_size + self.accessors.buffers.external_size();
-        if bytes <= MAX_GROWTH * size + 65536 {
+        if bytes <= MAX_GROWTH * size + any {
             return Ok(());
         }
         Err(MeshFileError::Record {
             path: self.accessors.path.to_owned(),
             record: name.to_owned(),
             problem: format!(
-                "nodes repeat meshes until they take {bytes} bytes, {MAX_GROWTH} times the \
-                 file; join and simplify them before exporting"
+                "nodes repeat meshes until they take {bytes} bytes, more than {MAX_GROWTH} times \
+                 the file; simplify them, or leave some of them out, before exporting"
             ),
         })
     }
@@ -342,7 +345,7 @@ impl Reader<'_> {
         let indices = indices.unwrap_or(corners);
         let bytes =
             24 * (self.mesh.positions.len() + corners) + 12 * (self.mesh.triangles.len() + indices);
-        self.check_size(bytes, name)?;
+        self.check_size(bytes, ANY_MESH, name)?;
         // 2. Corners.
         let first = self.mesh.positions.len();
         let positions = self.accessors.triples(positions, "positions")?;
