@@ -22,11 +22,13 @@ pub struct ComparedCell {
 pub struct ComparedPortal {
     /// The known one's name.
     pub name: String,
-    /// The nearest found one that none nearer has, its middle's greatest distance along an axis of the
-    /// world, and by how much it is wider; in world units.
+    /// The one that it is found as, or the nearest found one that none nearer has; its middle's greatest distance along
+    /// an axis of the world, and by how much it is wider; in world units.
     pub nearest: Option<(String, f64, f64)>,
-    /// Whether that is within the tolerance, and twice the tolerance in width.
+    /// Whether that is within the tolerance, and twice the tolerance in width, and joins the same cells.
     pub is_found: bool,
+    /// What it joins, where that alone is why it is not.
+    pub joins: Option<[String; 2]>,
 }
 
 /// How a found interior compares with a known one.
@@ -52,7 +54,8 @@ pub struct Comparison {
 const STEP: f64 = 0.25;
 const MOST: f64 = 2000.0;
 
-/// Compares cells with boxes by the floor that they share, and portals by where their middles are.
+/// Compares cells with boxes by the floor that they share, and portals by where their middles are and what they join: a
+/// cell is the same where half of the smaller one's floor is shared, or where one has no box.
 /// `tolerance` is in world units, of which a metre has so many; of interiors without any box there is nothing to
 /// compare but portals.
 pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -> Comparison {
@@ -95,38 +98,65 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
         untold.into_iter().map(name_of_known).collect(),
         uncertain.into_iter().map(name).collect(),
     ];
-    // 2. Portals, the nearest first.
+    // 2. Portals: which pairs are the same.
+    let is_same = |t: Option<CellId>, f: Option<CellId>| match (t, f) {
+        (Some(t), Some(f)) => {
+            let have_boxes = has_box(known.cell(t)) && has_box(found.cell(f));
+            let (t, f) = (t.0 as usize, f.0 as usize);
+            let least = shared.known[t].min(shared.found[f]);
+            !have_boxes || 2 * shared.both[t * m + f] >= least
+        }
+        (t, f) => t.is_none() && f.is_none(),
+    };
+    let joins_same = |t: usize, f: usize| {
+        let ([a, b], [c, d]) = (known.portals[t].cells, found.portals[f].cells);
+        (is_same(a, c) && is_same(b, d)) || (is_same(a, d) && is_same(b, c))
+    };
     let off = |t: usize, f: usize| {
         let [a, b] = [&known.portals[t], &found.portals[f]];
         let apart = b.polygon.center() - a.polygon.center();
         let wider = b.width(found.up) - a.width(known.up);
         (apart.abs().max_element(), wider)
     };
+    let is_near = |(apart, wider): (f64, f64)| apart <= tolerance && wider.abs() <= 2.0 * tolerance;
+    let is_found = |t: usize, f: usize| is_near(off(t, f)) && joins_same(t, f);
+    // 3. Those first, and then the nearest.
     let (n, m) = (known.portals.len(), found.portals.len());
-    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
-    pairs.sort_by(|a, b| off(a.0, a.1).0.total_cmp(&off(b.0, b.1).0));
+    let pairs = (0..n).flat_map(|t| (0..m).map(move |f| (t, f)));
+    let mut pairs: Vec<(bool, f64, usize, usize)> = pairs
+        .map(|(t, f)| (!is_found(t, f), off(t, f).0, t, f))
+        .collect();
+    pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let (mut of_known, mut is_matched) = (vec![None; n], vec![false; m]);
-    for (t, f) in pairs {
+    for (_, _, t, f) in pairs {
         if of_known[t].is_none() && !is_matched[f] {
             of_known[t] = Some(f);
             is_matched[f] = true;
         }
     }
+    let side = |id: Option<CellId>| {
+        id.map_or_else(
+            || "the outside".to_owned(),
+            |id| found.cell(id).name.clone(),
+        )
+    };
     let mut is_extra = vec![true; m];
     let mut portals = Vec::new();
     for t in 0..n {
-        let nearest = of_known[t].map(|f| (f, off(t, f)));
-        let is_near = |(_, (apart, wider)): &(usize, (f64, f64))| {
-            *apart <= tolerance && wider.abs() <= 2.0 * tolerance
-        };
-        if let Some((f, _)) = nearest.filter(is_near) {
+        let nearest: Option<usize> = of_known[t];
+        let as_found = nearest.filter(|f| is_found(t, *f));
+        if let Some(f) = as_found {
             is_extra[f] = false;
         }
+        let elsewhere = nearest.filter(|f| is_near(off(t, *f)) && !joins_same(t, *f));
         portals.push(ComparedPortal {
             name: known.portals[t].name.clone(),
-            is_found: nearest.is_some_and(|n| is_near(&n)),
-            nearest: nearest
-                .map(|(f, (apart, wider))| (found.portals[f].name.clone(), apart, wider)),
+            is_found: as_found.is_some(),
+            nearest: nearest.map(|f| {
+                let (apart, wider) = off(t, f);
+                (found.portals[f].name.clone(), apart, wider)
+            }),
+            joins: elsewhere.map(|f| found.portals[f].cells.map(side)),
         });
     }
     let extra = (0..m).filter(|f| is_extra[*f]);
@@ -253,7 +283,11 @@ impl fmt::Display for Comparison {
                 Some((name, apart, wider)) => {
                     let how = if *wider < 0.0 { "narrower" } else { "wider" };
                     let [apart, by] = [*apart, wider.abs()].map(|length| length / self.meter);
-                    writeln!(f, "; {name} is {apart:.2} m off and {by:.2} m {how}")?;
+                    write!(f, "; {name} is {apart:.2} m off and {by:.2} m {how}")?;
+                    match &portal.joins {
+                        Some([a, b]) => writeln!(f, ", but joins {a} and {b}")?,
+                        None => writeln!(f)?,
+                    }
                 }
                 None => writeln!(f)?,
             }
@@ -274,7 +308,7 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interior::{Content, parse_rooms};
+    use crate::interior::{Content, RoomBox, parse_rooms};
     use std::path::Path;
 
     /// Two rooms, and a doorway in the wall between them; those that are asked for are nodes.
@@ -316,6 +350,44 @@ mod tests {
         assert_eq!(said(&[], &[0]), one);
     }
 
+    #[test]
+    fn a_portal_is_found_only_where_it_joins_the_same_cells() {
+        let known = rooms(&[]);
+        let mut found = rooms(&[]);
+        let said = |found: &Interior| compare(&known, found, 0.3, 1.0).to_string();
+        let place = "door is 0.00 m off and 0.00 m wider";
+        // Either way round.
+        found.portals[0].cells.reverse();
+        assert!(said(&found).contains(&format!("door: found; {place}\n")));
+        found.portals[0].cells[0] = None;
+        let told = said(&found);
+        let line = format!("door: not found; {place}, but joins the outside and hall\n");
+        assert!(told.contains(&line), "{told}");
+        assert!(told.contains("2 of 2 rooms, 0 of 1 portals found\n"));
+        // One in the same place that does is it, wherever it is in the list.
+        let mut right = known.portals[0].clone();
+        right.name = "doorway".to_owned();
+        found.portals.push(right);
+        let told = said(&found);
+        let line = "door: found; doorway is 0.00 m off and 0.00 m wider\ndoor: no such portal\n";
+        assert!(told.contains(line), "{told}");
+        // Rooms that were found as one are that one.
+        let (mut one, mut parts) = (rooms(&[]), rooms(&[]));
+        one.cells.truncate(1);
+        one.cells[0].content = Content::Box(RoomBox {
+            min: DVec3::ZERO,
+            max: DVec3::new(8.0, 2.5, 3.0),
+        });
+        for (interior, cell) in [(&mut one, CellId(0)), (&mut parts, CellId(1))] {
+            interior.portals[0].cells = [Some(cell), None];
+        }
+        let told = compare(&parts, &one, 0.3, 1.0).to_string();
+        assert!(
+            told.contains("1 of 2 rooms, 1 of 1 portals found\n"),
+            "{told}"
+        );
+    }
+
     /// What is said of a room and a door in a world of which a metre has so many units; lengths are in metres.
     fn said(wider: f64, meter: f64) -> String {
         let cell = ComparedCell {
@@ -328,6 +400,7 @@ mod tests {
             name: "door".to_owned(),
             nearest: Some(("doorway 2".to_owned(), 0.65 * meter, wider * meter)),
             is_found: false,
+            joins: None,
         };
         let comparison = Comparison {
             cells: vec![cell],
