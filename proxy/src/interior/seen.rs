@@ -4,6 +4,8 @@ use super::CellId;
 use crate::mesh::{Mesh, Model};
 use crate::{MeshKind, Solid};
 use glam::DVec3;
+use rayon::prelude::*;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// From one ray to the next around an axis, in radians, so that many are spread evenly: the golden
 /// angle, (3 − √5) π.
@@ -17,7 +19,8 @@ const NOT_SEEN: u32 = u32::MAX;
 #[derive(Debug, PartialEq)]
 pub(super) struct Seen {
     solid: Solid,
-    /// By triangle of the model, which of `solid` it is; [`NOT_SEEN`] of others.
+    /// By triangle of the model, which of `solid` it is, where those with the same corners are one; [`NOT_SEEN`] of
+    /// others.
     places: Vec<u32>,
     /// By triangle of `solid`, where its cells begin; and where the last one's end.
     begins: Vec<u32>,
@@ -32,23 +35,29 @@ impl Seen {
         for i in by_cell.iter().flatten().chain(others) {
             is_there[*i as usize] = is_in_reach(&model.mesh, *i);
         }
-        let mut count = 0;
-        let mut place = |is_there: bool| {
-            count += u32::from(is_there);
-            if is_there { count - 1 } else { NOT_SEEN }
-        };
-        let places: Vec<u32> = is_there.iter().map(|is| place(*is)).collect();
-        let triangles = model.mesh.triangles.iter().zip(&is_there);
-        let triangles = triangles.filter(|(_, is_there)| **is_there);
+        let mut places = vec![NOT_SEEN; is_there.len()];
+        let mut triangles = Vec::new();
+        for (i, first) in firsts(&model.mesh, &is_there).into_iter().enumerate() {
+            if !is_there[i] {
+                continue;
+            }
+            if first as usize == i {
+                places[i] = triangles.len() as u32;
+                triangles.push(model.mesh.triangles[i]);
+            } else {
+                places[i] = places[first as usize];
+            }
+        }
+        let count = triangles.len();
         let mut mesh = Mesh {
             positions: model.mesh.positions.clone(),
-            triangles: triangles.map(|(triangle, _)| *triangle).collect(),
+            triangles,
         };
         mesh.drop_unused();
         let mut seen = Self {
             solid: Solid::new(MeshKind::Mesh, mesh),
             places,
-            begins: vec![0; count as usize + 1],
+            begins: vec![0; count + 1],
             cells: Vec::new(),
         };
         seen.regroup(by_cell);
@@ -57,13 +66,28 @@ impl Seen {
 
     /// The same triangles with other cells: those that are in none now hide what is behind them all the same.
     pub(super) fn regroup(&mut self, by_cell: &[Vec<u32>]) {
+        // 1. Where each cell's are: what it has twice counts once, and what one of which is in none is in none.
+        let mut is_in_none = vec![true; self.places.len()];
+        for i in by_cell.iter().flatten() {
+            is_in_none[*i as usize] = false;
+        }
+        let mut is_left_out = vec![false; self.begins.len() - 1];
+        for (place, is_in_none) in self.places.iter().zip(is_in_none) {
+            if *place != NOT_SEEN && is_in_none {
+                is_left_out[*place as usize] = true;
+            }
+        }
         let listed = by_cell.iter().map(|list| {
             let places = list.iter().map(|i| self.places[*i as usize]);
             let places = places.filter(|place| *place != NOT_SEEN);
-            places.map(|place| place as usize).collect()
+            let places = places.map(|place| place as usize);
+            let mut places: Vec<usize> = places.filter(|place| !is_left_out[*place]).collect();
+            places.sort_unstable();
+            places.dedup();
+            places
         });
         let by_cell: Vec<Vec<usize>> = listed.collect();
-        // 1. How many cells each has; where they begin.
+        // 2. How many cells each has; where they begin.
         self.begins.fill(0);
         for place in by_cell.iter().flatten() {
             self.begins[*place + 1] += 1;
@@ -73,7 +97,7 @@ impl Seen {
             total += *begin;
             *begin = total;
         }
-        // 2. Which.
+        // 3. Which.
         let mut next = self.begins.clone();
         self.cells.clear();
         self.cells.resize(total as usize, CellId(0));
@@ -114,7 +138,78 @@ impl Seen {
     }
 }
 
+/// By triangle, the first that is there and has the same corners, in whatever order: rooms may have a wall between
+/// them each for itself.
+fn firsts(mesh: &Mesh, is_there: &[bool]) -> Vec<u32> {
+    let corners = |i: u32| {
+        let mut corners = mesh.corners(i as usize);
+        corners.sort_by(|a, b| {
+            let by_axis = [0, 1, 2].map(|k| a[k].total_cmp(&b[k]));
+            by_axis[0].then(by_axis[1]).then(by_axis[2])
+        });
+        corners.map(|p| p.to_array().map(f64::to_bits))
+    };
+    let hash = |i: u32| {
+        let mut hasher = DefaultHasher::new();
+        corners(i).hash(&mut hasher);
+        hasher.finish()
+    };
+    let all = (0..mesh.triangles.len() as u32).into_par_iter();
+    let there = all.filter(|i| is_there[*i as usize]);
+    let mut sorted: Vec<(u64, u32)> = there.map(|i| (hash(i), i)).collect();
+    sorted.par_sort_unstable();
+    let mut firsts: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+    for alike in sorted.chunk_by(|a, b| a.0 == b.0) {
+        for (_, i) in alike.iter().skip(1) {
+            let first = alike.iter().find(|(_, k)| corners(*k) == corners(*i));
+            firsts[*i as usize] = first.map_or(*i, |(_, first)| *first);
+        }
+    }
+    firsts
+}
+
 fn is_in_reach(mesh: &Mesh, triangle_idx: u32) -> bool {
     let corners = mesh.corners(triangle_idx as usize);
     corners.iter().all(|p| p.abs().max_element() < FARTHEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cells_have_each_for_itself_is_of_all_of_them() {
+        // One triangle three times, the second the other way round; another behind it.
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let positions = [0.0, 0.0, 0.0, 1.0].map(|z| corners.map(|[x, y, _]| [x, y, z]));
+        let model = Model {
+            mesh: Mesh {
+                positions: positions
+                    .as_flattened()
+                    .iter()
+                    .map(|p| DVec3::from_array(*p))
+                    .collect(),
+                triangles: vec![[0, 1, 2], [4, 3, 5], [6, 7, 8], [9, 10, 11]],
+            },
+            ..Model::default()
+        };
+        let eye = DVec3::new(0.2, 0.2, -1.0);
+        let [a, b, c] = [0, 1, 2].map(CellId);
+        for (by_cell, others, expected) in [
+            (vec![vec![0], vec![1], vec![2, 3]], vec![], vec![a, b, c]),
+            // Twice in one cell.
+            (vec![vec![0, 1], vec![2, 3]], vec![], vec![a, b]),
+            // What is in none is drawn for all.
+            (vec![vec![0, 3], vec![1]], vec![2], vec![]),
+            (vec![vec![0, 3], vec![1]], vec![], vec![a, b]),
+        ] {
+            let seen = Seen::new(&model, &by_cell, &others);
+            let (along, cells) = seen.first(eye, DVec3::Z).unwrap();
+            assert_eq!((along, cells), (1.0, &expected[..]));
+            for id in expected {
+                let is = |cells: &[CellId]| cells.contains(&id);
+                assert!(seen.any_until(eye, DVec3::Z, 1.0 + 1e-6, is));
+            }
+        }
+    }
 }
