@@ -75,7 +75,13 @@ pub enum InteriorError {
          `portal:A|B`, or give the rooms with --rooms"
     )]
     NoCellNodes,
-    /// A node that stands for a portal has no outline.
+    /// A node's name would be a cell's or a portal's without capitals.
+    #[error(
+        "node `{0}`: names of rooms begin with `cell:`, and of openings with `portal:`, in small letters; rename it, \
+         or let rooms be found with --find"
+    )]
+    MisspeltNode(String),
+    /// A node that stands for a portal does not say of what, or has no outline.
     #[error("node `{0}`: {1}")]
     PortalNode(String, String),
 }

@@ -191,6 +191,11 @@ pub fn interior_from_nodes(
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorError> {
     // 1. Cells.
     let names = model.nodes.iter().map(|n| n.name.as_str());
+    let is_misspelt = |begin: &str| match misspelt(names.clone(), begin) {
+        Some(name) => Err(InteriorError::MisspeltNode(name.to_owned())),
+        None => Ok(()),
+    };
+    is_misspelt(CELL_NODE)?;
     let cells: Vec<Cell> = names
         .clone()
         .filter_map(|name| name.strip_prefix(CELL_NODE))
@@ -204,6 +209,7 @@ pub fn interior_from_nodes(
     if cells.is_empty() {
         return Err(InteriorError::NoCellNodes);
     }
+    is_misspelt(PORTAL_NODE)?;
     let mut interior = Interior {
         model: Some(file.to_owned()),
         up: DVec3::Y,
@@ -221,13 +227,17 @@ pub fn interior_from_nodes(
         let Some(between) = name.strip_prefix(PORTAL_NODE) else {
             continue;
         };
+        let failed = |problem: String| InteriorError::PortalNode(name.to_owned(), problem);
+        if !between.contains('|') {
+            let expected = "expected `portal:A|B`, or `portal:A|` for an opening to the outside";
+            return Err(failed(expected.to_owned()));
+        }
         let mut parts = between.splitn(3, '|');
         let mut side = || {
             let part = parts.next().map(|part| without_number(part, &ids));
             part.filter(|part| !part.is_empty()).map(str::to_owned)
         };
         let between_cells = [side(), side()];
-        let failed = |problem: String| InteriorError::PortalNode(name.to_owned(), problem);
         let corners = outline(model, &below(model, |n| n == name)).map_err(failed)?;
         let polygon =
             Polygon::new(corners).map_err(|e| InteriorError::Portal(between.to_owned(), e))?;
@@ -251,6 +261,15 @@ pub fn interior_from_nodes(
     }
     let warnings = interior.check()?;
     Ok((interior, warnings))
+}
+
+/// The first name that begins as nodes of a kind do, but for capitals.
+fn misspelt<'a>(mut names: impl Iterator<Item = &'a str>, begin: &str) -> Option<&'a str> {
+    let is_misspelt = |name: &&str| {
+        let start = name.get(..begin.len());
+        start.is_some_and(|start| start != begin && start.eq_ignore_ascii_case(begin))
+    };
+    names.find(is_misspelt)
 }
 
 /// What a portal's node calls a cell, without the number that tells copies of the node apart (`.001`): of

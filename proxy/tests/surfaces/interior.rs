@@ -556,6 +556,18 @@ fn nodes_name_cells_and_portals() {
     let error = Contents::new(&unknown, &Model::default()).unwrap_err();
     let error = error.to_string();
     assert!(error.ends_with("there are: none with a name"), "{error}");
+    // Names that are not quite as they should be.
+    for (i, name, said) in [
+        (2, "portal:a", "expected `portal:A|B`, or `portal:A|` for"),
+        (2, "Portal:a|b", "names of rooms begin with `cell:`"),
+        (1, "Cell:b", "names of rooms begin with `cell:`"),
+    ] {
+        let mut odd = model.clone();
+        odd.nodes[i].name = name.to_owned();
+        let error = interior_from_nodes(&odd, "m.glb", 1.0).unwrap_err();
+        let said = format!("node `{name}`: {said}");
+        assert!(error.to_string().starts_with(&said), "{error}");
+    }
     model.nodes[2].name = "portal:a|c".to_owned();
     let error = interior_from_nodes(&model, "m.glb", 1.0)
         .unwrap_err()

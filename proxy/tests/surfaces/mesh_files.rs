@@ -219,6 +219,44 @@ fn bad_gltf_files_say_where() {
         ),
         "a.gltf, mesh 0, primitive 0: the position of corner 1 is not finite"
     );
+    assert_eq!(
+        bad(
+            ONE_NODE,
+            r#"[{"mesh": 0, "matrix": [1,0,0,0.5, 0,1,0,0, 0,0,1,0, 0,0,0,1]}]"#
+        ),
+        "a.gltf, node 0: its matrix has the last row [0.5, 0.0, 0.0, 1.0], expected [0, 0, 0, 1]; \
+         apply its transform before exporting"
+    );
+    assert_eq!(
+        bad(r#""mode": 4"#, r#""mode": 9"#),
+        "a.gltf, mesh 0, primitive 0: its mode is 9, expected 0 to 6; export the mesh again"
+    );
+}
+
+#[test]
+fn what_of_a_gltf_file_is_no_triangle_is_told() {
+    let told = |text: &str| mesh::parse_model(Path::new("a.gltf"), text.as_bytes()).unwrap();
+    let (model, warnings) = told(&gltf(4, None, &SQUARE, ONE_NODE));
+    assert_eq!(model.mesh.triangles.len(), 1);
+    assert_eq!(
+        warnings,
+        ["mesh 0, primitive 0: the corners are no multiple of 3, and the last ones are left out"]
+    );
+    // Once, however many there are; files of triangles with their edges are many.
+    let both = gltf(4, Some(&[0, 1, 2]), &SQUARE, ONE_NODE);
+    let thin =
+        r#"{"mode": 1, "attributes": {"POSITION": 0}}, {"mode": 0, "attributes": {"POSITION": 0}}"#;
+    let both = both.replacen(
+        r#""primitives": ["#,
+        &format!(r#""primitives": [{thin}, "#),
+        1,
+    );
+    let (model, warnings) = told(&both);
+    assert_eq!(model.mesh.triangles.len(), 1);
+    assert_eq!(
+        warnings,
+        ["mesh 0, primitive 0 and 1 more: points and lines are not drawn"]
+    );
 }
 
 #[test]

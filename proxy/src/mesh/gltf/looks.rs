@@ -4,7 +4,7 @@ use super::accessor::Accessors;
 use super::buffers::fetch;
 use super::materials::{MaterialEntry, TextureUse, not_shown};
 use super::pictures::{Decoded, Picture, decode};
-use super::{Place, Visitor};
+use super::{PassedOver, Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::{Material, MeshFileError, Model, ModelNode, PORTAL_NODE, Part, Wrap};
 use serde::Deserialize;
@@ -98,7 +98,8 @@ pub(in crate::mesh) fn parse_model(
         });
     }
     let decoded = decode(path, &looks.pictures)?;
-    let not_shown = looks.not_shown(&decoded);
+    let mut not_shown = looks.not_shown(&decoded);
+    not_shown.extend(looks.told_passed_over());
     let Looks {
         mut model,
         mut warnings,
@@ -129,6 +130,8 @@ struct Looks {
     material_idxs: BTreeMap<Option<usize>, u32>,
     /// Of each of the model's nodes, whether it stands for an opening, which is not drawn.
     openings: Vec<bool>,
+    /// Primitives, by mesh, that are no triangles, or not all of them.
+    passed_over: BTreeMap<PassedOver, BTreeSet<(usize, usize)>>,
     /// How many triangles are left out as nobody could see them, by the file's materials.
     hidden: BTreeMap<usize, usize>,
     /// The least alpha of corners that are drawn, by the file's materials.
@@ -165,6 +168,11 @@ impl Visitor for Looks {
         if let (Some(number), true) = (self.material_of(mesh, primitive), triangles > 0) {
             *self.hidden.entry(number).or_insert(0) += triangles;
         }
+    }
+
+    fn passed_over(&mut self, mesh: usize, primitive: usize, what: PassedOver) {
+        let of_kind = self.passed_over.entry(what).or_default();
+        of_kind.insert((mesh, primitive));
     }
 
     fn primitive(
@@ -290,6 +298,27 @@ impl Looks {
         let drawn: BTreeMap<usize, f64> = drawn.collect();
         let materials = self.root.as_ref().map(|root| &root.materials[..]);
         not_shown(materials.unwrap_or_default(), &self.hidden, &drawn)
+    }
+
+    /// What of the primitives is no triangle, once a kind.
+    fn told_passed_over(&self) -> Vec<String> {
+        let told = self.passed_over.iter().filter_map(|(what, primitives)| {
+            let (mesh, primitive) = primitives.first()?;
+            let others = match primitives.len() - 1 {
+                0 => String::new(),
+                count => format!(" and {count} more"),
+            };
+            let what = match what {
+                PassedOver::Thin => "points and lines are not drawn",
+                PassedOver::Rest => {
+                    "the corners are no multiple of 3, and the last ones are left out"
+                }
+            };
+            Some(format!(
+                "mesh {mesh}, primitive {primitive}{others}: {what}"
+            ))
+        });
+        told.collect()
     }
 
     /// The model's material for one of the file's.

@@ -100,6 +100,9 @@ trait Visitor {
     /// A primitive that was left out, and how many triangles it has.
     fn left_out(&mut self, _mesh: usize, _primitive: usize, _triangles: usize) {}
 
+    /// What of a primitive is no triangle, and passed over.
+    fn passed_over(&mut self, _mesh: usize, _primitive: usize, _what: PassedOver) {}
+
     /// A primitive whose triangles have been read.
     fn primitive(
         &mut self,
@@ -113,6 +116,15 @@ trait Visitor {
     fn end(&mut self, _accessors: &mut Accessors<'_>) -> Result<(), MeshFileError> {
         Ok(())
     }
+}
+
+/// What is no triangle.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum PassedOver {
+    /// Points and lines.
+    Thin,
+    /// One or two corners after the last triangle.
+    Rest,
 }
 
 /// Where a primitive is in the file and in the mesh.
@@ -204,6 +216,9 @@ fn read(
                 let triangles = reader.triangle_count(primitive)?;
                 visitor.left_out(mesh, i, triangles * world_from_copies.len());
                 continue;
+            }
+            if let Some(what) = reader.passed_over(primitive)? {
+                visitor.passed_over(mesh, i, what);
             }
             let name = format!("mesh {mesh}, primitive {i}");
             for world_from_copy in &world_from_copies {
@@ -320,6 +335,22 @@ impl Reader<'_> {
         })
     }
 
+    /// What of a primitive makes no triangles.
+    fn passed_over(&mut self, primitive: &Primitive) -> Result<Option<PassedOver>, MeshFileError> {
+        let Some(positions) = primitive.attributes.position else {
+            return Ok(None);
+        };
+        Ok(match primitive.mode.unwrap_or(4) {
+            0..=3 => Some(PassedOver::Thin),
+            4 => {
+                let corners = primitive.indices.unwrap_or(positions);
+                let corners = self.accessors.count(corners)?;
+                (corners % 3 > 0).then_some(PassedOver::Rest)
+            }
+            _ => None,
+        })
+    }
+
     /// Takes in a primitive if it is made of triangles.
     fn primitive(
         &mut self,
@@ -332,8 +363,13 @@ impl Reader<'_> {
             record: name.to_owned(),
             problem,
         };
-        let (4..=6, Some(positions)) = (primitive.mode.unwrap_or(4), primitive.attributes.position)
-        else {
+        let mode = primitive.mode.unwrap_or(4);
+        if mode > 6 {
+            return Err(failed(format!(
+                "its mode is {mode}, expected 0 to 6; export the mesh again"
+            )));
+        }
+        let (4..=6, Some(positions)) = (mode, primitive.attributes.position) else {
             return Ok(());
         };
         // 1. How much it will be, before any memory is taken.
@@ -375,7 +411,7 @@ impl Reader<'_> {
         let triangles = &mut self.mesh.triangles;
         let mut push =
             |[a, b, c]: [u32; 3]| triangles.push(if is_mirrored { [a, c, b] } else { [a, b, c] });
-        match primitive.mode.unwrap_or(4) {
+        match mode {
             4 => indices.as_chunks::<3>().0.iter().for_each(|t| push(*t)),
             // Every other triangle of a strip is turned.
             5 => indices

@@ -27,6 +27,9 @@ pub(super) struct Node {
 /// The extension by which a node shows its mesh as often as accessors have transforms.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
+/// How far the last row of a node's matrix may be from (0, 0, 0, 1): rounding of what wrote it.
+const AFFINE: f64 = 1e-6;
+
 /// What is read of a node's extensions.
 #[derive(Deserialize)]
 struct Extensions {
@@ -94,6 +97,12 @@ pub(super) fn world_from_nodes(
             let problem = "two nodes have it as their child; nodes must form trees";
             return Err(failed(path, &here(), problem.to_owned()));
         }
+        if let Some(row) = node.projective_row() {
+            let problem = format!(
+                "its matrix has the last row {row:?}, expected [0, 0, 0, 1]; apply its transform before exporting"
+            );
+            return Err(failed(path, &here(), problem));
+        }
         let world_from_node = world_from_parent * node.parent_from_node();
         if !world_from_node.is_finite() {
             return Err(failed(
@@ -115,6 +124,15 @@ impl Node {
     pub(super) fn copies(&self) -> Option<&Copies> {
         let extensions = self.extensions.as_ref()?;
         Some(&extensions.instancing.as_ref()?.attributes)
+    }
+
+    /// The last row of its matrix where that is none of a transform that keeps planes parallel, but for rounding.
+    fn projective_row(&self) -> Option<[f64; 4]> {
+        let matrix = self.matrix.as_ref()?;
+        let [x, y, z, w] = [3, 7, 11, 15].map(|i| matrix[i]);
+        let off = [x, y, z, w - 1.0];
+        let is_affine = off.iter().all(|off| off.abs() <= AFFINE);
+        (!is_affine).then_some([x, y, z, w])
     }
 
     fn parent_from_node(&self) -> DMat4 {
