@@ -266,8 +266,11 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
             busy.finish_and_clear();
             let mut found = found.with_context(named)?;
             // What may be wrong is said at once: where the scale is, the rest takes long.
-            let warnings = found.warnings.drain(..);
-            warnings.for_each(|warning| say!("warning: {warning}"));
+            let mut warnings = std::mem::take(&mut found.warnings);
+            put_causes_first(&mut warnings);
+            for warning in warnings {
+                say!("warning: {warning}");
+            }
             let busy = spinner("fitting rooms to what is seen from them");
             let fitted = fitted(found, &model, options.meter);
             busy.finish_and_clear();
@@ -275,6 +278,11 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
         }
     };
     finish(args, &file, &bytes, &model, rooms, told.known)
+}
+
+/// Puts cells without portals, of which there are many where the scale is wrong, after all else.
+fn put_causes_first(warnings: &mut [InteriorWarning]) {
+    warnings.sort_by_key(|warning| matches!(warning, InteriorWarning::NoPortal(_)));
 }
 
 /// What was found with all of the model in sight that is.
@@ -436,7 +444,7 @@ pub(super) fn is_without_photos(given: &Path) -> bool {
 }
 
 /// Fails where there is nothing at a path.
-fn check_there(given: &Path) -> anyhow::Result<()> {
+pub(super) fn check_there(given: &Path) -> anyhow::Result<()> {
     if !given.exists() {
         bail!(
             "{}: there is no such file or folder; check the path",
@@ -543,4 +551,24 @@ const README_LINES: usize = 5;
 fn is_generated(file: &Path) -> bool {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     text.starts_with(README_BEGINS) && text.lines().count() == README_LINES
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_be_wrong_with_all_is_told_before_what_follows_from_it() {
+        let alone = |name: &str| InteriorWarning::NoPortal(name.to_owned());
+        let tall = InteriorWarning::TallWalls(25.0);
+        let storey = InteriorWarning::Storey(3.0);
+        let mut warnings = vec![
+            alone("room 1"),
+            alone("room 2"),
+            tall.clone(),
+            storey.clone(),
+        ];
+        put_causes_first(&mut warnings);
+        assert_eq!(warnings, [tall, storey, alone("room 1"), alone("room 2")]);
+    }
 }

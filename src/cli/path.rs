@@ -90,19 +90,19 @@ fn has_times(path: &CameraPath) -> bool {
     timed.any(|(index, time_s)| (time_s - index as f64 / path.fps).abs() > SAME_S)
 }
 
-/// Fails where what is given is the name of a path that is derived from photos.
-fn check_is_file(path: &Path) -> Result<(), Usage> {
+/// Fails where what is given is the name of a path that is derived from photos; a remedy is what to do instead.
+pub(super) fn check_is_file(path: &Path, remedy: &str) -> Result<(), Usage> {
     match path.to_str() {
         Some(kind) if derived(kind).is_some() && !path.exists() => Err(Usage(format!(
             "{kind}: no file is called so; paths of that name are derived from a scene's photos, as by \
-             `lumigraph render SCENE --path {kind} -o FRAMES`; give a path's file"
+             `lumigraph render SCENE --path {kind} -o FRAMES`; {remedy}"
         ))),
         _ => Ok(()),
     }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    check_is_file(&args.path)?;
+    check_is_file(&args.path, "give a path's file")?;
     check_file(&args.output, "-o")?;
     let inputs = [Some(&args.path), args.nerfstudio.file()].into_iter();
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();

@@ -8,12 +8,12 @@ use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::inputs::{files_behind, scenes_of, video_of};
-use super::interior::check_holds_none;
+use super::interior::{check_holds_none, check_there};
 use super::made::{self, Made};
 use super::notes::Notes;
 use super::options::{cut, size};
 use super::output::{print, print_json, say, write_file};
-use super::path::NerfstudioArgs;
+use super::path::{NerfstudioArgs, check_is_file};
 use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
@@ -136,11 +136,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--near is {near}; expected 0 or more");
         return Err(Usage(text).into());
     }
-    let chosen = args.chosen();
-    if args.path.as_ref().is_none_or(|path| path.exists()) {
-        // Of a path that is not there nobody can say how many frames it has; that is said below.
-        chosen.check(args.path.is_none())?;
+    if let Some(file) = &args.path {
+        let remedy = "give a path's file, or leave out --path, to walk a tour through all rooms";
+        check_is_file(file, remedy)?;
+        check_there(file)?;
     }
+    let chosen = args.chosen();
+    chosen.check(args.path.is_none())?;
     if args.persist && chosen.is_part() {
         let text = "--persist: what a frame keeps is of the one before; draw all of the path";
         return Err(Usage(text.to_owned()).into());

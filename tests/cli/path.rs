@@ -293,6 +293,17 @@ fn derived_paths_are_no_files() {
             format!("`lumigraph render SCENE --path {kind} -o FRAMES`; give a path's file");
         assert!(error.ends_with(&remedy), "{error}");
     }
+    let house = with_house();
+    let error = lumigraph(house.path(), "walk house --path orbit -o frames").error(2);
+    let said = "orbit: no file is called so; paths of that name are derived";
+    assert!(error.starts_with(said), "{error}");
+    let remedy = "or leave out --path, to walk a tour through all rooms";
+    assert!(error.ends_with(remedy), "{error}");
+    let error = lumigraph(house.path(), "walk house --path nowhere.json -o frames").error(1);
+    assert_eq!(
+        error,
+        "nowhere.json: there is no such file or folder; check the path"
+    );
 }
 
 #[test]
