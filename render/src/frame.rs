@@ -454,6 +454,13 @@ impl<'a> Frame<'a> {
         })
     }
 
+    /// Whether the middle of any pixel of the desired image shows the proxy, whether or not a photo shows it, too.
+    pub fn sees_proxy(&self) -> bool {
+        let (width, height) = (self.desired.width, self.desired.height);
+        let mut places = (0..height).flat_map(|y| (0..width).map(move |x| Pixel::center_of(x, y)));
+        places.any(|place| self.proxy_point(place).is_some())
+    }
+
     /// angDiff + β·resDiff of a source view (Buehler 2001, §4.1, with α = 1), and what its
     /// time adds.
     pub fn difference(&self, source_idx: usize, point: &ProxyPoint) -> f64 {

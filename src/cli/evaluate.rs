@@ -26,12 +26,13 @@ use std::path::PathBuf;
 /// picture is given the photo's own exposure (psnr_exposed), PSNR over the covered pixels,
 /// coverage (the mean alpha), the share of covered pixels among those that show sparse points
 /// which two or more other photos see (coverage_points), how far the photos that share a pixel
-/// are apart in steps of 255, details aside (seams), and processor time without decoding. Where
-/// a photo has an ignore mask or a matte, also PSNR, SSIM and coverage inside; with a matte, the
-/// mean alpha inside it (coverage_matte) and outside (coverage_background: best is 0), and with
-/// --json the shares of pixels covered by half or more (covered_matte, covered_background). Held
-/// out are the photos that the capture's split.json names, else every 8th. With --period or
-/// --time-window each is rendered as of its own time.
+/// are apart in steps of 255, details aside (seams), and processor time without decoding. There
+/// is no PSNR nor SSIM where neither photo nor picture shows anything. Where a photo has an
+/// ignore mask or a matte, also PSNR, SSIM and coverage inside; with a matte, the mean alpha
+/// inside it (coverage_matte) and outside (coverage_background: best is 0), and with --json the
+/// shares of pixels covered by half or more (covered_matte, covered_background). Held out are the
+/// photos that the capture's split.json names, else every 8th. With --period or --time-window
+/// each is rendered as of its own time.
 ///
 ///     lumigraph evaluate my-capture --every 4
 #[derive(clap::Args)]
@@ -228,13 +229,24 @@ fn mean_line(lines: &[Line]) -> Option<Line> {
     })
 }
 
+/// A line; PSNR and SSIM are `null` where neither photo nor picture shows anything.
+fn line_json(line: &Line) -> Value {
+    let mut json = json!(line);
+    if line.scores.is_of_nothing() {
+        for key in ["psnr", "psnr_exposed", "ssim"] {
+            json[key] = Value::Null;
+        }
+    }
+    json
+}
+
 fn json(session: &Session, lines: &[Line], report: &Report) -> Value {
-    let mut mean = json!(mean_line(lines));
+    let mut mean = json!(mean_line(lines).as_ref().map(line_json));
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
     json!({
-        "photos": lines,
+        "photos": lines.iter().map(line_json).collect::<Vec<_>>(),
         "mean": mean,
         "proxy": session.proxy.json(),
         "exposure": session.exposure.json(),
@@ -258,10 +270,11 @@ fn table(lines: &[Line]) -> String {
             masked,
             matte,
         } = line.scores;
+        let told = |value: f64| Some(value).filter(|_| !line.scores.is_of_nothing());
         let mut columns = vec![
-            ("psnr", db(Some(score.psnr))),
-            ("psnr_exposed", db(Some(score.psnr_exposed))),
-            ("ssim", share(Some(score.ssim))),
+            ("psnr", db(told(score.psnr))),
+            ("psnr_exposed", db(told(score.psnr_exposed))),
+            ("ssim", share(told(score.ssim))),
             ("psnr_covered", db(score.psnr_covered)),
             ("coverage", share(Some(score.coverage))),
             ("coverage_points", share(coverage_points)),

@@ -1,6 +1,7 @@
 //! Which views to render.
 
 use super::Usage;
+use super::report::UNSHOWN;
 use calibrate::{View, colmap};
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError};
@@ -137,16 +138,21 @@ impl Asked {
         matches!(self, Self::Derived(_))
     }
 
-    /// Why frames may show nothing, for people; `is_unplaced` where nobody says where nerfstudio's world lies,
-    /// whose path it is.
-    pub(super) fn why_empty(&self, is_unplaced: bool) -> &'static str {
-        match self {
-            Self::Derived(_) => "no proxy lies before their cameras; try another --proxy",
+    /// Why frames may show nothing, for people: where they see no proxy, and where no photo shows what they see of
+    /// it; `is_unplaced` where nobody says where nerfstudio's world lies, whose path it is.
+    pub(super) fn why_empty(&self, is_unplaced: bool) -> [&'static str; 2] {
+        let is_elsewhere = match self {
+            Self::Derived(_) => {
+                let unseen = "no proxy lies before their cameras; try another --proxy";
+                return [unseen, UNSHOWN];
+            }
             Self::Read { .. } if is_unplaced => {
                 "does the path lie in this scene's world (see --dataparser-transforms)?"
             }
             Self::Read { .. } => "does the path lie in this scene's world?",
-        }
+        };
+        // A plane is seen from other worlds, too.
+        [is_elsewhere; 2]
     }
 
     /// The views, and how many a second a film shows: of a derived path so many, `points_in_world` are

@@ -135,6 +135,8 @@ pub(super) struct Costs {
     alone: usize,
     alone_by_cpu: usize,
     alone_empty: usize,
+    /// And how many of the latter see the proxy, where no photo shows it.
+    alone_unshown: usize,
     /// By source view, whether any frame scored it.
     ever_scored: Vec<bool>,
 }
@@ -155,6 +157,8 @@ struct FrameCost {
     by_cpu: bool,
     /// No pixel is covered, not even in part.
     is_empty: bool,
+    /// And yet the proxy is seen: no photo shows what is seen of it.
+    is_unshown: bool,
 }
 
 impl Costs {
@@ -186,6 +190,7 @@ impl Costs {
             Some(_) => ready.photos_used(),
             None => Some(frame.lumigraph.photos.last_sampled()),
         };
+        let is_empty = is_empty(picture);
         let cost = FrameCost {
             grid: chosen.cells_across,
             error: chosen.error,
@@ -202,17 +207,25 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
-            is_empty: is_empty(picture),
+            is_empty,
+            is_unshown: is_empty && frame.sees_proxy(),
         };
         self.frames.insert(frame_idx, cost);
     }
 
-    /// Notes a view that was drawn by itself, however often.
-    pub(super) fn note_alone(&mut self, engine: &Engine, picture: &RgbaImage) {
+    /// Notes a view that was drawn by itself, however often; `frame` makes it ready again.
+    pub(super) fn note_alone<'a>(
+        &mut self,
+        engine: &Engine,
+        picture: &RgbaImage,
+        frame: impl FnOnce() -> Frame<'a>,
+    ) {
         let by_cpu = engine.gpu().is_none() || engine.last_by_cpu();
+        let is_empty = is_empty(picture);
         self.alone += 1;
         self.alone_by_cpu += usize::from(by_cpu);
-        self.alone_empty += usize::from(is_empty(picture));
+        self.alone_empty += usize::from(is_empty);
+        self.alone_unshown += usize::from(is_empty && frame().sees_proxy());
     }
 
     /// How many frames the CPU drew.
@@ -226,20 +239,25 @@ impl Costs {
     }
 
     /// What to say of pictures that show nothing at all, if there are any, where there are so many photos;
-    /// `why_empty` is why frames of a path may.
-    pub(super) fn note_of_empty(&self, photos: usize, why_empty: &str) -> Option<String> {
+    /// `why_empty` is why frames of a path may: where they see no proxy, and where no photo shows what they see of it.
+    pub(super) fn note_of_empty(&self, photos: usize, why_empty: [&str; 2]) -> Option<String> {
         let (of_path, alone) = (self.empty(), self.alone_empty);
-        let of_all = |empty: usize, all: usize, what: &str, otherwise: &str| {
-            let why = match photos {
-                0 | 1 => "one photo alone does not tell where things are",
-                _ => otherwise,
+        let of_all =
+            |[empty, unshown]: [usize; 2], all: usize, what: &str, otherwise: [&str; 2]| {
+                let why = match photos {
+                    0 | 1 => "one photo alone does not tell where things are",
+                    // Where some see no proxy that comes first.
+                    _ => otherwise[usize::from(unshown == empty)],
+                };
+                note_of_empty(empty, all, what, why)
             };
-            note_of_empty(empty, all, what, why)
-        };
         let unseen = "the proxy does not reach where those photos look; hold out fewer, or try another \
                       --proxy";
+        let unshown = self.frames.values().filter(|cost| cost.is_unshown).count();
+        let of_path = [of_path, unshown];
+        let alone = [alone, self.alone_unshown];
         of_all(of_path, self.frames.len(), "frames", why_empty)
-            .or_else(|| of_all(alone, self.alone, "pictures", unseen))
+            .or_else(|| of_all(alone, self.alone, "pictures", [unseen, UNSHOWN]))
     }
 
     /// A frame's, for `--json`.
@@ -261,6 +279,10 @@ impl Costs {
         })
     }
 }
+
+/// Why pictures may show nothing though they see the proxy, for people.
+pub(super) const UNSHOWN: &str = "no photo shows what they see of the proxy: it lies outside all photos, or masks, mattes \
+                                  or the photos' alpha hide it";
 
 /// What to say of pictures, called so, of which some show nothing at all; nothing if there are none.
 pub(super) fn note_of_empty(empty: usize, all: usize, what: &str, why: &str) -> Option<String> {

@@ -44,7 +44,7 @@ pub(super) struct Session {
     pub(super) ledger: Ledger,
     pub(super) costs: Costs,
     /// Why frames of a path may show nothing, for people (see [`super::frames::Asked::why_empty`]).
-    pub(super) why_empty: &'static str,
+    pub(super) why_empty: [&'static str; 2],
     /// What was said of what draws, before anything was drawn.
     notes: Vec<String>,
     /// How much of what the engine has to say was said.
@@ -115,7 +115,7 @@ impl Session {
             in_window: InWindow::default(),
             ledger: Ledger::new(),
             costs: Costs::default(),
-            why_empty: "",
+            why_empty: [""; 2],
             notes: Vec::new(),
             notes_said: 0,
             proxy,
@@ -334,7 +334,9 @@ impl Session {
         }
         let cpu = start.elapsed();
         if let Some(engine) = &self.engine {
-            self.costs.note_alone(engine, &picture);
+            let (lumigraph, options) = (&self.lumigraph, self.options);
+            let again = || frame(lumigraph, desired, options, moment, self.skips);
+            self.costs.note_alone(engine, &picture, again);
         }
         Ok(Timed { picture, cpu })
     }

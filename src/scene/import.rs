@@ -157,6 +157,7 @@ impl Scene {
             scene.add_named(named, options, &mut warnings);
         }
         scene.check_beside()?;
+        warnings.extend(scene.note_of_hidden());
         scene.judge_masks(options.masks.is_some(), &mut warnings);
         scene.judge_depth(&mut warnings);
         Ok((scene, warnings))

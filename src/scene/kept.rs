@@ -56,6 +56,35 @@ impl Scene {
         }
     }
 
+    /// Says so where masks, mattes or the photos' own alpha leave nothing of their photos, as far as a few tell:
+    /// those that are inverted do, or that are read for what they are not.
+    pub(super) fn note_of_hidden(&self) -> Option<Warning> {
+        let photos: Vec<&Photo> = self.photos.iter().collect();
+        let masked = photos.iter().filter(|p| p.ignore_mask.is_some());
+        let masked: Vec<&Photo> = masked.copied().collect();
+        let (what, all, remedy) = if is_each(&masked, hides_all) {
+            (
+                "ignore masks",
+                masked,
+                "they are to be 0 where photos are to be ignored and 255 where they are to be used: are they \
+                 inverted?",
+            )
+        } else if is_each(&photos, shows_no_object) {
+            (
+                "mattes or alpha channels",
+                photos,
+                "they are to be 255 where photos show the object and 0 elsewhere: are they inverted?",
+            )
+        } else {
+            return None;
+        };
+        Some(Warning::Note(format!(
+            "the {what} of {} photos leave nothing of them, as far as some of them tell ({}, for one); {remedy}",
+            all.len(),
+            all[0].name
+        )))
+    }
+
     /// Where the first ignore mask lies, as options may name it: from the capture's folder, if it
     /// is in there.
     fn masks_folder(&self) -> PathBuf {
@@ -72,6 +101,27 @@ impl Scene {
             _ => PathBuf::from(MASKS_FOLDER),
         }
     }
+}
+
+/// Whether something is so of a few of the photos, spread over all; not of none.
+fn is_each(photos: &[&Photo], is_so: fn(&Photo) -> bool) -> bool {
+    let step = photos.len().div_ceil(MASKS_JUDGED).max(1);
+    !photos.is_empty() && photos.iter().step_by(step).all(|photo| is_so(photo))
+}
+
+/// Whether a photo's ignore mask ignores all of it.
+fn hides_all(photo: &Photo) -> bool {
+    usable_mask(photo).is_some_and(|mask| mask.iter().all(|value| *value == 0))
+}
+
+/// Whether a photo's matte, or its alpha, is zero all over.
+fn shows_no_object(photo: &Photo) -> bool {
+    if !photo.is_cut_out() {
+        return false;
+    }
+    // As of masks.
+    let pixels = capture::photo_size(&photo.path).and_then(|size| photo.decode(size));
+    pixels.is_ok_and(|pixels| pixels.pixels().all(|pixel| pixel.0[3] == 0))
 }
 
 /// A photo's ignore mask, if it has one that can be decoded: what is wrong with a file is said when it is needed.

@@ -6,7 +6,7 @@ use capture::CaptureError;
 use image::{GrayImage, Luma, RgbaImage};
 use render::coverage::{MatteCoverage, coverage_matte, coverage_points, mean_matte};
 use render::score::{
-    MaskedScore, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
+    MaskedScore, PSNR_CAP_DB, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -115,15 +115,29 @@ impl Truth {
 }
 
 impl TruthScore {
-    /// The mean, each figure over the photos that have it; `None` of nothing.
+    /// Whether the picture shows nothing, nor does the photo: that they are equal says nothing of how good either is.
+    pub fn is_of_nothing(&self) -> bool {
+        self.score.coverage == 0.0 && self.score.psnr >= PSNR_CAP_DB
+    }
+
+    /// The mean, each figure over the photos that have it; those of nothing count for their coverage alone, unless
+    /// all are. `None` of nothing.
     pub fn mean(scores: &[Self]) -> Option<Self> {
         let of = |value: fn(&Self) -> Option<f64>| {
             mean_of(&scores.iter().filter_map(value).collect::<Vec<_>>())
         };
         let masked: Vec<MaskedScore> = scores.iter().filter_map(|s| s.masked).collect();
         let matte: Vec<MatteCoverage> = scores.iter().filter_map(|s| s.matte).collect();
+        let all: Vec<Score> = scores.iter().map(|s| s.score).collect();
+        let telling = scores.iter().filter(|s| !s.is_of_nothing());
+        let telling: Vec<Score> = telling.map(|s| s.score).collect();
+        let of_all = mean(&all)?;
+        let score = mean(&telling).map_or(of_all, |score| Score {
+            coverage: of_all.coverage,
+            ..score
+        });
         Some(Self {
-            score: mean(&scores.iter().map(|s| s.score).collect::<Vec<_>>())?,
+            score,
             coverage_points: of(|s| s.coverage_points),
             masked: mean_masked(&masked),
             matte: mean_matte(&matte),
@@ -227,6 +241,28 @@ mod tests {
         assert_eq!(scores.coverage_points, None);
         assert!(scores.masked.is_none() && scores.matte.is_none());
         assert_eq!(TruthScore::mean(&[]), None);
+    }
+
+    #[test]
+    fn nothing_compared_with_nothing_says_nothing() {
+        let of = |alpha| {
+            Truth::new(
+                RgbaImage::from_pixel(16, 16, Rgba([200, 0, 0, alpha])),
+                None,
+                Vec::new(),
+            )
+        };
+        let nothing = RgbaImage::new(16, 16);
+        let score = |alpha: u8| of(alpha).score(&nothing).unwrap();
+        assert!(score(0).is_of_nothing() && !score(255).is_of_nothing());
+        let mean = TruthScore::mean(&[score(0), score(255)]).unwrap();
+        assert_eq!(mean.score, score(255).score);
+        let mean = TruthScore::mean(&[score(0)]).unwrap();
+        assert!(mean.is_of_nothing());
+        // Half of the covered ones.
+        let shown = of(255).score(&of(255).pixels).unwrap();
+        let mean = TruthScore::mean(&[score(0), shown]).unwrap();
+        assert_eq!((mean.score.psnr, mean.score.coverage), (PSNR_CAP_DB, 0.5));
     }
 
     #[test]

@@ -184,6 +184,50 @@ fn masks_go_by_several_names_and_may_be_missing() {
 }
 
 #[test]
+fn masks_that_hide_everything_are_told_and_what_is_empty_for_them() {
+    let folder = with_wall();
+    for i in 0..9 {
+        save(
+            at(&folder, &format!("none/{i:04}.png")),
+            &GrayImage::new(SIZE.0, SIZE.1),
+        );
+    }
+    let ran = lumigraph(folder.path(), "import wall --masks none -o scene").ok();
+    let said = "note: the ignore masks of 9 photos leave nothing of them, as far as some of them tell (0000.png, \
+                for one); they are to be 0 where";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    // The proxy is there.
+    let render = "render scene --proxy plane --path orbit --frames 1 --size 32x24 -o out";
+    let why = "show nothing: no photo shows what they see of the proxy: it lies outside all photos, or masks, ";
+    for line in [render, "evaluate scene --proxy plane --size 32x24"] {
+        let ran = lumigraph(folder.path(), line).ok();
+        assert!(ran.stderr.contains(why), "{}", ran.stderr);
+    }
+
+    // Nothing that is drawn in place of nothing is no good picture.
+    let ran = lumigraph(folder.path(), "import wall --mattes none -o cut").ok();
+    let said = "note: the mattes or alpha channels of 9 photos leave nothing of them";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    let evaluate = "evaluate cut --proxy plane --size 32x24";
+    let table = lumigraph(folder.path(), evaluate).ok().stdout;
+    assert!(!table.contains("99.00"), "{table}");
+    let json = lumigraph(folder.path(), &format!("{evaluate} --json"))
+        .ok()
+        .json();
+    for scores in [&json["mean"], &json["photos"][0]] {
+        assert!(
+            scores["psnr"].is_null() && scores["ssim"].is_null(),
+            "{scores}"
+        );
+        assert_eq!(scores["coverage"], 0.0, "{scores}");
+    }
+    // Some that do are no mistake.
+    save(at(&folder, "none/0004.png"), &mask_of(4));
+    let ran = lumigraph(folder.path(), "import wall --masks none -o some").ok();
+    assert!(!ran.stderr.contains("leave nothing"), "{}", ran.stderr);
+}
+
+#[test]
 fn masks_may_be_jpegs_and_are_not_looked_for_in_alpha() {
     let folder = with_wall();
     for i in 0..9 {
