@@ -1,7 +1,7 @@
 //! Whether a calibration fits its photos at all, and each of them.
 
 use super::Warning;
-use calibrate::{Reconstruction, TRUSTED_TIE};
+use calibrate::{Image, Reconstruction, TRUSTED_TIE};
 
 /// Structure from motion misses what it measured by a pixel or less. What misses it by so many belongs to other
 /// photos, or counts pixels another way than was read.
@@ -46,12 +46,34 @@ pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
     names
 }
 
+/// Says so where a camera's principal point lies beside its photos by more than their size, as it does in no more
+/// than tiles cut from far larger pictures.
+pub(super) fn of_principal(whole: &Reconstruction) -> Option<Warning> {
+    let is_far = |principal: f64, side: u32| {
+        let side = f64::from(side);
+        !(-side..=2.0 * side).contains(&principal)
+    };
+    let far = |image: &Image| {
+        let camera = whole.cameras.get(&image.camera_id)?;
+        let (principal, width, height) =
+            (camera.lens().ok()?.principal, camera.width, camera.height);
+        let beside = is_far(principal.x, width) || is_far(principal.y, height);
+        beside.then_some((principal, width, height))
+    };
+    let mut images = whole.images.values();
+    let (name, (principal, width, height)) =
+        images.find_map(|image| Some((&image.name, far(image)?)))?;
+    Some(Warning::Note(format!(
+        "photo {name}: its principal point ({}, {}) is far beside its {width} × {height} pixels: unless it was cut \
+         from a larger one, check the calibration's cx and cy",
+        principal.x, principal.y
+    )))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::{
-        Camera, CameraId, Image, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Rigid3,
-    };
+    use calibrate::{Camera, CameraId, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Rigid3};
     use glam::DVec3;
 
     /// A point in the middle of a photo, at a depth, seen by so many pixels to the right.
@@ -133,5 +155,25 @@ mod tests {
         assert!(misplaced(&photos(&[(20, 0.5), (20, 40.0)])).is_empty());
         assert!(misplaced(&photos(&[(20, 30.0), (20, 40.0), (20, 25.0)])).is_empty());
         assert!(misplaced(&Reconstruction::default()).is_empty());
+    }
+
+    #[test]
+    fn a_principal_point_far_beside_the_photo_is_told() {
+        let at = |x: f64, y: f64| {
+            let mut whole = seen(2.0, 0.0);
+            whole
+                .cameras
+                .values_mut()
+                .for_each(|c| c.params[1..].copy_from_slice(&[x, y]));
+            of_principal(&whole)
+        };
+        assert_eq!(at(50.0, 50.0), None);
+        assert_eq!(at(-100.0, 200.0), None);
+        let note = at(5000.0, -900.0).unwrap().to_string();
+        assert_eq!(
+            note,
+            "photo a.jpg: its principal point (5000, -900) is far beside its 100 × 100 pixels: unless it was cut \
+             from a larger one, check the calibration's cx and cy"
+        );
     }
 }

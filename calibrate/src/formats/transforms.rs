@@ -8,6 +8,8 @@
 //! - Focal lengths are `fl_x`, `fl_y` in pixels, else `x_fov`, `y_fov` in degrees, else
 //!   `camera_angle_x`, `camera_angle_y` in radians. What a frame says goes before what is
 //!   said for all. With only one of the two axes, pixels are square.
+//! - Numbers that are no pixels but shares of the sides, as some scripts write them, are refused: which
+//!   they are shares of differs.
 //! - Distortion is OpenCV's; with `camera_model` OPENCV_FISHEYE or `is_fisheye` its
 //!   fisheye's. nerfstudio's r⁸ term of a lens that is no fisheye (`k4`) must be zero, and so
 //!   must `k5` and `k6` of all but FULL_OPENCV. `distortion_params`, a list of nerfstudio's in
@@ -23,6 +25,13 @@ use std::path::Path;
 /// Lenses of instant-ngp that no model here can represent.
 const FOREIGN_LENSES: [&str; 4] = ["ftheta_p0", "latlong", "equirectangular", "rolling_shutter"];
 const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+
+/// A principal point of so few pixels in both coordinates is in the photo's corner, or no pixels at all.
+const MOST_OF_SHARES: f64 = 1.0;
+/// And so is a focal length of so few pixels and of so small a share of its side, a field of view of 169°: shares
+/// of long lenses are no more.
+const MOST_OF_FOCAL_SHARES: f64 = 3.0;
+const LEAST_FOCAL: f64 = 0.05;
 
 /// Reads a `transforms.json`. Images are numbered from 1 in the order of `frames`; their
 /// names are as in the file (`./` left out), which may lack the photo's extension.
@@ -131,6 +140,7 @@ impl<'a> Intrinsics<'a> {
         let (fx, fy) = self.focals(width, height)?;
         let cx = self.number_or("cx", f64::from(width) / 2.0)?;
         let cy = self.number_or("cy", f64::from(height) / 2.0)?;
+        self.check_principal(cx, cy, (width, height))?;
         let (model, distortion) = self.lens()?;
         let mut params = vec![fx, fy, cx, cy];
         params.extend(distortion);
@@ -140,6 +150,19 @@ impl<'a> Intrinsics<'a> {
             height,
             params,
         })
+    }
+
+    /// Fails of a principal point that is no pixels.
+    fn check_principal(&self, cx: f64, cy: f64, (w, h): (u32, u32)) -> Result<(), FormatError> {
+        let is_share = |c: f64| c > 0.0 && c <= MOST_OF_SHARES;
+        let Some(json) = self.get("cx").or_else(|| self.get("cy")) else {
+            return Ok(());
+        };
+        if w.min(h) <= 2 || !(is_share(cx) && is_share(cy)) {
+            return Ok(());
+        }
+        let problem = format!("cx is {cx} and cy is {cy}, expected pixels of {w} × {h}");
+        Err(json.error(Problem::new(problem, PIXELS)))
     }
 
     /// The focal lengths in pixels along x and y.
@@ -256,10 +279,20 @@ impl<'a> Intrinsics<'a> {
     }
 }
 
+/// What to do about intrinsics that are no pixels.
+const PIXELS: &str = "if these are shares of the photo's sides, multiply cx and fl_x by the width and cy and fl_y by \
+                      the height";
+
 /// A focal length in pixels along an axis, where a level says it.
 fn focal(level: &Json<'_>, axis: &str, resolution: u32) -> Result<Option<f64>, FormatError> {
-    if let Some(focal) = level.optional(&format!("fl_{axis}")) {
-        return focal.number().map(Some);
+    if let Some(json) = level.optional(&format!("fl_{axis}")) {
+        let focal = json.number()?;
+        let side = f64::from(resolution);
+        if focal > 0.0 && focal <= MOST_OF_FOCAL_SHARES && focal < LEAST_FOCAL * side {
+            let problem = format!("found {focal}, expected pixels of {resolution}");
+            return Err(json.error(Problem::new(problem, PIXELS)));
+        }
+        return Ok(Some(focal));
     }
     let degrees = level.optional(&format!("{axis}_fov"));
     let (json, angle) = match (degrees, level.optional(&format!("camera_angle_{axis}"))) {

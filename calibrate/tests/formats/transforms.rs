@@ -230,6 +230,28 @@ fn coefficients_that_a_model_lacks_are_refused() {
 }
 
 #[test]
+fn intrinsics_that_are_no_pixels_are_refused() {
+    let remedy = "if these are shares of the photo's sides, multiply cx and fl_x by the width and cy and fl_y by the \
+                  height";
+    let with = |more: &str| format!(r#""w": 160, "h": 120, {more}"#);
+    assert_eq!(
+        error(&with(r#""fl_x": 297.6, "cx": 0.5, "cy": 0.51"#), FRAME),
+        format!("cx: cx is 0.5 and cy is 0.51, expected pixels of 160 × 120; {remedy}")
+    );
+    assert_eq!(
+        error(&with(r#""fl_x": 1.2, "fl_y": 1.6"#), FRAME),
+        format!("fl_x: found 1.2, expected pixels of 160; {remedy}")
+    );
+    // Corners of larger photos, and tiny photos.
+    for (cx, cy) in [(0.0, 0.0), (0.5, 60.0), (-0.5, 0.5)] {
+        let camera = camera(&with(&format!(r#""fl_x": 90, "cx": {cx}, "cy": {cy}"#)));
+        assert_eq!(camera.params[2..], [cx, cy]);
+    }
+    camera(r#""w": 2, "h": 2, "fl_x": 1.2, "cx": 1, "cy": 1"#);
+    camera(&with(r#""camera_angle_x": 3.1"#));
+}
+
+#[test]
 fn errors_name_the_frame_and_a_remedy() {
     let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
     let again = "copy the file again, or export it again from the program it is from";
