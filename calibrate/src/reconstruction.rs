@@ -103,6 +103,27 @@ impl Reconstruction {
         }
     }
 
+    /// Makes the sparse points' tracks of the keypoints that name them, where no point has a track of its own: some
+    /// programs write who observes which into the images alone. How many observations these are.
+    pub fn take_tracks_from_keypoints(&mut self) -> usize {
+        if self.points.values().any(|point| !point.track.is_empty()) {
+            return 0;
+        }
+        let mut count = 0;
+        for (id, image) in &self.images {
+            for (keypoint_idx, keypoint) in image.keypoints.iter().enumerate() {
+                let Some(point_id) = keypoint.point else {
+                    continue;
+                };
+                if let Some(point) = self.points.get_mut(&point_id) {
+                    point.track.push((*id, keypoint_idx as u32));
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
+
     /// The distances in pixels between a camera's keypoints and the projections of the
     /// sparse points that they observe; infinite where a point lies behind the camera.
     ///
@@ -238,6 +259,20 @@ mod tests {
             whole.images.insert(image_id, image);
         }
         whole
+    }
+
+    #[test]
+    fn tracks_that_nobody_wrote_are_those_of_the_keypoints() {
+        let whole = three_images();
+        let mut bare = whole.clone();
+        bare.points.values_mut().for_each(|p| p.track.clear());
+        assert_eq!(bare.take_tracks_from_keypoints(), 7);
+        assert_eq!(bare, whole);
+        // What is there is taken as it is.
+        bare.points.get_mut(&Point3DId(2)).unwrap().track.clear();
+        let before = bare.clone();
+        assert_eq!(bare.take_tracks_from_keypoints(), 0);
+        assert_eq!(bare, before);
     }
 
     fn named(names: &[&str]) -> BTreeSet<String> {

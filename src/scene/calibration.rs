@@ -4,13 +4,33 @@ pub(super) use super::source::{Source, find};
 
 use super::listed::Listed;
 use super::{ImportOptions, SceneError, Warning};
-use calibrate::Reconstruction;
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
+use calibrate::{Reconstruction, colmap};
 use capture::{PhotoSet, find_photos_folder, photo_size};
 use std::cell::{Cell, OnceCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+
+/// Reads COLMAP's model. Where its points have no tracks but its images tell who observes which, says so.
+///
+/// # Errors
+/// As for [`colmap::read_model`].
+pub(super) fn read_colmap(
+    model: &Path,
+    warnings: &mut Vec<Warning>,
+) -> Result<Reconstruction, SceneError> {
+    let mut whole = colmap::read_model(model)?;
+    let count = whole.take_tracks_from_keypoints();
+    if count > 0 {
+        warnings.push(Warning::Note(format!(
+            "{}: no point of points3D has a track; who observes which is taken from the {count} keypoints in images \
+             that name one",
+            model.display()
+        )));
+    }
+    Ok(whole)
+}
 
 /// Reads another program's calibration. Its photos are found by the ends of their paths.
 ///

@@ -10,9 +10,9 @@ use super::named::Named;
 use super::times::{Clues, TimeSource, set_times};
 use super::turned;
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
+use calibrate::Reconstruction;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
-use calibrate::{Reconstruction, colmap};
 use capture::{CaptureError, PhotoSet, find_photos_within, photo_size};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -105,7 +105,7 @@ impl Scene {
         warnings.extend(note_of_home(&source, capture, &home));
         let found = Self::photos_of(&home)?;
         let mut reconstruction = match &source {
-            Source::Colmap(model) => colmap::read_model(model)?,
+            Source::Colmap(model) => calibration::read_colmap(model, &mut warnings)?,
             // OpenCV may leave it to the photos which is which.
             Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
             Source::Other(format, file) => {

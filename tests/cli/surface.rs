@@ -206,6 +206,29 @@ fn points_that_no_photo_observes_count_for_where_they_are_alone() {
 }
 
 #[test]
+fn tracks_that_only_the_images_tell_serve_as_points_own() {
+    let folder = with_wall();
+    let here = folder.path();
+    let evaluate = || lumigraph(here, "evaluate wall --proxy points --size 32x24 --json").ok();
+    let whole = evaluate();
+    let sparse = here.join("wall/sparse/0");
+    let mut model = calibrate::colmap::read_model(&sparse).unwrap();
+    for point in model.points.values_mut() {
+        point.track.clear();
+    }
+    std::fs::remove_dir_all(&sparse).unwrap();
+    calibrate::colmap::write_text(&model, &sparse).unwrap();
+    let bare = evaluate();
+    for key in ["psnr", "ssim", "coverage", "coverage_points"] {
+        let [bare, whole] = [&bare, &whole].map(|ran| ran.json()["mean"][key].as_f64().unwrap());
+        assert!((bare - whole).abs() < 1e-9, "{key}: {bare} and {whole}");
+    }
+    let said = "note: wall/sparse/0: no point of points3D has a track; who observes which is taken from the ";
+    assert!(bare.stderr.contains(said), "{}", bare.stderr);
+    assert!(!whole.stderr.contains(said), "{}", whole.stderr);
+}
+
+#[test]
 fn points_that_photos_left_do_not_share_are_told() {
     let folder = with_wall();
     let here = folder.path();
