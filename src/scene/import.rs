@@ -148,6 +148,7 @@ impl Scene {
         // 3. Are they what was calibrated?
         warnings.extend(misfit::of(&scene.reconstruction));
         warnings.extend(misfit::of_principal(&scene.reconstruction));
+        warnings.extend(misfit::of_extent(&scene.reconstruction));
         warnings.extend(scene.leave_out_unusable(options.strict, &meant.near)?);
 
         // 4. What lies beside them.

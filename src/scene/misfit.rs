@@ -2,6 +2,7 @@
 
 use super::Warning;
 use calibrate::{Image, Reconstruction, TRUSTED_TIE};
+use std::ops::RangeInclusive;
 
 /// Structure from motion misses what it measured by a pixel or less. What misses it by so many belongs to other
 /// photos, or counts pixels another way than was read.
@@ -44,6 +45,33 @@ pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
     let mut names: Vec<String> = wrong.map(|(id, _)| whole.images[id].name.clone()).collect();
     names.sort();
     names
+}
+
+/// Lengths that numbers of 32 bits, which pictures are drawn with, hold with room for squares' roots and quotients.
+const HELD: RangeInclusive<f64> = 1e-30..=1e30;
+
+/// Says so where photos were taken so far apart, or so near one another, that nothing can be drawn of them.
+pub(super) fn of_extent(whole: &Reconstruction) -> Option<Warning> {
+    let mut images = whole.images.values();
+    let first = images.next()?;
+    let center = first.camera_from_world.center();
+    let away = images.map(|image| (image.camera_from_world.center().distance(center), image));
+    let (farthest, image) = away.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if farthest == 0.0 || HELD.contains(&farthest) {
+        return None;
+    }
+    let (name, first) = (&image.name, &first.name);
+    let problem = if farthest < 1.0 {
+        format!("no photo is farther than {farthest:.0e} from {first}, {name} being the farthest")
+    } else {
+        format!("photo {name} is {farthest:.0e} from {first}")
+    };
+    Some(Warning::Note(format!(
+        "{problem}, in the calibration's units: pictures are drawn in 32 bits, which hold {:e} to {:e}; scale the \
+         calibration, or leave out what strays",
+        HELD.start(),
+        HELD.end()
+    )))
 }
 
 /// Says so where a camera's principal point lies beside its photos by more than their size, as it does in no more
@@ -174,6 +202,33 @@ mod tests {
             note,
             "photo a.jpg: its principal point (5000, -900) is far beside its 100 × 100 pixels: unless it was cut \
              from a larger one, check the calibration's cx and cy"
+        );
+    }
+
+    #[test]
+    fn photos_beyond_what_is_drawn_are_told() {
+        let two = |apart: f64| {
+            let mut whole = seen(2.0, 0.0);
+            let mut image = whole.images[&ImageId(1)].clone();
+            image.name = "b.jpg".to_owned();
+            image.camera_from_world.translation = DVec3::new(-apart, 0.0, 0.0);
+            whole.images.insert(ImageId(2), image);
+            of_extent(&whole).map(|note| note.to_string())
+        };
+        assert_eq!(of_extent(&seen(2.0, 0.0)), None);
+        for apart in [0.0, 1e-30, 1.0, 1e30] {
+            assert_eq!(two(apart), None);
+        }
+        let far = two(1e39).unwrap();
+        assert!(
+            far.starts_with("photo b.jpg is 1e39 from a.jpg, in the"),
+            "{far}"
+        );
+        assert!(far.contains("which hold 1e-30 to 1e30; scale"), "{far}");
+        let near = two(1e-40).unwrap();
+        assert!(
+            near.starts_with("no photo is farther than 1e-40 from a.jpg, b.jpg being"),
+            "{near}"
         );
     }
 }

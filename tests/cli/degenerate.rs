@@ -209,6 +209,22 @@ fn outliers_far_away() {
 }
 
 #[test]
+fn sizes_that_nothing_is_drawn_in_are_told() {
+    for scale in [1e39, 1e-40] {
+        let scaled = |places: Vec<DVec3>| -> Vec<DVec3> {
+            places.into_iter().map(|place| scale * place).collect()
+        };
+        let folder = capture(&scaled(in_a_row(5)), &scaled(ordinary(60)));
+        let ran = lumigraph(folder.path(), "evaluate c --proxy carved --every 3");
+        if ran.code != 0 {
+            println!("{scale:e}: {}", ran.error(1));
+        }
+        let said = "pictures are drawn in 32 bits, which hold 1e-30 to 1e30; scale the calibration";
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    }
+}
+
+#[test]
 fn points_behind_the_cameras() {
     let points: Vec<DVec3> = ordinary(40).iter().map(|p| -*p).collect();
     only_these_fail(&in_a_row(7), &points, &["plane", "carved", "carved-dense"]);

@@ -14,7 +14,7 @@ use runs::Runs;
 pub(crate) use runs::Sight;
 use std::collections::HashSet;
 use std::fmt;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -85,6 +85,8 @@ pub struct Solid {
     runs: Runs,
     /// Where the hierarchy's origin lies in the world: f32 has digits only around it.
     origin: DVec3,
+    /// What lengths are multiplied by in the hierarchy: f32 has no others than about one.
+    scale: f64,
 }
 
 /// Where a ray first meets a mesh.
@@ -99,6 +101,10 @@ pub struct Hit {
 /// How much larger boxes are than what they hold, relative to their distance from the origin
 /// or to the mesh's typical size: rays and boxes are rounded to f32.
 const ROUNDING: f64 = 1e-6;
+/// Typical sizes of meshes, in the world, that the hierarchy takes as they are.
+const SIZES: RangeInclusive<f64> = 1e-12..=1e12;
+/// The hierarchy's coordinates are no larger: areas of boxes are to be finite in f32.
+const FARTHEST: f64 = 1e18;
 /// How far beyond its sides a triangle is still met, in shares of itself: neighbours leave
 /// no gap.
 const GAP: f64 = 1e-12;
@@ -187,6 +193,7 @@ impl Solid {
             0 => 0.0,
             _ => *offsets.select_nth_unstable_by(middle, f64::total_cmp).1,
         };
+        let scale = scale_of(typical);
         let bounds = |i: usize| {
             let corners = mesh.corners(i).map(|p| p - origin);
             let (least, greatest) = corners.iter().fold(
@@ -195,7 +202,12 @@ impl Solid {
             );
             let far = least.abs().max(greatest.abs()).max_element();
             let room = DVec3::splat(ROUNDING * (far + typical));
-            let corner = |p: DVec3| Vec3A::from(p.as_vec3());
+            let corner = |p: DVec3| Vec3A::from((p * scale).as_vec3());
+            // What reaches farther may be met by any ray.
+            if !((far + room.x) * scale <= FARTHEST) {
+                let all = Vec3A::splat(FARTHEST as f32);
+                return Bounds(Aabb::new(-all, all));
+            }
             Bounds(Aabb::new(corner(least - room), corner(greatest + room)))
         };
         let (boxed, bvh) = Boxed::new(&mesh, bounds);
@@ -208,6 +220,7 @@ impl Solid {
             bvh,
             boxed,
             origin,
+            scale,
         }
     }
 
@@ -312,7 +325,7 @@ impl Solid {
                     });
                 }
                 // A little farther than it is, so that rounding hides nothing nearer.
-                bound = bound.min((along * (1.0 + 4.0 * ROUNDING)) as f32);
+                bound = bound.min((along * self.scale * (1.0 + 4.0 * ROUNDING)) as f32);
             }
             bound
         });
@@ -336,7 +349,7 @@ impl Solid {
         };
         let farthest = along * length;
         let ray = Ray {
-            tmax: (farthest * (1.0 + 4.0 * ROUNDING)) as f32,
+            tmax: (farthest * self.scale * (1.0 + 4.0 * ROUNDING)) as f32,
             ..ray
         };
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
@@ -357,11 +370,13 @@ impl Solid {
     /// The ray for the hierarchy, the direction in unit length, and its length; `None` where nothing can be met.
     #[inline]
     fn ray(&self, from_in_world: DVec3, direction: DVec3) -> Option<(Ray, DVec3, f64)> {
-        let from = from_in_world - self.origin;
-        if self.boxed.triangles.is_empty() || !from.is_finite() || !direction.is_finite() {
+        let from = (from_in_world - self.origin) * self.scale;
+        // Nor from beyond what f32 holds.
+        let is_near = from.is_finite() && from.abs().max_element() <= FARTHEST;
+        if self.boxed.triangles.is_empty() || !is_near || !direction.is_finite() {
             return None;
         }
-        // Unit length, so that the distances compared in f32 are those of the world.
+        // Unit length, so that the distances compared in f32 are those of the world, scaled.
         let length = direction.length();
         let unit = direction / length;
         if !unit.is_finite() {
@@ -402,6 +417,17 @@ fn meet([a, b, c]: [DVec3; 3], direction: DVec3, front_only: bool) -> Option<f64
     let seen = !front_only || volume > 0.0;
     // A NaN, of a triangle seen edge on, is no hit.
     (inside && seen && along > 0.0 && along < f64::INFINITY).then_some(along)
+}
+
+/// What a mesh of this typical size is multiplied by to be of a size that f32 holds: one as a rule, else a power of
+/// two, which costs no digits.
+fn scale_of(typical: f64) -> f64 {
+    if typical == 0.0 || SIZES.contains(&typical) {
+        return 1.0;
+    }
+    // As far as powers of two and what they are multiplied by are finite.
+    let exponent = typical.log2().floor().clamp(-1000.0, 1000.0);
+    2.0_f64.powi(-exponent as i32)
 }
 
 fn median(positions: &[DVec3]) -> DVec3 {
@@ -483,6 +509,32 @@ mod tests {
         assert!((hit.along - 1.0).abs() < 0.01, "{}", hit.along);
         let beyond = solid.first_hit(from, DVec3::NEG_Z).unwrap();
         assert!(beyond.triangle_idx >= near);
+    }
+
+    #[test]
+    fn sizes_beyond_f32_are_met_as_others() {
+        for radius in [1e-90, 1e-40, 1e39, 1e90] {
+            let solid = Solid::new(MeshKind::Mesh, globe(DVec3::ZERO, radius));
+            let from = DVec3::new(0.1, 0.2, -3.0) * radius;
+            let hit = solid.first_hit(from, DVec3::Z).unwrap();
+            let off = (from + DVec3::Z * hit.along).length() / radius;
+            assert!((0.98..1.001).contains(&off), "{radius}: {off}");
+            assert_eq!(solid.first_hit(from, DVec3::X), None);
+            let met = |share: f64| solid.own_hits_until(from, DVec3::Z, share * radius).len();
+            assert_eq!(met(1.5), 0, "{radius}");
+            assert!(met(2.5) > 0 && met(5.0) > met(2.5), "{radius}");
+        }
+        // What is too far away for the rest of the mesh is met, too, but no ray begins there.
+        let mut mesh = globe(DVec3::ZERO, 1.0);
+        let own = mesh.triangles.len() as u32;
+        mesh.append(&globe(DVec3::ZERO, 1e30));
+        mesh.append(&globe(DVec3::ZERO, 0.5));
+        let solid = Solid::new(MeshKind::Mesh, mesh);
+        let from = DVec3::new(0.1, 0.2, -3.0);
+        assert!(solid.first_hit(from, DVec3::Z).unwrap().triangle_idx < own);
+        let beyond = solid.first_hit(from, DVec3::NEG_Z).unwrap();
+        assert!((own..2 * own).contains(&beyond.triangle_idx), "{beyond:?}");
+        assert_eq!(solid.first_hit(DVec3::Z * 1e39, DVec3::NEG_Z), None);
     }
 
     #[test]
