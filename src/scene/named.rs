@@ -57,6 +57,8 @@ impl Scene {
         let FilesBeside {
             masks,
             depth_maps,
+            depth_scale,
+            unscaled_depth_maps,
             points,
             applied_scale,
             times: _,
@@ -79,12 +81,22 @@ impl Scene {
         if options.depth.is_none() && !options.no_depth {
             // A scale that was asked for is that of the scene's units.
             let is_asked = options.depth_scale != DEPTH_UNITS_PER_STEP;
-            let scale = options.depth_scale * if is_asked { 1.0 } else { applied_scale };
+            let scale = match depth_scale {
+                _ if is_asked => options.depth_scale,
+                Some(scale) => scale,
+                None => options.depth_scale * applied_scale,
+            };
             let unused = self.add_depth_maps(&depth_maps, scale);
             if let Some(reason) = unused.first() {
                 note(format!(
                     "{} depth maps that are not used, for one: {reason}",
                     unused.len()
+                ));
+            }
+            if unscaled_depth_maps > 0 {
+                note(format!(
+                    "{unscaled_depth_maps} depth maps (depth_path) that are not used: it lacks integer_depth_scale, the \
+                     world units a step; add it, or give --depth DIR --depth-scale UNITS"
                 ));
             }
         }

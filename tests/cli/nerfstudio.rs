@@ -77,6 +77,38 @@ fn what_a_transforms_file_names_beside_the_photos_is_used() {
 }
 
 #[test]
+fn depth_maps_of_instant_ngp_are_read_in_its_scale() {
+    let folder = with_wall();
+    let here = folder.path();
+    let at = |path: &str| here.join(path);
+    let run = |line: &str| lumigraph(here, line).ok();
+    run("export wall --format transforms -o wall/transforms.json");
+    fs::remove_dir_all(at("wall/sparse")).unwrap();
+    fs::rename(at("wall/depth"), at("wall/dpt")).unwrap();
+    let text = fs::read_to_string(at("wall/transforms.json")).unwrap();
+    let text = text.replace("depth_file_path", "depth_path");
+    let text = text.replace("\"depth/", "\"dpt/");
+    let frames = "\"frames\"";
+    let scale_of = |more: &str, options: &str| {
+        let text = text.replacen(frames, &format!("{more}{frames}"), 1);
+        fs::write(at("wall/transforms.json"), text).unwrap();
+        let ran = run(&format!("import wall {options}-o scene --force"));
+        let scale = scene_json(&folder, "scene")["photos"][3]["depth_scale"].as_f64();
+        (scale, ran.stderr)
+    };
+    let scaled = "\"integer_depth_scale\": 0.002, \"applied_scale\": 0.5, ";
+    assert_eq!(scale_of(scaled, "").0, Some(0.002));
+    assert_eq!(scale_of(scaled, "--depth-scale 0.25 ").0, Some(0.25));
+    let note =
+        "note: wall/transforms.json names 9 depth maps (depth_path) that are not used: it lacks";
+    let (scale, said) = scale_of("", "");
+    assert!(scale.is_none() && said.contains(note), "{said}");
+    let off = format!("\"enable_depth_loading\": false, {scaled}");
+    let (scale, said) = scale_of(&off, "");
+    assert!(scale.is_none() && !said.contains("depth_path"), "{said}");
+}
+
+#[test]
 fn what_a_transforms_file_names_and_cannot_be_used_is_told() {
     let folder = with_wall();
     let here = folder.path();

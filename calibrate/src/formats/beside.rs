@@ -3,6 +3,8 @@
 //! - nerfstudio's `mask_path` is an ignore mask as ours are: 0 = ignore.
 //! - Its `depth_file_path` is depth along z, in steps of which nerfstudio takes 1000 to a unit.
 //!   `applied_scale` scaled the poses that are in the file and not the depths.
+//! - instant-ngp's `depth_path` is depth along z, too, in steps of `integer_depth_scale` of the poses' units; without
+//!   that, or where `enable_depth_loading` is false, it reads none. nerfstudio's go before them.
 //! - `ply_file_path` are the sparse points.
 //! - D-NeRF's `time` of a frame, which nerfstudio reads, too, often goes from 0 to 1. Nothing says
 //!   in what unit.
@@ -23,6 +25,10 @@ pub struct FilesBeside {
     pub masks: BTreeMap<String, PathBuf>,
     /// Depth maps, likewise.
     pub depth_maps: BTreeMap<String, PathBuf>,
+    /// The poses' units a step of the depth maps, where the file says: of instant-ngp's.
+    pub depth_scale: Option<f64>,
+    /// How many depth maps are named but for their scale, without which they say nothing.
+    pub unscaled_depth_maps: usize,
     /// Times of photos, likewise, in a unit of the file's own.
     pub times: BTreeMap<String, f64>,
     /// The sparse points.
@@ -59,6 +65,8 @@ pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, Form
     let mut beside = FilesBeside {
         masks: BTreeMap::new(),
         depth_maps: BTreeMap::new(),
+        depth_scale: None,
+        unscaled_depth_maps: 0,
         times: BTreeMap::new(),
         points: file(&root, "ply_file_path")?,
         applied_scale: 1.0,
@@ -70,6 +78,7 @@ pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, Form
             return Err(scale.error(Problem::broken(problem)));
         }
     }
+    let mut of_ngp = BTreeMap::new();
     for frame in root.field("frames")?.items()? {
         let file_path = frame.field("file_path")?;
         let name = build::name(file_path.text()?).map_err(|p| file_path.error(p))?;
@@ -79,8 +88,22 @@ pub fn parse_files_beside(path: &Path, bytes: &[u8]) -> Result<FilesBeside, Form
         if let Some(time) = frame.optional("time") {
             beside.times.insert(name.clone(), time.number()?);
         }
+        if let Some(depth) = file(&frame, "depth_path")? {
+            of_ngp.insert(name.clone(), depth);
+        }
         if let Some(depth) = file(&frame, "depth_file_path")? {
             beside.depth_maps.insert(name, depth);
+        }
+    }
+    let is_loaded = root.optional("enable_depth_loading");
+    let is_loaded = is_loaded.map_or(Ok(true), |json| json.flag())?;
+    if beside.depth_maps.is_empty() && is_loaded {
+        let scale = root.optional("integer_depth_scale");
+        let scale = scale.map(|json| json.number()).transpose()?;
+        beside.depth_scale = scale.filter(|scale| *scale > 0.0);
+        match beside.depth_scale {
+            Some(_) => beside.depth_maps = of_ngp,
+            None => beside.unscaled_depth_maps = of_ngp.len(),
         }
     }
     Ok(beside)
