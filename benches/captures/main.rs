@@ -131,6 +131,7 @@ fn measure(capture: &Path, args: &Args) -> Result<Row, SceneError> {
     let mut scene = open(capture, args.mattes.as_deref())?;
     // As the command line does.
     scene.drop_weak();
+    scene.drop_misplaced();
     let held_out = scene.held_out_by_default()?;
     // As `evaluate` does.
     if scene.folder.is_none() || !scene.exposure_is_without(&held_out) {

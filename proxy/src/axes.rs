@@ -3,7 +3,7 @@
 use crate::Plane;
 use crate::condition::thinnest;
 use crate::fit::{FitBasis, FitError, PlaneFit, forward_or};
-use calibrate::Reconstruction;
+use calibrate::{Reconstruction, outer};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
@@ -94,8 +94,7 @@ pub fn plane_across_axes(
 fn nearest_to(rays: &[(DVec3, DVec3)]) -> Option<(DVec3, f64)> {
     let (mut across, mut right_side) = (DMat3::ZERO, DVec3::ZERO);
     for &(center, axis) in rays {
-        let projector =
-            DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+        let projector = DMat3::IDENTITY - outer(axis);
         across += projector;
         right_side += projector * center;
     }

@@ -245,11 +245,16 @@ impl<'a> Trials<'a> {
         Ok(&self.dense[judge % folds])
     }
 
+    /// The names of photos that are not used where some judges are not, either.
+    fn names_without(&self, judges: &[usize]) -> BTreeSet<String> {
+        let judges = judges.iter().map(|&j| self.judges[j].name.clone());
+        self.without.iter().cloned().chain(judges).collect()
+    }
+
     /// The sparse points, as all but some judges observe them.
     fn sparse_without(&self, judges: &[usize]) -> Vec<SparsePoint> {
-        let mut fewer = self.without.clone();
-        fewer.extend(judges.iter().map(|&j| self.judges[j].name.clone()));
-        self.scene.observed_points(&fewer, &self.names)
+        self.scene
+            .observed_points(&self.names_without(judges), &self.names)
     }
 
     /// The judges' source views.
@@ -317,10 +322,10 @@ impl<'a> Trials<'a> {
         if let Some(bound) = self.bounds.get(&fold) {
             return Ok(bound.clone());
         }
-        let members = (fold..self.judges.len()).step_by(folds);
-        let mut fewer = self.without.clone();
-        fewer.extend(members.map(|j| self.judges[j].name.clone()));
-        let carved = self.scene.cutout(&fewer, Some(&like))?;
+        let members: Vec<usize> = (fold..self.judges.len()).step_by(folds).collect();
+        let carved = self
+            .scene
+            .cutout(&self.names_without(&members), Some(&like))?;
         let bound = carved.map(|carved| carved.hull);
         self.bounds.insert(fold, bound.clone());
         Ok(bound)
@@ -328,8 +333,7 @@ impl<'a> Trials<'a> {
 
     /// Makes the lumigraph's proxy without some of the judges.
     fn prepare(&mut self, kind: Kind, judges: &[usize]) -> Result<(), SceneError> {
-        let mut fewer = self.without.clone();
-        fewer.extend(judges.iter().map(|&j| self.judges[j].name.clone()));
+        let fewer = self.names_without(judges);
         let within = match kind {
             Kind::Points | Kind::Dense | Kind::CarvedDense => self.bound(judges[0])?,
             _ => None,

@@ -1,11 +1,10 @@
 //! Points split into two halves that lie in different places.
 
+use crate::{outer, principal_axes};
 use glam::{DMat3, DVec3};
 
 /// Points are cut in two this often: 2⁶ blocks.
 const CUTS: u32 = 6;
-/// Squarings of a matrix after which nothing is left of eigenvalues that are smaller by a millionth.
-const SQUARINGS: u32 = 26;
 /// Places along a block's axis are told apart by so many steps from its mean to its farthest point: rounding, as of
 /// a world whose origin is far away, does not decide which of two comes first.
 const STEPS: f64 = (1 << 20) as f64;
@@ -49,10 +48,9 @@ fn along_principal_axis(points: &[DVec3], block: &[usize]) -> Vec<(i64, usize)> 
     let reach = offsets().fold(0.0_f64, |reach, d| reach.max(d.abs().max_element()));
     let mut spread = DMat3::ZERO;
     for offset in offsets() {
-        let d = offset / reach;
-        spread += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        spread += outer(offset / reach);
     }
-    let axis = principal_axis(spread);
+    let [(_, axis), ..] = principal_axes(spread);
     let along: Vec<f64> = offsets().map(|d| axis.dot(d / reach)).collect();
     let farthest = along.iter().fold(0.0_f64, |far, t| far.max(t.abs()));
     let clear = block.iter().zip(&along);
@@ -65,28 +63,6 @@ fn along_principal_axis(points: &[DVec3], block: &[usize]) -> Vec<(i64, usize)> 
     let mut places: Vec<(i64, usize)> = along.iter().map(step).zip(block.iter().copied()).collect();
     places.sort_unstable();
     places
-}
-
-/// The direction of a covariance's largest eigenvalue, of either sign: of the matrix' powers nothing else is left.
-/// Zero where there is none.
-fn principal_axis(mut matrix: DMat3) -> DVec3 {
-    for _ in 0..SQUARINGS {
-        let trace = matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z;
-        if !(trace > 0.0 && trace < f64::INFINITY) {
-            return DVec3::ZERO;
-        }
-        let scaled = matrix * trace.recip();
-        matrix = scaled * scaled;
-    }
-    let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-    let longest = columns.into_iter().fold(DVec3::ZERO, |a, b| {
-        if b.length_squared() > a.length_squared() {
-            b
-        } else {
-            a
-        }
-    });
-    longest.normalize_or_zero()
 }
 
 #[cfg(test)]

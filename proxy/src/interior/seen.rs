@@ -4,8 +4,7 @@ use super::CellId;
 use crate::mesh::{Mesh, Model};
 use crate::{MeshKind, Solid};
 use glam::DVec3;
-use rayon::prelude::*;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::collections::HashMap;
 
 /// From one ray to the next around an axis, in radians, so that many are spread evenly: the golden
 /// angle, (3 − √5) π.
@@ -149,23 +148,12 @@ fn firsts(mesh: &Mesh, is_there: &[bool]) -> Vec<u32> {
         });
         corners.map(|p| p.to_array().map(f64::to_bits))
     };
-    let hash = |i: u32| {
-        let mut hasher = DefaultHasher::new();
-        corners(i).hash(&mut hasher);
-        hasher.finish()
+    let mut known = HashMap::new();
+    let first = |i: u32| match is_there[i as usize] {
+        true => *known.entry(corners(i)).or_insert(i),
+        false => i,
     };
-    let all = (0..mesh.triangles.len() as u32).into_par_iter();
-    let there = all.filter(|i| is_there[*i as usize]);
-    let mut sorted: Vec<(u64, u32)> = there.map(|i| (hash(i), i)).collect();
-    sorted.par_sort_unstable();
-    let mut firsts: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-    for alike in sorted.chunk_by(|a, b| a.0 == b.0) {
-        for (_, i) in alike.iter().skip(1) {
-            let first = alike.iter().find(|(_, k)| corners(*k) == corners(*i));
-            firsts[*i as usize] = first.map_or(*i, |(_, first)| *first);
-        }
-    }
-    firsts
+    (0..mesh.triangles.len() as u32).map(first).collect()
 }
 
 fn is_in_reach(mesh: &Mesh, triangle_idx: u32) -> bool {

@@ -7,7 +7,7 @@
 
 use crate::Plane;
 use crate::points::{EASY_ANGLE, SparsePoint, unlikeness};
-use calibrate::{Pixel, View};
+use calibrate::{Pixel, View, outer};
 use glam::{DMat3, DVec3};
 
 /// Within this share of the image's shorter side points fade out towards the border.
@@ -71,7 +71,7 @@ pub fn fit_plane_for_view(
             let residual = (q.dot(s.ray) - s.inverse_distance).abs();
             let w = s.weight / largest * huber(residual, scale);
             let v = s.ray;
-            matrix += DMat3::from_cols(v * v.x, v * v.y, v * v.z) * w;
+            matrix += outer(v) * w;
             right_side += v * (w * s.inverse_distance);
         }
         // The wish to be parallel: q's x and y are zero.

@@ -4,9 +4,8 @@ mod ground;
 
 use crate::cloud::{geometric_median, isolated_points, median};
 use crate::{Mesh, Plane, SparsePoint};
-use calibrate::View;
+use calibrate::{View, outer, principal_axes};
 use glam::{DMat3, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen};
 
 /// The dome's radius as a multiple of how far nearly all points are from the cameras'
 /// middle: what lies there moves against the horizon by 6° at most between any two of them.
@@ -170,17 +169,11 @@ fn axes(center: DVec3, points: &[DVec3]) -> DMat3 {
     let (mut spread, mut mean) = (DMat3::ZERO, DVec3::ZERO);
     for point in points {
         let d = direction(*point - center);
-        spread += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        spread += outer(d);
         mean += d;
     }
-    let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&spread.to_cols_array()));
-    let mut order = [0, 1, 2];
-    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let [x, y] = [order[0], order[1]].map(|k| {
-        let axis = eigen.eigenvectors.column(k);
-        let axis = DVec3::new(axis[0], axis[1], axis[2]);
-        if axis.dot(mean) < 0.0 { -axis } else { axis }
-    });
+    let [x, y, _] =
+        principal_axes(spread).map(|(_, axis)| if axis.dot(mean) < 0.0 { -axis } else { axis });
     DMat3::from_cols(x, y, x.cross(y))
 }
 

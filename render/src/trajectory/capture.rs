@@ -3,9 +3,8 @@
 use super::{PI, Standing, gaze};
 use crate::lumigraph::SourceView;
 use crate::path::{fitted_rotation, mean_rotation};
-use calibrate::{Rigid3, View};
+use calibrate::{Rigid3, View, outer, principal_axes};
 use glam::{DMat3, DQuat, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen};
 use proxy::{Proxy, geometric_median};
 
 /// Positions here are relative to the reference camera's centre, axes are the world's.
@@ -72,14 +71,13 @@ impl Capture {
         // signs by it and by its y axis.
         let mean = centers.iter().sum::<DVec3>() / centers.len() as f64;
         let right = rotation.conjugate() * DVec3::X;
-        let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
         let mut covariance = DMat3::ZERO;
         for c in &centers {
             covariance += outer(*c - mean);
         }
         let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
         covariance += outer(right) * (0.01 * trace);
-        let mut axes = eigenvectors(covariance).map(|(_, v)| v);
+        let mut axes = principal_axes(covariance).map(|(_, v)| v);
         let signed = |v: DVec3, like: DVec3| if v.dot(like) < 0.0 { -v } else { v };
         axes[0] = signed(axes[0], right + 0.5 * forward);
         axes[1] = signed(axes[1], rotation.conjugate() * (DVec3::Y + 0.5 * DVec3::Z));
@@ -193,11 +191,11 @@ impl Capture {
         // 1. The place nearest to all optical axes: Σ (I − ddᵀ)(x − c) = 0.
         let (mut a, mut b) = (DMat3::ZERO, DVec3::ZERO);
         for (d, c) in forwards.iter().zip(&self.centers) {
-            let across = DMat3::IDENTITY - DMat3::from_cols(*d * d.x, *d * d.y, *d * d.z);
+            let across = DMat3::IDENTITY - outer(*d);
             a += across;
             b += across * *c;
         }
-        let [_, _, (smallest, _)] = eigenvectors(a);
+        let [_, _, (smallest, _)] = principal_axes(a);
         if !self.has_extent || smallest < 0.05 * count {
             return None; // Their axes are all but parallel.
         }
@@ -338,17 +336,6 @@ pub(super) fn nearest(centers: &[DVec3], to: DVec3) -> usize {
     distances()
         .position(|d| d <= nearest * (1.0 + 1e-6))
         .unwrap_or(0)
-}
-
-/// Eigenvalues and vectors of a symmetric matrix, the largest first.
-fn eigenvectors(m: DMat3) -> [(f64, DVec3); 3] {
-    let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&m.to_cols_array()));
-    let mut pairs = [0, 1, 2].map(|i| {
-        let v = eigen.eigenvectors.column(i);
-        (eigen.eigenvalues[i], DVec3::new(v[0], v[1], v[2]))
-    });
-    pairs.sort_by(|x, y| y.0.total_cmp(&x.0));
-    pairs
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -1,6 +1,6 @@
 //! Photos as they stand upright: as most of a capture do, where some were taken with the camera turned.
 
-use calibrate::View;
+use calibrate::{View, outer};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;
 
@@ -111,9 +111,7 @@ fn looks_down(rotation: DQuat, up: DVec3) -> bool {
 
 /// The sum of r rᵀ over right axes of photos.
 fn squares(rights: impl Iterator<Item = DVec3>) -> DMat3 {
-    rights.fold(DMat3::ZERO, |sum, r| {
-        sum + DMat3::from_cols(r * r.x, r * r.y, r * r.z)
-    })
+    rights.fold(DMat3::ZERO, |sum, r| sum + outer(r))
 }
 
 /// A camera turned about its optical axis, from x towards y.
