@@ -81,6 +81,27 @@ pub(super) struct Estimate {
     /// A direction that far more lies across, where up is taken to be y for no other reason than habit, and rooms
     /// would not be as high as most or far more may be floor.
     pub(super) rival: Option<DVec3>,
+    /// A direction that more lies across, where up is so taken: to be told if rooms have little of the model.
+    pub(super) better: Option<DVec3>,
+}
+
+/// Up, and what speaks against it.
+struct Upward {
+    up: DVec3,
+    /// See [`Estimate`].
+    rival: Option<DVec3>,
+    better: Option<DVec3>,
+}
+
+impl Upward {
+    /// Against which nothing speaks.
+    fn sure(up: DVec3) -> Self {
+        Self {
+            up,
+            rival: None,
+            better: None,
+        }
+    }
 }
 
 pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Estimate, FindError> {
@@ -104,7 +125,7 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Est
     if facets.is_empty() {
         return Err(FindError::NoSurface);
     }
-    let (up, rival) = up(&facets, evidence, options);
+    let Upward { up, rival, better } = up(&facets, evidence, options);
     let up = as_world_axis(up);
     let (height, has_floor) = floor(&facets, up, base, evidence, options);
     if !has_floor {
@@ -120,6 +141,7 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Est
     Ok(Estimate {
         level,
         rival: rival.map(as_world_axis),
+        better: better.map(as_world_axis),
     })
 }
 
@@ -218,13 +240,15 @@ fn is_doubtful(
 
 /// Up: given, as cameras had it, or the direction that most floor lies across; y, if that is
 /// about as good, and then the best one, if that is far better.
-fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, Option<DVec3>) {
+fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> Upward {
     let bin = BIN * options.meter;
     if let Some(up) = options.up.and_then(DVec3::try_normalize) {
         return match refined(facets, up) {
             // What was said is meant, but nobody says it to the last digit.
-            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => (near, None),
-            _ => (up, None),
+            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => {
+                Upward::sure(near)
+            }
+            _ => Upward::sure(up),
         };
     }
     // 1. The best direction: of normals of large areas, each tried once.
@@ -254,16 +278,20 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, O
     let near = refined(facets, hint);
     let area = level_area(facets, near, bin);
     if near.dot(hint) > 0.9 && area >= TRUST * best.1 {
-        let is_doubtful =
-            evidence.cameras.is_empty() && is_doubtful(facets, (near, area), best, options.meter);
-        return (near, is_doubtful.then_some(best.0));
+        let by_habit = evidence.cameras.is_empty();
+        let is_doubtful = by_habit && is_doubtful(facets, (near, area), best, options.meter);
+        return Upward {
+            up: near,
+            rival: is_doubtful.then_some(best.0),
+            better: (by_habit && best.1 > DOUBT * area).then_some(best.0),
+        };
     }
     if agreed && !evidence.cameras.is_empty() {
         let up = match best.0.dot(hint) {
             cos if cos.abs() > 0.7 => best.0 * cos.signum(),
             _ => hint,
         };
-        return (up, None);
+        return Upward::sure(up);
     }
     // 3. Things stand on the floor: more is below the middle than above.
     let direction = best.0;
@@ -280,7 +308,7 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, O
     });
     let (area, moment) = between.fold((0.0, 0.0), |(s, m), (a, at)| (s + a, m + a * at));
     let is_down = area > 0.0 && moment / area > 0.5 * (low + high);
-    (if is_down { -direction } else { direction }, None)
+    Upward::sure(if is_down { -direction } else { direction })
 }
 
 /// The floor's height over the base: the fullest level surface, under the cameras or in the

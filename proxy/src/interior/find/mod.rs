@@ -174,7 +174,11 @@ pub fn find_interior(
         return Err(FindError::Option(name, *value));
     }
     // 1. Where the floor is.
-    let level::Estimate { level, rival } = level::estimate(evidence, options)?;
+    let level::Estimate {
+        level,
+        rival,
+        better,
+    } = level::estimate(evidence, options)?;
     // 2. What is free over it.
     let columns = Columns::new(evidence, &level, options)?;
     // 3. Rooms, and the holes between them.
@@ -191,7 +195,10 @@ pub fn find_interior(
             asked: options.cell_size,
         });
     }
-    if let Some(rival) = rival {
+    // Rooms have most of a house that stands upright.
+    let count = evidence.mesh.triangles.len();
+    let has_little = || 2 * in_rooms(evidence, &interior, options.meter) < count;
+    if let Some(rival) = rival.or_else(|| better.filter(|_| has_little())) {
         // Either way round; no zeros below 0.
         let rival = rival.dot(DVec3::ONE).signum() * rival + DVec3::ZERO;
         warnings.push(InteriorWarning::OnItsSide(rival));
@@ -229,6 +236,26 @@ pub fn find_interior(
         plan,
         ceiling: columns.ceiling.map(|height| height * options.meter),
     })
+}
+
+/// How far from a room's box what is in its walls may lie, in metres.
+const IN_WALL: f64 = 0.5;
+
+/// How many triangles have their middle in a room, or in its walls.
+fn in_rooms(evidence: &Evidence, interior: &Interior, meter: f64) -> usize {
+    let rooms: Vec<_> = interior
+        .cells
+        .iter()
+        .filter_map(|cell| cell.content.room())
+        .collect();
+    let is_in_one = |i: &usize| {
+        let [a, b, c] = evidence.mesh.corners(*i);
+        let middle = (a + b + c) / 3.0;
+        rooms
+            .iter()
+            .any(|room| room.distance(middle) <= IN_WALL * meter)
+    };
+    (0..evidence.mesh.triangles.len()).filter(is_in_one).count()
 }
 
 /// Eyes are this high where no camera says otherwise, in metres.
