@@ -77,6 +77,7 @@ fn shelf() -> Lumigraph {
         view: p.view.clone(),
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     Lumigraph {
         points: Vec::new(),

@@ -20,6 +20,7 @@ fn lumigraph(dataset: &Dataset) -> Lumigraph {
         view: p.view.clone(),
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let views: Vec<View> = dataset.photos.iter().map(|p| p.view.clone()).collect();
     let points = dataset.reconstruction.points.values();

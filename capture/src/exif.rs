@@ -48,6 +48,23 @@ pub fn read_exif(path: &Path) -> Result<Exif, CaptureError> {
     })
 }
 
+/// By how many quarters, clockwise, what is stored is turned to be shown as an orientation says; mirrored or not.
+///
+/// ```
+/// # use capture::quarters_of;
+/// assert_eq!([1, 6, 3, 8].map(quarters_of), [0, 1, 2, 3]);
+/// // Mirrored across before: what is left above is where it is right above in those.
+/// assert_eq!([2, 5, 4, 7].map(quarters_of), [0, 1, 2, 3]);
+/// ```
+pub fn quarters_of(orientation: u8) -> u8 {
+    match orientation {
+        5 | 6 => 1,
+        3 | 4 => 2,
+        7 | 8 => 3,
+        _ => 0,
+    }
+}
+
 /// `2012:07:01 12:34:56`; a clock that was never set says `0000:00:00 00:00:00`.
 fn seconds(text: &str) -> Option<f64> {
     let numbers: Vec<u32> = text

@@ -33,7 +33,7 @@ pub use beside::{
 };
 pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;
-pub use exif::{Exif, read_exif};
+pub use exif::{Exif, quarters_of, read_exif};
 pub use photo_set::{
     PhotoFile, PhotoSet, find_photos_folder, find_photos_within, has_photo_extension,
 };

@@ -14,6 +14,8 @@ pub struct SourceView {
     pub gain: [f64; 3],
     /// When it was taken, in seconds from any moment common to all; where known.
     pub time_s: Option<f64>,
+    /// By how many quarters, clockwise, the photo is turned when it is shown as its camera says: 0 to 3.
+    pub quarters: u8,
 }
 
 /// An unstructured lumigraph: everything a view is rendered from.

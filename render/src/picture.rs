@@ -131,6 +131,7 @@ mod tests {
             view: view(DVec3::new(x, 0.0, 0.0), 40, 30),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         let wall = Plane::new(DVec3::new(0.0, 0.0, 4.0), DVec3::Z).unwrap();
         Lumigraph {

@@ -469,6 +469,7 @@ mod tests {
             view: ahead(DVec3::X * x, Distortion::None),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         let point = |i: i32| SparsePoint {
             position: DVec3::new(-30.0, 0.2 * f64::from(i), 5.0),

@@ -103,6 +103,7 @@ pub fn lumigraph(kind: Surroundings, count: usize, photo_size: (u32, u32)) -> Lu
         },
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let sources: Vec<SourceView> = (0..count).map(source).collect();
     let proxy = kind.proxy();

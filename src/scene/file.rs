@@ -106,6 +106,9 @@ pub struct PhotoEntry {
     /// The nearest and farthest depth along z that it shows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_bounds: Option<[f64; 2]>,
+    /// EXIF's orientation of its stored pixels, 1 to 8; absent where nothing says that they are turned or mirrored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<u8>,
     /// Everything else.
     #[serde(flatten)]
     pub other: Extra,

@@ -143,6 +143,7 @@ impl Scene {
             named: named.as_ref(),
         };
         let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        turned::set(&mut scene.photos, &taken);
         warnings.extend(turned::note(&scene.photos, &taken));
 
         // 3. Are they what was calibrated?
@@ -206,6 +207,7 @@ impl Scene {
             time_s: None,
             gain: None,
             depth_bounds: bounds.get(name.as_str()).copied(),
+            orientation: None,
             other: Extra::new(),
         };
         Self {

@@ -83,6 +83,7 @@ impl Scene {
                 view: view.resized(reduced.0, reduced.1),
                 gain: photo.gain.unwrap_or([1.0; 3]),
                 time_s: photo.time_s,
+                quarters: photo.orientation.map_or(0, capture::quarters_of),
             });
         }
         if sources.is_empty() {

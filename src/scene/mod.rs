@@ -121,6 +121,8 @@ pub struct Photo {
     pub gain: Option<[f64; 3]>,
     /// The nearest and farthest depth along z that it shows, where the calibration says.
     pub depth_bounds: Option<[f64; 2]>,
+    /// EXIF's orientation of its stored pixels, where that is not upright.
+    pub orientation: Option<u8>,
     /// What `scene.json` says beyond this version's keys.
     pub other: Extra,
 }

@@ -107,6 +107,7 @@ impl Scene {
                 time_s: entry.time_s,
                 gain: entry.gain,
                 depth_bounds: entry.depth_bounds,
+                orientation: entry.orientation,
                 other: entry.other,
                 name: entry.name,
             });
@@ -335,6 +336,7 @@ impl Scene {
                 time_s: photo.time_s,
                 gain: photo.gain,
                 depth_bounds: photo.depth_bounds,
+                orientation: photo.orientation,
                 other: photo.other.clone(),
             })
         };

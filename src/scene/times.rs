@@ -35,14 +35,17 @@ pub(super) struct Clues<'a> {
 }
 
 /// Gives the photos their times. Where some have none, a note says so: at a moment they take no part. What cameras wrote
-/// into the photos comes back, where that had to be read, in their order; else nothing.
+/// into the photos comes back, in their order.
 pub(super) fn set_times(
     photos: &mut [Photo],
     source: &TimeSource,
     clues: &Clues<'_>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Exif>, SceneError> {
-    let mut taken = Vec::new();
+    let read = photos.iter();
+    let taken: Vec<Exif> = read
+        .map(|p| read_exif(&p.path).unwrap_or_default())
+        .collect();
     let own = clues.capture.join(TIMES_FILE);
     let times: Times = match source {
         TimeSource::List(file) => from_list(photos, file, clues, warnings)?,
@@ -50,13 +53,7 @@ pub(super) fn set_times(
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
         TimeSource::Found => match from_calibration(photos, clues, warnings) {
             Some(times) => times,
-            None => {
-                let read = photos.iter();
-                taken = read
-                    .map(|p| read_exif(&p.path).unwrap_or_default())
-                    .collect();
-                from_photos(photos, &taken, warnings)
-            }
+            None => from_photos(photos, &taken, warnings),
         },
     };
     for (photo, time_s) in photos.iter_mut().zip(times) {

@@ -5,7 +5,7 @@ use super::{Photo, Warning};
 use capture::Exif;
 
 /// Says which photos are stored turned or mirrored, for people; `None` where none is known to be. `taken` is what
-/// cameras wrote into each of them, or nothing where that was not read.
+/// cameras wrote into each of them.
 pub(super) fn text(photos: &[Photo], taken: &[Exif]) -> Option<String> {
     let mut turned = photos.iter().zip(taken).filter_map(|(photo, exif)| {
         let orientation = exif.orientation.filter(|o| *o != 1)?;
@@ -19,13 +19,20 @@ pub(super) fn text(photos: &[Photo], taken: &[Exif]) -> Option<String> {
     ))
 }
 
-/// The same, with what comes of it and what to do.
+/// The same, with what comes of it.
 pub(super) fn note(photos: &[Photo], taken: &[Exif]) -> Option<Warning> {
     let text = text(photos, taken)?;
     Some(Warning::Note(format!(
-        "{text}: their pixels are used as stored, so that what is upright may lie on its side; `mogrify -auto-orient`, \
-         before they are calibrated, stands them upright"
+        "{text}: their pixels are used as stored, of which calibrations speak; paths derived from them and the \
+         window stand upright as they do when they are shown turned"
     )))
+}
+
+/// Lets photos know how they are stored.
+pub(super) fn set(photos: &mut [Photo], taken: &[Exif]) {
+    for (photo, exif) in photos.iter_mut().zip(taken) {
+        photo.orientation = exif.orientation.filter(|orientation| *orientation != 1);
+    }
 }
 
 #[cfg(test)]

@@ -58,6 +58,7 @@ impl Scene {
             named: None,
         };
         let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        turned::set(&mut scene.photos, &taken);
         let turned = turned::text(&scene.photos, &taken);
         warnings.extend(turned::note(&scene.photos, &taken));
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);

@@ -179,7 +179,8 @@ impl Space {
     pub fn of_scene(lumigraph: &Lumigraph) -> Self {
         let views: Vec<&View> = lumigraph.sources.iter().map(|s| &s.view).collect();
         // Photos taken with the camera turned say no less which way is up.
-        let up = upright(&views).up;
+        let shown = lumigraph.sources.iter().map(|s| (&s.view, s.quarters));
+        let up = upright(&shown.collect::<Vec<_>>()).up;
         let count = views.len().max(1) as f64;
         let middle = views.iter().map(|v| v.center()).sum::<DVec3>() / count;
         let reach = |v: &&View| v.center().distance(middle);
@@ -408,6 +409,7 @@ pub(crate) mod tests {
                 },
                 gain: [1.0; 3],
                 time_s: None,
+                quarters: 0,
             }
         };
         let lumigraph = Lumigraph {

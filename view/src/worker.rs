@@ -426,6 +426,7 @@ mod tests {
             view: view(x),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         let photo = |red: u8| RgbaImage::from_fn(40, 30, |x, y| Rgba([red, x as u8, y as u8, 255]));
         Arc::new(Lumigraph {

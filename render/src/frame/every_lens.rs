@@ -108,6 +108,7 @@ pub(crate) fn lumigraph() -> Lumigraph {
                 view,
                 gain: [1.0; 3],
                 time_s: None,
+                quarters: 0,
             }),
         );
     }

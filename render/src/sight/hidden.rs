@@ -352,6 +352,7 @@ mod tests {
             view: view(*x),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         let sources: Vec<SourceView> = places.iter().map(source).collect();
         let photo = RgbaImage::new(SIZE.0, SIZE.1);

@@ -64,7 +64,8 @@ const ORBIT_POINTS: usize = 720;
 /// `points_in_world` are the sparse points, or nothing. All frames have one camera: a
 /// pinhole with the median focal length of the source views, their most common image
 /// size, and the principal point in its centre. The path of a capture of one place, or of one photo, stands
-/// still. Photos that were taken with the camera turned count as if they stood as most do; see [`upright()`].
+/// still. Photos stand as their cameras say ([`SourceView::quarters`]), and those taken with the camera turned
+/// count as if they stood as most do; see [`upright()`].
 /// What a photo looks at is in its middle, wherever its principal point is.
 /// Photos whose cameras are misplaced by far do not count.
 ///
@@ -88,7 +89,8 @@ pub fn derive(
 
     let sources = without_strays(sources, points_in_world, proxy);
     let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
-    let mut standing = upright(&views);
+    let shown = sources.iter().map(|s| (&s.view, s.quarters));
+    let mut standing = upright(&shown.collect::<Vec<_>>());
     for (photo, view) in standing.photos.iter_mut().zip(&views) {
         photo.rotation = gaze::centered(view, photo.rotation);
     }

@@ -22,6 +22,7 @@ fn source(i: usize, camera_from_world: Rigid3) -> SourceView {
         },
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     }
 }
 

@@ -54,25 +54,51 @@ const MOST_GUESSES: usize = 64;
 /// Two directions that photos' mean gaze differs from by so much less, as cosines, are told apart by it.
 const DOWNWARD: f64 = 0.05;
 
-/// All photos of a capture as they stand upright, by index.
+/// A photo as its camera says that it is shown.
+struct Shown {
+    /// `camera_from_world`.
+    rotation: DQuat,
+    center: DVec3,
+}
+
+impl Shown {
+    fn right(&self) -> DVec3 {
+        self.rotation.conjugate() * DVec3::X
+    }
+
+    fn up(&self) -> DVec3 {
+        self.rotation.conjugate() * DVec3::NEG_Y
+    }
+
+    fn forward(&self) -> DVec3 {
+        self.rotation.conjugate() * DVec3::Z
+    }
+}
+
+/// All photos of a capture as they stand upright, by index; of each by how many quarters, clockwise, its camera says
+/// that it is turned when it is shown ([`SourceView::quarters`](crate::SourceView::quarters)).
 ///
-/// Most photos decide which way that is. Where they stand alike nothing is turned, whichever way they do; nor
+/// Of photos that are turned so most decide which way is up. Where they stand alike no other turn is made, whichever way they do; nor
 /// where no way is that of half of them, as from above, heading in all directions. Whether the world's
 /// axes are turned, and in which order photos come, makes no difference; but of two halves that nothing else tells
 /// apart, that of the photo in the middle stands, or of the first of two there. Beside photos from all around that
 /// share a vertical those that look straight down change nothing, however many they are.
-pub fn upright(views: &[&View]) -> Standing {
-    let vertical = shared_vertical(views);
-    let stand = |view: &&View| {
-        let rotation = view.camera_from_world.rotation;
-        let turn = vertical.and_then(|up| quarters(rotation, up));
+pub fn upright(photos: &[(&View, u8)]) -> Standing {
+    let show = |(view, turn): &(&View, u8)| Shown {
+        rotation: turned(view.camera_from_world.rotation, *turn),
+        center: view.center(),
+    };
+    let shown: Vec<Shown> = photos.iter().map(show).collect();
+    let vertical = shared_vertical(&shown);
+    let stand = |(shown, (_, own)): (&Shown, &(&View, u8))| {
+        let turn = vertical.and_then(|up| quarters(shown.rotation, up));
         let turn = turn.unwrap_or(0);
         Upright {
-            rotation: turned(rotation, turn),
-            sides_exchanged: !turn.is_multiple_of(2),
+            rotation: turned(shown.rotation, turn),
+            sides_exchanged: !(own + turn).is_multiple_of(2),
         }
     };
-    let photos: Vec<Upright> = views.iter().map(stand).collect();
+    let photos: Vec<Upright> = shown.iter().zip(photos).map(stand).collect();
     let mean = || {
         let ups = photos.iter().map(Upright::up).sum::<DVec3>();
         ups / photos.len().max(1) as f64
@@ -193,16 +219,13 @@ impl Vote {
 
 /// The vertical that most photos have, upwards as half of them or more are; `None` where there is no such
 /// direction.
-fn shared_vertical(views: &[&View]) -> Option<DVec3> {
-    let rotations: Vec<DQuat> = views
-        .iter()
-        .map(|view| view.camera_from_world.rotation)
-        .collect();
-    let ahead = views.iter().map(|view| view.forward()).sum::<DVec3>();
-    let ahead = ahead / views.len().max(1) as f64;
+fn shared_vertical(photos: &[Shown]) -> Option<DVec3> {
+    let rotations: Vec<DQuat> = photos.iter().map(|photo| photo.rotation).collect();
+    let ahead = photos.iter().map(Shown::forward).sum::<DVec3>();
+    let ahead = ahead / photos.len().max(1) as f64;
     let mut best: Option<Vote> = None;
     let mut tried: Vec<DVec3> = Vec::new();
-    for guess in guesses(views) {
+    for guess in guesses(photos) {
         let is_known = |other: &DVec3| other.dot(guess).abs() > SAME_GUESS;
         if tried.iter().any(is_known) {
             continue;
@@ -217,7 +240,7 @@ fn shared_vertical(views: &[&View]) -> Option<DVec3> {
                 best = Some(vote);
             }
         }
-        let is_all = |vote: &Vote| vote.by_quarters[0] == views.len();
+        let is_all = |vote: &Vote| vote.by_quarters[0] == photos.len();
         if best.as_ref().is_some_and(is_all) || tried.len() == MOST_GUESSES {
             break;
         }
@@ -225,33 +248,29 @@ fn shared_vertical(views: &[&View]) -> Option<DVec3> {
     let is_shared = |vote: &Vote| {
         vote.is_upright()
             && 2 * vote.by_quarters[0] >= vote.clear()
-            && 2 * vote.explained() >= views.len()
+            && 2 * vote.explained() >= photos.len()
     };
     best.filter(is_shared).map(|vote| vote.up)
 }
 
 /// Directions that may be the vertical: first that of the mean of all ups; then, from the photos in the middle
 /// outwards, what is level in two of them, and up or aside in one.
-fn guesses(views: &[&View]) -> Vec<DVec3> {
-    let axis = |axis: DVec3| {
-        let axes = views.iter();
-        axes.map(move |view| view.camera_from_world.rotation.conjugate() * axis)
-            .collect::<Vec<DVec3>>()
-    };
-    let (rights, ups) = (axis(DVec3::X), axis(DVec3::NEG_Y));
+fn guesses(photos: &[Shown]) -> Vec<DVec3> {
+    let rights: Vec<DVec3> = photos.iter().map(Shown::right).collect();
+    let ups: Vec<DVec3> = photos.iter().map(Shown::up).collect();
 
-    let first = views.first().map_or(DVec3::ZERO, |view| view.center());
-    let centers: Vec<DVec3> = views.iter().map(|view| view.center() - first).collect();
-    let middle = centers.iter().sum::<DVec3>() / views.len().max(1) as f64;
+    let first = photos.first().map_or(DVec3::ZERO, |photo| photo.center);
+    let centers: Vec<DVec3> = photos.iter().map(|photo| photo.center - first).collect();
+    let middle = centers.iter().sum::<DVec3>() / photos.len().max(1) as f64;
     let distances: Vec<f64> = centers.iter().map(|c| c.distance(middle)).collect();
     let farthest = distances.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     // Those that are equally near but for rounding stay in their order.
     let nearness = |i: usize| (1e6 * (distances[i] / farthest)).round();
-    let mut outwards: Vec<usize> = (0..views.len()).collect();
+    let mut outwards: Vec<usize> = (0..photos.len()).collect();
     outwards.sort_by(|i, j| nearness(*i).total_cmp(&nearness(*j)));
 
     let direction = |v: DVec3| (v.length() > 1e-9).then(|| v.normalize());
-    let mut guesses = Vec::with_capacity(3 * views.len() + 2);
+    let mut guesses = Vec::with_capacity(3 * photos.len() + 2);
     guesses.extend(direction(ups.iter().sum()));
     guesses.extend(direction(rights.iter().sum()));
     for (place, &i) in outwards.iter().enumerate() {
@@ -331,8 +350,13 @@ mod tests {
         (0..count).map(|i| view(pose(i))).collect()
     }
 
+    /// Of photos whose cameras say nothing.
+    fn stand(views: &[View]) -> Standing {
+        upright(&views.iter().map(|view| (view, 0)).collect::<Vec<_>>())
+    }
+
     fn all(views: &[View]) -> Vec<Upright> {
-        upright(&views.iter().collect::<Vec<_>>()).photos
+        stand(views).photos
     }
 
     fn roll(views: &mut [View], which: impl IntoIterator<Item = usize>, quarters: u8) {
@@ -358,6 +382,35 @@ mod tests {
             let same = found.rotation.dot(view.camera_from_world.rotation).abs();
             assert!((same - 1.0).abs() < 1e-12, "{what}: {i}");
         }
+    }
+
+    #[test]
+    fn photos_that_all_lie_on_their_side_stand_as_their_cameras_say() {
+        for quarters in 0..4 {
+            let straight = ring(12, 0.3, TAU);
+            let mut stored = straight.clone();
+            // Shown clockwise turned: stored counter-clockwise.
+            roll(&mut stored, 0..12, (4 - quarters) % 4);
+            let said: Vec<(&View, u8)> = stored.iter().map(|view| (view, quarters)).collect();
+            assert_stand(&upright(&said), &straight, quarters);
+            // One of them is wrong about itself.
+            let mut wrong = said.clone();
+            wrong[5].1 = (quarters + 1) % 4;
+            assert_stand(&upright(&wrong), &straight, quarters);
+        }
+    }
+
+    fn assert_stand(standing: &Standing, straight: &[View], quarters: u8) {
+        assert_alike(&standing.photos, straight, &format!("{quarters}"));
+        let up = standing.up.unwrap();
+        assert!(up.distance(DVec3::NEG_Y) < 1e-6, "{quarters}: {up}");
+        let exchanged = !quarters.is_multiple_of(2);
+        assert!(
+            standing
+                .photos
+                .iter()
+                .all(|photo| photo.sides_exchanged == exchanged)
+        );
     }
 
     #[test]
@@ -399,7 +452,7 @@ mod tests {
                         Rigid3::new(lean, DVec3::ZERO) * view.camera_from_world;
                 }
                 let off = |views: &[View]| {
-                    let up = upright(&views.iter().collect::<Vec<_>>()).up.unwrap();
+                    let up = stand(views).up.unwrap();
                     up.angle_between(DVec3::NEG_Y).to_degrees()
                 };
                 // The mean of their ups is some 50° off in the worst of these.
@@ -506,7 +559,7 @@ mod tests {
                     let mut rolled = straight.clone();
                     roll(&mut rolled, (0..24).step_by(5), 1);
                     for views in [&straight, &rolled] {
-                        let found = upright(&views.iter().collect::<Vec<_>>());
+                        let found = stand(views);
                         let what = format!("{elevation} {count} {headings}");
                         let off = found.up.unwrap().angle_between(DVec3::NEG_Y);
                         assert!(off.to_degrees() < 0.1, "{what}: {off}");

@@ -29,6 +29,7 @@ fn lumigraph(photos: [(f64, Lens); 2], proxy: Proxy) -> Lumigraph {
         view: view(x, lens, [160, 120]),
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let sources = photos.map(source).to_vec();
     let photo = |color: [u8; 4]| RgbaImage::from_pixel(160, 120, Rgba(color));

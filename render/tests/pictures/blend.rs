@@ -21,6 +21,7 @@ fn lumigraph(views: Vec<View>, plane: Plane) -> Lumigraph {
         view,
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     Lumigraph {
         points: Vec::new(),

@@ -401,6 +401,7 @@ fn capture(name: &str) -> Option<Lumigraph> {
             },
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         }
     });
     let sources: Vec<SourceView> = sources.collect();
@@ -725,6 +726,7 @@ fn crowd() -> (Lumigraph, View) {
         view: view.clone(),
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let desired = views[0].between(&views[4], 0.3).resized(101, 75);
     let lumigraph = Lumigraph {

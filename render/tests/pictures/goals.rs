@@ -23,6 +23,7 @@ fn lumigraph(views: Vec<View>, proxy: Proxy) -> Lumigraph {
         view,
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let sources: Vec<SourceView> = views.into_iter().enumerate().map(source).collect();
     Lumigraph {

@@ -87,6 +87,7 @@ impl Capture {
             view: view.clone(),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         let sources: Vec<SourceView> = self.photos.iter().enumerate().map(source).collect();
         let solid = Solid::new(MeshKind::Depth, self.house.model.mesh.clone());

@@ -132,6 +132,7 @@ impl Taken {
             view: view.clone(),
             gain: [gain(i); 3],
             time_s: None,
+            quarters: 0,
         });
         let exposed = photos.map(|(i, (_, pixels, _))| {
             let mut pixels = pixels.clone();

@@ -60,6 +60,7 @@ fn shot() -> Shot {
         view: view(0.5 * i as f64, 2.0),
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     Shot {
         photos: (0..COUNT).map(photo).collect(),

@@ -116,6 +116,7 @@ fn lumigraph_from(
         view,
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     let sources: Vec<SourceView> = views.into_iter().enumerate().map(source).collect();
     let proxy = Proxy::Mesh(Arc::clone(solid));

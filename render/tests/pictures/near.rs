@@ -21,6 +21,7 @@ fn lumigraph(views: Vec<View>, random: &mut Random) -> Lumigraph {
         view,
         gain: [1.0; 3],
         time_s: (random.within(0.0, 1.0) < 0.9).then(|| random.within(0.0, 1.0)),
+        quarters: 0,
     };
     Lumigraph {
         points: Vec::new(),

@@ -30,6 +30,7 @@ impl Shot {
             view: view.clone(),
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         };
         Lumigraph {
             sources: self.views.iter().enumerate().map(source).collect(),

@@ -115,6 +115,7 @@ impl Case {
             view,
             gain: [1.0; 3],
             time_s: None,
+            quarters: 0,
         });
         let sources: Vec<SourceView> = named.collect();
         let proxy = moved(proxy, placement);

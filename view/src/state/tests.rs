@@ -24,6 +24,7 @@ fn wall() -> Content {
         },
         gain: [1.0; 3],
         time_s: None,
+        quarters: 0,
     };
     Content::Scene(Arc::new(Lumigraph {
         points: Vec::new(),

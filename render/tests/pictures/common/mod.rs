@@ -145,6 +145,7 @@ impl Shot {
             view: view.clone(),
             gain: [1.0; 3],
             time_s: self.dataset.photos[i].time_s,
+            quarters: 0,
         };
         self.views.iter().enumerate().map(source).collect()
     }
