@@ -279,6 +279,10 @@ fn what_is_no_video_is_refused() {
         error("a.png"),
         VideoError::NoVideo { frames: 1, .. }
     ));
+    // Of which ffmpeg draws the letters, frame by frame.
+    let lines: Vec<String> = (0..400).map(|i| format!("photo number {i}\n")).collect();
+    fs::write(here.path().join("list.txt"), lines.concat()).unwrap();
+    assert!(matches!(error("list.txt"), VideoError::Text { .. }));
     assert!(!photos.exists() && !here.path().join(".photos.partial").exists());
 }
 

@@ -28,6 +28,15 @@ pub enum VideoError {
         /// What it says.
         source: ToolError,
     },
+    /// A text, which ffmpeg would draw letter by letter.
+    #[error(
+        "{}: a text, not a video; give a video, or a folder of photos",
+        path.display()
+    )]
+    Text {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file with too few frames.
     #[error(
         "{}: {frames} frames found, expected a video of two or more; for photos give their folder",

@@ -9,10 +9,14 @@ use std::path::Path;
 /// pixel in a full frame is often only its noise.
 const SCORED_SIDE: u32 = 480;
 
+/// What begins ffmpeg's line about a file that it takes for a terminal's text, by its name (`.txt`): pictures of letters
+/// are no photos.
+const OF_TEXT: &str = "[info] Input #0, tty, ";
+
 /// Decodes a video once, reduced, and scores every frame.
 ///
 /// # Errors
-/// `ffmpeg` is missing, or the file is nothing that it can decode.
+/// `ffmpeg` is missing, or the file is nothing that it can decode, or a text.
 pub fn scan(
     ffmpeg: &Tool,
     video: &Path,
@@ -70,8 +74,10 @@ fn scan_once(
     arguments.extend("-c:v pgm -f image2pipe pipe:1".split(' ').map(Into::into));
     let mut times_s: Vec<f64> = Vec::new();
     let mut log = Log::default();
+    let mut is_text = false;
     let mut on_line = |line: &str| {
         log.read(line);
+        is_text |= line.starts_with(OF_TEXT);
         let Some(time_s) = shown_at_s(line) else {
             return;
         };
@@ -89,6 +95,11 @@ fn scan_once(
         }
         Ok(scores)
     });
+    if is_text {
+        return Err(VideoError::Text {
+            path: video.to_owned(),
+        });
+    }
     let scores = scores.map_err(|source| match source {
         ToolError::Failed { .. } => VideoError::Decode {
             path: video.to_owned(),
