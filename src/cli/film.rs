@@ -82,22 +82,27 @@ impl FrameChoice {
         self.range.is_some()
     }
 
+    /// Fails where frames are asked for that a path of so many does not have.
+    pub(super) fn check_end(&self, count: usize) -> anyhow::Result<()> {
+        let Some(range) = self.range.as_ref().filter(|range| range.end > count) else {
+            return Ok(());
+        };
+        let all = self
+            .count
+            .map_or(String::new(), |count| format!("/{count}"));
+        let text = format!(
+            "--frames {}..{}{all}: the path has {count} frames",
+            range.start, range.end
+        );
+        Err(Usage(text).into())
+    }
+
     /// Keeps the frames that are to be drawn.
     pub(super) fn of<T>(&self, mut frames: Vec<T>) -> anyhow::Result<Vec<T>> {
+        self.check_end(frames.len())?;
         let Some(range) = &self.range else {
             return Ok(frames);
         };
-        let count = frames.len();
-        if range.end > count {
-            let all = self
-                .count
-                .map_or(String::new(), |count| format!("/{count}"));
-            let text = format!(
-                "--frames {}..{}{all}: the path has {count} frames",
-                range.start, range.end
-            );
-            return Err(Usage(text).into());
-        }
         frames.truncate(range.end);
         frames.drain(..range.start);
         Ok(frames)
@@ -376,6 +381,9 @@ mod tests {
         assert_eq!(part.count(30), 30);
         let of_derived = frame_choice("1..2/7").unwrap();
         assert_eq!(of_derived.count(30), 7);
+        assert!(of_derived.check_end(7).is_ok() && all(60).check_end(7).is_ok());
+        let beyond = frame_choice("3..5/4").unwrap().check_end(4).unwrap_err();
+        assert_eq!(beyond.to_string(), "--frames 3..5/4: the path has 4 frames");
         assert!(part.check(false).is_ok() && FrameChoice::default().check(false).is_ok());
         for count in [of_derived, all(60)] {
             assert!(count.check(true).is_ok() && count.check(false).is_err());

@@ -76,6 +76,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Of a path that is not there nobody can say how many frames it has.
     let asked = Asked::new(&args.views, &args.nerfstudio.frame()?)?;
     chosen.check(asked.is_derived())?;
+    if asked.is_derived() {
+        chosen.check_end(chosen.count(FRAMES) as usize)?;
+    }
     let file = args.views.path.as_ref().map(PathBuf::from);
     let file = file.filter(|_| !asked.is_derived());
     let read = args.views.views.as_ref().or(file.as_ref());

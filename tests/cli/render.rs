@@ -294,16 +294,14 @@ fn a_film_is_shared_resumed_and_made() {
     )
     .error(1);
     assert!(error.contains("without --resume"), "{error}");
-    let beyond = lumigraph(
-        folder.path(),
-        &format!("{render} --frames 5..7/6 -o beyond"),
-    );
-    assert_eq!(beyond.code, 2);
-    assert!(
-        beyond.stderr.contains("the path has 6 frames"),
-        "{}",
-        beyond.stderr
-    );
+    // Which is said before the scene is looked at.
+    for (part, count) in [("5..7/6", 6), ("2..99", 30)] {
+        let line = format!("render gone --path sweep --frames {part} -o beyond");
+        let beyond = lumigraph(folder.path(), &line);
+        assert_eq!(beyond.code, 2, "{part}");
+        let said = format!("--frames {part}: the path has {count} frames");
+        assert!(beyond.stderr.contains(&said), "{}", beyond.stderr);
+    }
 }
 
 #[test]
