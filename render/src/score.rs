@@ -15,8 +15,8 @@ pub struct Score {
     #[serde(serialize_with = "capped")]
     pub psnr: f64,
     /// PSNR in dB over the whole picture when it is first given the photo's exposure: red,
-    /// green and blue are each multiplied by the factor that fits the covered pixels best, and not
-    /// rounded again.
+    /// green and blue are each multiplied by the factor that fits the covered pixels best, by least squares, and
+    /// then clipped at white, but not rounded again.
     #[serde(serialize_with = "capped")]
     pub psnr_exposed: f64,
     /// Structural similarity over the whole picture; 1 where it is identical.

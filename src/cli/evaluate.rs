@@ -23,7 +23,8 @@ use std::path::PathBuf;
 /// Score held-out photos: render each at its own pose and compare
 ///
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR once the
-/// picture is given the photo's own exposure (psnr_exposed), PSNR over the covered pixels,
+/// picture is given the photo's own exposure (psnr_exposed: channels are multiplied by what fits
+/// best by least squares, and then clipped at white), PSNR over the covered pixels,
 /// coverage (the mean alpha), the share of covered pixels among those that show sparse points
 /// which two or more other photos see (coverage_points), how far the photos that share a pixel
 /// are apart in steps of 255, details aside (seams), and processor time without decoding. There

@@ -213,6 +213,16 @@ fn the_help_says_along_which_side_a_grid_is_counted() {
 }
 
 #[test]
+fn the_help_says_that_exposed_pictures_are_clipped_at_white() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = lumigraph(folder.path(), "evaluate --help").ok();
+    let said: Vec<&str> = ran.stdout.split_whitespace().collect();
+    let said = said.join(" ");
+    let expected = "multiplied by what fits best by least squares, and then clipped at white)";
+    assert!(said.contains(expected), "{said}");
+}
+
+#[test]
 fn the_demo_ends_with_scores_and_files() {
     let folder = tempfile::tempdir().unwrap();
     let old = folder.path().join("lumigraph-demo");
