@@ -86,6 +86,26 @@ fn paths_go_to_nerfstudio_and_back() {
 }
 
 #[test]
+fn a_calibration_is_no_path_and_its_error_says_what_draws_its_poses() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "export wall --format transforms -o t.json").ok();
+    let render = "render wall --proxy plane --size 48x36";
+    for option in ["--views", "--path"] {
+        let error = lumigraph(here, &format!("{render} {option} t.json -o x")).error(1);
+        let said = "t.json: a calibration, not a path file; with its photos, `lumigraph import PHOTOS --calibration \
+                    t.json -o SCENE` and `lumigraph export SCENE --format colmap -o MODEL` make a model";
+        assert!(error.contains(said), "{error}");
+    }
+    lumigraph(here, "import wall/images --calibration t.json -o scene").ok();
+    lumigraph(here, "export scene --format colmap -o model").ok();
+    lumigraph(here, &format!("{render} --views model -o theirs")).ok();
+    lumigraph(here, &format!("{render} --views wall -o own")).ok();
+    let [own, theirs] = ["own", "theirs"].map(|folder| pixels(&here.join(folder).join("0003.png")));
+    assert!(most_apart(&own, &theirs) <= 1);
+}
+
+#[test]
 fn a_screenshot_is_a_path_wherever_one_is_read() {
     let folder = with_house();
     let here = folder.path();

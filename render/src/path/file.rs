@@ -4,11 +4,13 @@
 use super::nerfstudio::{self, NerfstudioFrame};
 use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
+use calibrate::formats::detect_content;
 use calibrate::{Camera, ModelKind, Rigid3};
-use capture::without_byte_order_mark;
+use capture::{as_argument, without_byte_order_mark};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// What is wrong with a path file.
@@ -21,8 +23,20 @@ pub enum PathFileError {
     #[error("{path}: cannot write: {error}", path = .0.display(), error = .1)]
     Write(PathBuf, std::io::Error),
     /// It is not the JSON that was expected.
-    #[error("{path}: not a path file: {error}", path = .0.display(), error = .1)]
+    #[error(
+        "{path}: not a path file: {error}; read are paths of this program (JSON, as `lumigraph path` writes), \
+         nerfstudio's camera_path.json, and screenshots of `lumigraph view`",
+        path = .0.display(), error = .1
+    )]
     Json(PathBuf, serde_json::Error),
+    /// It is a calibration.
+    #[error(
+        "{path}: a calibration, not a path file; with its photos, `lumigraph import PHOTOS --calibration {argument} \
+         -o SCENE` and `lumigraph export SCENE --format colmap -o MODEL` make a model, whose views `render --views \
+         MODEL` draws",
+        path = .0.display(), argument = as_argument(.0)
+    )]
+    Calibration(PathBuf),
     /// It is from a later version.
     #[error("{path}: path file version {found}; this program reads version 1", path = .0.display(), found = .1)]
     Version(PathBuf, u64),
@@ -170,7 +184,11 @@ pub(super) fn parse_own(
     struct Version {
         version: u64,
     }
-    let Version { version } = serde_json::from_slice(bytes).map_err(json)?;
+    let other = |error| match detect_content(Cursor::new(bytes)) {
+        Some(_) => PathFileError::Calibration(path.to_owned()),
+        None => json(error),
+    };
+    let Version { version } = serde_json::from_slice(bytes).map_err(other)?;
     if version != 1 {
         return Err(PathFileError::Version(path.to_owned(), version));
     }

@@ -269,6 +269,23 @@ fn bad_files_are_named() {
         )),
         "DIR/p.json: keyframe 0: missing field `t_s`, its time in seconds"
     );
+    // Trajectories and transforms.json, among others.
+    let other = message("0.5 1 2 3 0 0 0 1\n");
+    assert!(
+        other.starts_with("DIR/p.json: not a path file: "),
+        "{other}"
+    );
+    assert!(
+        other.contains("; read are paths of this program (JSON,"),
+        "{other}"
+    );
+    let calibration =
+        message(r#"{"camera_angle_x": 1, "frames": [{"file_path": "a", "transform_matrix": []}]}"#);
+    assert!(
+        calibration.starts_with("DIR/p.json: a calibration, not a path file; with its photos, ")
+            && calibration.contains("--calibration DIR/p.json -o SCENE` and `lumigraph export"),
+        "{calibration}"
+    );
     assert!(message("[").starts_with("DIR/p.json: not a path file: "));
     assert!(message(r#"{"fps": 3}"#).starts_with("DIR/p.json: not a path file: missing field"));
 }
