@@ -76,8 +76,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         written.iter().map(PathBuf::as_path),
         &inputs,
     )?;
-    if !is_file {
-        check_model_folder(&scene, output)?;
+    match is_file {
+        true => check_no_picture(output)?,
+        false => check_model_folder(&scene, output)?,
     }
     let whole = &scene.reconstruction;
     match args.format {
@@ -113,6 +114,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             _ => format!("{} points", whole.points.len()),
         }
     ))
+}
+
+/// What the names of pictures end in.
+const PICTURES: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+
+/// Fails where a file of text would be called as a picture, by which others know what it is.
+fn check_no_picture(output: &Path) -> Result<(), Usage> {
+    let end = output.extension().unwrap_or_default();
+    if !PICTURES.iter().any(|known| end.eq_ignore_ascii_case(known)) {
+        return Ok(());
+    }
+    let text = format!(
+        "-o {}: that is a picture's name, but this format is a text; choose another, as transforms.json or camera.yml",
+        output.display()
+    );
+    Err(Usage(text))
 }
 
 /// Fails where a COLMAP model would lie among the scene's photos, or with the model of any scene: of one in binary

@@ -238,6 +238,19 @@ fn nothing_that_belongs_to_a_scene_is_written_over() {
         "scene --format opencv -o sweep.mp4",
         "sweep.mp4: the scene is made of this very",
     );
+    // Nor is a text to be called as a picture, whoever's it is.
+    for name in ["new.png", "wall/copy.JPG", "new.jpeg", "new.webp"] {
+        for format in ["transforms", "opencv"] {
+            let ran = lumigraph(here, &format!("export scene --format {format} -o {name}"));
+            let said = format!("-o {name}: that is a picture's name");
+            assert!(
+                ran.code == 2 && ran.stderr.contains(&said),
+                "{}",
+                ran.stderr
+            );
+            assert!(!here.join(name).exists());
+        }
+    }
     // What is nobody's is.
     for _ in 0..2 {
         lumigraph(here, "export scene --format transforms -o wall/t.json").ok();
