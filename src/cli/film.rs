@@ -231,7 +231,7 @@ impl FilmArgs {
         }
     }
 
-    /// Which frames of a folder are there already: of `files`, which this run makes. `all` are those of
+    /// Which frames of a folder are there already, and whole: of `files`, which this run makes. `all` are those of
     /// the whole film, and `inputs` the files that frames are made of, over which none is written. Without
     /// `--resume` none counts as there.
     pub(super) fn begin(
@@ -247,8 +247,7 @@ impl FilmArgs {
             return Ok(vec![false; files.len()]);
         }
         kept::begin(folder, all, inputs)?;
-        // A frame appears complete or not at all.
-        Ok(files.iter().map(|f| f.exists()).collect())
+        Ok(files.iter().map(|file| kept::is_whole(file)).collect())
     }
 
     /// The photos without which frames of a folder are made, as a run found them damaged: by name, with what is
@@ -393,6 +392,23 @@ mod tests {
         ] {
             assert!(frame_choice(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn frames_that_are_cut_short_do_not_count_as_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let frame = folder.path().join("0.png");
+        assert!(!kept::is_whole(&frame));
+        capture::write_png(&frame, &RgbaImage::new(8, 8)).unwrap();
+        assert!(kept::is_whole(&frame));
+        let bytes = std::fs::read(&frame).unwrap();
+        for count in [0, 8, 15, bytes.len() - 1] {
+            std::fs::write(&frame, &bytes[..count]).unwrap();
+            assert!(!kept::is_whole(&frame), "{count} bytes");
+        }
+        // As long as it was, where the file system kept its length alone.
+        std::fs::write(&frame, vec![0; bytes.len()]).unwrap();
+        assert!(!kept::is_whole(&frame));
     }
 
     #[test]

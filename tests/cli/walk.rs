@@ -235,9 +235,10 @@ fn a_walk_becomes_a_film() {
         lumigraph(here, &format!("{walk} --frames {part} -o parts --resume")).ok();
     }
     std::fs::remove_file(here.join("parts/frame_0003.png")).unwrap();
+    std::fs::write(here.join("parts/frame_0004.png"), "").unwrap();
     let again = format!("{walk} --frames 6 -o parts --resume");
     let said = lumigraph(here, &again).ok().stdout;
-    assert!(said.contains("6 frames, 5 of them from before"), "{said}");
+    assert!(said.contains("6 frames, 4 of them from before"), "{said}");
     for i in 0..6 {
         assert!(frame("whole", i) == frame("parts", i), "frame {i}");
     }

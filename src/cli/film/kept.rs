@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -231,6 +231,23 @@ pub(super) fn leave_out(
     remove(all)?;
     plan.write(folder)?;
     remove(all)
+}
+
+/// Whether a frame is there, and begins and ends as a PNG. It takes its name only when it is complete, but after a loss
+/// of power, or where a copy was cut short, it may be empty, or end early.
+pub(super) fn is_whole(frame: &Path) -> bool {
+    const BEGIN: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+    const END: [u8; 12] = *b"\0\0\0\0IEND\xaeB`\x82";
+    let read = || -> std::io::Result<bool> {
+        let mut file = File::open(frame)?;
+        let mut begin = [0; BEGIN.len()];
+        file.read_exact(&mut begin)?;
+        file.seek(SeekFrom::End(-(END.len() as i64)))?;
+        let mut end = [0; END.len()];
+        file.read_exact(&mut end)?;
+        Ok(begin == BEGIN && end == END)
+    };
+    read().unwrap_or(false)
 }
 
 /// Removes those frames that are there.
