@@ -4,7 +4,7 @@ use super::budget;
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::inputs::{files_of, files_of_mesh};
-use super::interior::open;
+use super::interior::{open, said};
 use super::options::{compared, drop_weak_of_interior, print_warnings};
 use super::output::say;
 use anyhow::{Context, bail};
@@ -45,9 +45,7 @@ impl Opened {
         warnings.into_iter().for_each(&warn);
         let named = || file.display().to_string();
         let (contents, warnings) = Contents::new(&interior, &model).with_context(named)?;
-        warnings
-            .iter()
-            .for_each(|warning| warn(warning.to_string()));
+        said(&warnings).into_iter().for_each(&warn);
         let photos = match exposure {
             Some(exposure) => Photos::open(&file, &interior, exposure)?,
             None => None,

@@ -21,8 +21,10 @@ use proxy::interior::{
     fit_to_sight, interior_from_nodes, read_interior, strays, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
+use std::collections::HashMap;
 use std::ffi::OsString;
 use std::io::Cursor;
+use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use told::{Told, model_name};
@@ -80,6 +82,8 @@ pub(super) struct Args {
 const SAME_PORTAL: f64 = 0.3;
 /// Rooms and portals reach farther by this at most to have what is seen; metres.
 const WALL: f64 = 0.35;
+/// Of so many cells or portals the same is said one by one: where the scale is wrong, it is true of most.
+const MAX_ALIKE: usize = 16;
 /// What a capture's model is called.
 const MODEL: &str = "model.glb";
 
@@ -268,7 +272,7 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
             // What may be wrong is said at once: where the scale is, the rest takes long.
             let mut warnings = std::mem::take(&mut found.warnings);
             put_causes_first(&mut warnings);
-            for warning in warnings {
+            for warning in said(&warnings) {
                 say!("warning: {warning}");
             }
             let busy = spinner("fitting rooms to what is seen from them");
@@ -280,9 +284,40 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     finish(args, &file, &bytes, &model, rooms, told.known)
 }
 
-/// Puts cells without portals, of which there are many where the scale is wrong, after all else.
+/// Puts what may be wrong with the scale before all else, and what is said of single cells and portals, many of them
+/// where it is wrong, after.
 fn put_causes_first(warnings: &mut [InteriorWarning]) {
-    warnings.sort_by_key(|warning| matches!(warning, InteriorWarning::NoPortal(_)));
+    use InteriorWarning::{Away, NoPortal, Overlap, TallWalls, Turned};
+    warnings.sort_by_key(|warning| match warning {
+        TallWalls(_) => 0,
+        NoPortal(_) => 3,
+        Overlap(..) | Away { .. } | Turned(_) => 2,
+        _ => 1,
+    });
+}
+
+/// Warnings in words, in order. Where there are many of a kind the last that is told has how many more there are; of
+/// overlaps all are told, as no more than some are looked for.
+pub(super) fn said(warnings: &[InteriorWarning]) -> Vec<String> {
+    let mut counts = HashMap::new();
+    for warning in warnings {
+        *counts.entry(discriminant(warning)).or_insert(0_usize) += 1;
+    }
+    let mut texts = Vec::new();
+    let mut before = HashMap::new();
+    for warning in warnings {
+        let kind = discriminant(warning);
+        let number = before.entry(kind).or_insert(0_usize);
+        *number += 1;
+        let is_overlap = matches!(warning, InteriorWarning::Overlap(..));
+        let more = counts[&kind].saturating_sub(MAX_ALIKE);
+        if is_overlap || more == 0 || *number < MAX_ALIKE {
+            texts.push(warning.to_string());
+        } else if *number == MAX_ALIKE {
+            texts.push(format!("{warning} (and {more} more of this kind)"));
+        }
+    }
+    texts
 }
 
 /// What was found with all of the model in sight that is.
@@ -323,9 +358,11 @@ impl Rooms {
             (PLAN_SVG, found.svg().into_bytes()),
             (PLAN_PNG, png.into_inner()),
         ];
+        let mut warnings = found.warnings;
+        put_causes_first(&mut warnings);
         Ok(Self {
             interior: found.interior,
-            warnings: found.warnings,
+            warnings,
             pictures,
         })
     }
@@ -350,7 +387,8 @@ fn finish(
         compare(&known, &interior, tolerance, args.meter).to_string()
     });
     let (contents, more) = Contents::new(&interior, model).with_context(named)?;
-    for warning in warnings.into_iter().chain(more) {
+    let warnings: Vec<InteriorWarning> = warnings.into_iter().chain(more).collect();
+    for warning in said(&warnings) {
         say!("warning: {warning}");
     }
     write(args, file, bytes, &interior, &pictures)?;
@@ -423,7 +461,7 @@ pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
         Err(error @ InteriorFileError::Json(..)) if !is_named => bail!("{error}; {REMEDY}"),
         read => read?,
     };
-    for warning in warnings {
+    for warning in said(&warnings) {
         say!("warning: {warning}");
     }
     Ok((path, interior))
@@ -569,6 +607,40 @@ mod tests {
             storey.clone(),
         ];
         put_causes_first(&mut warnings);
-        assert_eq!(warnings, [tall, storey, alone("room 1"), alone("room 2")]);
+        let expected = [
+            tall.clone(),
+            storey.clone(),
+            alone("room 1"),
+            alone("room 2"),
+        ];
+        assert_eq!(warnings, expected);
+        let turned = InteriorWarning::Turned("door".to_owned());
+        let mut warnings = [
+            alone("room 1"),
+            turned.clone(),
+            storey.clone(),
+            tall.clone(),
+        ];
+        put_causes_first(&mut warnings);
+        assert_eq!(warnings, [tall, storey, turned, alone("room 1")]);
+    }
+
+    #[test]
+    fn of_many_warnings_of_a_kind_the_first_are_said_and_how_many_more_there_are() {
+        let alone = |i: usize| InteriorWarning::NoPortal(format!("room {i}"));
+        let mut warnings: Vec<InteriorWarning> = (0..MAX_ALIKE).map(alone).collect();
+        let each = |warnings: &[InteriorWarning]| -> Vec<String> {
+            warnings.iter().map(|w| w.to_string()).collect()
+        };
+        assert_eq!(said(&warnings), each(&warnings));
+        let first = each(&warnings);
+        warnings.extend((0..84).map(|i| alone(MAX_ALIKE + i)));
+        warnings.push(InteriorWarning::Elsewhere(7));
+        let texts = said(&warnings);
+        assert_eq!(texts.len(), MAX_ALIKE + 1);
+        assert_eq!(texts[..MAX_ALIKE - 1], first[..MAX_ALIKE - 1]);
+        let last = format!("{} (and 84 more of this kind)", first[MAX_ALIKE - 1]);
+        assert_eq!(texts[MAX_ALIKE - 1], last);
+        assert!(texts[MAX_ALIKE].starts_with("7 triangles"));
     }
 }
