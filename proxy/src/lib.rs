@@ -23,6 +23,7 @@ mod planes;
 pub mod points;
 mod scan;
 mod shell;
+mod shown;
 mod solid;
 pub mod tunnel;
 
@@ -44,6 +45,7 @@ pub use planes::{
 pub use points::SparsePoint;
 pub use scan::{Kept, Rays, Scan};
 pub use shell::shell;
+pub use shown::shown_name;
 pub use solid::{Hit, MeshKind, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 

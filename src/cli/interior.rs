@@ -21,6 +21,7 @@ use proxy::interior::{
     fit_to_sight, interior_from_nodes, read_interior, strays, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
+use proxy::shown_name;
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::io::Cursor;
@@ -394,7 +395,8 @@ fn finish(
     write(args, file, bytes, &interior, &pictures)?;
     let mut table = String::new();
     for (cell, triangles) in interior.cells.iter().zip(&contents.triangles) {
-        table += &format!("{:>9} triangles  {}\n", triangles.len(), cell.name);
+        let name = shown_name(&cell.name);
+        table += &format!("{:>9} triangles  {name}\n", triangles.len());
     }
     table += &compared.unwrap_or_default();
     print(&format!(

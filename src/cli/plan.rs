@@ -10,6 +10,7 @@ use proxy::interior::{
     Cell, CellId, Content, Contents, Interior, InteriorWarning, SemicircleOptions, semicircles,
 };
 use proxy::mesh::Model;
+use proxy::shown_name;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -93,9 +94,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let [x, y, z] = pose.center;
         text += &format!(
             "{:<20} {:<20} {:<20} {:>6.1}° {x:>width$.digits$} {y:>width$.digits$} {z:>width$.digits$}\n",
-            pose.portal,
-            pose.from.unwrap_or("(outside)"),
-            pose.into,
+            shown_name(pose.portal),
+            shown_name(pose.from.unwrap_or("(outside)")),
+            shown_name(pose.into),
             pose.angle_degrees,
         );
     }
@@ -123,7 +124,9 @@ fn remedy(interior: &Interior, poses: &[Pose<'_>]) -> anyhow::Result<String> {
     let outside = poses.iter().filter(|pose| !pose.inside);
     let outside: BTreeSet<&str> = outside.map(|pose| pose.portal).collect();
     let named = outside.intersection(&turned);
-    let named: Vec<String> = named.map(|portal| format!("`{portal}`")).collect();
+    let named: Vec<String> = named
+        .map(|portal| format!("`{}`", shown_name(portal)))
+        .collect();
     let reverse = format!("reverse the `polygon` of {}", named.join(", "));
     Ok(match named.len() {
         0 => "give portals a smaller `radius`".to_owned(),

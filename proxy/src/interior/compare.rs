@@ -1,6 +1,7 @@
 //! How a found interior compares with a known one.
 
 use super::{Cell, CellId, Interior};
+use crate::shown_name;
 use glam::DVec3;
 use std::fmt;
 
@@ -252,8 +253,11 @@ impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for cell in &self.cells {
             match &cell.found {
-                Some(found) => write!(f, "{}: {found}, IoU {:.3}", cell.name, cell.iou)?,
-                None => write!(f, "{}: not found", cell.name)?,
+                Some(found) => {
+                    let [name, found] = [&cell.name, found].map(|name| shown_name(name));
+                    write!(f, "{name}: {found}, IoU {:.3}", cell.iou)?;
+                }
+                None => write!(f, "{}: not found", shown_name(&cell.name))?,
             }
             match cell.apart {
                 Some(apart) => writeln!(f, ", sides {:.2} m apart at most", apart / self.meter)?,
@@ -261,11 +265,11 @@ impl fmt::Display for Comparison {
             }
         }
         for name in &self.extra_cells {
-            writeln!(f, "{name}: no such room")?;
+            writeln!(f, "{}: no such room", shown_name(name))?;
         }
         for (whose, names) in ["known", "found"].into_iter().zip(&self.not_compared) {
             if !names.is_empty() {
-                let names = names.join(", ");
+                let names = shown_name(&names.join(", "));
                 writeln!(
                     f,
                     "{whose} rooms that are not compared, as nodes have no boxes: {names}"
@@ -278,14 +282,18 @@ impl fmt::Display for Comparison {
             } else {
                 "not found"
             };
-            write!(f, "{}: {said}", portal.name)?;
+            write!(f, "{}: {said}", shown_name(&portal.name))?;
             match &portal.nearest {
                 Some((name, apart, wider)) => {
                     let how = if *wider < 0.0 { "narrower" } else { "wider" };
+                    let name = shown_name(name);
                     let [apart, by] = [*apart, wider.abs()].map(|length| length / self.meter);
                     write!(f, "; {name} is {apart:.2} m off and {by:.2} m {how}")?;
                     match &portal.joins {
-                        Some([a, b]) => writeln!(f, ", but joins {a} and {b}")?,
+                        Some([a, b]) => {
+                            let [a, b] = [a, b].map(|name| shown_name(name));
+                            writeln!(f, ", but joins {a} and {b}")?;
+                        }
                         None => writeln!(f)?,
                     }
                 }
@@ -293,7 +301,7 @@ impl fmt::Display for Comparison {
             }
         }
         for name in &self.extra_portals {
-            writeln!(f, "{name}: no such portal")?;
+            writeln!(f, "{}: no such portal", shown_name(name))?;
         }
         let (cells, portals) = (self.cells.len(), self.portals.len());
         let found = self.cells.iter().filter(|c| c.found.is_some()).count();

@@ -1,4 +1,5 @@
 use super::PolygonError;
+use crate::shown_name;
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -6,13 +7,18 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InteriorError {
     /// A portal's outline.
-    #[error("portal `{0}`: {1}")]
+    #[error("portal `{}`: {}", shown_name(.0), .1)]
     Portal(String, PolygonError),
     /// A floor's outline.
-    #[error("the floor of cell `{0}`: {1}")]
+    #[error("the floor of cell `{}`: {}", shown_name(.0), .1)]
     Floor(String, PolygonError),
     /// A portal leads to a cell that is not there.
-    #[error("portal `{portal}` leads to the cell `{cell}`; there are: {known}")]
+    #[error(
+        "portal `{}` leads to the cell `{}`; there are: {}",
+        shown_name(.portal),
+        shown_name(.cell),
+        shown_name(.known)
+    )]
     UnknownCell {
         /// The portal.
         portal: String,
@@ -22,30 +28,39 @@ pub enum InteriorError {
         known: String,
     },
     /// Both sides of a portal are the same.
-    #[error("portal `{0}` leads from {1} to {1}; a portal joins two cells, or one and null")]
+    #[error(
+        "portal `{portal}` leads from {side} to {side}; a portal joins two cells, or one and null",
+        portal = shown_name(.0),
+        side = shown_name(.1)
+    )]
     SameCell(String, String),
     /// Two of a kind share a name.
-    #[error("two {0} are called `{1}`; give each its own name")]
+    #[error("two {} are called `{}`; give each its own name", .0, shown_name(.1))]
     DuplicateName(&'static str, String),
     /// A name is empty.
     #[error("a {0} has no name; give it one")]
     NoName(&'static str),
     /// A box encloses nothing.
     #[error(
-        "the box of cell `{0}` is empty or not finite: min must be less than max on every axis"
+        "the box of cell `{}` is empty or not finite: min must be less than max on every axis",
+        shown_name(.0)
     )]
     Box(String),
     /// A cell says nothing, or too much, about what is in it.
     #[error(
-        "cell `{0}` must have one of `box`, `nodes` and `scene`, or `scene` and `box`, and has {1}"
+        "cell `{}` must have one of `box`, `nodes` and `scene`, or `scene` and `box`, and has {}",
+        shown_name(.0),
+        .1
     )]
     Content(String, usize),
     /// A length that is none.
-    #[error("{0} is {1}; expected a positive number")]
+    #[error("{} is {}; expected a positive number", shown_name(.0), .1)]
     Length(String, f64),
     /// A number of which nothing can be computed.
     #[error(
-        "{0}: {1:e} is too large; expected no more than 1e12 world units: correct it, or scale the model"
+        "{}: {:e} is too large; expected no more than 1e12 world units: correct it, or scale the model",
+        shown_name(.0),
+        .1
     )]
     Huge(String, f64),
     /// No direction.
@@ -55,11 +70,14 @@ pub enum InteriorError {
     #[error("there are no cells; give at least one")]
     NoCells,
     /// The cells' content is in a model, but none is named.
-    #[error("cell `{0}` shows a part of a model, but no `model` is named")]
+    #[error("cell `{}` shows a part of a model, but no `model` is named", shown_name(.0))]
     NoModel(String),
     /// A node that is not in the model.
     #[error(
-        "cell `{cell}` shows the node `{node}`, which the model does not have; correct its `nodes`; there are: {known}"
+        "cell `{}` shows the node `{}`, which the model does not have; correct its `nodes`; there are: {}",
+        shown_name(.cell),
+        shown_name(.node),
+        shown_name(.known)
     )]
     UnknownNode {
         /// The cell.
@@ -77,12 +95,13 @@ pub enum InteriorError {
     NoCellNodes,
     /// A node's name would be a cell's or a portal's without capitals.
     #[error(
-        "node `{0}`: names of rooms begin with `cell:`, and of openings with `portal:`, in small letters; rename it, \
-         or let rooms be found with --find"
+        "node `{}`: names of rooms begin with `cell:`, and of openings with `portal:`, in small letters; rename it, \
+         or let rooms be found with --find",
+        shown_name(.0)
     )]
     MisspeltNode(String),
     /// A node that stands for a portal does not say of what, or has no outline.
-    #[error("node `{0}`: {1}")]
+    #[error("node `{}`: {}", shown_name(.0), .1)]
     PortalNode(String, String),
 }
 
@@ -110,7 +129,11 @@ pub enum InteriorFileError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InteriorWarning {
     /// Two boxes share space.
-    #[error("the boxes of cells `{0}` and `{1}` overlap: what is in both is drawn for either")]
+    #[error(
+        "the boxes of cells `{}` and `{}` overlap: what is in both is drawn for either",
+        shown_name(.0),
+        shown_name(.1)
+    )]
     Overlap(String, String),
     /// Eyes are over all ceilings, or as good as on the floor.
     #[error(
@@ -126,10 +149,15 @@ pub enum InteriorWarning {
         most: f64,
     },
     /// A cell that nobody sees from elsewhere.
-    #[error("cell `{0}` has no portal: it cannot be seen from elsewhere")]
+    #[error("cell `{}` has no portal: it cannot be seen from elsewhere", shown_name(.0))]
     NoPortal(String),
     /// A portal is not at its cell's box.
-    #[error("portal `{portal}` is {distance} away from the box of its cell `{cell}`")]
+    #[error(
+        "portal `{}` is {} away from the box of its cell `{}`",
+        shown_name(.portal),
+        .distance,
+        shown_name(.cell)
+    )]
     Away {
         /// The portal.
         portal: String,
@@ -140,8 +168,9 @@ pub enum InteriorWarning {
     },
     /// A floor is not in its cell's box.
     #[error(
-        "the floor of cell `{cell}` is outside the cell's box, {}: eyes are placed over it, on tours and \
+        "the floor of cell `{}` is outside the cell's box, {}: eyes are placed over it, on tours and \
          before portals; correct its `floor`, or its `box`",
+        shown_name(.cell),
         how_far(.distance)
     )]
     FloorAway {
@@ -152,18 +181,20 @@ pub enum InteriorWarning {
     },
     /// A floor that nobody stands on.
     #[error(
-        "the floor of cell `{0}` is as steep as a wall: eyes are placed over it, on tours and before portals; give \
-         the outline of what one stands on, as seen from above"
+        "the floor of cell `{}` is as steep as a wall: eyes are placed over it, on tours and before portals; give \
+         the outline of what one stands on, as seen from above",
+        shown_name(.0)
     )]
     FloorSteep(String),
     /// A portal's outline goes the other way round.
     #[error(
-        "portal `{0}` seems to be turned round: its corners are to be counter-clockwise as seen \
-         from the first of its cells"
+        "portal `{}` seems to be turned round: its corners are to be counter-clockwise as seen \
+         from the first of its cells",
+        shown_name(.0)
     )]
     Turned(String),
     /// A cell without a triangle.
-    #[error("nothing of the model is in cell `{0}`")]
+    #[error("nothing of the model is in cell `{}`", shown_name(.0))]
     Empty(String),
     /// Rooms were looked for on a coarser floor grid than was asked for.
     #[error(
@@ -196,9 +227,10 @@ pub enum InteriorWarning {
     Storey(f64),
     /// Portals hide what is seen.
     #[error(
-        "{hidden} of {tried} lines of sight meet what portals hide, such as the one from {eye} in cell `{cell}` to \
+        "{hidden} of {tried} lines of sight meet what portals hide, such as the one from {eye} in cell `{}` to \
          {seen}: frames may lack it there; let the portal that it passes, or the cell's box, reach farther, or add \
-         the opening that it passes"
+         the opening that it passes",
+        shown_name(.cell)
     )]
     Hidden {
         /// Lines of sight.

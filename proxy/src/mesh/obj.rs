@@ -2,6 +2,7 @@
 
 use super::polygon::{Fan, Fans};
 use super::{Mesh, MeshFileError};
+use crate::shown_name;
 use capture::{byte_lines, without_byte_order_mark};
 use glam::DVec3;
 use std::path::Path;
@@ -103,7 +104,7 @@ fn index(word: &str, corners: usize) -> Result<u32, String> {
 /// A word as messages show it.
 pub(super) fn shown(word: &str) -> String {
     match word.char_indices().nth(40) {
-        Some((end, _)) => format!("{}…", &word[..end]),
-        None => word.to_owned(),
+        Some((end, _)) => format!("{}…", shown_name(&word[..end])),
+        None => shown_name(word),
     }
 }

@@ -333,6 +333,19 @@ fn what_is_odd_is_told() {
         "\"min\": [-9, 0, 0], \"max\": [-5, 3, 4]",
     );
     assert!(odd(&far).contains("portal `door` is 9 away from the box of its cell `west`"));
+    // Names do not end lines, nor command the terminal.
+    let named = apart.replace("west", "we\\u001b[31mst\\n");
+    let said = odd(&named);
+    assert!(
+        said.contains(r"cell `we\u{1b}[31mst\n` has no portal"),
+        "{said}"
+    );
+    let lost = TWO_ROOMS.replace("\"name\": \"west\"", "\"name\": \"we\\u001bst\"");
+    let error = rooms(&lost).unwrap_err().to_string();
+    assert!(
+        error.contains(r"`west`; there are: we\u{1b}st, east"),
+        "{error}"
+    );
     // Rooms' outlines are turned the right way; an interior's are believed, and doubted.
     let mut interior = two_rooms();
     assert!((interior.portals[0].polygon.normal() + DVec3::X).length() < 1e-12);

@@ -8,6 +8,7 @@ use calibrate::{Camera, Lens};
 use capture::as_argument;
 use glam::DVec2;
 use proxy::interior::{CellId, Interior};
+use proxy::shown_name;
 use render::CameraPath;
 use render::interior::Tour;
 use render::path::{self, PathFileError};
@@ -123,7 +124,7 @@ fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
         |ids: &[CellId]| -> Vec<&str> { ids.iter().map(|id| &*interior.cell(*id).name).collect() };
     let mut notes = Vec::new();
     if !tour.left_out.is_empty() {
-        let names = cells(&tour.left_out).join(", ");
+        let names = shown_name(&cells(&tour.left_out).join(", "));
         notes.push(format!(
             "no opening leads to {names}; the tour leaves them out"
         ));
@@ -131,7 +132,7 @@ fn notes_of(tour: &Tour, interior: &Interior) -> Vec<String> {
     let portals = tour.shut.iter().map(|id| &*interior.portal(*id).name);
     let names: Vec<&str> = cells(&tour.blocked).into_iter().chain(portals).collect();
     if !names.is_empty() {
-        let names = names.join(", ");
+        let names = shown_name(&names.join(", "));
         notes.push(format!(
             "something at eye height is in the way in {names}; the tour goes straight through it"
         ));
