@@ -171,12 +171,16 @@ impl Interior {
                 found.push(InteriorWarning::FloorSteep(cell.name.clone()));
                 continue;
             }
-            let room = cell.content.room();
-            if let Some(distance) = room.and_then(|room| self.floor_away(floor, &room)) {
+            let Some(room) = cell.content.room() else {
+                continue;
+            };
+            if let Some(distance) = self.floor_away(floor, &room) {
                 found.push(InteriorWarning::FloorAway {
                     cell: cell.name.clone(),
                     distance,
                 });
+            } else if self.is_floor_high(floor, &room) {
+                found.push(InteriorWarning::FloorHigh(cell.name.clone()));
             }
         }
         for portal in &self.portals {
@@ -219,6 +223,21 @@ impl Interior {
         let eyes = DVec3::new(0.0, self.eye_height, 0.0);
         let is_outside = apart(eyes).cmpgt(-ROUNDING * (high - low)).any();
         is_outside.then(|| apart(DVec3::ZERO).max(DVec3::ZERO).length())
+    }
+
+    /// Whether eyes over a cell's floor, where that is lowest, are above the cell's box, though over the box's own
+    /// bottom they are not.
+    fn is_floor_high(&self, floor: &Polygon, room: &RoomBox) -> bool {
+        let span = |points: &[DVec3]| {
+            let heights = points.iter().map(|p| p.dot(self.up));
+            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
+                (low.min(height), high.max(height))
+            })
+        };
+        let (low, high) = span(&room.corners());
+        let (floor_low, _) = span(floor.corners());
+        let most = high + ROUNDING * (high - low);
+        low + self.eye_height <= most && floor_low + self.eye_height > most
     }
 }
 

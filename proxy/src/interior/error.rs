@@ -179,6 +179,13 @@ pub enum InteriorWarning {
         /// In world units; zero where they touch.
         distance: f64,
     },
+    /// A floor so high in its cell's box that eyes over it are above the box.
+    #[error(
+        "the floor of cell `{}` is so high that eyes over it, on tours and before portals, are above the cell's \
+         box; correct its `floor`, or its `box`",
+        shown_name(.0)
+    )]
+    FloorHigh(String),
     /// A floor that nobody stands on.
     #[error(
         "the floor of cell `{}` is as steep as a wall: eyes are placed over it, on tours and before portals; give \

@@ -431,6 +431,13 @@ fn floors_outside_their_boxes_are_told() {
     assert!(said(&at).contains("outside the cell's box, 16 away: eyes"));
     let at = with_floor([4.0, 8.0], 0.0);
     assert!(said(&at).contains("outside the cell's box, which it only touches: eyes"));
+    // In it, with eyes 1.6 above it that are not.
+    let high = InteriorWarning::FloorHigh("west".to_owned());
+    let mut at = with_floor(own, 2.0);
+    assert_eq!(at.check().unwrap(), [high]);
+    assert!(said(&at).contains("`west` is so high that eyes over it"));
+    at.eye_height = 0.9;
+    assert_eq!(at.check().unwrap(), []);
     // On a wall of it, or anywhere, as walls are: what is said is how it stands.
     for x in [0.0, 2.0, 4.0, 50.0] {
         let mut interior = two_rooms();
