@@ -43,7 +43,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
 /// drawn opaque and is not, and what is left out, as alpha makes it invisible.
 ///
 /// # Errors
-/// As for [`read()`]; a picture that cannot be decoded.
+/// As for [`read()`]; pictures that take more memory than they may.
 pub fn read_model(path: &Path) -> Result<(Model, Vec<String>), MeshFileError> {
     if !["glb", "gltf"].contains(&extension(path).as_str()) {
         return Err(MeshFileError::Looks(path.to_owned()));

@@ -28,7 +28,10 @@ const MAX_PICTURE: u64 = 1 << 30;
 /// Bytes that all of a model's may take.
 const MAX_PICTURES: u64 = 4 << 30;
 
-/// Decodes pictures on all threads; they come back in order.
+/// Decodes pictures on all threads; they come back in order. What cannot be decoded is white, with a warning.
+///
+/// # Errors
+/// They take more memory together than they may.
 pub(super) fn decode(path: &Path, pictures: &[Picture]) -> Result<Vec<Decoded>, MeshFileError> {
     let mut together = 0;
     for picture in pictures {
@@ -46,10 +49,7 @@ pub(super) fn decode(path: &Path, pictures: &[Picture]) -> Result<Vec<Decoded>, 
             });
         }
     }
-    // All of them, so that the first that is corrupt is the one that is named.
-    let decoded: Vec<Result<_, MeshFileError>> =
-        pictures.par_iter().map(|p| decode_one(path, p)).collect();
-    decoded.into_iter().collect()
+    Ok(pictures.par_iter().map(decode_one).collect())
 }
 
 /// Bytes that a picture takes as RGBA, with the smaller ones of it, by what it says of itself; none where
@@ -62,39 +62,42 @@ fn decoded_size(bytes: &[u8]) -> u64 {
     })
 }
 
-/// A picture; white, and a warning, where it is of a kind that is not read.
-fn decode_one(path: &Path, picture: &Picture) -> Result<Decoded, MeshFileError> {
-    let record = format!("image {}", picture.number);
-    let failed = |problem: String| MeshFileError::Record {
-        path: path.to_owned(),
-        record: record.clone(),
-        problem,
-    };
-    let reader = ImageReader::new(Cursor::new(&picture.bytes)).with_guessed_format();
-    let mut reader = reader.map_err(|e| failed(e.to_string()))?;
+/// A picture; white, and a warning, where it cannot be had.
+fn decode_one(picture: &Picture) -> Decoded {
+    match pixels(&picture.bytes) {
+        Ok(pixels) => {
+            let least_alpha = pixels.pixels().map(|pixel| pixel.0[3]).min();
+            Decoded {
+                texture: Texture::new(pixels),
+                least_alpha: f64::from(least_alpha.unwrap_or(255)) / 255.0,
+                warning: None,
+            }
+        }
+        Err(problem) => {
+            let white = RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
+            let number = picture.number;
+            Decoded {
+                texture: Texture::new(white),
+                least_alpha: 1.0,
+                warning: Some(format!("image {number} {problem}: a plain colour instead")),
+            }
+        }
+    }
+}
+
+/// A picture's pixels, or what is wrong with it: it is of a kind that is not read, or damaged.
+fn pixels(bytes: &[u8]) -> Result<RgbaImage, String> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = reader.map_err(|error| format!("cannot be read ({error})"))?;
     let is_read = |f| matches!(f, image::ImageFormat::Png | image::ImageFormat::Jpeg);
     if !reader.format().is_some_and(is_read) {
-        let white = RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
-        let warning = format!("{record} is neither PNG nor JPEG: a plain colour instead");
-        return Ok(Decoded {
-            texture: Texture::new(white),
-            least_alpha: 1.0,
-            warning: Some(warning),
-        });
+        return Err("is neither PNG nor JPEG".to_owned());
     }
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_PICTURE);
     reader.limits(limits);
-    let decoded = reader.decode().map_err(|error| {
-        failed(format!(
-            "it cannot be decoded ({error}); export the model again"
-        ))
-    })?;
-    let picture = decoded.into_rgba8();
-    let least_alpha = picture.pixels().map(|pixel| pixel.0[3]).min();
-    Ok(Decoded {
-        texture: Texture::new(picture),
-        least_alpha: f64::from(least_alpha.unwrap_or(255)) / 255.0,
-        warning: None,
-    })
+    match reader.decode() {
+        Ok(decoded) => Ok(decoded.into_rgba8()),
+        Err(error) => Err(format!("cannot be decoded ({error})")),
+    }
 }
