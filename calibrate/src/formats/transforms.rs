@@ -224,11 +224,11 @@ impl<'a> Intrinsics<'a> {
                     )
                 });
             }
-            Some("PINHOLE" | "SIMPLE_PINHOLE") => {
+            Some(pinhole @ ("PINHOLE" | "SIMPLE_PINHOLE")) => {
                 return match nonzero {
                     None => Ok((ModelKind::Pinhole, Vec::new())),
                     Some((key, value)) => refuse(
-                        format!("found {name:?} with {key} = {value}, which a pinhole lacks"),
+                        format!("found {pinhole} with {key} = {value}, which a pinhole lacks"),
                         "set camera_model to OPENCV, or remove the coefficients",
                     ),
                 };

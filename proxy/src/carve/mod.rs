@@ -115,6 +115,12 @@ pub enum CarveError {
         /// How many there were.
         given: usize,
     },
+    /// Beside how far they reach, numbers do not tell cameras and points apart.
+    #[error(
+        "cameras and sparse points are too far apart for a surface: beside how far some are, the others are in one \
+         place; leave out what is misplaced, or scale the model"
+    )]
+    TooFar,
     /// More than indices can count.
     #[error("there are {given} sparse points; at most {most} can be carved, so thin them out")]
     TooManyPoints {
@@ -150,8 +156,8 @@ pub fn surface(
 ) -> Result<Surface, CarveError> {
     // 1. The points that photos see, on the lattice, with the shell around them.
     let scene = Scene::new(sources, points, options)?;
-    // 2. Tetrahedra. The shell spans space whatever the points do.
-    let delaunay = Delaunay::new(scene.sites.clone()).expect("a shell is not flat");
+    // 2. Tetrahedra. The shell spans space whatever the points do, unless numbers do not reach as far.
+    let delaunay = Delaunay::new(scene.sites.clone()).map_err(|_| CarveError::TooFar)?;
     // 3. What each label costs.
     let graph = energy(&delaunay, &scene, options);
     // 4. The cheapest labelling, and the facets between free and solid.

@@ -298,6 +298,22 @@ fn moving_scaling_and_turning_the_world_does_the_same_to_the_surface() {
 }
 
 #[test]
+fn a_camera_farther_off_than_numbers_reach_is_told() {
+    let room = Room::new(5);
+    let points = room.points(100, 0.0, &mut Random(5));
+    for far in [1e160, 1e300] {
+        let mut views = room.views.clone();
+        let mut stray = views[0].clone();
+        stray.camera_from_world.translation = DVec3::X * far;
+        views.push(stray);
+        match carve::surface(&views, &points, &Options::default()) {
+            Ok(surface) => assert_closed(&surface.mesh),
+            Err(error) => assert_eq!(error, CarveError::TooFar, "{far}"),
+        }
+    }
+}
+
+#[test]
 fn degenerate_points_give_a_closed_surface() {
     let room = Room::new(5);
     let seen = |position: DVec3| SparsePoint {
