@@ -343,7 +343,7 @@ fn what_is_odd_is_told() {
     let lost = TWO_ROOMS.replace("\"name\": \"west\"", "\"name\": \"we\\u001bst\"");
     let error = rooms(&lost).unwrap_err().to_string();
     assert!(
-        error.contains(r"`west`; there are: we\u{1b}st, east"),
+        error.contains(r"`west`; there are: east, we\u{1b}st"),
         "{error}"
     );
     // Rooms' outlines are turned the right way; an interior's are believed, and doubted.
