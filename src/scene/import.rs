@@ -7,7 +7,7 @@ use super::home::{home_of, note_of_home};
 use super::meant::Meant;
 use super::misfit;
 use super::named::Named;
-use super::times::{Clues, TimeSource, set_times};
+use super::times::{Clues, TimeSource, set_times, taken};
 use super::turned;
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::Reconstruction;
@@ -142,9 +142,11 @@ impl Scene {
             meant: &meant,
             named: named.as_ref(),
         };
-        let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        let taken = taken(&scene.photos);
+        let times = &options.times;
+        set_times(&mut scene.photos, times, &taken, &clues, &mut warnings)?;
         turned::set(&mut scene.photos, &taken);
-        warnings.extend(turned::note(&scene.photos, &taken));
+        warnings.extend(turned::note(&scene.photos));
 
         // 3. Are they what was calibrated?
         warnings.extend(misfit::of(&scene.reconstruction));

@@ -34,18 +34,21 @@ pub(super) struct Clues<'a> {
     pub(super) named: Option<&'a Named>,
 }
 
-/// Gives the photos their times. Where some have none, a note says so: at a moment they take no part. What cameras wrote
-/// into the photos comes back, in their order.
+/// What cameras wrote into photos, in their order; nothing of those that cannot be read.
+pub(super) fn taken(photos: &[Photo]) -> Vec<Exif> {
+    let read = photos.iter();
+    read.map(|p| read_exif(&p.path).unwrap_or_default())
+        .collect()
+}
+
+/// Gives the photos their times. Where some have none, a note says so: at a moment they take no part.
 pub(super) fn set_times(
     photos: &mut [Photo],
     source: &TimeSource,
+    taken: &[Exif],
     clues: &Clues<'_>,
     warnings: &mut Vec<Warning>,
-) -> Result<Vec<Exif>, SceneError> {
-    let read = photos.iter();
-    let taken: Vec<Exif> = read
-        .map(|p| read_exif(&p.path).unwrap_or_default())
-        .collect();
+) -> Result<(), SceneError> {
     let own = clues.capture.join(TIMES_FILE);
     let times: Times = match source {
         TimeSource::List(file) => from_list(photos, file, clues, warnings)?,
@@ -53,13 +56,13 @@ pub(super) fn set_times(
         TimeSource::FrameRate(per_second) => from_numbers(photos, *per_second)?,
         TimeSource::Found => match from_calibration(photos, clues, warnings) {
             Some(times) => times,
-            None => from_photos(photos, &taken, warnings),
+            None => from_photos(photos, taken, warnings),
         },
     };
     for (photo, time_s) in photos.iter_mut().zip(times) {
         photo.time_s = time_s;
     }
-    Ok(taken)
+    Ok(())
 }
 
 /// Those that the calibration says, unless it has one time for all.

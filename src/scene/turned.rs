@@ -4,13 +4,10 @@
 use super::{Photo, Warning};
 use capture::Exif;
 
-/// Says which photos are stored turned or mirrored, for people; `None` where none is known to be. `taken` is what
-/// cameras wrote into each of them.
-pub(super) fn text(photos: &[Photo], taken: &[Exif]) -> Option<String> {
-    let mut turned = photos.iter().zip(taken).filter_map(|(photo, exif)| {
-        let orientation = exif.orientation.filter(|o| *o != 1)?;
-        Some((photo.name.as_str(), orientation))
-    });
+/// Says which photos are stored turned or mirrored, for people; `None` where none is known to be.
+pub(super) fn text(photos: &[Photo]) -> Option<String> {
+    let of = |photo: &Photo| Some((photo.name.clone(), photo.orientation?));
+    let mut turned = photos.iter().filter_map(of);
     let (name, orientation) = turned.next()?;
     let count = 1 + turned.count();
     Some(format!(
@@ -20,15 +17,15 @@ pub(super) fn text(photos: &[Photo], taken: &[Exif]) -> Option<String> {
 }
 
 /// The same, with what comes of it.
-pub(super) fn note(photos: &[Photo], taken: &[Exif]) -> Option<Warning> {
-    let text = text(photos, taken)?;
+pub(super) fn note(photos: &[Photo]) -> Option<Warning> {
+    let text = text(photos)?;
     Some(Warning::Note(format!(
         "{text}: their pixels are used as stored, of which calibrations speak; paths derived from them and the \
          window stand upright as they do when they are shown turned"
     )))
 }
 
-/// Lets photos know how they are stored.
+/// Lets photos know how they are stored, as cameras wrote into them.
 pub(super) fn set(photos: &mut [Photo], taken: &[Exif]) {
     for (photo, exif) in photos.iter_mut().zip(taken) {
         photo.orientation = exif.orientation.filter(|orientation| *orientation != 1);
@@ -51,7 +48,9 @@ mod tests {
                 ..Exif::default()
             };
             let taken: Vec<Exif> = orientations.iter().map(of).collect();
-            text(&scene.photos, &taken)
+            let mut photos = scene.photos.clone();
+            set(&mut photos, &taken);
+            text(&photos)
         };
         assert_eq!(said(&[]), None);
         assert_eq!(said(&[None, Some(1), None]), None);

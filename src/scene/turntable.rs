@@ -2,7 +2,7 @@
 //! alone.
 
 use super::meant::Meant;
-use super::times::{Clues, set_times};
+use super::times::{Clues, set_times, taken};
 use super::turned;
 use super::{ImportOptions, Photo, Scene, SceneError, Warning, calibration};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3};
@@ -57,10 +57,12 @@ impl Scene {
             meant: &meant,
             named: None,
         };
-        let taken = set_times(&mut scene.photos, &options.times, &clues, &mut warnings)?;
+        let taken = taken(&scene.photos);
+        let times = &options.times;
+        set_times(&mut scene.photos, times, &taken, &clues, &mut warnings)?;
         turned::set(&mut scene.photos, &taken);
-        let turned = turned::text(&scene.photos, &taken);
-        warnings.extend(turned::note(&scene.photos, &taken));
+        let turned = turned::text(&scene.photos);
+        warnings.extend(turned::note(&scene.photos));
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);
         scene.find_beside(capture, &meant, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);

@@ -209,16 +209,8 @@ impl Interior {
     /// How far a cell's floor is from its box, in world units, where no part of its outline is over the box, it
     /// is above the box, or so far below that not even eyes over it are in the box.
     fn floor_away(&self, floor: &Polygon, room: &RoomBox) -> Option<f64> {
-        let across = self.up.any_orthonormal_vector();
-        let to_plan = DMat3::from_cols(across, self.up, self.up.cross(across)).transpose();
-        let span = |points: &[DVec3]| {
-            let places = points.iter().map(|p| to_plan * *p);
-            places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                (low.min(p), high.max(p))
-            })
-        };
-        let (low, high) = span(&room.corners());
-        let (floor_low, floor_high) = span(floor.corners());
+        let (low, high) = self.span(&room.corners());
+        let (floor_low, floor_high) = self.span(floor.corners());
         let apart = |below: DVec3| (floor_low - high).max(low - floor_high - below);
         let eyes = DVec3::new(0.0, self.eye_height, 0.0);
         let is_outside = apart(eyes).cmpgt(-ROUNDING * (high - low)).any();
@@ -228,16 +220,20 @@ impl Interior {
     /// Whether eyes over a cell's floor, where that is lowest, are above the cell's box, though over the box's own
     /// bottom they are not.
     fn is_floor_high(&self, floor: &Polygon, room: &RoomBox) -> bool {
-        let span = |points: &[DVec3]| {
-            let heights = points.iter().map(|p| p.dot(self.up));
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
-                (low.min(height), high.max(height))
-            })
-        };
-        let (low, high) = span(&room.corners());
-        let (floor_low, _) = span(floor.corners());
-        let most = high + ROUNDING * (high - low);
-        low + self.eye_height <= most && floor_low + self.eye_height > most
+        let (low, high) = self.span(&room.corners());
+        let (floor_low, _) = self.span(floor.corners());
+        let most = high.y + ROUNDING * (high.y - low.y);
+        low.y + self.eye_height <= most && floor_low.y + self.eye_height > most
+    }
+
+    /// From where to where points lie along two axes of the plan, and along the one between, y, which is up.
+    fn span(&self, points: &[DVec3]) -> (DVec3, DVec3) {
+        let across = self.up.any_orthonormal_vector();
+        let to_plan = DMat3::from_cols(across, self.up, self.up.cross(across)).transpose();
+        let places = points.iter().map(|p| to_plan * *p);
+        places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(p), high.max(p))
+        })
     }
 }
 

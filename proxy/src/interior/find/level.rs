@@ -78,30 +78,16 @@ fn as_world_axis(direction: DVec3) -> DVec3 {
 /// A storey's frame, and what speaks against it.
 pub(super) struct Estimate {
     pub(super) level: Level,
-    /// A direction that far more lies across, where up is taken to be y for no other reason than habit, and rooms
-    /// would not be as high as most or far more may be floor.
-    pub(super) rival: Option<DVec3>,
-    /// A direction that more lies across, where up is so taken: to be told if rooms have little of the model.
-    pub(super) better: Option<DVec3>,
+    /// What speaks against up, where that is taken to be y for no other reason than habit.
+    pub(super) better: Option<Better>,
 }
 
-/// Up, and what speaks against it.
-struct Upward {
-    up: DVec3,
-    /// See [`Estimate`].
-    rival: Option<DVec3>,
-    better: Option<DVec3>,
-}
-
-impl Upward {
-    /// Against which nothing speaks.
-    fn sure(up: DVec3) -> Self {
-        Self {
-            up,
-            rival: None,
-            better: None,
-        }
-    }
+/// A direction that more lies across than across up.
+pub(super) struct Better {
+    pub(super) direction: DVec3,
+    /// Whether rooms would not be as high as most, or far more may be floor; else it is to be told if rooms have
+    /// little of the model.
+    pub(super) is_likely: bool,
 }
 
 pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Estimate, FindError> {
@@ -125,7 +111,7 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Est
     if facets.is_empty() {
         return Err(FindError::NoSurface);
     }
-    let Upward { up, rival, better } = up(&facets, evidence, options);
+    let (up, better) = up(&facets, evidence, options);
     let up = as_world_axis(up);
     let (height, has_floor) = floor(&facets, up, base, evidence, options);
     if !has_floor {
@@ -138,11 +124,7 @@ pub(super) fn estimate(evidence: &Evidence, options: &FindOptions) -> Result<Est
         origin: base + height * up,
         world_from_level: axes,
     };
-    Ok(Estimate {
-        level,
-        rival: rival.map(as_world_axis),
-        better: better.map(as_world_axis),
-    })
+    Ok(Estimate { level, better })
 }
 
 /// Where normals near a direction, either way round, point on average.
@@ -223,16 +205,13 @@ impl RoomHeights {
     }
 }
 
-/// Whether rooms may lie on their side with a direction up that less lies across than another, and how much.
-fn is_doubtful(
+/// Whether rooms may lie on their side with a direction up that less lies across than a rival, and how much.
+fn is_likely(
     facets: &[Facet],
     (up, area): (DVec3, f64),
     (rival, most): (DVec3, f64),
     meter: f64,
 ) -> bool {
-    if most <= DOUBT * area {
-        return false;
-    }
     let [own, other] = [up, rival].map(|up| RoomHeights::new(facets, up, meter));
     let is_far_better = other.is_usual && most > FAR_BETTER * area;
     other.most >= LEAST_CEILING && (!own.is_usual || is_far_better)
@@ -240,15 +219,13 @@ fn is_doubtful(
 
 /// Up: given, as cameras had it, or the direction that most floor lies across; y, if that is
 /// about as good, and then the best one, if that is far better.
-fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> Upward {
+fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, Option<Better>) {
     let bin = BIN * options.meter;
     if let Some(up) = options.up.and_then(DVec3::try_normalize) {
         return match refined(facets, up) {
             // What was said is meant, but nobody says it to the last digit.
-            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => {
-                Upward::sure(near)
-            }
-            _ => Upward::sure(up),
+            near if near.dot(up) > 0.99 && level_area(facets, near, bin) > 0.0 => (near, None),
+            _ => (up, None),
         };
     }
     // 1. The best direction: of normals of large areas, each tried once.
@@ -278,20 +255,19 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> Upward {
     let near = refined(facets, hint);
     let area = level_area(facets, near, bin);
     if near.dot(hint) > 0.9 && area >= TRUST * best.1 {
-        let by_habit = evidence.cameras.is_empty();
-        let is_doubtful = by_habit && is_doubtful(facets, (near, area), best, options.meter);
-        return Upward {
-            up: near,
-            rival: is_doubtful.then_some(best.0),
-            better: (by_habit && best.1 > DOUBT * area).then_some(best.0),
-        };
+        let is_better = evidence.cameras.is_empty() && best.1 > DOUBT * area;
+        let better = is_better.then(|| Better {
+            direction: as_world_axis(best.0),
+            is_likely: is_likely(facets, (near, area), best, options.meter),
+        });
+        return (near, better);
     }
     if agreed && !evidence.cameras.is_empty() {
         let up = match best.0.dot(hint) {
             cos if cos.abs() > 0.7 => best.0 * cos.signum(),
             _ => hint,
         };
-        return Upward::sure(up);
+        return (up, None);
     }
     // 3. Things stand on the floor: more is below the middle than above.
     let direction = best.0;
@@ -308,7 +284,7 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> Upward {
     });
     let (area, moment) = between.fold((0.0, 0.0), |(s, m), (a, at)| (s + a, m + a * at));
     let is_down = area > 0.0 && moment / area > 0.5 * (low + high);
-    Upward::sure(if is_down { -direction } else { direction })
+    (if is_down { -direction } else { direction }, None)
 }
 
 /// The floor's height over the base: the fullest level surface, under the cameras or in the

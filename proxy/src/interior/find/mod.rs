@@ -174,11 +174,7 @@ pub fn find_interior(
         return Err(FindError::Option(name, *value));
     }
     // 1. Where the floor is.
-    let level::Estimate {
-        level,
-        rival,
-        better,
-    } = level::estimate(evidence, options)?;
+    let level::Estimate { level, better } = level::estimate(evidence, options)?;
     // 2. What is free over it.
     let columns = Columns::new(evidence, &level, options)?;
     // 3. Rooms, and the holes between them.
@@ -198,10 +194,11 @@ pub fn find_interior(
     // Rooms have most of a house that stands upright.
     let count = evidence.mesh.triangles.len();
     let has_little = || 2 * in_rooms(evidence, &interior, options.meter) < count;
-    if let Some(rival) = rival.or_else(|| better.filter(|_| has_little())) {
+    if let Some(better) = better.filter(|better| better.is_likely || has_little()) {
         // Either way round; no zeros below 0.
-        let rival = rival.dot(DVec3::ONE).signum() * rival + DVec3::ZERO;
-        warnings.push(InteriorWarning::OnItsSide(rival));
+        let direction = better.direction;
+        let direction = direction.dot(DVec3::ONE).signum() * direction + DVec3::ZERO;
+        warnings.push(InteriorWarning::OnItsSide(direction));
     }
     let is_beyond = |height: &f64| *height >= columns::REACH[1] - columns::BIN;
     if let Some(height) = columns.ceiling.filter(is_beyond) {
