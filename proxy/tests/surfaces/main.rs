@@ -20,6 +20,7 @@ mod mesh_gltf;
 mod mesh_obj;
 mod mesh_ply;
 mod model_files;
+mod model_looks;
 mod portals;
 mod room;
 mod strays;
