@@ -11,6 +11,7 @@ mod find_odd;
 mod hostile;
 mod house;
 mod hull;
+mod hull_photos;
 mod interior;
 mod interior_nodes;
 mod interior_odd;
