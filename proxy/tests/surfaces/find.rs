@@ -1,15 +1,14 @@
-//! Rooms found in models and captures, against what is known of them.
+//! Rooms found in models, against what is known of them.
 
 use crate::common;
-use crate::house;
+use crate::house::small_house;
 
 use glam::{DMat4, DQuat, DVec3};
-use house::small_house;
 use proxy::Mesh;
 use proxy::interior::find::{
-    Evidence, FindError, FindOptions, FoundInterior, Place, find_interior, sights,
+    Evidence, FindError, FindOptions, FoundInterior, Place, find_interior,
 };
-use proxy::interior::{CellId, Content, Contents, Interior, RoomBox, compare, parse_rooms};
+use proxy::interior::{CellId, Content, Contents, RoomBox, compare};
 use proxy::mesh::Model;
 
 pub(crate) fn find(mesh: &Mesh, options: &FindOptions) -> Result<FoundInterior, FindError> {
@@ -175,63 +174,6 @@ fn the_floor_of_found_rooms_is_where_one_stands() {
 }
 
 #[test]
-fn what_is_no_room_is_told() {
-    let none = find(&Mesh::default(), &FindOptions::default()).unwrap_err();
-    assert_eq!(none, FindError::NoSurface);
-    let triangle = Mesh {
-        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Z],
-        triangles: vec![[0, 1, 2]],
-    };
-    let error = find(&triangle, &FindOptions::default()).unwrap_err();
-    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
-    let nan = Mesh {
-        positions: vec![DVec3::NAN, DVec3::X, DVec3::Z],
-        triangles: vec![[0, 1, 2]],
-    };
-    assert_eq!(
-        find(&nan, &FindOptions::default()).unwrap_err(),
-        FindError::NoSurface
-    );
-    // A field is no room: nothing encloses it.
-    let field = open_box(DVec3::ZERO, DVec3::new(30.0, 0.0, 30.0), &[2]);
-    let error = find(&field, &FindOptions::default()).unwrap_err();
-    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
-    let options = FindOptions {
-        meter: 0.0,
-        ..FindOptions::default()
-    };
-    assert_eq!(
-        find(&field, &options).unwrap_err(),
-        FindError::Option("the metre", 0.0)
-    );
-}
-
-#[test]
-fn how_to_say_the_scale_and_which_way_is_up_is_told_where_nothing_is_found() {
-    // A room in kilometres, in which somebody stood.
-    let size = DVec3::new(0.005, 0.0026, 0.004);
-    let room = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
-    let eye = DVec3::new(0.002, 0.0016, 0.002);
-    let evidence = Evidence {
-        mesh: &room,
-        cameras: &[(eye, DVec3::Y)],
-        sights: &[],
-    };
-    let error = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap_err();
-    assert_eq!(error, FindError::NoFloor(1.0));
-    assert_eq!(
-        error.to_string(),
-        "no floor: nothing level lies below; is the scale right (--meter says how many world units a metre is; now \
-         1), and which way is up (--up)? Else give the rooms by hand (--rooms)"
-    );
-    assert_eq!(
-        FindError::NoRooms(1.5, 0.001).to_string(),
-        "no rooms: over the floor nothing of 1.5 m² or more is free at eye height and enclosed; is the scale right \
-         (--meter says how many world units a metre is; now 0.001), and which way is up (--up)?"
-    );
-}
-
-#[test]
 fn rooms_of_a_modelled_house_are_where_its_description_says() {
     let Some(folder) = common::find_capture("interior-house") else {
         return;
@@ -256,144 +198,6 @@ fn rooms_of_a_modelled_house_are_where_its_description_says() {
     });
     let width: f64 = doors.map(|p| p.width(found.interior.up)).sum();
     assert!((width - 3.4).abs() < 0.2, "{width}");
-}
-
-/// Rooms found in a capture's fused depth maps.
-fn found_in(name: &str) -> Option<(FoundInterior, Vec<[DVec3; 2]>)> {
-    let capture = common::capture(&common::find_capture(name)?);
-    let all: Vec<_> = capture.used.iter().chain(&capture.held_out).collect();
-    let frame = |i: usize| common::decode(all[i]);
-    let options = proxy::depth::Options {
-        voxel_size: Some(0.05),
-        ..proxy::depth::Options::default()
-    };
-    let fusion = proxy::depth::fuse(all.len(), frame, &options).unwrap();
-    let cameras: Vec<_> = all.iter().map(|(v, _)| (v.center(), v.up())).collect();
-    let mut lines = Vec::new();
-    for each in &all {
-        let (view, map) = common::decode(each).unwrap();
-        lines.extend(sights(&view, &map, 4));
-    }
-    let evidence = Evidence {
-        mesh: &fusion.mesh,
-        cameras: &cameras,
-        sights: &lines,
-    };
-    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
-    look_at(&found, name);
-    for (i, cell) in found.interior.cells.iter().enumerate() {
-        eprintln!("{name}: {} {:?}", cell.name, bounds(&found, i));
-    }
-    for portal in &found.interior.portals {
-        let width = portal.width(found.interior.up);
-        eprintln!(
-            "{name}: {} at {} width {width:.2}",
-            portal.name,
-            portal.polygon.center()
-        );
-    }
-    Some((found, lines))
-}
-
-#[test]
-fn a_capture_of_the_house_has_the_same_rooms_as_its_model() {
-    let Some((found, sights)) = found_in("house-walk") else {
-        return;
-    };
-    let Some(folder) = common::find_capture("interior-house") else {
-        return;
-    };
-    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
-    assert!((found.interior.eye_height - 1.55).abs() < 0.1);
-    let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
-    let model = find(&model.mesh, &FindOptions::default()).unwrap();
-    assert_eq!(found.interior.cells.len(), model.interior.cells.len());
-    // 1. Cells: their sides are within 0.2 m, but where no photo saw as far.
-    let mut west = f64::NEG_INFINITY;
-    for i in 0..model.interior.cells.len() {
-        let truth = bounds(&model, i);
-        let off = |j: &usize| {
-            let of = bounds(&found, *j);
-            (of.max - truth.max).length() + (of.min.z - truth.min.z).abs()
-        };
-        let nearest = (0..found.interior.cells.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
-        let of = bounds(&found, nearest.unwrap());
-        let (min, max) = (of.min - truth.min, of.max - truth.max);
-        eprintln!("cell {i}: {min:.2} {max:.2}");
-        let same = [min.z, max.x, max.z, min.y, max.y];
-        assert!(same.iter().all(|d| d.abs() <= 0.2), "{truth:?} {of:?}");
-        if min.x.abs() > 0.2 {
-            // Nothing was seen between what was found and the true wall: no line of sight ends there.
-            let is_in = |p: &DVec3| p.x < of.min.x - 0.2 && p.z > of.min.z && p.z < of.max.z;
-            let beyond = sights.iter().filter(|s| is_in(&s[1])).count();
-            let farthest = sights
-                .iter()
-                .map(|s| s[1])
-                .filter(|p| p.z > of.min.z && p.z < of.max.z);
-            let farthest = farthest.map(|p| p.x).fold(f64::INFINITY, f64::min);
-            eprintln!(
-                "cell {i}: {beyond} of {} sights end beyond, the farthest {farthest:.2}",
-                sights.len()
-            );
-            assert_eq!(beyond, 0);
-            west = west.max(of.min.x);
-        }
-    }
-    // 2. Portals, as far as photos saw.
-    let extent = |interior: &Interior, i: usize| {
-        let corners = interior.portals[i].polygon.corners().iter();
-        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
-            (l.min(*p), h.max(*p))
-        })
-    };
-    let mut left: Vec<usize> = (0..found.interior.portals.len()).collect();
-    for i in 0..model.interior.portals.len() {
-        let (low, high) = extent(&model.interior, i);
-        if high.x < west {
-            eprintln!("portal {i}: never seen");
-            continue;
-        }
-        let seen = |low: DVec3| low.with_x(low.x.max(west));
-        let worst = |j: usize| {
-            let (l, h) = extent(&found.interior, j);
-            (seen(l) - seen(low))
-                .abs()
-                .max((h - high).abs())
-                .max_element()
-        };
-        let best = left
-            .iter()
-            .copied()
-            .min_by(|a, b| worst(*a).total_cmp(&worst(*b)));
-        let best = best.unwrap();
-        eprintln!("portal {i}: {:.2}", worst(best));
-        assert!(
-            worst(best) <= 0.2,
-            "{low} {high} {:?}",
-            extent(&found.interior, best)
-        );
-        left.retain(|j| *j != best);
-    }
-    assert!(left.is_empty(), "{left:?}");
-}
-
-#[test]
-fn the_hall_of_an_office_is_found() {
-    let Some((found, _)) = found_in("office-walk") else {
-        return;
-    };
-    let rooms = include_bytes!("../data/office-walk-rooms.json");
-    let (truth, _) = parse_rooms("rooms.json".as_ref(), rooms, "model.glb").unwrap();
-    let compared = compare(&truth, &found.interior, 0.3, 1.0);
-    eprint!("office-walk\n{compared}");
-    assert!(found.interior.up.dot(DVec3::Y) > 0.999);
-    assert!(compared.cells[0].iou > 0.9 && compared.cells[1].iou > 0.6);
-    assert!(compared.extra_cells.is_empty());
-    // The corridor's mouth is as wide as it; above it nothing was seen.
-    let [said, mouth] = [&truth, &found.interior].map(|i| &i.portals[0]);
-    let off = mouth.polygon.center() - said.polygon.center();
-    assert!(off.with_y(0.0).length() < 0.2, "{off}");
-    assert!((mouth.width(DVec3::Y) - said.width(DVec3::Y)).abs() < 0.1);
 }
 
 #[test]
@@ -433,7 +237,7 @@ fn corridors_as_wide_as_their_mouths_are_rooms() {
 }
 
 /// A room that goes around a smaller one in two arms, and a door between them.
-fn room_around_another() -> Mesh {
+pub(crate) fn room_around_another() -> Mesh {
     let mut mesh = Mesh::default();
     let mut add = |min: [f64; 3], max: [f64; 3], faces: &[usize]| {
         let [min, max] = [min, max].map(DVec3::from_array);
@@ -485,34 +289,6 @@ fn ground_around_a_house_takes_nothing_from_it() {
         assert!(compared.extra_cells.is_empty(), "{compared}");
         assert!(compared.extra_portals.is_empty(), "{compared}");
     }
-}
-
-#[test]
-fn a_plan_coarser_than_asked_for_is_told() {
-    let size = DVec3::new(5.0, 2.6, 4.0);
-    let mut mesh = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
-    // A fence far away.
-    let far = DVec3::X * 500.0;
-    mesh.append(&open_box(far, far + DVec3::new(0.1, 2.0, 4.0), &[0, 1]));
-    let found = find(&mesh, &FindOptions::default()).unwrap();
-    let said: Vec<String> = found.warnings.iter().map(|w| w.to_string()).collect();
-    assert_eq!(said.len(), 1, "{said:?}");
-    let coarse = "the floor plan's squares are 0.06 m wide, not 0.05, as";
-    assert!(said[0].starts_with(coarse), "{said:?}");
-    assert_eq!(found.interior.cells.len(), 1);
-}
-
-#[test]
-fn a_house_in_millimetres_is_told_soon_or_found_if_that_is_said() {
-    let mut mesh = room_around_another();
-    mesh.transform(&DMat4::from_scale(DVec3::splat(1000.0)));
-    let error = find(&mesh, &FindOptions::default()).unwrap_err();
-    assert_eq!(error, FindError::NoRooms(1.5, 1.0));
-    let options = FindOptions {
-        meter: 1000.0,
-        ..FindOptions::default()
-    };
-    assert_eq!(find(&mesh, &options).unwrap().interior.cells.len(), 2);
 }
 
 #[test]
