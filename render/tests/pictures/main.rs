@@ -4,6 +4,8 @@
 
 mod between_corners;
 mod blend;
+mod blend_continuity;
+mod blend_promises;
 mod bounded;
 mod common;
 mod engines;
