@@ -3,6 +3,8 @@
 mod export;
 mod exposure;
 mod lens;
+mod lens_any;
+mod lens_range;
 mod opencv_calibration;
 mod opencv_find;
 mod opencv_projection;
