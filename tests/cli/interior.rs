@@ -1,10 +1,8 @@
 //! Interiors: a house is generated, made an interior of anew, and planned.
 
 use crate::run::{files, lumigraph};
-use crate::uncalibrated::is_installed;
-use glam::{DQuat, DVec3};
-use proxy::interior::find::{Evidence, FindOptions, find_interior};
-use proxy::interior::{read_interior, surface_of, write_interior};
+use glam::DVec3;
+use proxy::interior::read_interior;
 use proxy::mesh::{Mesh, model_to_glb, read_model};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -306,7 +304,7 @@ fn a_metre_says_how_high_eyes_are_where_nodes_name_the_rooms() {
 }
 
 /// How far a box's or a polygon's sides are from another's, at most.
-fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+pub(crate) fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     let extent = |corners: &[DVec3]| {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let grown = |(l, h): (DVec3, DVec3), p: &DVec3| (l.min(*p), h.max(*p));
@@ -317,7 +315,7 @@ fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 /// The corners of an interior's cells, then those of its portals.
-fn corners(folder: &Path) -> [Vec<Vec<DVec3>>; 2] {
+pub(crate) fn corners(folder: &Path) -> [Vec<Vec<DVec3>>; 2] {
     let (interior, _) = read_interior(&folder.join("interior.json")).unwrap();
     let cells = interior.cells.iter().map(|cell| {
         let room = cell.content.room().unwrap();
@@ -326,49 +324,6 @@ fn corners(folder: &Path) -> [Vec<Vec<DVec3>>; 2] {
     let portals = interior.portals.iter();
     let portals = portals.map(|p| p.polygon.corners().to_vec());
     [cells.collect(), portals.collect()]
-}
-
-/// Makes an interior of a model, and one of photos with depth taken all around in its rooms, and
-/// looks for each cell and portal of either in the other.
-fn same_from_model_and_photos(here: &Path, model: &Path, survey: &str) {
-    // As found: what is walked through reaches as far as lines of sight in the model do.
-    let (read, _) = read_model(&here.join(model)).unwrap();
-    let evidence = Evidence {
-        mesh: &surface_of(&read),
-        cameras: &[],
-        sights: &[],
-    };
-    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
-    std::fs::create_dir(here.join("found")).unwrap();
-    std::fs::copy(here.join(model), here.join("found/model.glb")).unwrap();
-    write_interior(&here.join("found/interior.json"), &found.interior).unwrap();
-    lumigraph(
-        here,
-        &format!("generate survey --of found {survey} -o survey"),
-    )
-    .ok();
-    let ran = lumigraph(here, "interior survey --compare found -o photos").ok();
-    let (model, photos) = (corners(&here.join("found")), corners(&here.join("photos")));
-    let [rooms, openings] = [&model[0], &model[1]].map(Vec::len);
-    let said = format!("{rooms} of {rooms} rooms, {openings} of {openings} portals found");
-    assert!(ran.stdout.contains(&said), "{}", ran.stdout);
-    for (of_model, of_photos) in model.iter().zip(&photos) {
-        assert_eq!(of_model.len(), of_photos.len(), "{}", ran.stdout);
-        for (some, others) in [(of_model, of_photos), (of_photos, of_model)] {
-            for one in some {
-                let nearest = others.iter().map(|other| apart(one, other));
-                let nearest = nearest.fold(f64::INFINITY, f64::min);
-                assert!(nearest <= 0.2, "{nearest}: {one:?}\n{}", ran.stdout);
-            }
-        }
-    }
-}
-
-#[test]
-fn photos_of_a_house_give_the_cells_and_portals_of_its_model() {
-    let folder = with_house();
-    let (model, survey) = ("house/house.glb", "--photos 48 --size 128x96");
-    same_from_model_and_photos(folder.path(), Path::new(model), survey);
 }
 
 #[test]
@@ -417,134 +372,11 @@ fn found_rooms_are_drawn_as_the_whole_model_is_and_what_given_ones_hide_is_told(
     assert!(ran.stderr.contains(said), "{}", ran.stderr);
 }
 
-#[test]
-fn photos_of_another_house_do_so_too() {
-    let captures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/captures"));
-    let model = captures.join("interior-house/house.glb");
-    if !model.exists() {
-        eprintln!("SKIPPED: {} is not there", model.display());
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let survey = "--photos 160 --size 192x144";
-    same_from_model_and_photos(folder.path(), &model, survey);
-}
-
 pub(crate) const HALVES: &str = r#"{"version": 1, "rooms": [
     {"name": "front", "min": [-9, -9, -99], "max": [9, 9, -2]},
     {"name": "back", "min": [-9, -9, -2], "max": [9, 9, 99]}],
     "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,
         "polygon": [[-1, 0, -2], [1, 0, -2], [1, 2.4, -2], [-1, 2.4, -2]]}]}"#;
-
-#[test]
-fn a_captures_rooms_are_drawn_from_its_photos() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
-    std::fs::write(here.join("halves.json"), HALVES).unwrap();
-    let made = "interior hall --rooms halves.json --hold-out hall/split.json -o two";
-    let ran = lumigraph(here, made).ok();
-    assert!(ran.stderr.contains("24 depth maps fused"), "{}", ran.stderr);
-    // Photos are named, not copied.
-    assert_eq!(names(&here.join("two")), ["interior.json", "model.glb"]);
-    let file: Value =
-        serde_json::from_slice(&std::fs::read(here.join("two/interior.json")).unwrap()).unwrap();
-    assert_eq!(file["cells"][1]["scene"], "../hall");
-    assert_eq!(file["held_out"].as_array().unwrap().len(), 4);
-    // Held-out photos are close to what is drawn, much closer than with the model's own colours.
-    let line = "walk two --held-out --portals geometry,ldi,whole --device cpu --json";
-    let scores = |more: &str| -> Vec<f64> {
-        let report = lumigraph(here, &format!("{line} {more}")).ok().json();
-        let walks = report["walks"].as_array().unwrap().clone();
-        assert!(
-            walks
-                .iter()
-                .all(|w| w["frames"].as_array().unwrap().len() == 4)
-        );
-        let score = |w: &Value| w["mean"]["psnr"].as_f64().unwrap();
-        walks.iter().map(score).collect()
-    };
-    let photos = scores("-o scored");
-    let plain = scores("--no-photos -o plain");
-    assert!(
-        photos[0] > 26.0 && photos[0] > plain[0] + 3.0,
-        "{photos:?} {plain:?}"
-    );
-    assert_eq!(photos[0], photos[2]);
-    // So small photos are coarser than the views that are made of several of them.
-    let of_views = scores("--ldi-from views -o views");
-    assert!(of_views[1] > photos[2] - 0.5, "{of_views:?}");
-    assert!(photos[1] > photos[2] - 1.2, "{photos:?}");
-    // A walk, byte for byte on one thread.
-    let walk = "walk two --tour --frames 2 --size 48x32 --reference-size 32x32 --portals ldi";
-    lumigraph(here, &format!("{walk} -o a")).ok();
-    lumigraph(here, &format!("--threads 1 {walk} -o b")).ok();
-    for file in ["frame_0000.png", "frame_0001.png"] {
-        let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
-        assert!(read("a") == read("b"), "{file}");
-    }
-    // Held-out photos that the scene does not have are told by name, with the file to correct.
-    let path = here.join("two/interior.json");
-    let held_out = file["held_out"].as_array().unwrap();
-    for (gone, named) in [
-        (&["nope.jpg"][..], "nope.jpg"),
-        (&["nope.jpg", "lost.jpg"][..], "nope.jpg and 1 more"),
-    ] {
-        let mut changed = file.clone();
-        let mut all = held_out.clone();
-        all.extend(gone.iter().map(|name| Value::from(*name)));
-        changed["held_out"] = Value::from(all);
-        std::fs::write(&path, changed.to_string()).unwrap();
-        let said = lumigraph(here, "walk two --tour --frames 1 --size 48x32 -o told").ok();
-        let warning = format!("warning: two/interior.json: its `held_out` has {named}, which ");
-        let is_told = said.stderr.lines().any(|line| line.starts_with(&warning));
-        assert!(is_told, "{}", said.stderr);
-    }
-    std::fs::write(&path, file.to_string()).unwrap();
-    // Photos that are gone are missed by name.
-    std::fs::rename(here.join("hall"), here.join("gone")).unwrap();
-    let error = lumigraph(here, "walk two --tour --frames 1 -o c").error(1);
-    assert!(error.contains("the scene of its cells"), "{error}");
-    lumigraph(
-        here,
-        "walk two --tour --frames 1 --size 48x32 --no-photos -o c",
-    )
-    .ok();
-}
-
-#[test]
-fn a_capture_without_depth_needs_a_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
-    std::fs::remove_dir_all(here.join("hall/depth")).unwrap();
-    let error = lumigraph(here, "interior hall -o none").error(1);
-    assert!(error.contains("no depth maps"), "{error}");
-    assert!(error.contains("lumigraph proxy SCENE tunnel"), "{error}");
-    lumigraph(here, "import hall -o scene").ok();
-    lumigraph(here, "proxy scene tunnel").ok();
-    std::fs::write(here.join("halves.json"), HALVES).unwrap();
-    lumigraph(here, "interior scene --rooms halves.json -o two").ok();
-    lumigraph(here, "walk two --tour --frames 2 --size 48x32 -o walk").ok();
-    let error = lumigraph(here, "walk two --held-out -o x").error(1);
-    assert!(error.contains("no photos were held out"), "{error}");
-    // Of a video that the scene's photos were taken out of no film takes the place, whatever is drawn.
-    let path = here.join("scene/scene.json");
-    let mut scene: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    scene["settings"]["video"] = "../hall.mp4".into();
-    std::fs::write(&path, scene.to_string()).unwrap();
-    std::fs::write(here.join("hall.mp4"), "a video").unwrap();
-    let films = is_installed(&capture::video::ffmpeg());
-    for photos in ["", " --no-photos"].into_iter().filter(|_| films) {
-        let line = "walk two --tour --frames 2 --size 48x32 -o film --video hall.mp4";
-        let error = lumigraph(here, &format!("{line}{photos}")).error(1);
-        let said = "hall.mp4: the film is made of this very file; nothing was written: choose another --video";
-        assert_eq!(error, said);
-    }
-    let line = "interior scene --hold-out hall/split.json -o other";
-    let error = lumigraph(here, line).error(1);
-    assert!(error.contains("which is held out"), "{error}");
-}
 
 #[test]
 fn usage_errors_exit_with_2() {
@@ -590,98 +422,4 @@ fn usage_errors_exit_with_2() {
         assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
         assert!(ran.stderr.contains(said), "{line}: {}", ran.stderr);
     }
-}
-
-/// A hallway as a capture, its world turned and moved; `copies` of it, 40 m apart.
-fn hallways(here: &Path, from: &str, to: &str, world: DQuat, copies: u32) {
-    let read = |file: &str| here.join(from).join(file);
-    let model = calibrate::colmap::read_model(&read("sparse/0")).unwrap();
-    let mut whole = calibrate::Reconstruction {
-        images: BTreeMap::new(),
-        points: BTreeMap::new(),
-        ..model.clone()
-    };
-    for folder in ["images", "depth", "sparse/0"] {
-        std::fs::create_dir_all(here.join(to).join(folder)).unwrap();
-    }
-    for copy in 0..copies {
-        let there = DVec3::new(40.0 * f64::from(copy), 3.0, 0.0);
-        for image in model.images.values() {
-            let mut image = image.clone();
-            let name = format!("{copy}_{}", image.name);
-            std::fs::copy(
-                read("images").join(&image.name),
-                here.join(to).join("images").join(&name),
-            )
-            .unwrap();
-            let stem = |name: &str| Path::new(name).with_extension("png");
-            std::fs::copy(
-                read("depth").join(stem(&image.name)),
-                here.join(to).join("depth").join(stem(&name)),
-            )
-            .unwrap();
-            image.name = name;
-            image.keypoints.clear();
-            let pose = &mut image.camera_from_world;
-            let rotation = pose.rotation * world.conjugate();
-            pose.translation -= rotation * (world * there);
-            pose.rotation = rotation;
-            let id = calibrate::ImageId(whole.images.len() as u32 + 1);
-            whole.images.insert(id, image);
-        }
-    }
-    calibrate::colmap::write_binary(&whole, &here.join(to).join("sparse/0")).unwrap();
-}
-
-#[test]
-fn one_room_parts_without_a_door_and_a_world_upside_down_are_toured() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
-    // 1. One room.
-    let ran = lumigraph(here, "interior hall -o one").ok();
-    assert!(
-        ran.stdout.contains("one: 1 cells, 0 portals"),
-        "{}",
-        ran.stdout
-    );
-    let walk = "--tour --frames 2 --size 32x24 --portals ldi";
-    let ran = lumigraph(here, &format!("walk one {walk} -o walk-one")).ok();
-    assert!(!ran.stderr.contains("leaves them out"), "{}", ran.stderr);
-    // 2. The same, the world turned: the same room, whichever way up is.
-    let turned = DQuat::from_euler(glam::EulerRot::XYZ, 2.1, -0.4, 0.9);
-    hallways(here, "hall", "turned", turned, 1);
-    let ran = lumigraph(here, "interior turned -o other").ok();
-    assert!(
-        ran.stdout.contains("other: 1 cells, 0 portals"),
-        "{}",
-        ran.stdout
-    );
-    let up = |folder: &str| -> DVec3 {
-        let file = std::fs::read(here.join(folder).join("interior.json")).unwrap();
-        let file: Value = serde_json::from_slice(&file).unwrap();
-        let up = file["up"].as_array().unwrap();
-        DVec3::from_array([0, 1, 2].map(|k| up[k].as_f64().unwrap()))
-    };
-    assert!((turned * up("one")).dot(up("other")) > 0.999);
-    lumigraph(here, &format!("walk other {walk} -o walk-other")).ok();
-    // 3. Two parts that nothing joins: the tour is in the first, and says so.
-    hallways(here, "hall", "apart", DQuat::IDENTITY, 2);
-    let ran = lumigraph(here, "interior apart -o two").ok();
-    assert!(
-        ran.stdout.contains("two: 2 cells, 0 portals"),
-        "{}",
-        ran.stdout
-    );
-    let ran = lumigraph(here, &format!("walk two {walk} -o walk-two")).ok();
-    let said = "no opening leads to room 2; the tour leaves them out";
-    assert!(ran.stderr.contains(said), "{}", ran.stderr);
-    // 4. Known rooms, to compare with.
-    std::fs::write(here.join("halves.json"), HALVES).unwrap();
-    let ran = lumigraph(here, "interior hall --compare halves.json -o again").ok();
-    assert!(
-        ran.stdout.contains("1 of 2 rooms, 0 of 1 portals found"),
-        "{}",
-        ran.stdout
-    );
 }

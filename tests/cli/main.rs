@@ -20,6 +20,8 @@ mod interior;
 mod interior_damaged;
 mod interior_eyes;
 mod interior_folder;
+mod interior_halls;
+mod interior_photos;
 mod kinds;
 mod ldis;
 mod masked_depth;

@@ -1,0 +1,176 @@
+//! Interiors out of photos: the same as of the model, and drawn from the photos.
+
+use crate::interior::{HALVES, apart, corners, names, with_house};
+use crate::run::lumigraph;
+use crate::uncalibrated::is_installed;
+use proxy::interior::find::{Evidence, FindOptions, find_interior};
+use proxy::interior::{surface_of, write_interior};
+use proxy::mesh::read_model;
+use serde_json::Value;
+use std::path::Path;
+
+/// Makes an interior of a model, and one of photos with depth taken all around in its rooms, and
+/// looks for each cell and portal of either in the other.
+fn same_from_model_and_photos(here: &Path, model: &Path, survey: &str) {
+    // As found: what is walked through reaches as far as lines of sight in the model do.
+    let (read, _) = read_model(&here.join(model)).unwrap();
+    let evidence = Evidence {
+        mesh: &surface_of(&read),
+        cameras: &[],
+        sights: &[],
+    };
+    let found = find_interior(&evidence, "model.glb", &FindOptions::default()).unwrap();
+    std::fs::create_dir(here.join("found")).unwrap();
+    std::fs::copy(here.join(model), here.join("found/model.glb")).unwrap();
+    write_interior(&here.join("found/interior.json"), &found.interior).unwrap();
+    lumigraph(
+        here,
+        &format!("generate survey --of found {survey} -o survey"),
+    )
+    .ok();
+    let ran = lumigraph(here, "interior survey --compare found -o photos").ok();
+    let (model, photos) = (corners(&here.join("found")), corners(&here.join("photos")));
+    let [rooms, openings] = [&model[0], &model[1]].map(Vec::len);
+    let said = format!("{rooms} of {rooms} rooms, {openings} of {openings} portals found");
+    assert!(ran.stdout.contains(&said), "{}", ran.stdout);
+    for (of_model, of_photos) in model.iter().zip(&photos) {
+        assert_eq!(of_model.len(), of_photos.len(), "{}", ran.stdout);
+        for (some, others) in [(of_model, of_photos), (of_photos, of_model)] {
+            for one in some {
+                let nearest = others.iter().map(|other| apart(one, other));
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                assert!(nearest <= 0.2, "{nearest}: {one:?}\n{}", ran.stdout);
+            }
+        }
+    }
+}
+
+#[test]
+fn photos_of_a_house_give_the_cells_and_portals_of_its_model() {
+    let folder = with_house();
+    let (model, survey) = ("house/house.glb", "--photos 48 --size 128x96");
+    same_from_model_and_photos(folder.path(), Path::new(model), survey);
+}
+
+#[test]
+fn photos_of_another_house_do_so_too() {
+    let captures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/captures"));
+    let model = captures.join("interior-house/house.glb");
+    if !model.exists() {
+        eprintln!("SKIPPED: {} is not there", model.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let survey = "--photos 160 --size 192x144";
+    same_from_model_and_photos(folder.path(), &model, survey);
+}
+
+#[test]
+fn a_captures_rooms_are_drawn_from_its_photos() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    let made = "interior hall --rooms halves.json --hold-out hall/split.json -o two";
+    let ran = lumigraph(here, made).ok();
+    assert!(ran.stderr.contains("24 depth maps fused"), "{}", ran.stderr);
+    // Photos are named, not copied.
+    assert_eq!(names(&here.join("two")), ["interior.json", "model.glb"]);
+    let file: Value =
+        serde_json::from_slice(&std::fs::read(here.join("two/interior.json")).unwrap()).unwrap();
+    assert_eq!(file["cells"][1]["scene"], "../hall");
+    assert_eq!(file["held_out"].as_array().unwrap().len(), 4);
+    // Held-out photos are close to what is drawn, much closer than with the model's own colours.
+    let line = "walk two --held-out --portals geometry,ldi,whole --device cpu --json";
+    let scores = |more: &str| -> Vec<f64> {
+        let report = lumigraph(here, &format!("{line} {more}")).ok().json();
+        let walks = report["walks"].as_array().unwrap().clone();
+        assert!(
+            walks
+                .iter()
+                .all(|w| w["frames"].as_array().unwrap().len() == 4)
+        );
+        let score = |w: &Value| w["mean"]["psnr"].as_f64().unwrap();
+        walks.iter().map(score).collect()
+    };
+    let photos = scores("-o scored");
+    let plain = scores("--no-photos -o plain");
+    assert!(
+        photos[0] > 26.0 && photos[0] > plain[0] + 3.0,
+        "{photos:?} {plain:?}"
+    );
+    assert_eq!(photos[0], photos[2]);
+    // So small photos are coarser than the views that are made of several of them.
+    let of_views = scores("--ldi-from views -o views");
+    assert!(of_views[1] > photos[2] - 0.5, "{of_views:?}");
+    assert!(photos[1] > photos[2] - 1.2, "{photos:?}");
+    // A walk, byte for byte on one thread.
+    let walk = "walk two --tour --frames 2 --size 48x32 --reference-size 32x32 --portals ldi";
+    lumigraph(here, &format!("{walk} -o a")).ok();
+    lumigraph(here, &format!("--threads 1 {walk} -o b")).ok();
+    for file in ["frame_0000.png", "frame_0001.png"] {
+        let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
+        assert!(read("a") == read("b"), "{file}");
+    }
+    // Held-out photos that the scene does not have are told by name, with the file to correct.
+    let path = here.join("two/interior.json");
+    let held_out = file["held_out"].as_array().unwrap();
+    for (gone, named) in [
+        (&["nope.jpg"][..], "nope.jpg"),
+        (&["nope.jpg", "lost.jpg"][..], "nope.jpg and 1 more"),
+    ] {
+        let mut changed = file.clone();
+        let mut all = held_out.clone();
+        all.extend(gone.iter().map(|name| Value::from(*name)));
+        changed["held_out"] = Value::from(all);
+        std::fs::write(&path, changed.to_string()).unwrap();
+        let said = lumigraph(here, "walk two --tour --frames 1 --size 48x32 -o told").ok();
+        let warning = format!("warning: two/interior.json: its `held_out` has {named}, which ");
+        let is_told = said.stderr.lines().any(|line| line.starts_with(&warning));
+        assert!(is_told, "{}", said.stderr);
+    }
+    std::fs::write(&path, file.to_string()).unwrap();
+    // Photos that are gone are missed by name.
+    std::fs::rename(here.join("hall"), here.join("gone")).unwrap();
+    let error = lumigraph(here, "walk two --tour --frames 1 -o c").error(1);
+    assert!(error.contains("the scene of its cells"), "{error}");
+    lumigraph(
+        here,
+        "walk two --tour --frames 1 --size 48x32 --no-photos -o c",
+    )
+    .ok();
+}
+
+#[test]
+fn a_capture_without_depth_needs_a_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    std::fs::remove_dir_all(here.join("hall/depth")).unwrap();
+    let error = lumigraph(here, "interior hall -o none").error(1);
+    assert!(error.contains("no depth maps"), "{error}");
+    assert!(error.contains("lumigraph proxy SCENE tunnel"), "{error}");
+    lumigraph(here, "import hall -o scene").ok();
+    lumigraph(here, "proxy scene tunnel").ok();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    lumigraph(here, "interior scene --rooms halves.json -o two").ok();
+    lumigraph(here, "walk two --tour --frames 2 --size 48x32 -o walk").ok();
+    let error = lumigraph(here, "walk two --held-out -o x").error(1);
+    assert!(error.contains("no photos were held out"), "{error}");
+    // Of a video that the scene's photos were taken out of no film takes the place, whatever is drawn.
+    let path = here.join("scene/scene.json");
+    let mut scene: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    scene["settings"]["video"] = "../hall.mp4".into();
+    std::fs::write(&path, scene.to_string()).unwrap();
+    std::fs::write(here.join("hall.mp4"), "a video").unwrap();
+    let films = is_installed(&capture::video::ffmpeg());
+    for photos in ["", " --no-photos"].into_iter().filter(|_| films) {
+        let line = "walk two --tour --frames 2 --size 48x32 -o film --video hall.mp4";
+        let error = lumigraph(here, &format!("{line}{photos}")).error(1);
+        let said = "hall.mp4: the film is made of this very file; nothing was written: choose another --video";
+        assert_eq!(error, said);
+    }
+    let line = "interior scene --hold-out hall/split.json -o other";
+    let error = lumigraph(here, line).error(1);
+    assert!(error.contains("which is held out"), "{error}");
+}
