@@ -34,6 +34,8 @@ mod opencv;
 mod path;
 mod readme;
 mod render;
+mod render_again;
+mod render_film;
 mod repeat;
 mod report;
 mod run;

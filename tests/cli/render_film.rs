@@ -1,0 +1,164 @@
+//! Frames made a film, and films that are refused.
+
+use crate::run::{files, lumigraph, run, with_wall};
+use calibrate::{Camera, ModelKind, Rigid3};
+use render::path::{CameraPath, PathFrame};
+
+#[test]
+fn a_film_is_shared_resumed_and_made() {
+    let folder = with_wall();
+    let render = "render wall --proxy plane --path sweep --size 47x35 --background #204060";
+    let whole = format!("{render} --frames 6 -o whole --video films/sweep.mp4 --fps 12");
+    lumigraph(folder.path(), &whole).ok();
+    let frames = files(&folder.path().join("whole"));
+    assert_eq!(frames.len(), 6);
+    let some = image::open(
+        folder
+            .path()
+            .join("whole")
+            .join(frames.keys().next().unwrap()),
+    );
+    assert!(some.unwrap().to_rgba8().pixels().all(|p| p.0[3] == 255));
+    // Others can tell what is in it.
+    let film = folder.path().join("films/sweep.mp4");
+    let probe = std::process::Command::new("ffprobe")
+        .args(["-v", "error", "-count_frames", "-show_entries"])
+        .args([
+            "stream=nb_read_frames,width,height,r_frame_rate",
+            "-of",
+            "csv=p=0",
+        ])
+        .arg(&film)
+        .output()
+        .unwrap();
+    let probed = String::from_utf8_lossy(&probe.stdout).trim().to_owned();
+    assert_eq!(probed, "48,36,12/1,6");
+    assert_eq!(files(&folder.path().join("films")).len(), 1);
+
+    // In parts, and after an interruption, the bytes are the same.
+    for part in ["0..2/6", "2..6/6"] {
+        let line = format!("{render} --frames {part} -o parts --resume");
+        lumigraph(folder.path(), &line).ok();
+    }
+    let lost = folder
+        .path()
+        .join("parts")
+        .join(frames.keys().nth(3).unwrap());
+    std::fs::remove_file(&lost).unwrap();
+    let line = format!("{render} --frames 6 -o parts --resume");
+    let again = lumigraph(folder.path(), &line).ok();
+    assert!(
+        again.stdout.contains("6 frames, 5 of them from before"),
+        "{}",
+        again.stdout
+    );
+    let mut parts = files(&folder.path().join("parts"));
+    assert!(parts.remove(std::path::Path::new("resume.json")).is_some());
+    assert!(parts == frames);
+
+    // Frames of something else are not mixed in.
+    let other = format!("{render} --frames 6 --k 2 -o parts --resume");
+    let error = lumigraph(folder.path(), &other).error(1);
+    assert!(error.contains("another command line"), "{error}");
+    let photo = folder.path().join("wall/images/0000.png");
+    let bytes = std::fs::read(&photo).unwrap();
+    std::fs::write(&photo, bytes).unwrap();
+    let error = lumigraph(folder.path(), &line).error(1);
+    assert!(
+        error.contains("made of other files: wall/images/0000.png was written since"),
+        "{error}"
+    );
+    let error = lumigraph(
+        folder.path(),
+        &format!("{render} --frames 6 -o whole --resume"),
+    )
+    .error(1);
+    assert!(error.contains("without --resume"), "{error}");
+    // Which is said before the scene is looked at.
+    for (part, count) in [("5..7/6", 6), ("2..99", 30)] {
+        let line = format!("render gone --path sweep --frames {part} -o beyond");
+        let beyond = lumigraph(folder.path(), &line);
+        assert_eq!(beyond.code, 2, "{part}");
+        let said = format!("--frames {part}: the path has {count} frames");
+        assert!(beyond.stderr.contains(&said), "{}", beyond.stderr);
+    }
+}
+
+#[test]
+fn without_ffmpeg_a_film_fails_before_anything_is_drawn() {
+    let folder = with_wall();
+    let line = "render wall --proxy plane --path sweep -o frames --video film.mp4";
+    let words: Vec<&str> = line.split(' ').collect();
+    let error = run(folder.path(), &words, &[("PATH", "/nowhere")]).error(1);
+    assert!(error.contains("apt-get install ffmpeg"), "{error}");
+    assert!(!folder.path().join("frames").exists());
+}
+
+#[test]
+fn a_film_by_no_name_of_films_is_refused_before_anything_is_drawn() {
+    let folder = with_wall();
+    let render = |video: &str| {
+        let line = "render wall --proxy plane --path sweep --frames 2 --size 48x36 -o out --video";
+        lumigraph(folder.path(), &format!("{line} {video}"))
+    };
+    // A name of pictures is good for one frame at most.
+    for video in ["a", "a.xyz", "a.png"] {
+        let error = render(video).error(2);
+        let said = format!(
+            "--video {video}: ffmpeg makes no film of that name; films end in .mp4, .webm, .mkv,"
+        );
+        assert!(error.starts_with(&said), "{error}");
+        assert!(!folder.path().join("out").exists(), "{video}");
+    }
+    for video in ["a.MP4", "a.mov"] {
+        render(video).ok();
+        assert!(folder.path().join(video).is_file(), "{video}");
+    }
+}
+
+#[test]
+fn frames_of_several_sizes_are_no_film_and_none_is_drawn() {
+    let folder = with_wall();
+    let frame = |name: &str, width: u32| {
+        let camera = Camera {
+            model: ModelKind::Pinhole,
+            width,
+            height: 36,
+            params: vec![40.0, 40.0, 24.0, 18.0],
+        };
+        PathFrame::new(name.to_owned(), camera, Rigid3::IDENTITY, None).unwrap()
+    };
+    let path = CameraPath::new(30.0, vec![frame("a", 48), frame("b", 48), frame("c", 64)]);
+    render::path::write(&folder.path().join("path.json"), &path.unwrap()).unwrap();
+    let film = |options: &str| {
+        let line =
+            format!("render wall --proxy plane --path path.json -o out --video f.mp4{options}");
+        lumigraph(folder.path(), &line)
+    };
+    let error = film("").error(2);
+    assert_eq!(
+        error,
+        "--video f.mp4: frames of a film are of one size, but a has 48x36 pixels and c 64x36; give --size"
+    );
+    assert!(!folder.path().join("out").exists());
+    // Those that are not drawn are not in the film, and all can be of one size.
+    film(" --frames 0..2").ok();
+    film(" --size 32x24").ok();
+}
+
+#[test]
+fn a_film_is_no_folder() {
+    let folder = with_wall();
+    let before = files(folder.path());
+    for (video, output) in [
+        ("x.mp4", "x.mp4"),
+        ("./x.mp4", "x.mp4/frames"),
+        ("wall", "out"),
+    ] {
+        let line = format!("render wall --path orbit --video {video} -o {output}");
+        let error = lumigraph(folder.path(), &line).error(2);
+        let said = format!("--video {video}: a folder has that name, or would have it");
+        assert!(error.starts_with(&said), "{line}: {error}");
+        assert!(files(folder.path()) == before, "{line}");
+    }
+}
