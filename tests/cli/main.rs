@@ -40,6 +40,8 @@ mod repeat;
 mod report;
 mod run;
 mod scene;
+#[cfg(feature = "window")]
+mod screen;
 mod shape;
 mod surface;
 mod time;
