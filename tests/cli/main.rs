@@ -26,6 +26,7 @@ mod kinds;
 mod ldis;
 mod masked_depth;
 mod masks;
+mod masks_told;
 mod memory;
 mod names;
 mod nerfstudio;
