@@ -53,3 +53,4 @@ mod undistort;
 #[cfg(feature = "window")]
 mod view;
 mod walk;
+mod walk_again;
