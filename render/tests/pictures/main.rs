@@ -31,6 +31,7 @@ mod ldi;
 mod ldi_order;
 mod limits;
 mod masks;
+mod mattes;
 mod mesh;
 mod near;
 mod points;
