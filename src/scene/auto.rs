@@ -135,6 +135,8 @@ impl Scene {
         let takes_long = |kind: Kind| kind == Kind::Dense && photos > MOST_COMPARED;
         // Of one photo of several none is left, as nobody else saw them.
         let points = self.observed(without)?.1.len();
+        // What is made of who sees what for every view shows nothing of one alone.
+        let needs_others = |kind: Kind| matches!(kind, Kind::Points | Kind::Dense);
         let mut said = vec![why];
         for kind in [Kind::Points, Kind::Hull, Kind::Dense] {
             if !candidates.contains(&kind) || takes_long(kind) {
@@ -143,6 +145,13 @@ impl Scene {
             if kind == Kind::Points && points < FEWEST_POINTS {
                 let few = format!("no points ({points} sparse points are too few for a surface)");
                 said.push(few);
+                continue;
+            }
+            if needs_others(kind) && photos < 2 {
+                let name = kind.name();
+                said.push(format!(
+                    "no {name} (one photo alone does not tell where things are)"
+                ));
                 continue;
             }
             match self.fit_to_all(kind, without) {
@@ -242,6 +251,33 @@ mod tests {
         let note = note_of_plane(&mut scene, &others);
         let said = "; no points (0 sparse points are too few for a surface); no dense (";
         assert!(note.contains(said), "{note}");
+    }
+
+    /// As of a capture of one photo, whose points nobody else saw from the start.
+    #[test]
+    fn of_one_photo_a_plane_is_taken_as_points_show_nothing_of_it() {
+        let (_folder, mut scene) = wall();
+        scene.photos.truncate(1);
+        let name = scene.photos[0].name.clone();
+        let whole = &mut scene.reconstruction;
+        whole.images.retain(|_, image| image.name == name);
+        for point in whole.points.values_mut() {
+            point.track.retain(|(id, _)| whole.images.contains_key(id));
+        }
+        assert!(scene.observed_count() >= FEWEST_POINTS);
+
+        let fitted = scene.fit_best(&BTreeSet::new()).unwrap();
+        assert_eq!(fitted.proxy.kind(), "plane");
+        assert!(
+            fitted.how.contains(" observations of points"),
+            "{}",
+            fitted.how
+        );
+        assert_eq!(
+            fitted.note.unwrap(),
+            "1 photos are too few to compare proxies by; no points (one photo alone does not tell where things are); \
+             no dense (one photo alone does not tell where things are)"
+        );
     }
 
     #[test]
