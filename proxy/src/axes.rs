@@ -2,7 +2,7 @@
 
 use crate::Plane;
 use crate::condition::thinnest;
-use crate::fit::{FitBasis, FitError, PlaneFit, forward_or};
+use crate::fit::{FitBasis, FitError, PlaneFit, forward, forward_or, mean_forward};
 use calibrate::{Reconstruction, outer};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -11,15 +11,23 @@ use std::collections::BTreeMap;
 /// square, in the direction that tells depths) are parallel: 2°, about what hand-held photos
 /// of one thing turn by without meaning to.
 const LEAST_SPREAD: f64 = 0.035;
+/// Centres nearer to one another than this share of how far they are from the world's origin are one place: a rotation
+/// and a translation, as they are written, tell them no better. Paths stand still by the same.
+const ONE_PLACE: f64 = 1e-10;
+/// How far from photos of one place their plane lies, in world units: as good as any other.
+const ANY_DISTANCE: f64 = 100.0;
+/// Cosine of the widest angle between where photos of one place look and where they do on the whole, for one plane to
+/// lie before all: 80°, beyond which hardly half of a photo meets it.
+const BEFORE: f64 = 0.17;
 
 /// The plane through the point that is nearest to all optical axes, in the least-squares
 /// sense: x with Σ (I − d dᵀ)(x − c) = 0 over the cameras' centres c and axes d. Parallel to
 /// the mean image plane; where cameras look every way, across the direction in which their
 /// centres spread least.
 ///
-/// Where the axes are as good as parallel, or meet behind the cameras, the harmonic mean of
-/// the depths in `depth_bounds` (nearest and farthest, by image name) is the plane's
-/// distance.
+/// Where the axes are as good as parallel, or meet behind the cameras or in [one place](is_one_place) of
+/// them all, the harmonic mean of the depths in `depth_bounds` (nearest and farthest, by image name) is the
+/// plane's distance.
 ///
 /// # Errors
 /// Axes that meet nowhere before the cameras, and no bounds.
@@ -38,7 +46,7 @@ pub fn plane_across_axes(
         .iter()
         .map(|image| {
             let pose = &image.camera_from_world;
-            (pose.center() - origin, pose.rotation.conjugate() * DVec3::Z)
+            (pose.center() - origin, forward(image))
         })
         .collect();
     let mean_center = rays.iter().map(|(c, _)| *c).sum::<DVec3>() / count;
@@ -52,8 +60,10 @@ pub fn plane_across_axes(
         })
     };
 
-    // 1. Where the axes meet.
-    if let Some((point, along)) = nearest_to(&rays) {
+    // 1. Where the axes meet, unless it is where they begin: before or behind is a matter of rounding there.
+    if !is_one_place(reconstruction)
+        && let Some((point, along)) = nearest_to(&rays)
+    {
         let depths: Vec<f64> = rays.iter().map(|(c, d)| d.dot(point - *c)).collect();
         if depths.iter().all(|depth| *depth > 0.0) {
             let distance = count / depths.iter().map(|depth| 1.0 / depth).sum::<f64>();
@@ -88,6 +98,47 @@ pub fn plane_across_axes(
         },
         across,
     )
+}
+
+/// Whether all images were taken from one place but for rounding, as one alone was. Of none it is not so.
+pub fn is_one_place(reconstruction: &Reconstruction) -> bool {
+    let images = reconstruction.images.values();
+    let mut centers = images.map(|image| image.camera_from_world.center());
+    let Some(first) = centers.next() else {
+        return false;
+    };
+    centers.all(|center| {
+        let apart = center.distance(first);
+        apart.is_finite() && apart <= ONE_PLACE * center.length().max(first.length())
+    })
+}
+
+/// The plane before images that were all taken from [one place](is_one_place), where nothing tells how far away things are:
+/// whatever its distance, a viewer there sees the same. It lies across where they look on the whole, 100 world units away.
+///
+/// # Errors
+/// No images; [`FitError::AllAround`] of such as look past any plane.
+pub fn plane_of_one_place(reconstruction: &Reconstruction) -> Result<PlaneFit, FitError> {
+    let images = &reconstruction.images;
+    let Some(first) = images.values().next() else {
+        return Err(FitError::NoPoints);
+    };
+    let normal = mean_forward(reconstruction).normalize_or_zero();
+    if images
+        .values()
+        .any(|image| forward(image).dot(normal) < BEFORE)
+    {
+        return Err(FitError::AllAround);
+    }
+    let point = first.camera_from_world.center() + ANY_DISTANCE * normal;
+    Ok(PlaneFit {
+        plane: Plane::new(point, normal)?,
+        distance: ANY_DISTANCE,
+        basis: FitBasis::OnePlace {
+            cameras: images.len(),
+        },
+        condition: 1.0,
+    })
 }
 
 /// The point nearest to all rays, and its condition number; `None` where they are parallel.
@@ -193,6 +244,47 @@ mod tests {
         assert!((fit.distance - 3.0).abs() < 1e-12, "{fit:?}");
         assert!((fit.plane.signed_distance(DVec3::ZERO) + 3.0).abs() < 1e-9);
         assert_eq!(fit.basis, FitBasis::DepthBounds { cameras: 2 });
+    }
+
+    /// Cameras at one place that look so far to the side, in degrees.
+    fn turned(place: DVec3, sides: &[f64]) -> Reconstruction {
+        let rays: Vec<(DVec3, DVec3)> = sides
+            .iter()
+            .map(|side| {
+                let (sin, cos) = side.to_radians().sin_cos();
+                (place, place + DVec3::new(sin, 0.0, cos))
+            })
+            .collect();
+        looking(&rays)
+    }
+
+    #[test]
+    fn a_plane_lies_before_cameras_of_one_place_unless_they_look_all_around() {
+        for place in [
+            DVec3::ZERO,
+            DVec3::new(0.1, -0.3, 7.0),
+            DVec3::new(4e5, 5e6, 120.0),
+        ] {
+            let whole = turned(place, &[-70.0, -20.0, 20.0, 70.0]);
+            assert!(is_one_place(&whole));
+            // The axes meet, if anywhere, where they begin.
+            let error = plane_across_axes(&whole, &BTreeMap::new()).unwrap_err();
+            assert_eq!(error, FitError::NoPoints);
+            let fit = plane_of_one_place(&whole).unwrap();
+            assert_eq!(fit.basis, FitBasis::OnePlace { cameras: 4 });
+            assert!((fit.plane.signed_distance(place) + fit.distance).abs() < 1e-6);
+            assert!(fit.plane.normal().z > 1.0 - 1e-6, "{fit:?}");
+            for around in [
+                &[0.0, 90.0, 180.0, 270.0][..],
+                &[0.0, 120.0, 240.0],
+                &[-85.0, 85.0],
+            ] {
+                let fit = plane_of_one_place(&turned(place, around));
+                assert_eq!(fit.unwrap_err(), FitError::AllAround, "{around:?}");
+            }
+        }
+        assert!(!is_one_place(&looking(&ring(DVec3::ZERO, 1e-3))));
+        assert!(!is_one_place(&Reconstruction::default()));
     }
 
     #[test]

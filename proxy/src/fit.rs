@@ -4,7 +4,7 @@
 use crate::cloud::{isolated_points, median};
 use crate::condition::{Thinnest, thinnest};
 use crate::{Plane, PlaneError};
-use calibrate::Reconstruction;
+use calibrate::{Image, Reconstruction};
 use glam::DVec3;
 use std::fmt;
 
@@ -42,6 +42,11 @@ pub enum FitBasis {
         /// For how many.
         cameras: usize,
     },
+    /// Nothing but where photos from one place look, which any distance suits.
+    OnePlace {
+        /// How many.
+        cameras: usize,
+    },
 }
 
 impl fmt::Display for FitBasis {
@@ -64,6 +69,11 @@ impl fmt::Display for FitBasis {
                 "the nearest and farthest depths of {cameras} photos, as they observe no sparse \
                  points"
             ),
+            Self::OnePlace { cameras } => write!(
+                f,
+                "what {cameras} photos show from one place, where any distance serves, as they \
+                 observe no sparse points"
+            ),
         }
     }
 }
@@ -77,6 +87,12 @@ pub enum FitError {
          their optical axes do not meet there; give the plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)"
     )]
     NoPoints,
+    /// All images were taken from one place, and look too far apart for one plane.
+    #[error(
+        "all photos were taken from one place and look all around, which no one plane lies before; try carved, \
+         a dome around them"
+    )]
+    AllAround,
     /// The points make no plane.
     #[error(transparent)]
     Plane(#[from] PlaneError),
@@ -178,16 +194,21 @@ pub(crate) fn forward_or(
 }
 
 /// The mean of the unit vectors that the cameras look along.
-fn mean_forward(reconstruction: &Reconstruction) -> DVec3 {
+pub(crate) fn mean_forward(reconstruction: &Reconstruction) -> DVec3 {
     let images = reconstruction.images.values();
-    let forward = images.map(|i| i.camera_from_world.rotation.conjugate() * DVec3::Z);
-    forward.sum::<DVec3>() / reconstruction.images.len().max(1) as f64
+    let sum: DVec3 = images.map(forward).sum();
+    sum / reconstruction.images.len().max(1) as f64
+}
+
+/// The unit vector that an image's camera looks along.
+pub(crate) fn forward(image: &Image) -> DVec3 {
+    image.camera_from_world.rotation.conjugate() * DVec3::Z
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Point3D, Point3DId, Rigid3};
+    use calibrate::{Camera, CameraId, ImageId, ModelKind, Point3D, Point3DId, Rigid3};
     use glam::DQuat;
 
     /// Four cameras at z = 0 looking along +z at points on z = `depth`.

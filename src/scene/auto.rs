@@ -161,7 +161,14 @@ impl Scene {
                 Err(error) => said.push(format!("no {} ({error})", kind.name())),
             }
         }
-        Ok(noted(self.fit_to_all(Kind::Plane, without)?, said))
+        match self.fit_to_all(Kind::Plane, without) {
+            // Photos of one place that look all around.
+            Err(error) if self.suits_any_distance() => {
+                said.push(format!("no plane ({error})"));
+                Ok(noted(self.fit_to_all(Kind::Carved, without)?, said))
+            }
+            plane => Ok(noted(plane?, said)),
+        }
     }
 
     /// Whether a scene has at all what a kind of proxy is made from.
@@ -169,6 +176,7 @@ impl Scene {
         match kind {
             Kind::Plane => true,
             Kind::DominantPlane | Kind::Tunnel => self.reconstruction.points.len() >= FEWEST_POINTS,
+            Kind::Carved if self.suits_any_distance() => true,
             Kind::ViewPlane | Kind::Points | Kind::Carved => self.observed_count() >= FEWEST_POINTS,
             // Photos are compared whatever there is of points.
             Kind::Dense | Kind::CarvedDense => true,
@@ -251,6 +259,35 @@ mod tests {
         let note = note_of_plane(&mut scene, &others);
         let said = "; no points (0 sparse points are too few for a surface); no dense (";
         assert!(note.contains(said), "{note}");
+    }
+
+    /// Which nothing tells the distance of, nor has to.
+    #[test]
+    fn photos_of_one_place_that_tell_no_distances_have_a_plane_or_a_dome() {
+        let (_folder, mut scene) = wall();
+        scene.reconstruction.points.clear();
+        for (step_deg, kind) in [(20.0_f64, "plane"), (72.0, "carved")] {
+            for (i, image) in scene.reconstruction.images.values_mut().enumerate() {
+                image.keypoints.clear();
+                let angle = i as f64 * step_deg.to_radians();
+                let pose = &mut image.camera_from_world;
+                pose.rotation = glam::DQuat::from_rotation_y(angle);
+                pose.translation = glam::DVec3::ZERO;
+            }
+            let fitted = scene.fit_best(&BTreeSet::new()).unwrap();
+            assert_eq!(fitted.proxy.kind(), kind);
+            let note = fitted.note.unwrap();
+            assert!(
+                note.contains("one place, where any distance serves"),
+                "{note}"
+            );
+        }
+        let error = scene.fit(Kind::Plane, &BTreeSet::new()).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "all photos were taken from one place and look all around, which no one plane lies before; try carved, \
+             a dome around them"
+        );
     }
 
     /// As of a capture of one photo, whose points nobody else saw from the start.

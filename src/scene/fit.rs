@@ -163,6 +163,7 @@ impl Scene {
                 Ok(Fitted::points(self.bound(without)?))
             }
             Kind::Tunnel => Ok(Fitted::tunnel(&self.tunnel(without)?)),
+            Kind::Carved if self.suits_any_distance() => self.fit_dome(without),
             Kind::Carved => {
                 self.needs_observed(kind)?;
                 let (views, points) = self.observed(without)?;
@@ -260,10 +261,11 @@ impl Scene {
     }
 
     /// The plane that fits the sparse points when the photos of the given names were never
-    /// taken; where no photo observes any, that through what the cameras look at.
+    /// taken; where no photo observes any, that through what the cameras look at. Of a scene whose photos were all
+    /// taken from one place, which a view does not leave, one at any distance.
     ///
     /// # Errors
-    /// Nothing to fit to.
+    /// Nothing to fit to; photos of one place that look all around.
     pub fn fit_plane(&self, without: &BTreeSet<String>) -> Result<PlaneFit, SceneError> {
         let rest = self.reconstruction.without_images(without);
         let fitted = match proxy::fit_plane(&rest) {
@@ -271,9 +273,33 @@ impl Scene {
             fit => fit,
         };
         match fitted {
+            Err(FitError::NoPoints) if proxy::is_one_place(&self.reconstruction) => {
+                Ok(proxy::plane_of_one_place(&rest)?)
+            }
             Err(FitError::NoPoints) => Err(self.lack_of_plane(&rest)),
             fit => Ok(fit?),
         }
+    }
+
+    /// Whether nothing tells how far away things are, nor has to: no photo observes sparse points, and all were taken
+    /// from one place, where any distance shows the same.
+    pub(super) fn suits_any_distance(&self) -> bool {
+        self.observed_count() == 0 && proxy::is_one_place(&self.reconstruction)
+    }
+
+    /// What is left of a carved mesh where there is [any distance](Self::suits_any_distance): the dome.
+    fn fit_dome(&self, without: &BTreeSet<String>) -> Result<Fitted, SceneError> {
+        let (views, _) = self.sparse(without)?;
+        // What the others are apart by is rounding, which would say how far they reach.
+        let dome = proxy::shell(&views[..views.len().min(1)], &[]);
+        let how = format!(
+            "a dome around {} photos of one place, where any distance serves",
+            views.len()
+        );
+        let note = format!("the proxy is {how}, as they observe no sparse points");
+        let mut fitted = Fitted::mesh(MeshKind::Carved, dome, how);
+        fitted.note = Some(note);
+        Ok(fitted)
     }
 
     /// The nearest and the farthest depth of photos, where the calibration says so, by name.
@@ -292,6 +318,8 @@ impl Scene {
         let rest = self.reconstruction.without_images(without);
         let (distance, nearest) = match proxy::plane_across_axes(&rest, &bounds) {
             Ok(fit) => (fit.distance, NEAREST),
+            // That much is rounding.
+            Err(_) if proxy::is_one_place(&rest) => (0.0, NEAREST_AROUND),
             Err(_) => (
                 spread(sources.iter().map(|(_, view)| view.center())),
                 NEAREST_AROUND,
@@ -300,7 +328,7 @@ impl Scene {
         if !(distance > 0.0 && distance.is_finite()) {
             return Err(unfit(
                 "no photo observes sparse points, and all were taken from one place, which tells no \
-                 depths; give a plane by hand (`proxy SCENE plane --point X,Y,Z --normal X,Y,Z`)",
+                 depths; try plane, or carved where they look all around",
             ));
         }
         let range = |photo: &Photo| match bounds.get(&photo.name) {

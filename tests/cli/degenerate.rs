@@ -239,6 +239,19 @@ fn two_photos() {
 fn cameras_at_one_place() {
     let cameras = vec![DVec3::new(0.1, 0.0, 0.2); 7];
     only_these_fail(&cameras, &ordinary(60), &["dominant-plane"]);
+    // Nothing tells how far away things are, and it is no matter: a plane before them and a dome around them show all.
+    let compared = ["dense", "carved-dense"];
+    let of_points = ["dominant-plane", "view-plane", "points", "tunnel"];
+    only_these_fail(&cameras, &[], &[&of_points[..], &compared].concat());
+    let folder = capture(&cameras, &[]);
+    let line = "render c --path orbit --frames 2 --size 24x18 -o out --json";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert_eq!(ran.json()["report"]["frames_empty"], 0);
+    assert!(
+        ran.stderr.contains(": the path stands still\n"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
