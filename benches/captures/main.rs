@@ -132,6 +132,7 @@ fn measure(capture: &Path, args: &Args) -> Result<Row, SceneError> {
     // As the command line does.
     scene.drop_weak();
     scene.drop_misplaced();
+    scene.drop_contradicted();
     let held_out = scene.held_out_by_default()?;
     // As `evaluate` does.
     if scene.folder.is_none() || !scene.exposure_is_without(&held_out) {

@@ -103,6 +103,46 @@ impl Reconstruction {
         }
     }
 
+    /// The sparse points that every image observing them has farther than so many pixels from where it observes them, or
+    /// behind it. Points that no image observes are none of them, nor those of which one observation cannot be
+    /// judged: its keypoint is not there, or its camera has no lens.
+    pub fn contradicted_points(&self, limit_px: f64) -> BTreeSet<Point3DId> {
+        let cameras = self.cameras.iter();
+        let lenses: BTreeMap<CameraId, Lens> = cameras
+            .filter_map(|(id, camera)| Some((*id, camera.lens().ok()?)))
+            .collect();
+        let error = |(image_id, keypoint_idx): &(ImageId, u32)| {
+            let image = self.images.get(image_id)?;
+            let keypoint = image.keypoints.get(*keypoint_idx as usize)?;
+            let lens = lenses.get(&image.camera_id)?;
+            self.error_px(image, lens, keypoint, DVec2::ZERO)
+        };
+        let is_contradicted = |point: &Point3D| {
+            let mut errors = point.track.iter().map(error);
+            !point.track.is_empty() && errors.all(|px| px.is_some_and(|px| px > limit_px))
+        };
+        let points = self.points.iter();
+        points
+            .filter(|(_, point)| is_contradicted(point))
+            .map(|(id, _)| *id)
+            .collect()
+    }
+
+    /// Takes sparse points out, and their keypoints' links.
+    pub fn remove_points(&mut self, gone: &BTreeSet<Point3DId>) {
+        if gone.is_empty() {
+            return;
+        }
+        self.points.retain(|id, _| !gone.contains(id));
+        for keypoint in self
+            .images
+            .values_mut()
+            .flat_map(|image| &mut image.keypoints)
+        {
+            keypoint.point = keypoint.point.filter(|id| !gone.contains(id));
+        }
+    }
+
     /// Makes the sparse points' tracks of the keypoints that name them, where no point has a track of its own: some
     /// programs write who observes which into the images alone. How many observations these are.
     pub fn take_tracks_from_keypoints(&mut self) -> usize {
@@ -317,6 +357,43 @@ mod tests {
         assert!((errors[6] - 0.5).abs() < 1e-12);
         let none = three_images().reprojection_errors_px(CameraId(8)).unwrap();
         assert!(none.is_empty());
+    }
+
+    #[test]
+    fn points_are_contradicted_where_all_who_observe_them_have_them_elsewhere() {
+        let mut whole = three_images();
+        let contradicted = |whole: &Reconstruction| -> Vec<u64> {
+            let ids = whole.contradicted_points(10.0).into_iter();
+            ids.map(|id| id.0).collect()
+        };
+        assert!(contradicted(&whole).is_empty());
+        // 1. Point 2 is behind all; point 3 is off, in both images that observe it.
+        for (id, to) in [
+            (2, DVec3::new(0.0, 0.0, -5.0)),
+            (3, DVec3::new(3.0, 9.0, 10.0)),
+        ] {
+            whole.points.get_mut(&Point3DId(id)).unwrap().position = to;
+        }
+        assert_eq!(contradicted(&whole), [2, 3]);
+        // 2. One that agrees is enough, and so is one of which nothing is known.
+        let mut agreed = whole.clone();
+        agreed.images.get_mut(&ImageId(12)).unwrap().keypoints[1].y = 140.0;
+        assert_eq!(contradicted(&agreed), [2]);
+        let unknown = agreed.images.get_mut(&ImageId(11)).unwrap();
+        unknown.keypoints.truncate(1);
+        assert!(contradicted(&agreed).is_empty());
+        // 3. Those that nobody observes are given.
+        let mut given = whole.clone();
+        given.points.get_mut(&Point3DId(2)).unwrap().track.clear();
+        assert_eq!(contradicted(&given), [3]);
+
+        let gone = whole.contradicted_points(10.0);
+        whole.remove_points(&gone);
+        let ids: Vec<u64> = whole.points.keys().map(|id| id.0).collect();
+        assert_eq!(ids, [1]);
+        let keypoints = whole.images.values().flat_map(|image| &image.keypoints);
+        let links: Vec<u64> = keypoints.filter_map(|k| Some(k.point?.0)).collect();
+        assert_eq!(links, [1; 3]);
     }
 
     #[test]

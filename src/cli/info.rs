@@ -4,7 +4,8 @@ use super::import::check_photos;
 use super::info_of_file;
 use super::interior::check_no_interior;
 use super::options::{
-    KeyArgs, SceneArgs, beside_counts, beside_text, misplaced_text, print_warnings, tie_text,
+    KeyArgs, SceneArgs, beside_counts, beside_text, contradicted_text, misplaced_text,
+    print_warnings, tie_text,
 };
 use super::output::{print, print_json, say};
 use super::report::megabytes;
@@ -62,7 +63,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let weak = scene.reconstruction.weakly_tied(TRUSTED_TIE);
     let misplaced = scene.misplaced();
-    let info = gather(&scene, &weak, &misplaced)?;
+    let contradicted = scene.contradicted_points().len();
+    let mut info = gather(&scene, &weak, &misplaced)?;
+    info["contradicted_points"] = json!(contradicted);
     if args.json {
         return print_json(&info);
     }
@@ -75,6 +78,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     if let Some(misplaced) = misplaced_text(&misplaced) {
         say!("note: {misplaced}; what draws leaves them out, unless --keep-weak");
+    }
+    let points = scene.reconstruction.points.len();
+    if let Some(contradicted) = contradicted_text(contradicted, points) {
+        say!("note: {contradicted}; what draws leaves them out, unless --keep-weak");
     }
     Ok(())
 }

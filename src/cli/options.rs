@@ -22,13 +22,14 @@ pub(super) struct SceneArgs {
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     pub(super) strict: bool,
-    /// Use photos, too, that share too few points with the rest to be placed surely, or see most of theirs far off
+    /// Use photos, too, that share too few points with the rest to be placed surely, or see most of theirs far off, and
+    /// points that all their photos see far off
     #[arg(long)]
     pub(super) keep_weak: bool,
 }
 
 impl SceneArgs {
-    /// Opens it, and says which photos are not used.
+    /// Opens it, and says which photos are not used, and how many points.
     pub(super) fn open(&self) -> anyhow::Result<Scene> {
         let mut scene = self.open_whole()?;
         if !self.keep_weak {
@@ -37,7 +38,7 @@ impl SceneArgs {
         Ok(scene)
     }
 
-    /// As [`Self::open`], with photos whose places are unsure.
+    /// As [`Self::open`], with photos whose places are unsure, and all points.
     pub(super) fn open_whole(&self) -> anyhow::Result<Scene> {
         check_no_interior(&self.scene)?;
         let (scene, warnings) = Scene::open(&self.scene, self.strict)?;
@@ -63,7 +64,8 @@ pub(super) fn beside_text(scene: &Scene) -> String {
     counts.map(|(what, n)| format!(", {n} {what}")).collect()
 }
 
-/// Leaves out photos whose places are unsure, and says which, and what uses them.
+/// Leaves out photos whose places are unsure, and then points that all theirs contradict, and says which, and
+/// what uses them.
 pub(super) fn drop_weak(scene: &mut Scene) {
     drop_weak_saying(scene, "; --keep-weak uses them");
 }
@@ -82,6 +84,20 @@ fn drop_weak_saying(scene: &mut Scene, remedy: &str) {
     if let Some(misplaced) = misplaced_text(&scene.drop_misplaced()) {
         say!("note: left out, as misplaced: {misplaced}{remedy}");
     }
+    let points = scene.reconstruction.points.len();
+    if let Some(contradicted) = contradicted_text(scene.drop_contradicted(), points) {
+        say!("note: left out, as wrong: {contradicted}{remedy}");
+    }
+}
+
+/// What tells that so many of all sparse points are wrong; `None` of none.
+pub(super) fn contradicted_text(count: usize, points: usize) -> Option<String> {
+    (count > 0).then(|| {
+        format!(
+            "{count} of {points} sparse points, which all photos that observe them see behind them or more than \
+             {DOUBTFUL_PX} pixels from where the calibration has them"
+        )
+    })
 }
 
 /// What tells that these photos are misplaced; `None` of none.

@@ -1,7 +1,8 @@
 //! Whether a calibration fits its photos at all, and each of them.
 
 use super::Warning;
-use calibrate::{Image, Reconstruction, TRUSTED_TIE};
+use calibrate::{Image, Point3DId, Reconstruction, TRUSTED_TIE};
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 /// Structure from motion misses what it measured by a pixel or less. What misses it by so many belongs to other
@@ -45,6 +46,16 @@ pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
     let mut names: Vec<String> = wrong.map(|(id, _)| whole.images[id].name.clone()).collect();
     names.sort();
     names
+}
+
+/// The sparse points that all photos observing them see behind them, or so far from where the calibration has them,
+/// while photos usually do not: they are wrong, whatever observes them.
+pub(super) fn contradicted(whole: &Reconstruction) -> BTreeSet<Point3DId> {
+    match whole.median_error_px() {
+        // Where all are a little off, some are by more.
+        Some(usual_px) => whole.contradicted_points(DOUBTFUL_PX * usual_px.max(1.0)),
+        None => BTreeSet::new(),
+    }
 }
 
 /// Lengths that numbers of 32 bits, which pictures are drawn with, hold with room for squares' roots and quotients.
@@ -101,7 +112,7 @@ pub(super) fn of_principal(whole: &Reconstruction) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibrate::{Camera, CameraId, ImageId, Keypoint, ModelKind, Point3D, Point3DId, Rigid3};
+    use calibrate::{Camera, CameraId, ImageId, Keypoint, ModelKind, Point3D, Rigid3};
     use glam::DVec3;
 
     /// A point in the middle of a photo, at a depth, seen by so many pixels to the right.
@@ -183,6 +194,25 @@ mod tests {
         assert!(misplaced(&photos(&[(20, 0.5), (20, 40.0)])).is_empty());
         assert!(misplaced(&photos(&[(20, 30.0), (20, 40.0), (20, 25.0)])).is_empty());
         assert!(misplaced(&Reconstruction::default()).is_empty());
+    }
+
+    #[test]
+    fn points_that_all_their_photos_miss_while_others_do_not_are_contradicted() {
+        let mut whole = photos(&[(20, 0.5), (20, 0.1)]);
+        assert!(contradicted(&whole).is_empty());
+        let mut stray = whole.points[&Point3DId(1)].clone();
+        stray.track = vec![(ImageId(0), 0)];
+        whole.points.insert(Point3DId(2), stray);
+        for (off_px, expected) in [(9.0, 0), (11.0, 1)] {
+            let image = whole.images.get_mut(&ImageId(0)).unwrap();
+            image.keypoints[0].x = 50.0 + off_px;
+            image.keypoints[0].point = Some(Point3DId(2));
+            assert_eq!(contradicted(&whole).len(), expected);
+        }
+        // Where most observations miss as much, that says nothing of a point.
+        for all_off in [seen(2.0, 31.0), seen(-2.0, 0.0), Reconstruction::default()] {
+            assert!(contradicted(&all_off).is_empty());
+        }
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub use split::SplitFile;
 pub use times::TimeSource;
 pub use truth::{Truth, TruthScore};
 
-use calibrate::{Reconstruction, TRUSTED_TIE, WeakGroup};
+use calibrate::{Point3DId, Reconstruction, TRUSTED_TIE, WeakGroup};
 use file::{ExposureEntry, Extra, Settings};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -150,6 +150,20 @@ impl Scene {
             self.take_out(&names.iter().cloned().collect::<BTreeSet<String>>());
         }
         names
+    }
+
+    /// The sparse points that all photos observing them see behind them, or more than [`DOUBTFUL_PX`] from where the
+    /// calibration has them, while photos usually do not.
+    pub fn contradicted_points(&self) -> BTreeSet<Point3DId> {
+        misfit::contradicted(&self.reconstruction)
+    }
+
+    /// Leaves out the sparse points that are [contradicted](Self::contradicted_points), so that no surface is made of
+    /// them, and returns how many they are.
+    pub fn drop_contradicted(&mut self) -> usize {
+        let gone = self.contradicted_points();
+        self.reconstruction.remove_points(&gone);
+        gone.len()
     }
 
     /// Takes photos out of the scene, and notes that they were left out.

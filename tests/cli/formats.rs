@@ -1,7 +1,7 @@
 //! Calibrations of other programs, from file to picture.
 
 use crate::run::{lumigraph, with_wall};
-use calibrate::{ImageId, Reconstruction, colmap};
+use calibrate::{ImageId, Point3DId, Reconstruction, colmap};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -215,6 +215,51 @@ fn a_photo_that_is_misplaced_is_named_and_harms_no_others() {
     assert!(
         without > usual - 1.0 && with > usual - 1.0,
         "{usual} dB, {without} without it, {with} with it"
+    );
+}
+
+/// As wrong matches have them.
+#[test]
+fn points_that_all_their_photos_contradict_are_left_out() {
+    let folder = with_wall();
+    let here = folder.path();
+    let model_folder = here.join("wall/sparse/0");
+    let mut model = colmap::read_model(&model_folder).unwrap();
+    let write = |model: &Reconstruction| {
+        fs::remove_dir_all(&model_folder).unwrap();
+        colmap::write_text(model, &model_folder).unwrap();
+    };
+    let scored = |more: &str| -> (f64, String) {
+        let ran = lumigraph(here, &format!("evaluate wall --proxy points --json{more}"));
+        let ran = ran.ok();
+        (ran.json()["mean"]["psnr"].as_f64().unwrap(), ran.stderr)
+    };
+    let wrong: BTreeSet<Point3DId> = model.points.keys().step_by(10).copied().collect();
+    for id in &wrong {
+        model.points.get_mut(id).unwrap().position.x += 30.0;
+    }
+    write(&model);
+    let named = format!(
+        "{} of {} sparse points, which all photos",
+        wrong.len(),
+        model.points.len()
+    );
+    let info = lumigraph(here, "info wall").ok();
+    assert!(info.stderr.contains(&named), "{}", info.stderr);
+    let (left_out, said) = scored("");
+    let note = format!("note: left out, as wrong: {named}");
+    assert!(said.contains(&note), "{said}");
+    let (_, said) = scored(" --keep-weak");
+    assert!(!said.contains(&named), "{said}");
+
+    // They make no difference.
+    model.remove_points(&wrong);
+    write(&model);
+    let (without, said) = scored("");
+    assert!(!said.contains("left out, as wrong"), "{said}");
+    assert!(
+        (left_out - without).abs() < 1e-9,
+        "{left_out} and {without} dB"
     );
 }
 
