@@ -301,6 +301,14 @@ fn errors_name_the_frame_and_a_remedy() {
         "camera_model: found the camera model \"EQUIRECTANGULAR\", expected PINHOLE, OPENCV or \
          OPENCV_FISHEYE; undistort the photos and export them as PINHOLE"
     );
+    assert_eq!(
+        error(
+            &format!("{shared}, \"camera_model\": \"PINHOLE\", \"k1\": 0.5"),
+            FRAME
+        ),
+        "camera_model: found PINHOLE with k1 = 0.5, which a pinhole lacks; set camera_model to \
+         OPENCV, or remove the coefficients"
+    );
     let nan = error(shared, &FRAME.replace("[1, 0, 0, 1]", "[NaN, 0, 0, 1]"));
     assert!(nan.starts_with("line 2 column 7: not JSON"), "{nan}");
     let place = ": not JSON: frames[0].transform_matrix[0][0] (a/b c.jpg) is NaN, expected a finite \
