@@ -114,6 +114,9 @@ impl Model {
     /// Red, green and blue at a place of a triangle, sRGB codes 0 to 255: the product of all that
     /// colours it. `shares` are the corners' barycentric weights, and sum to 1.
     ///
+    /// Files say factors and corners' colours as shares of linear light, which are read into codes. The product of
+    /// codes stands for that of light: where one is a power of the other, as sRGB is nearly, the two commute.
+    ///
     /// The texture is bilinear in each of the two levels that suit a pixel with a [`footprint`], and
     /// mixed between them; 0 asks for the finest. [`Coloring`](super::Coloring) is the fast twin, in f32,
     /// for many places.

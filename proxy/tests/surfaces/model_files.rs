@@ -99,6 +99,44 @@ fn a_model_comes_back_from_its_file() {
     assert_eq!(mesh, back.mesh);
 }
 
+#[test]
+fn factors_and_corners_colours_are_linear_in_files_and_codes_in_models() {
+    // Positions as corners' colours: three numbers of 32 bits, as many programs write them, a quarter for blue.
+    let bytes = changed(&mesh::model_to_glb(&small()).unwrap(), |text| {
+        let mut json: Value = serde_json::from_str(&text).unwrap();
+        for mesh in json["meshes"].as_array_mut().unwrap() {
+            let attributes = &mut mesh["primitives"][0]["attributes"];
+            attributes["COLOR_0"] = attributes["POSITION"].clone();
+        }
+        let factor = json!([1.0, 0.25, 0.0, 1.0]);
+        json["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"] = factor;
+        json.to_string()
+    });
+    let (model, warnings) = read(&bytes).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    for (position, color) in model.mesh.positions.iter().zip(&model.colors) {
+        // A quarter of the light is the code 137 of 255.
+        let code = |x: f64| if x == 0.25 { 137 } else { 255 * x as u8 };
+        assert_eq!(color[..3], position.to_array().map(code));
+    }
+    let [r, g, b] = model.materials[1].base_color;
+    assert!(r == 1.0 && (g - 0.5371).abs() < 1e-4 && b == 0.0, "{g}");
+
+    // All codes come back as they were.
+    let mut all = small();
+    for first in 0..64 {
+        for (corner, color) in all.colors.iter_mut().enumerate() {
+            *color = [(4 * first + corner) as u8, 0, 255, 255];
+        }
+        let (back, _) = read(&mesh::model_to_glb(&all).unwrap()).unwrap();
+        let codes = |model: &Model| -> Vec<[u8; 4]> {
+            let corners = model.mesh.triangles.as_flattened().iter();
+            corners.map(|i| model.colors[*i as usize]).collect()
+        };
+        assert_eq!(codes(&back), codes(&all));
+    }
+}
+
 /// The small model, stretched and moved.
 fn small_at(size: DVec3, place: DVec3) -> Model {
     let mut model = small();
