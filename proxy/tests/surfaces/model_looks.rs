@@ -191,6 +191,42 @@ fn what_shines_is_shown_where_it_was_black_and_told_elsewhere() {
 }
 
 #[test]
+fn what_bones_would_pose_is_told_once() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    let skinned = |nodes: &[usize], name: &str| {
+        let changed = changed(&bytes, |text| {
+            let mut json: Value = serde_json::from_str(&text).unwrap();
+            json["skins"] = json!([{"joints": [0]}]);
+            for node in nodes {
+                json["nodes"][*node]["skin"] = 0.into();
+            }
+            json["nodes"][1]["name"] = name.into();
+            json.to_string()
+        });
+        read(&changed).unwrap()
+    };
+    let said = |of: &str| {
+        format!(
+            "what bones pose (a skin) is drawn as it was modelled, in its rest pose; apply the pose before \
+             exporting ({of})"
+        )
+    };
+    for (nodes, name, of) in [
+        (vec![1], "man", "1 node: `man`"),
+        (vec![1], "", "1 node: number 1"),
+        (vec![0, 1], "man", "2 nodes: `cell:a`, `man`"),
+    ] {
+        let (model, warnings) = skinned(&nodes, name);
+        assert_eq!(warnings, [said(of)]);
+        assert_eq!(model.mesh, plain.mesh);
+    }
+    // A skin that no node has poses nothing.
+    let (_, warnings) = skinned(&[], "man");
+    assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
 fn what_alpha_makes_invisible_is_left_out_and_told() {
     let bytes = mesh::model_to_glb(&small()).unwrap();
     let (plain, _) = read(&bytes).unwrap();

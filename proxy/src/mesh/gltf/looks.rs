@@ -8,6 +8,7 @@ use super::{PassedOver, Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::{Material, MeshFileError, Model, ModelNode, PORTAL_NODE, Part, Wrap};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -31,6 +32,8 @@ struct Root {
 struct Node {
     #[serde(default)]
     name: String,
+    /// What poses its mesh by other nodes, its bones.
+    skin: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -100,6 +103,7 @@ pub(in crate::mesh) fn parse_model(
     let decoded = decode(path, &looks.pictures)?;
     let mut not_shown = looks.not_shown(&decoded);
     not_shown.extend(looks.told_passed_over());
+    not_shown.extend(looks.told_unposed());
     let Looks {
         mut model,
         mut warnings,
@@ -132,6 +136,8 @@ struct Looks {
     openings: Vec<bool>,
     /// Primitives, by mesh, that are no triangles, or not all of them.
     passed_over: BTreeMap<PassedOver, BTreeSet<(usize, usize)>>,
+    /// Nodes whose meshes bones would pose.
+    unposed: BTreeSet<usize>,
     /// How many triangles are left out as nobody could see them, by the file's materials.
     hidden: BTreeMap<usize, usize>,
     /// The least alpha of corners that are drawn, by the file's materials.
@@ -147,7 +153,7 @@ struct Looks {
 
 impl Visitor for Looks {
     fn node(&mut self, number: usize, parent: Option<usize>) {
-        let named = self.root.as_ref().and_then(|root| root.nodes.get(number));
+        let named = self.node_entry(number);
         let name = named.map(|n| n.name.clone()).unwrap_or_default();
         let parent_idx = parent.and_then(|p| self.node_idxs.get(&p).copied());
         let is_below = parent.is_some_and(|p| self.is_opening(p));
@@ -180,6 +186,12 @@ impl Visitor for Looks {
         accessors: &mut Accessors<'_>,
         place: Place,
     ) -> Result<(), MeshFileError> {
+        if self
+            .node_entry(place.node)
+            .is_some_and(|node| node.skin.is_some())
+        {
+            self.unposed.insert(place.node);
+        }
         let entry = self.root.as_ref().and_then(|root| {
             let mesh = root.meshes.get(place.mesh)?;
             mesh.primitives.get(place.primitive)
@@ -260,6 +272,11 @@ impl Visitor for Looks {
 }
 
 impl Looks {
+    /// A node of the file.
+    fn node_entry(&self, number: usize) -> Option<&Node> {
+        self.root.as_ref()?.nodes.get(number)
+    }
+
     /// A material of the file.
     fn entry(&self, material: usize) -> Option<&MaterialEntry> {
         self.root.as_ref()?.materials.get(material)
@@ -298,6 +315,19 @@ impl Looks {
         let drawn: BTreeMap<usize, f64> = drawn.collect();
         let materials = self.root.as_ref().map(|root| &root.materials[..]);
         not_shown(materials.unwrap_or_default(), &self.hidden, &drawn)
+    }
+
+    /// What stands otherwise than its bones say.
+    fn told_unposed(&self) -> Option<String> {
+        let numbers: Vec<usize> = self.unposed.iter().copied().collect();
+        let name = |number| Some(self.node_entry(number)?.name.as_str());
+        let of = super::listed("node", &numbers, name);
+        (!numbers.is_empty()).then(|| {
+            format!(
+                "what bones pose (a skin) is drawn as it was modelled, in its rest pose; apply the pose before \
+                 exporting ({of})"
+            )
+        })
     }
 
     /// What of the primitives is no triangle, once a kind.

@@ -285,25 +285,9 @@ pub(super) fn not_shown(
     warnings
 }
 
-/// So many materials are named at most.
-const MOST_NAMES: usize = 3;
-
-/// Materials as messages show them: how many, and the names of the first.
+/// Materials as messages show them.
 fn listed(materials: &[MaterialEntry], numbers: &[usize]) -> String {
-    let name = |number: &usize| match materials.get(*number).map(|m| m.name.as_str()) {
-        None | Some("") => format!("number {number}"),
-        Some(name) => format!("`{}`", shown(name)),
-    };
-    let names: Vec<String> = numbers.iter().take(MOST_NAMES).map(name).collect();
-    let noun = if numbers.len() == 1 {
-        "material"
-    } else {
-        "materials"
-    };
-    let more = if numbers.len() > MOST_NAMES {
-        ", …"
-    } else {
-        ""
-    };
-    format!("{} {noun}: {}{more}", numbers.len(), names.join(", "))
+    super::listed("material", numbers, |number| {
+        materials.get(number).map(|material| material.name.as_str())
+    })
 }

@@ -429,3 +429,26 @@ impl Reader<'_> {
         Ok(())
     }
 }
+
+/// So many records are named at most.
+const MOST_NAMES: usize = 3;
+
+/// Records of a kind as messages show them: how many, and the names of the first, or their numbers.
+fn listed<'a>(noun: &str, numbers: &[usize], name: impl Fn(usize) -> Option<&'a str>) -> String {
+    let shown = |number: &usize| match name(*number) {
+        None | Some("") => format!("number {number}"),
+        Some(name) => format!("`{}`", super::obj::shown(name)),
+    };
+    let names: Vec<String> = numbers.iter().take(MOST_NAMES).map(shown).collect();
+    let plural = if numbers.len() == 1 { "" } else { "s" };
+    let more = if numbers.len() > MOST_NAMES {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "{} {noun}{plural}: {}{more}",
+        numbers.len(),
+        names.join(", ")
+    )
+}
