@@ -12,7 +12,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Value, FormatError> {
         let place = format!("line {} column {}", error.line(), error.column());
         let said = error.to_string();
         let said = said.strip_suffix(&format!(" at {place}")).unwrap_or(&said);
-        let problem = no_number(text);
+        let problem = no_number(text).map(|found| Problem::new(found, WITHOUT_NUMBER));
         let problem = problem.unwrap_or_else(|| Problem::broken(format!("not JSON: {said}")));
         problem.at(path, place)
     })
@@ -23,13 +23,17 @@ const NO_NUMBERS: [&str; 3] = ["NaN", "Infinity", "-Infinity"];
 /// What they begin with once they are texts, as hardly another text does.
 const MARK: char = '\u{1}';
 
-/// What to say of a text that is JSON but for such words: where the first of them is.
-fn no_number(text: &str) -> Option<Problem> {
+/// What to do about such a word.
+pub const WITHOUT_NUMBER: &str =
+    "remove what has it, as a frame without a pose, or export it again from the program it is from";
+
+/// What to say of a text that is JSON but for words that Python writes where a number is none: where the first of
+/// them is. `None` of any other text.
+pub fn no_number(text: &str) -> Option<String> {
     let value: Value = serde_json::from_str(&with_texts(text)).ok()?;
     let (record, word) = marked(&value, String::new())?;
-    Some(Problem::new(
-        format!("not JSON: {record} is {word}, expected a finite number"),
-        "remove what has it, as a frame without a pose, or export it again from the program it is from",
+    Some(format!(
+        "not JSON: {record} is {word}, expected a finite number"
     ))
 }
 
@@ -54,7 +58,7 @@ fn with_texts(text: &str) -> String {
 }
 
 /// The first marked text in a value, without the mark, and the way there: objects are called by
-/// their photo's name, too.
+/// their photo's name, or their own, too.
 fn marked(value: &Value, record: String) -> Option<(String, String)> {
     match value {
         Value::String(text) => Some((record, text.strip_prefix(MARK)?.to_owned())),
@@ -67,7 +71,8 @@ fn marked(value: &Value, record: String) -> Option<(String, String)> {
             let (found, word) = fields
                 .iter()
                 .find_map(|(key, item)| marked(item, format!("{record}{dot}{key}")))?;
-            let name = fields.get("file_path").and_then(Value::as_str);
+            let name = fields.get("file_path").or_else(|| fields.get("name"));
+            let name = name.and_then(Value::as_str);
             let name = name.and_then(|name| build::name(name).ok());
             let called = name.map(|name| format!("{found} ({name})"));
             Some((called.unwrap_or(found), word))

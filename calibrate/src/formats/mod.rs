@@ -27,6 +27,7 @@ pub use build::SizeOf;
 pub use bundler::{parse_bundler, read_bundler};
 pub use detect::{Format, by_name, detect, detect_content, meant};
 pub use error::FormatError;
+pub use json::{WITHOUT_NUMBER, no_number};
 pub use llff::{parse_llff, read_llff, read_llff_bounds};
 pub use meshroom::{parse_meshroom, read_meshroom};
 pub use nvm::{parse_nvm, read_nvm};

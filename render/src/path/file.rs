@@ -4,7 +4,7 @@
 use super::nerfstudio::{self, NerfstudioFrame};
 use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
-use calibrate::formats::detect_content;
+use calibrate::formats::{WITHOUT_NUMBER, detect_content, no_number};
 use calibrate::{Camera, ModelKind, Rigid3};
 use capture::{as_argument, without_byte_order_mark};
 use glam::{DMat3, DVec3};
@@ -29,6 +29,9 @@ pub enum PathFileError {
         path = .0.display(), error = .1
     )]
     Json(PathBuf, serde_json::Error),
+    /// It is JSON but for a number that is none; where that is.
+    #[error("{path}: {found}; {remedy}", path = .0.display(), found = .1, remedy = WITHOUT_NUMBER)]
+    NoNumber(PathBuf, String),
     /// It is a calibration.
     #[error(
         "{path}: a calibration, not a path file; with its photos, `lumigraph import PHOTOS --calibration {argument} \
@@ -184,9 +187,14 @@ pub(super) fn parse_own(
     struct Version {
         version: u64,
     }
-    let other = |error| match detect_content(Cursor::new(bytes)) {
-        Some(_) => PathFileError::Calibration(path.to_owned()),
-        None => json(error),
+    let other = |error| {
+        if detect_content(Cursor::new(bytes)).is_some() {
+            return PathFileError::Calibration(path.to_owned());
+        }
+        match str::from_utf8(bytes).ok().and_then(no_number) {
+            Some(found) => PathFileError::NoNumber(path.to_owned(), found),
+            None => json(error),
+        }
     };
     let Version { version } = serde_json::from_slice(bytes).map_err(other)?;
     if version != 1 {

@@ -287,6 +287,25 @@ fn bad_files_are_named() {
         "{calibration}"
     );
     assert!(message("[").starts_with("DIR/p.json: not a path file: "));
+    // What Python writes where a number is none, nerfstudio's paths included.
+    let again = "; remove what has it, as a frame without a pose, or export it again from the program it is from";
+    for (text, found) in [
+        (
+            r#"{"version": 1, "fps": 5, "frames": [{"name": "a"}, {"name": "b", "params": [1, NaN]}]}"#,
+            "frames[1].params[1] (b) is NaN",
+        ),
+        (
+            r#"{"version": 1, "fps": 5, "keyframes": [{"t_s": -Infinity}]}"#,
+            "keyframes[0].t_s is -Infinity",
+        ),
+        (
+            r#"{"camera_path": [{"camera_to_world": [NaN]}], "fps": 5}"#,
+            "camera_path[0].camera_to_world[0] is NaN",
+        ),
+    ] {
+        let expected = format!("DIR/p.json: not JSON: {found}, expected a finite number{again}");
+        assert_eq!(message(text), expected);
+    }
     assert!(message(r#"{"fps": 3}"#).starts_with("DIR/p.json: not a path file: missing field"));
 }
 
