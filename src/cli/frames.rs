@@ -2,9 +2,11 @@
 
 use super::Usage;
 use super::report::UNSHOWN;
-use calibrate::{View, colmap};
+use anyhow::bail;
+use calibrate::formats::{self, Format};
+use calibrate::{Reconstruction, View, colmap};
 use glam::DVec3;
-use lumigraph::scene::{Scene, SceneError};
+use lumigraph::scene::{Scene, SceneError, Sizes, calibration_in, read_bare};
 use render::Lumigraph;
 use render::path::{self, CameraPath, NerfstudioFrame, PathFrame};
 use render::trajectory::{self, Trajectory};
@@ -15,7 +17,8 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 pub(super) struct ViewArgs {
-    /// The views of a COLMAP model, of a path file, or of a screenshot of `view`
+    /// The views of a COLMAP model, of a transforms.json (NeRF's transforms_test.json, say), of a path file, or of
+    /// a screenshot of `view`
     #[arg(long, value_name = "MODEL|FILE")]
     pub(super) views: Option<PathBuf>,
     /// A path derived from where the photos were taken, or a path file, nerfstudio's too. orbit goes around,
@@ -75,20 +78,22 @@ impl Asked {
         };
         if !views.exists() {
             let message = format!(
-                "--views {}: there is no such file; expected the folder of a COLMAP model, a path \
-                 file (.json), or a screenshot of `view` (.png)",
+                "--views {}: there is no such file; expected the folder of a COLMAP model, a \
+                 transforms.json, a path file (.json), or a screenshot of `view` (.png)",
                 views.display()
             );
             return Err(Usage(message).into());
         }
-        match views.is_dir() {
-            true => Ok(Self::Read {
-                views: of_model(views)?,
-                fps: FPS,
-                are_images: true,
-            }),
-            false => of_file(views, frame),
-        }
+        let views = match transforms_of(views) {
+            Some(file) => of_transforms(&file)?,
+            None if views.is_dir() => of_model(views)?,
+            None => return of_file(views, frame),
+        };
+        Ok(Self::Read {
+            views,
+            fps: FPS,
+            are_images: true,
+        })
     }
 
     /// The same of a path: a kind of derived path, or a file.
@@ -193,12 +198,44 @@ pub(super) const FRAMES: u32 = 30;
 /// Frames a second where no path says. Only a film made of the frames would show it.
 const FPS: f64 = 30.0;
 
+/// The `transforms.json` that is given: a file, or that of a capture which has no COLMAP model.
+fn transforms_of(given: &Path) -> Option<PathBuf> {
+    let file = match given.is_dir() {
+        true if colmap::find_model(given).is_ok() => None,
+        true => calibration_in(given),
+        // A pipe can be read once.
+        false => Some(given.to_owned()),
+    };
+    file.filter(|file| file.is_file() && formats::detect(file) == Some(Format::Transforms))
+}
+
 /// The images of a COLMAP model, by name.
 fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
     let model = colmap::read_model(&colmap::find_model(folder)?)?;
+    of_images(&model, &BTreeMap::new())
+}
+
+/// The frames of a `transforms.json`, by name, where and as large as an import has them.
+fn of_transforms(file: &Path) -> anyhow::Result<Vec<NamedView>> {
+    let (whole, sizes) = read_bare(Format::Transforms, file)?;
+    if sizes == Sizes::Unknown {
+        bail!(
+            "{}: neither it nor pictures where its frames name them say how large these are; give it \"w\" and \"h\", \
+             the width and height in pixels",
+            file.display()
+        );
+    }
+    of_images(&whole, &formats::read_files_beside(file)?.times)
+}
+
+/// The images of a calibration, by name; `times`, in seconds, are by name, too.
+fn of_images(
+    whole: &Reconstruction,
+    times: &BTreeMap<String, f64>,
+) -> anyhow::Result<Vec<NamedView>> {
     let mut views = Vec::new();
-    for image in model.images.values() {
-        let camera = &model.cameras[&image.camera_id];
+    for image in whole.images.values() {
+        let camera = &whole.cameras[&image.camera_id];
         let lens = camera.lens().map_err(|source| SceneError::Camera {
             name: image.name.clone(),
             source,
@@ -211,7 +248,7 @@ fn of_model(folder: &Path) -> anyhow::Result<Vec<NamedView>> {
                 height: camera.height,
                 camera_from_world: image.camera_from_world,
             },
-            time_s: None,
+            time_s: times.get(&image.name).copied(),
         });
     }
     views.sort_by(|a, b| a.name.cmp(&b.name));

@@ -99,7 +99,15 @@ pub fn read_bare(format: Format, path: &Path) -> Result<(Reconstruction, Sizes),
     let sizes = Cell::new(Sizes::Known);
     let size_of = |path: &str| {
         let photo = listed.as_ref().and_then(|listed| listed.photo(path));
+        // Splits of NeRF's have theirs in folders of their own, and leave out what files end in.
+        let beside = || {
+            let files = [path.to_owned(), format!("{path}.png")].into_iter();
+            files
+                .map(|file| folder.join(file))
+                .find_map(|file| photo_size(&file).ok())
+        };
         let size = photo.and_then(|photo| photo_size(&photo.path).ok());
+        let size = size.or_else(beside);
         // LLFF's file has a size of its own.
         if size.is_none() && format != Format::Llff {
             sizes.set(Sizes::Unknown);

@@ -1,6 +1,6 @@
 //! Calibrations of other programs, from file to picture.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_wall};
 use calibrate::{ImageId, Point3DId, Reconstruction, colmap};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,6 +58,53 @@ fn a_transforms_file_gives_the_pictures_of_the_model_it_was_made_from() {
     for (a, b) in scores(&both).into_iter().zip(scores(&alone)) {
         assert!((a - b).abs() < 1e-3, "{a} dB and {b} dB");
     }
+}
+
+#[test]
+fn frames_of_a_transforms_file_are_views() {
+    let folder = with_wall();
+    let at = |path: &str| folder.path().join(path);
+    let draw = |views: &str, out: &str| {
+        let line = format!("render wall --proxy plane --views {views} -o {out}");
+        lumigraph(folder.path(), &line)
+    };
+    let mut file = transforms(&at("wall/sparse/0"));
+    fs::write(at("all.json"), file.to_string()).unwrap();
+    draw("wall", "model").ok();
+    draw("all.json", "frames").ok();
+    let names = |out: &str| files(&at(out)).into_keys().collect::<Vec<_>>();
+    assert_eq!(names("frames"), names("model"));
+    let apart = |a: &str, b: &str| {
+        let [a, b] = [a, b].map(|file| image::open(at(file)).unwrap().into_rgba8());
+        assert_eq!(a.dimensions(), b.dimensions());
+        let bytes = a.as_raw().iter().zip(b.as_raw());
+        bytes.map(|(a, b)| a.abs_diff(*b)).max().unwrap()
+    };
+    assert!(apart("frames/0003.png", "model/0003.png") <= 1);
+
+    // As NeRF writes a split: without sizes, and names without what files end in. A capture's folder stands for
+    // its file, too.
+    let angle = 2.0 * (0.5 * 96.0 / file["fl_x"].as_f64().unwrap()).atan();
+    let mut frame = file["frames"][3].clone();
+    frame["file_path"] = json!("./test/r_3");
+    file = json!({"camera_angle_x": angle, "frames": [frame]});
+    fs::create_dir(at("nerf")).unwrap();
+    fs::write(at("nerf/transforms_test.json"), file.to_string()).unwrap();
+    let error = draw("nerf/transforms_test.json", "split").error(1);
+    assert!(
+        error.starts_with(
+            "nerf/transforms_test.json: neither it nor pictures where its frames name them"
+        ),
+        "{error}"
+    );
+    fs::create_dir(at("nerf/test")).unwrap();
+    fs::copy(at("wall/images/0003.png"), at("nerf/test/r_3.png")).unwrap();
+    draw("nerf/transforms_test.json", "split").ok();
+    assert_eq!(names("split"), [Path::new("test/r_3.png")]);
+    assert!(apart("split/test/r_3.png", "model/0003.png") <= 1);
+    fs::rename(at("nerf/transforms_test.json"), at("nerf/transforms.json")).unwrap();
+    draw("nerf", "folder").ok();
+    assert_eq!(apart("folder/test/r_3.png", "split/test/r_3.png"), 0);
 }
 
 #[test]

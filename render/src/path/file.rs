@@ -4,7 +4,7 @@
 use super::nerfstudio::{self, NerfstudioFrame};
 use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
-use calibrate::formats::{WITHOUT_NUMBER, detect_content, no_number};
+use calibrate::formats::{Format, WITHOUT_NUMBER, detect_content, no_number};
 use calibrate::{Camera, ModelKind, Rigid3};
 use capture::{as_argument, without_byte_order_mark};
 use glam::{DMat3, DVec3};
@@ -25,14 +25,22 @@ pub enum PathFileError {
     /// It is not the JSON that was expected.
     #[error(
         "{path}: not a path file: {error}; read are paths of this program (JSON, as `lumigraph path` writes), \
-         nerfstudio's camera_path.json, and screenshots of `lumigraph view`",
+         nerfstudio's camera_path.json, and screenshots of `lumigraph view`; poses that are another text (TUM's, CSV) \
+         can be made frames of a transforms.json, which `lumigraph render --views` draws",
         path = .0.display(), error = .1
     )]
     Json(PathBuf, serde_json::Error),
     /// It is JSON but for a number that is none; where that is.
     #[error("{path}: {found}; {remedy}", path = .0.display(), found = .1, remedy = WITHOUT_NUMBER)]
     NoNumber(PathBuf, String),
-    /// It is a calibration.
+    /// It is a `transforms.json`.
+    #[error(
+        "{path}: a calibration, not a path file; `lumigraph render SCENE --views {argument} -o FRAMES` draws the views \
+         of its frames",
+        path = .0.display(), argument = as_argument(.0)
+    )]
+    Transforms(PathBuf),
+    /// It is another calibration.
     #[error(
         "{path}: a calibration, not a path file; with its photos, `lumigraph import PHOTOS --calibration {argument} \
          -o SCENE` and `lumigraph export SCENE --format colmap -o MODEL` make a model, whose views `render --views \
@@ -188,12 +196,14 @@ pub(super) fn parse_own(
         version: u64,
     }
     let other = |error| {
-        if detect_content(Cursor::new(bytes)).is_some() {
-            return PathFileError::Calibration(path.to_owned());
-        }
-        match str::from_utf8(bytes).ok().and_then(no_number) {
-            Some(found) => PathFileError::NoNumber(path.to_owned(), found),
-            None => json(error),
+        let path = path.to_owned();
+        match detect_content(Cursor::new(bytes)) {
+            Some(Format::Transforms) => PathFileError::Transforms(path),
+            Some(_) => PathFileError::Calibration(path),
+            None => match str::from_utf8(bytes).ok().and_then(no_number) {
+                Some(found) => PathFileError::NoNumber(path, found),
+                None => json(error),
+            },
         }
     };
     let Version { version } = serde_json::from_slice(bytes).map_err(other)?;

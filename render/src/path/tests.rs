@@ -276,11 +276,18 @@ fn bad_files_are_named() {
         "{other}"
     );
     assert!(
-        other.contains("; read are paths of this program (JSON,"),
+        other.contains("; read are paths of this program (JSON,")
+            && other.contains(
+                "; poses that are another text (TUM's, CSV) can be made frames of a transforms.json"
+            ),
         "{other}"
     );
-    let calibration =
-        message(r#"{"camera_angle_x": 1, "frames": [{"file_path": "a", "transform_matrix": []}]}"#);
+    assert_eq!(
+        message(r#"{"camera_angle_x": 1, "frames": [{"file_path": "a", "transform_matrix": []}]}"#),
+        "DIR/p.json: a calibration, not a path file; `lumigraph render SCENE --views DIR/p.json -o FRAMES` draws the \
+         views of its frames"
+    );
+    let calibration = message("NVM_V3\n");
     assert!(
         calibration.starts_with("DIR/p.json: a calibration, not a path file; with its photos, ")
             && calibration.contains("--calibration DIR/p.json -o SCENE` and `lumigraph export"),
