@@ -7,7 +7,7 @@ use super::made;
 use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
-use super::targets::check_new_folder;
+use super::targets::{check_new_folder, holder};
 use anyhow::{Context, bail};
 use calibrate::colmap;
 use capture::as_argument;
@@ -527,14 +527,7 @@ pub(super) fn check_holds_none(folder: &Path) -> anyhow::Result<()> {
 /// Fails where something else, a file or a folder of files, is to be written into the folder of an interior that
 /// could be replaced, however far below: it could not be any more. The option names it.
 pub(super) fn check_outside(path: &Path, option: &str) -> anyhow::Result<()> {
-    let whole = std::path::absolute(path).ok();
-    // What is to be made, `house/film` or `../film`, lies in what is there.
-    let there = whole.and_then(|whole| whole.ancestors().find_map(|p| p.canonicalize().ok()));
-    let holder = there.and_then(|there| {
-        let holder = there.ancestors().find(|folder| is_ours(folder));
-        holder.map(Path::to_owned)
-    });
-    if let Some(holder) = holder {
+    if let Some(holder) = holder(path, is_ours) {
         bail!(
             "{}: {} holds an interior, and what else lies there keeps it from being replaced; choose another {option}",
             path.display(),

@@ -13,7 +13,7 @@ use super::session::{Session, progress};
 use super::shot::say_other_look;
 use super::stamp::in_unicode;
 use super::surface::ProxyArgs;
-use super::targets::{check_film, check_folder, check_inputs, others};
+use super::targets::{check_film, check_folder, check_inputs, check_no_photos, others};
 use super::time::{AtArgs, TimeArgs};
 use super::took::Start;
 use calibrate::View;
@@ -94,6 +94,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Photos that are left out, too, are nobody's to replace, nor the video that they were taken out of.
     let kept = files_behind_scene(&args.scene.scene, &scene);
     check_film(args.film.file(), &kept)?;
+    check_no_photos(&args.output, &scene)?;
     let without = args.hold_out.names(&scene)?;
     let asked = asked.in_scene(&scene);
     // What need not be derived is checked first: fitting a proxy may take long.

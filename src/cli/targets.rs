@@ -2,6 +2,8 @@
 
 use super::interior::check_outside;
 use anyhow::{Context, bail};
+use capture::find_photos_folder;
+use lumigraph::scene::{Photo, Scene};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -109,6 +111,56 @@ pub(super) fn check_apart<'a>(
         Some(file) => bail!(
             "{}: {what} made of this very file; nothing was written: choose another {option}",
             file.display()
+        ),
+    }
+}
+
+/// The innermost of the folders that a path is, or lies in, that is such a one, links followed.
+pub(super) fn holder(path: &Path, is_such: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+    let whole = std::path::absolute(path).ok()?;
+    // What is to be made, `house/film` or `../film`, lies in what is there.
+    let there = whole.ancestors().find_map(|p| p.canonicalize().ok())?;
+    let holder = there.ancestors().find(|folder| is_such(folder));
+    holder.map(Path::to_owned)
+}
+
+/// Fails where pictures would lie among a scene's photos, masks or depth maps, for more of which an import would
+/// take them.
+pub(super) fn check_no_photos(folder: &Path, scene: &Scene) -> anyhow::Result<()> {
+    // 1. Folders that hold nothing but photos, in whatever folders within.
+    let captures = [&scene.folder, &scene.capture].into_iter().flatten();
+    let of_photos = captures.filter_map(|capture| {
+        let photos = find_photos_folder(capture).filter(|photos| photos != capture);
+        photos?.canonicalize().ok()
+    });
+    let of_photos: BTreeSet<PathBuf> = of_photos.collect();
+    // 2. Those that some lie in directly, as where a capture is one flat folder.
+    let folders_of = |photo: &Photo| {
+        let beside = [
+            &photo.ignore_mask,
+            &photo.object_matte,
+            &photo.silhouette,
+            &photo.depth_map,
+        ];
+        let folder = |file: &PathBuf| file.parent().map(Path::to_owned);
+        let beside = beside.into_iter().flatten().filter_map(folder);
+        beside.chain(folder(&photo.path)).collect::<Vec<_>>()
+    };
+    let direct: BTreeSet<PathBuf> = scene.photos.iter().flat_map(folders_of).collect();
+    let itself = folder.canonicalize().ok();
+    let is_direct = |folder: &&PathBuf| {
+        direct
+            .iter()
+            .any(|f| f.canonicalize().is_ok_and(|f| f == **folder))
+    };
+    let holds = holder(folder, |folder| of_photos.contains(folder));
+    match holds.as_ref().or(itself.as_ref().filter(is_direct)) {
+        None => Ok(()),
+        Some(holds) => bail!(
+            "{}: photos, masks or depth maps of this scene lie in {}, and an import would take pictures there for more \
+             of them; choose another -o",
+            folder.display(),
+            holds.display()
         ),
     }
 }

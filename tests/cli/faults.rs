@@ -273,14 +273,21 @@ fn photos_are_not_written_over() {
     let here = folder.path();
     let before = files(here);
     let size = "--proxy plane --size 48x36";
+    let line = format!("field wall --view 0000.png {size} -o wall/images/0000.png");
+    let error = lumigraph(here, &line).error(1);
+    assert!(
+        error.contains("0000.png: pictures are made of this"),
+        "{error}"
+    );
+    // Nor do pictures lie among them, which an import would take for photos.
     for line in [
         format!("evaluate wall --every 3 {size} -o wall/images"),
         format!("render wall --views wall {size} -o wall/../wall/images"),
-        format!("field wall --view 0000.png {size} -o wall/images/0000.png"),
+        format!("render wall --path sweep --frames 1 {size} -o wall/images/new"),
+        format!("render wall --path sweep --frames 1 {size} -o wall/depth"),
     ] {
         let error = lumigraph(here, &line).error(1);
-        assert!(error.contains("000"), "{error}");
-        assert!(error.contains("pictures are made of this"), "{error}");
+        assert!(error.contains("of this scene lie in"), "{error}");
         assert!(files(here) == before, "{line}");
     }
     // Nor one that is left out.
@@ -290,9 +297,16 @@ fn photos_are_not_written_over() {
     let error = lumigraph(here, &line).error(1);
     assert!(error.contains("pictures are made of this"), "{error}");
     assert_eq!(fs::read(&damaged).unwrap(), b"no picture any more");
-    // Beside them is room.
-    let line = format!("render wall --path sweep --frames 1 {size} -o wall/images");
+    // Beside their folder is room.
+    let line = format!("render wall --path sweep --frames 1 {size} -o wall/frames");
     lumigraph(here, &line).ok();
+    // A capture may be one flat folder.
+    fs::rename(here.join("wall/images"), here.join("flat")).unwrap();
+    fs::rename(here.join("wall/sparse"), here.join("flat/sparse")).unwrap();
+    let line = format!("render flat --path sweep --frames 1 {size} -o flat");
+    let error = lumigraph(here, &line).error(1);
+    assert!(error.contains("of this scene lie in"), "{error}");
+    lumigraph(here, &format!("{line}/frames")).ok();
 }
 
 /// As with photos that are links into the scene's folder.
