@@ -4,7 +4,6 @@ use crate::lens::on_plane;
 use calibrate::{Distortion, Lens, Pixel};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
-use serde_json::Value;
 use std::f64::consts::{PI, TAU};
 
 const CASES: u32 = 4000;

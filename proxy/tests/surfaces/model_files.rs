@@ -5,6 +5,7 @@ use crate::common;
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use proxy::mesh::{self, Material, Mesh, Model, ModelNode, Part, Texture, Wrap};
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Two nodes, one below the other; a texture, a base colour and corners' colours.
