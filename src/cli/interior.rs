@@ -251,11 +251,9 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     let rooms = match given {
         Some((interior, mut warnings)) => {
             // They are as they were given, and what they hide is said.
-            warnings.extend(
-                strays(&interior, &model)
-                    .with_context(named)?
-                    .warning(&interior),
-            );
+            let hidden = strays(&interior, &model).with_context(named)?;
+            warnings.extend(hidden.warning(&interior));
+            warnings.extend(hidden.cut_warning());
             Rooms::given(interior, warnings)
         }
         None => {
@@ -329,6 +327,7 @@ fn fitted(
 ) -> Result<FoundInterior, InteriorError> {
     let left = fit_to_sight(&mut found.interior, model, WALL * meter)?;
     found.warnings.extend(left.warning(&found.interior));
+    found.warnings.extend(left.cut_warning());
     Ok(found)
 }
 

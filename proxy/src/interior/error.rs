@@ -251,6 +251,12 @@ pub enum InteriorWarning {
         /// What it sees.
         seen: DVec3,
     },
+    /// Not all was looked at to tell what portals hide: lines of sight that were tried.
+    #[error(
+        "the openings lead on in so many ways that what portals hide was looked for no further after {0} lines of \
+         sight: they may hide more than is told"
+    )]
+    SightsCut(usize),
     /// Triangles that no cell has.
     #[error("{0} triangles are in no cell; they are drawn whatever is visible")]
     Elsewhere(usize),

@@ -42,6 +42,10 @@ pub struct Strays {
     pub tried: usize,
     /// In the order of portals, and of their sides; then in that of cells.
     pub found: Vec<Stray>,
+    /// Whether some places were left out, as too many ways lead from there through portals.
+    pub is_cut: bool,
+    /// How many portals were looked at to tell, each as often as it was.
+    looked_at: usize,
 }
 
 impl Strays {
@@ -56,6 +60,19 @@ impl Strays {
             seen: first.seen,
         })
     }
+
+    /// What is to be said where not all was looked at.
+    pub fn cut_warning(&self) -> Option<InteriorWarning> {
+        self.is_cut
+            .then_some(InteriorWarning::SightsCut(self.tried))
+    }
+
+    fn append(&mut self, other: Self) {
+        self.tried += other.tried;
+        self.found.extend(other.found);
+        self.is_cut |= other.is_cut;
+        self.looked_at += other.looked_at;
+    }
 }
 
 /// Eyes before each side of a portal, and lines of sight from each.
@@ -63,6 +80,10 @@ const EYES: u32 = 64;
 const LINES: u32 = 128;
 /// Places that are tried for each eye.
 const TRIES: u32 = 16;
+/// Portals that are looked at, each as often as ways lead to it, for the eyes before one side of a portal, or within one
+/// cell. Of a house of 40 rooms that is some 10,000. Of one that is taken for a hundred rooms, as its units are no
+/// metres, it would be millions.
+const PORTALS: usize = 1 << 18;
 /// Eyes stand between these heights over the floor, and look past the portal by so much, in eyes' heights.
 const HEIGHTS: [f64; 2] = [0.1, 1.6];
 const BESIDE: f64 = 1.0;
@@ -79,7 +100,8 @@ const NEXT_3: [f64; 3] = [
 ];
 
 /// Looks through and past every portal from many places before it, and all around from places in every cell, and
-/// finds what portals hide though it is seen.
+/// finds what portals hide though it is seen. From where too many ways lead through portals, fewer places are looked
+/// from: [`Strays::is_cut`].
 ///
 /// The same for any number of threads.
 ///
@@ -88,7 +110,7 @@ const NEXT_3: [f64; 3] = [
 pub fn strays(interior: &Interior, model: &Model) -> Result<Strays, InteriorError> {
     let (contents, _) = Contents::new(interior, model)?;
     let seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
-    Ok(look(interior, &contents, &seen))
+    Ok(look(interior, &contents, &seen, PORTALS))
 }
 
 /// What needs so much of the reach is fitted first; then what needs twice as much, and so on.
@@ -121,14 +143,23 @@ pub fn fit_to_sight(
 ) -> Result<Strays, InteriorError> {
     let (mut contents, _) = Contents::new(interior, model)?;
     let mut seen = Seen::new(model, &contents.triangles, &contents.elsewhere);
-    let mut strays = look(interior, &contents, &seen);
+    let mut strays = look(interior, &contents, &seen, PORTALS);
     let margin = MARGIN * reach;
     let widest = widest(interior, reach);
+    // Not many more portals are looked at, before it is looked for the last time, than may be for one look.
+    let most = PORTALS * (2 * interior.portals.len() + interior.cells.len());
+    let mut looked_at = strays.looked_at;
     for _ in 1..LOOKS {
+        if looked_at > most {
+            break;
+        }
         let mut left = strays.found.clone();
         let mut is_fitted = false;
         for share in SHARES {
             for _ in 0..ROUNDS {
+                if looked_at > most {
+                    break;
+                }
                 let fitted = left
                     .iter()
                     .filter_map(|stray| fit(interior, &widest, stray, share * reach, margin));
@@ -142,7 +173,9 @@ pub fn fit_to_sight(
                     contents.refill(interior, model, &grown);
                     seen.regroup(&contents.triangles);
                 }
-                left = look_again(interior, &seen, &left);
+                let again = look_again(interior, &seen, &left);
+                left = again.0;
+                looked_at += again.1;
                 if fitted.iter().all(|one| one.farther <= SAME * margin) {
                     break;
                 }
@@ -152,7 +185,8 @@ pub fn fit_to_sight(
             break;
         }
         let before = strays.found.len();
-        strays = look(interior, &contents, &seen);
+        strays = look(interior, &contents, &seen, PORTALS);
+        looked_at += strays.looked_at;
         // What is left is hidden for other reasons, as where rooms are none.
         if strays.found.len() >= before {
             break;
@@ -265,39 +299,47 @@ fn fit(
     })
 }
 
-fn look(interior: &Interior, contents: &Contents, seen: &Seen) -> Strays {
+/// From everywhere, with no more portals looked at than so many before each side of a portal, and within each cell.
+fn look(interior: &Interior, contents: &Contents, seen: &Seen, most: usize) -> Strays {
     let sides = interior.portals.iter().flat_map(|portal| {
         let from = portal.cells.into_iter().flatten();
         from.map(move |from| (portal, from))
     });
     let sides: Vec<(&Portal, CellId)> = sides.collect();
-    let before = |(portal, from): (&Portal, CellId)| before(interior, contents, seen, portal, from);
+    let before =
+        |(portal, from): (&Portal, CellId)| before(interior, contents, seen, (portal, from), most);
     let mut found: Vec<Strays> = sides.into_par_iter().map(before).collect();
     let ids = (0..interior.cells.len() as u32).into_par_iter().map(CellId);
-    let within = ids.map(|id| within(interior, contents, seen, id).unwrap_or_default());
+    let within = ids.map(|id| within(interior, contents, seen, id, most).unwrap_or_default());
     found.extend(within.collect::<Vec<Strays>>());
     found.into_iter().fold(Strays::default(), |mut all, some| {
-        all.tried += some.tried;
-        all.found.extend(some.found);
+        all.append(some);
         all
     })
 }
 
-/// Those of some lines of sight that are still hidden.
-fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> Vec<Stray> {
+/// Those of some lines of sight that are still hidden, and how many portals were looked at to tell.
+fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> (Vec<Stray>, usize) {
     let of_eyes: Vec<&[Stray]> = strays
         .chunk_by(|a, b| a.eye == b.eye && a.from == b.from)
         .collect();
-    let left = of_eyes.into_par_iter().flat_map_iter(|of_eye| {
-        let visibility = all_around(interior, of_eye[0].from, of_eye[0].eye);
-        let again = move |old: &Stray| {
-            let (eye, ray) = (old.eye, old.seen - old.eye);
+    let left = of_eyes.into_par_iter().filter_map(|of_eye| {
+        let (from, eye) = (of_eye[0].from, of_eye[0].eye);
+        let (visibility, looked_at) = all_around(interior, from, eye, usize::MAX)?;
+        let again = |old: &Stray| {
+            let ray = old.seen - eye;
             let hit = seen.first(eye, ray)?;
-            hidden(seen, &visibility, old.from, eye, ray, hit)
+            hidden(seen, &visibility, from, eye, ray, hit)
         };
-        of_eye.iter().filter_map(again)
+        let left: Vec<Stray> = of_eye.iter().filter_map(again).collect();
+        Some((left, looked_at))
     });
-    left.collect()
+    let left: Vec<(Vec<Stray>, usize)> = left.collect();
+    let looked_at = left.iter().map(|(_, looked_at)| looked_at).sum();
+    (
+        left.into_iter().flat_map(|(left, _)| left).collect(),
+        looked_at,
+    )
 }
 
 /// What is seen from the places on one side of a portal from which one sees through it.
@@ -305,8 +347,8 @@ fn before(
     interior: &Interior,
     contents: &Contents,
     seen: &Seen,
-    portal: &Portal,
-    from: CellId,
+    (portal, from): (&Portal, CellId),
+    most: usize,
 ) -> Strays {
     let mut strays = Strays::default();
     let Some(bounds) = contents.bounds.get(from.0 as usize).copied().flatten() else {
@@ -332,7 +374,12 @@ fn before(
             continue;
         }
         // 2. Past it.
-        let visibility = all_around(interior, from, eye);
+        let left = most.saturating_sub(strays.looked_at);
+        let Some((visibility, looked_at)) = all_around(interior, from, eye, left) else {
+            strays.is_cut = true;
+            break;
+        };
+        strays.looked_at += looked_at;
         for k in 0..LINES {
             let number = f64::from(eyes * LINES + k);
             let place = NEXT_2.map(|step| (step * number).fract());

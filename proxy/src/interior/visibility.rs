@@ -227,12 +227,22 @@ pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibi
     }
 }
 
-/// The cells that an eye in one sees all around.
-pub(super) fn all_around(interior: &Interior, cell: CellId, eye: DVec3) -> Visibility {
+/// The cells that an eye in one sees all around, and how many portals were looked at to tell, each as often as it
+/// was; `None` where it takes more than `most`.
+pub(super) fn all_around(
+    interior: &Interior,
+    cell: CellId,
+    eye: DVec3,
+    most: usize,
+) -> Option<(Visibility, usize)> {
     let mut search = Search::new(interior, eye);
-    match search.visit(cell, &Region::ALL, None, 0) {
-        Ok(()) => search.found,
-        Err(TooMany) => everything(interior, Some(cell), &Region::ALL),
+    search.most = most;
+    let end = search.visit(cell, &Region::ALL, None, 0);
+    let looked_at = search.looked_at;
+    match end {
+        _ if looked_at > most => None,
+        Ok(()) => Some((search.found, looked_at)),
+        Err(TooMany) => Some((everything(interior, Some(cell), &Region::ALL), looked_at)),
     }
 }
 
@@ -283,6 +293,9 @@ struct Search<'a> {
     pieces: Vec<Vec<Vec<DVec3>>>,
     /// Whether a portal is part of the way that is being followed.
     is_passed: Vec<bool>,
+    /// How many portals were looked at, each as often as it was; and how many may be.
+    looked_at: usize,
+    most: usize,
     found: Visibility,
 }
 
@@ -296,6 +309,8 @@ impl<'a> Search<'a> {
                 .map(|portal| portal.polygon.convex_pieces())
                 .collect(),
             is_passed: vec![false; interior.portals.len()],
+            looked_at: 0,
+            most: usize::MAX,
             found: Visibility::default(),
         }
     }
@@ -314,6 +329,10 @@ impl<'a> Search<'a> {
         for (id, portal) in interior.portals_of(Some(cell)) {
             if self.is_passed[id.0 as usize] {
                 continue;
+            }
+            self.looked_at += 1;
+            if self.looked_at > self.most {
+                return Err(TooMany);
             }
             let into = portal.beyond(Some(cell)).flatten();
             for seen in self.through(id, portal, cell, region, entrance) {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::interior::parse_rooms;
+use crate::mesh::Mesh;
 use std::path::Path;
 
 /// Two rooms, and a doorway in the wall between them.
@@ -34,6 +35,50 @@ fn stray(shown: CellId, x: [f64; 2], [y, z]: [f64; 2]) -> Stray {
 /// Fits one line of sight, of rooms as they were at first.
 fn fit_one(interior: &mut Interior, stray: &Stray) -> Option<Fitted> {
     fit(interior, &widest(&rooms(), REACH), stray, REACH, WITH)
+}
+
+/// Walls, floor and ceiling around both rooms.
+fn around_both() -> Model {
+    let corner = |i: usize| {
+        let at = |k: usize, far: f64| if i >> k & 1 == 1 { far } else { 0.0 };
+        DVec3::new(at(0, 8.0), at(1, 2.5), at(2, 3.0))
+    };
+    let sides = [
+        [0, 1, 3, 2],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 3, 7, 5],
+    ];
+    let triangles = sides.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    Model {
+        mesh: Mesh {
+            positions: (0..8).map(corner).collect(),
+            triangles: triangles.as_flattened().to_vec(),
+        },
+        ..Model::default()
+    }
+}
+
+#[test]
+fn where_too_many_ways_lead_on_fewer_places_are_looked_from() {
+    let (interior, model) = (rooms(), around_both());
+    let eye = DVec3::new(2.0, 1.0, 1.5);
+    assert_eq!(all_around(&interior, WEST, eye, 0), None);
+    let (visibility, looked_at) = all_around(&interior, WEST, eye, 1).unwrap();
+    assert_eq!((visibility.cells.len(), looked_at), (2, 1));
+    let (contents, _) = Contents::new(&interior, &model).unwrap();
+    let seen = Seen::new(&model, &contents.triangles, &contents.elsewhere);
+    let all = look(&interior, &contents, &seen, PORTALS);
+    assert_eq!((all.is_cut, all.cut_warning()), (false, None));
+    assert_eq!(all, look(&interior, &contents, &seen, usize::MAX));
+    // From both sides of the door, and from both rooms, each eye looks at the door alone.
+    let few = look(&interior, &contents, &seen, 8);
+    assert!(few.is_cut && few.looked_at <= 4 * 8 && few.looked_at < all.looked_at);
+    assert!(0 < few.tried && few.tried < all.tried);
+    let told = InteriorWarning::SightsCut(few.tried);
+    assert_eq!(few.cut_warning(), Some(told));
 }
 
 #[test]

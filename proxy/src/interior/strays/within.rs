@@ -17,12 +17,14 @@ const UNEVEN: f64 = 0.25;
 /// Who sees more of what is hidden than this share is not in the cell: in a shaft that its outline takes in, say.
 const MOST_HIDDEN: f64 = 0.25;
 
-/// What is seen all around from places spread over a cell's floor; `None` of a cell whose place is unknown.
+/// What is seen all around from places spread over a cell's floor, with no more portals looked at than so many; `None`
+/// of a cell whose place is unknown.
 pub(super) fn within(
     interior: &Interior,
     contents: &Contents,
     seen: &Seen,
     from: CellId,
+    most: usize,
 ) -> Option<Strays> {
     // 1. Where eyes are tried: over the floor's outline, which stays as it is where boxes grow, else in the bounds.
     let heights = HEIGHTS_WITHIN.map(|height| height * interior.eye_height * interior.up);
@@ -55,7 +57,12 @@ pub(super) fn within(
             continue;
         }
         // 3. All around.
-        let visibility = all_around(interior, from, eye);
+        let left = most.saturating_sub(strays.looked_at);
+        let Some((visibility, looked_at)) = all_around(interior, from, eye, left) else {
+            strays.is_cut = true;
+            break;
+        };
+        strays.looked_at += looked_at;
         let mut around = Strays::default();
         for k in 0..LINES {
             let number = f64::from(eyes * LINES + k);
@@ -69,8 +76,7 @@ pub(super) fn within(
             }
         }
         if around.found.len() as f64 <= MOST_HIDDEN * around.tried as f64 {
-            strays.tried += around.tried;
-            strays.found.extend(around.found);
+            strays.append(around);
         }
         eyes += 1;
         if eyes == EYES_WITHIN {
