@@ -286,9 +286,9 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
 /// Puts what may be wrong with the scale before all else, and what is said of single cells and portals, many of them
 /// where it is wrong, after.
 fn put_causes_first(warnings: &mut [InteriorWarning]) {
-    use InteriorWarning::{Away, NoPortal, Overlap, TallWalls, Turned};
+    use InteriorWarning::{Away, NoPortal, Overlap, TallWalls, Turned, UpsideDown};
     warnings.sort_by_key(|warning| match warning {
-        TallWalls(_) => 0,
+        TallWalls(_) | UpsideDown(_) => 0,
         NoPortal(_) => 3,
         Overlap(..) | Away { .. } | Turned(_) => 2,
         _ => 1,

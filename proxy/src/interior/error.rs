@@ -220,6 +220,11 @@ pub enum InteriorWarning {
          side, say --up with that, or with its opposite"
     )]
     OnItsSide(DVec3),
+    /// The house may be upside down; what is up then.
+    #[error(
+        "far more hangs below the ceiling than stands on the floor: if the house is upside down, say --up with {0:.2}"
+    )]
+    UpsideDown(DVec3),
     /// There is no ceiling as far up as is looked, and walls go on: units may be no metres.
     #[error(
         "walls are {0} m high or more, and no ceiling is lower: is the scale right? --meter says how many world units \

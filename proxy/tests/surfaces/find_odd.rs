@@ -2,6 +2,7 @@
 
 use crate::common;
 use crate::find::{bounds, find, look_at, open_box};
+use crate::house::small_house;
 
 use glam::DVec3;
 use proxy::Mesh;
@@ -235,6 +236,38 @@ fn a_house_that_may_lie_on_its_side_is_told() {
     rooms.append(&open_box(min, max, &[2, 3]));
     let found = find(&rooms, &FindOptions::default()).unwrap();
     assert!(found.warnings.contains(&told), "{:?}", found.warnings);
+}
+
+#[test]
+fn a_house_that_may_be_upside_down_is_told() {
+    // A room with a bed in its corner.
+    let size = DVec3::new(6.0, 2.5, 5.0);
+    let bed = DVec3::new(2.5, 0.5, 3.0);
+    let mut room = open_box(DVec3::ZERO, size, &[0, 1, 2, 3, 4, 5]);
+    room.append(&open_box(DVec3::ZERO, bed, &[0, 1, 2, 3, 4, 5]));
+    let told = InteriorWarning::UpsideDown(DVec3::NEG_Y);
+    let is_told = |mesh: &Mesh, up: Option<DVec3>| {
+        let options = FindOptions {
+            up,
+            ..FindOptions::default()
+        };
+        find(mesh, &options).unwrap().warnings.contains(&told)
+    };
+    assert!(!is_told(&room, None));
+    let turned = |mesh: &Mesh| {
+        let mut mesh = mesh.clone();
+        mesh.positions.iter_mut().for_each(|p| p.y = -p.y);
+        mesh
+    };
+    assert!(is_told(&turned(&room), None));
+    for up in [DVec3::Y, DVec3::NEG_Y] {
+        assert!(!is_told(&turned(&room), Some(up)), "{up}");
+    }
+    let said = "say --up with [0.00, -1.00, 0.00]";
+    assert!(told.to_string().ends_with(said), "{told}");
+    for (rooms, seed) in [(2, 1), (5, 2)] {
+        assert!(!is_told(&small_house(rooms, seed).0.model.mesh, None));
+    }
 }
 
 #[test]

@@ -23,6 +23,7 @@ mod sights;
 mod storeys;
 mod stubs;
 mod thick;
+mod upside;
 
 pub use level::Level;
 pub use sights::sights;
@@ -199,6 +200,16 @@ pub fn find_interior(
         let direction = better.direction;
         let direction = direction.dot(DVec3::ONE).signum() * direction + DVec3::ZERO;
         warnings.push(InteriorWarning::OnItsSide(direction));
+    }
+    // Of a model only its things tell which way up it is.
+    let is_guessed = options.up.is_none() && evidence.cameras.is_empty();
+    let is_down = |height: f64| {
+        let ceiling = height * options.meter;
+        upside::is_upside_down(evidence.mesh, &level, ceiling, options.meter)
+    };
+    if is_guessed && columns.ceiling.is_some_and(is_down) {
+        // No zeros below 0.
+        warnings.push(InteriorWarning::UpsideDown(-level.up() + DVec3::ZERO));
     }
     let is_beyond = |height: &f64| *height >= columns::REACH[1] - columns::BIN;
     if let Some(height) = columns.ceiling.filter(is_beyond) {
