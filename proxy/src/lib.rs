@@ -45,7 +45,7 @@ pub use planes::{
 pub use points::SparsePoint;
 pub use scan::{Kept, Rays, Scan};
 pub use shell::shell;
-pub use shown::shown_name;
+pub use shown::{shown_name, shown_number};
 pub use solid::{Hit, MeshKind, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 

@@ -14,6 +14,7 @@ use calibrate::{TRUSTED_TIE, WeakGroup, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
 use lumigraph::scene::{Photo, Scene, SceneError, other_models};
+use proxy::shown_number;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -241,7 +242,8 @@ fn text(scene: &Scene, info: &Value) -> String {
     }
     text += &format!("points   {}", info["points"]);
     if let (Some(spacing), Some(isolated)) = (info["spacing"].as_f64(), info["isolated"].as_u64()) {
-        text += &format!(", median spacing {spacing:.4} world units, {isolated} isolated");
+        let spacing = shown_number(spacing);
+        text += &format!(", median spacing {spacing} world units, {isolated} isolated");
     }
     text += &match &scene.proxy {
         Some(own) => match own.surface() {

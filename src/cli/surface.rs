@@ -12,6 +12,7 @@ use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trial
 use proxy::Proxy;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
@@ -294,6 +295,9 @@ fn within_text(proxy: &Proxy) -> String {
     })
 }
 
+/// Of the greatest of three coordinates: these are told to six decimals, others in powers of ten.
+const USUAL: Range<f64> = 1e-3..1e9;
+
 pub(super) fn proxy_text(proxy: &Proxy) -> String {
     let plane = match proxy {
         Proxy::Plane(plane) => plane,
@@ -313,7 +317,12 @@ pub(super) fn proxy_text(proxy: &Proxy) -> String {
             return format!("{kind} of {count} triangles{}", within_text(proxy));
         }
     };
-    let triple = |v: DVec3| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
+    // Whatever the unit, as many digits as tell planes apart, and no noise beside them.
+    let is_usual = |most: f64| most == 0.0 || USUAL.contains(&most);
+    let triple = |v: DVec3| match is_usual(v.abs().max_element()) {
+        true => format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z),
+        false => format!("({:.6e}, {:.6e}, {:.6e})", v.x, v.y, v.z),
+    };
     format!(
         "plane through {} across {}",
         triple(plane.point()),

@@ -14,7 +14,7 @@ use proxy::{
     FitBasis, FitError, Form, ILL_CONDITIONED, Mesh, MeshKind, PlaneFit, Proxy, Solid, SparsePoint,
     Tunnel,
 };
-use proxy::{carve, tunnel};
+use proxy::{carve, shown_number, tunnel};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -138,7 +138,11 @@ impl Scene {
         match kind {
             Kind::Plane => {
                 let fit = self.fit_plane(without)?;
-                let how = format!("fitted at distance {:.4} to {}", fit.distance, fit.basis);
+                let how = format!(
+                    "fitted at distance {} to {}",
+                    shown_number(fit.distance),
+                    fit.basis
+                );
                 let mut fitted = Fitted::new(Proxy::Plane(fit.plane), how);
                 if !matches!(fit.basis, FitBasis::Points { .. }) {
                     let basis = fit.basis;
@@ -251,8 +255,8 @@ impl Scene {
             |photo: &Photo, size: (u32, u32)| photo.decode_depth(size).map_err(SceneError::from);
         let fusion = fuse_depth(&sources, MOST_TRIANGLES, decode)?;
         let how = format!(
-            "{maps} depth maps fused in voxels of {:.4}",
-            fusion.voxel_size
+            "{maps} depth maps fused in voxels of {}",
+            shown_number(fusion.voxel_size)
         );
         let (views, points) = self.sparse(without)?;
         let mut mesh = fusion.mesh;
@@ -452,10 +456,10 @@ impl Fitted {
 
     fn tunnel(tunnel: &Tunnel) -> Self {
         let how = format!(
-            "{:.3} wide, {:.3} high, {:.3} long, {:.0} % of the points on its walls",
-            tunnel.width(),
-            tunnel.height(),
-            tunnel.length(),
+            "{} wide, {} high, {} long, {:.0} % of the points on its walls",
+            shown_number(tunnel.width()),
+            shown_number(tunnel.height()),
+            shown_number(tunnel.length()),
             100.0 * tunnel.share_on_walls
         );
         Self::mesh(MeshKind::Tunnel, tunnel.mesh(), how).with_condition(tunnel.condition)

@@ -1,5 +1,5 @@
 use super::PolygonError;
-use crate::shown_name;
+use crate::{shown_name, shown_number};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -137,8 +137,11 @@ pub enum InteriorWarning {
     Overlap(String, String),
     /// Eyes are over all ceilings, or as good as on the floor.
     #[error(
-        "`eye_height` is {eye_height}, and the cells are {least} to {most} high: eyes see nothing of them, or little; \
-         it is in world units as boxes are: correct it"
+        "`eye_height` is {}, and the cells are {} to {} high: eyes see nothing of them, or little; \
+         it is in world units as boxes are: correct it",
+        shown(.eye_height),
+        shown(.least),
+        shown(.most)
     )]
     EyeHeight {
         /// In world units.
@@ -155,7 +158,7 @@ pub enum InteriorWarning {
     #[error(
         "portal `{}` is {} away from the box of its cell `{}`",
         shown_name(.portal),
-        .distance,
+        shown(.distance),
         shown_name(.cell)
     )]
     Away {
@@ -270,7 +273,12 @@ pub enum InteriorWarning {
 /// For messages: how far away something is, in world units.
 fn how_far(distance: &f64) -> String {
     match *distance > 0.0 {
-        true => format!("{distance} away"),
+        true => format!("{} away", shown(distance)),
         false => "which it only touches".to_owned(),
     }
+}
+
+/// For messages: a length, in world units.
+fn shown(length: &f64) -> String {
+    shown_number(*length)
 }

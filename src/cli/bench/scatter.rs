@@ -211,18 +211,7 @@ pub(super) fn scatter(
 
 /// Four digits.
 pub(super) fn round(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let digits = 3 - value.abs().log10().floor() as i32;
-    let rounded = format!("{value:.*}", digits.clamp(0, 9) as usize);
-    match rounded.contains('.') {
-        true => rounded
-            .trim_end_matches('0')
-            .trim_end_matches('.')
-            .to_owned(),
-        false => rounded,
-    }
+    proxy::shown_number(value)
 }
 
 /// Text that is safe between tags and in attributes.
