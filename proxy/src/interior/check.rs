@@ -184,14 +184,12 @@ impl Interior {
             }
         }
         for portal in &self.portals {
-            let center = portal.polygon.center();
             for id in portal.cells.into_iter().flatten() {
                 let cell = self.cell(id);
                 let Some(room) = cell.content.room() else {
                     continue;
                 };
-                let distance = room.distance(center);
-                if distance > 0.5 * portal.polygon.size() {
+                if let Some(distance) = away(&portal.polygon, &room) {
                     found.push(InteriorWarning::Away {
                         portal: portal.name.clone(),
                         cell: cell.name.clone(),
@@ -235,6 +233,12 @@ impl Interior {
             (low.min(p), high.max(p))
         })
     }
+}
+
+/// How far a portal's middle is from the box of one of its cells, in world units, where that is too far for one.
+pub(super) fn away(portal: &Polygon, room: &RoomBox) -> Option<f64> {
+    let distance = room.distance(portal.center());
+    (distance > 0.5 * portal.size()).then_some(distance)
 }
 
 /// Fails where a record of numbers has one that is too large.

@@ -28,6 +28,7 @@ mod upside;
 pub use level::Level;
 pub use sights::sights;
 
+use super::check::away;
 use super::{
     Cell, CellId, Content, Extra, Interior, InteriorError, InteriorWarning, Polygon, Portal,
     RoomBox, triangle_touches_box,
@@ -186,6 +187,8 @@ pub fn find_interior(
     // 4. Cells and portals.
     let (interior, ids) = interior(evidence, &columns, &grown, openings, model, options)?;
     let mut warnings = interior.check()?;
+    // The plan says which room is before a portal, whatever boxes and outlines on a coarse one let guess.
+    warnings.retain(|warning| !matches!(warning, InteriorWarning::Turned(_)));
     if columns.step_m > options.cell_size * (1.0 + 1e-9) {
         warnings.push(InteriorWarning::Coarse {
             found: columns.step_m,
@@ -344,6 +347,17 @@ fn interior(
         let inwards = level.direction(opening.normal());
         if polygon.normal().dot(inwards) < 0.0 {
             polygon = polygon.reversed();
+        }
+        // On a coarse plan outlines are brought into line by more than a portal measures.
+        for id in rooms.into_iter().flatten() {
+            let cell = &mut cells[id.0 as usize];
+            if cell
+                .content
+                .room()
+                .is_some_and(|room| away(&polygon, &room).is_some())
+            {
+                reach(cell, polygon.corners());
+            }
         }
         portals.push(Portal {
             name: format!("{kind} {}", portals.len() + 1),
