@@ -351,8 +351,14 @@ impl<'a> Frame<'a> {
     /// The same view, leaving out these things alone: the same pictures, sooner or later.
     #[must_use]
     pub fn skipping(mut self, skips: Skips) -> Self {
+        let asks_others = skips.views != self.skips.views;
         self.skips = skips;
         self.view_tree = OnceLock::new();
+        if asks_others {
+            // Who was scored for the frame's exposure, too.
+            self.tally = Tally::new(self.sources.len());
+            self.match_exposures();
+        }
         self
     }
 

@@ -6,6 +6,7 @@ use crate::options::Resolution;
 use crate::reference::candidate;
 use crate::view_tree::{Around, Ball, Measure};
 use calibrate::Pixel;
+use glam::DVec3;
 
 /// What there is to know about a point of the proxy without asking all source views.
 #[derive(Clone, Debug, Default)]
@@ -68,13 +69,51 @@ impl Frame<'_> {
     /// is `None`: at infinity. They are about to be scored.
     pub(crate) fn views_within(&self, ball: Option<&Ball>, most: f64, found: &mut Vec<u32>) {
         match ball {
-            Some(ball) => self.view_tree().within(ball, self.measure(), most, found),
+            Some(ball) => {
+                self.view_tree().within(ball, self.measure(), most, found);
+                self.note(ball, most, found);
+                if !self.may_skip() {
+                    found.sort_unstable();
+                }
+            }
             None => {
                 found.clear();
                 found.extend(self.taking_part().map(|i| i as u32));
+                self.tally.note(found.iter().copied());
             }
         }
-        self.tally.note(found.iter().copied());
+    }
+
+    /// Counts the views that were found by bounds, of a difference of `most` or less somewhere in a ball, as scored.
+    ///
+    /// Where no view is to be passed over, each that takes part is asked, and counted, and those that bounds should not
+    /// have ruled out are added at the end. There are none if bounds are true; and those that they do rule out must
+    /// not be: what triangles list depends on what was found.
+    fn note(&self, ball: &Ball, most: f64, found: &mut Vec<u32>) {
+        if self.may_skip() {
+            self.tally.note(found.iter().copied());
+            return;
+        }
+        let mut known = found.clone();
+        known.sort_unstable();
+        let all: Vec<u32> = self.taking_part().map(|i| i as u32).collect();
+        self.tally.note(all.iter().copied());
+        let missed = all.into_iter().filter(|view| {
+            self.may_count_in(ball, *view as usize, most) && known.binary_search(view).is_err()
+        });
+        found.extend(missed);
+    }
+
+    /// Whether a source view differs by `most` or less in the middle of a ball, and has it in its image.
+    fn may_count_in(&self, ball: &Ball, source_idx: usize, most: f64) -> bool {
+        let middle = ProxyPoint {
+            ray: ball.center,
+            inverse_distance: 1.0,
+            plane: DVec3::ZERO,
+        };
+        let pixel = self.project(source_idx, &middle);
+        let is_seen = pixel.is_some_and(|pixel| self.fov_blend(source_idx, pixel) >= 0.0);
+        self.difference(source_idx, &middle) <= most && is_seen
     }
 
     /// The same views; those that may differ least come first. They are counted as scored, whoever is.
@@ -87,7 +126,7 @@ impl Frame<'_> {
         around.within(ball, self.measure(), most, &mut by_least);
         found.clear();
         found.extend(by_least.into_iter().map(|(_, i)| i));
-        self.tally.note(found.iter().copied());
+        self.note(ball, most, found);
     }
 
     /// The same views, for parts of the ball to ask them: who scores some says so.

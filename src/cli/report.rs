@@ -413,7 +413,8 @@ struct Skipped {
     scorings_omitted: u64,
     #[serde(skip)]
     scorings: u64,
-    /// Photos whose lens needs no more than a division.
+    /// Photos whose lens needs no more than a division, unless each is seen through as if it bent: which graphics
+    /// devices never do.
     lens_maths_omitted_photos: usize,
     /// Photos that nothing asks whether they see a point, as the proxy hides nothing of itself.
     visibility_tests_omitted_photos: usize,
@@ -450,7 +451,10 @@ impl Skipped {
             cameras_never_scored: (!costs.frames.is_empty()).then(|| unscored.count()),
             scorings_omitted: costs.frames.values().map(|f| f.scorings_omitted).sum(),
             scorings: costs.frames.values().filter_map(|f| f.scorings).sum(),
-            lens_maths_omitted_photos: lumigraph.sources.iter().filter(pinhole).count(),
+            lens_maths_omitted_photos: match session.skips().lenses || gpu.is_some() {
+                true => lumigraph.sources.iter().filter(pinhole).count(),
+                false => 0,
+            },
             visibility_tests_omitted_photos: match lumigraph.visibility {
                 Some(_) => 0,
                 None => count,

@@ -141,6 +141,11 @@ impl Session {
         &self.lumigraph
     }
 
+    /// What frames leave out.
+    pub(super) fn skips(&self) -> Skips {
+        self.skips
+    }
+
     /// The sparse points that do not rest on held-out photos, in the world.
     pub(super) fn points(&self) -> Vec<DVec3> {
         points(&self.scene, &self.without)

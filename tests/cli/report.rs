@@ -88,6 +88,26 @@ fn a_frame_says_what_it_took_and_the_run_what_all_did() {
         let skipped = &all["report"]["skipped"];
         assert_eq!(skipped["photos_never_decoded"], 0);
         assert_eq!(skipped["bytes_never_decoded"], 0);
+        for what in [
+            "cameras_never_scored",
+            "scorings_omitted",
+            "lens_maths_omitted_photos",
+        ] {
+            assert_eq!(skipped[what], 0, "{renderer}, {what}");
+        }
+        // Of one thing alone the other is left out.
+        for (kept, left_out) in [
+            ("views", "lens_maths_omitted_photos"),
+            ("lenses", "scorings_omitted"),
+        ] {
+            let out = format!("{renderer}-{kept}");
+            let some = render(&format!(" --no-skip={kept}"), &out);
+            let skipped = &some["report"]["skipped"];
+            assert!(
+                skipped[left_out].as_u64() > Some(0),
+                "{renderer}: {skipped}"
+            );
+        }
     }
     let line = "render wall --proxy plane --path sweep --frames 2 -o text";
     let said = lumigraph(folder.path(), line).ok().stderr;

@@ -51,14 +51,14 @@ impl Asked {
     }
 
     /// The views that may differ by `within` or less in a tile of the block: by how much at least, and their
-    /// indices. Those that may differ least come first.
+    /// indices. Those that may differ least come first. Where no view is to be passed over, all.
     pub(super) fn views(
         &mut self,
         frame: &Frame<'_>,
         tile: Option<&Ball>,
         within: f64,
     ) -> &[(f32, u32)] {
-        let Some(tile) = tile else {
+        let Some(tile) = tile.filter(|_| frame.may_skip()) else {
             self.views.clear();
             let all = frame.taking_part().map(|i| (0.0, i as u32));
             self.views.extend(all);

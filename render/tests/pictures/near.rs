@@ -191,8 +191,13 @@ fn pictures_are_the_same_bytes_when_all_views_are_asked() {
         let new = || Frame::new(&lumigraph, desired.clone(), FieldOptions::default());
         for method in [Method::Exact, Method::TRIANGULATED] {
             let picture = cpu::render(&new(), method).unwrap();
-            let asking_all = cpu::render(&new().skipping(Skips::NONE), method).unwrap();
+            let frame = new().skipping(Skips::NONE);
+            let asking_all = cpu::render(&frame, method).unwrap();
             assert!(picture == asking_all, "{kind}, {method:?}");
+            // All were, whenever any was.
+            let scored = frame.scored();
+            assert_eq!(scored.scorings, scored.questions * count as u64);
+            assert!(scored.ever.iter().all(|ever| *ever), "{kind}, {method:?}");
             assert!(picture.pixels().any(|p| p.0[3] > 0), "{kind}");
         }
     }
