@@ -97,15 +97,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut scene = args.scene.open()?;
     check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
     let mut without = args.hold_out.names(&scene)?;
+    let photo = scene.name_here(&args.view);
     if args.without_view {
-        without.insert(args.view.clone());
+        without.insert(photo.clone());
     }
     let path = args.path.as_deref();
     let asked = path.map(|path| Asked::path(path, &NerfstudioFrame::default()));
     let count = args.frames.unwrap_or(FRAMES);
     // What need not be derived is found first: fitting a proxy may take long.
     let known = match asked.transpose()? {
-        None => Ok((scene.view(&args.view)?, scene.time_s(&args.view))),
+        None => Ok((scene.view(&photo)?, scene.time_s(&photo))),
         Some(Asked::Read { views, .. }) => {
             check_no_count(args)?;
             Ok(frame_of(views, &args.view)?)

@@ -254,7 +254,8 @@ fn by_hand(
     }
     if let Some(focus) = &args.focus {
         let (name, pixel) = focused(focus)?;
-        let view = scene.view(name)?;
+        let name = scene.name_here(name);
+        let view = scene.view(&name)?;
         let rest = scene.reconstruction.without_images(without);
         let id = rest.images.iter().find(|(_, image)| image.name == name);
         let seen = rest.points.values().filter(|p| {

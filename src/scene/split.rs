@@ -1,6 +1,6 @@
 //! Held-out photos: `split.json`, `{"test": ["a.jpg", …]}`.
 
-use super::{Photo, Scene, SceneError};
+use super::{Scene, SceneError};
 use capture::without_byte_order_mark;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -53,13 +53,15 @@ impl Scene {
     pub fn held_out(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
         let read = read(split)?;
         // Splits speak of the photos as the capture calls them.
-        let called = |photo: &Photo| photo.original.clone().map(|was| (was, photo.name.clone()));
-        let renamed: BTreeMap<String, String> = self.photos.iter().filter_map(called).collect();
+        let renamed = self.renamed();
         let known: BTreeSet<&str> = self.photos.iter().map(|p| p.name.as_str()).collect();
         let (here, not_here): (BTreeSet<String>, BTreeSet<String>) = read
             .test
             .into_iter()
-            .map(|name| renamed.get(&name).cloned().unwrap_or(name))
+            .map(|name| match renamed.get(name.as_str()) {
+                Some(here) => (*here).to_owned(),
+                None => name,
+            })
             .partition(|name| known.contains(name.as_str()));
         let unknown: Vec<String> = not_here
             .into_iter()
@@ -122,6 +124,20 @@ impl Scene {
     /// Every `step`-th photo by name, the first included.
     pub fn every(&self, step: usize) -> BTreeSet<String> {
         self.names().into_iter().step_by(step.max(1)).collect()
+    }
+
+    /// What this scene calls the photos that undistorting gave other names, by the capture's names.
+    fn renamed(&self) -> BTreeMap<&str, &str> {
+        let photos = self.photos.iter();
+        let renamed = photos.filter_map(|p| Some((p.original.as_deref()?, p.name.as_str())));
+        renamed.collect()
+    }
+
+    /// What this scene calls a photo that may be named as the capture calls it; the name as it is where no
+    /// photo was renamed from it.
+    pub fn name_here(&self, name: &str) -> String {
+        let renamed = self.renamed();
+        renamed.get(name).copied().unwrap_or(name).to_owned()
     }
 
     /// The photos' names, sorted.

@@ -1,6 +1,6 @@
 //! A capture through a fisheye, undistorted, against what a pinhole would have taken.
 
-use crate::run::lumigraph;
+use crate::run::{lumigraph, with_wall};
 use calibrate::{Camera, CameraId, ModelKind, colmap};
 use datasets::{DEPTH_STEPS_PER_UNIT, Dataset, Options, by_name, render_depth, render_view};
 use image::{DynamicImage, GrayImage, Rgba};
@@ -113,4 +113,32 @@ fn a_fisheyes_photos_masks_and_depth_become_a_pinholes() {
     let original = psnr(folder.path(), "shelf", "psnr_covered");
     let undistorted = psnr(folder.path(), "flat", "psnr_masked");
     println!("views: {original:.2} dB, undistorted {undistorted:.2} dB");
+}
+
+#[test]
+fn renamed_photos_are_found_by_the_captures_names_too() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    // As of photos that were JPEG files before they were undistorted.
+    let file = folder.path().join("scene/scene.json");
+    let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    assert_eq!(scene["photos"][0]["name"], "0000.png");
+    scene["photos"][0]["original"] = "0000.jpg".into();
+    fs::write(&file, scene.to_string()).unwrap();
+    let made = |line: &str, file: &str| {
+        lumigraph(folder.path(), &format!("{line} -o {file}")).ok();
+        fs::read(folder.path().join(file)).unwrap()
+    };
+    let field = |name: &str, file: &str| {
+        let line = format!("field scene --proxy plane --without-view --size 48x36 --view {name}");
+        made(&line, file)
+    };
+    assert!(field("0000.jpg", "was.png") == field("0000.png", "is.png"));
+    let focused =
+        |name: &str, file: &str| made(&format!("proxy scene plane --focus {name}:48,36"), file);
+    assert!(focused("0000.jpg", "was.json") == focused("0000.png", "is.json"));
+    // Of no photo it is no name here either.
+    let line = "field scene --proxy plane --view 0001.jpg -o none.png";
+    let error = lumigraph(folder.path(), line).error(1);
+    assert!(error.contains("no photo is called 0001.jpg"), "{error}");
 }
