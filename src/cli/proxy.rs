@@ -9,7 +9,7 @@ use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
 use super::targets::{check_apart, check_file, check_scene_folder};
 use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use calibrate::{Pixel, View};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -256,6 +256,15 @@ fn by_hand(
         let (name, pixel) = focused(focus)?;
         let name = scene.name_here(name);
         let view = scene.view(&name)?;
+        // Which leaves it no points.
+        if let Some(split) = &args.hold_out.hold_out
+            && without.contains(&name)
+        {
+            bail!(
+                "cannot focus on {focus}: {name} is held out by {}; focus on another photo",
+                split.display()
+            );
+        }
         let rest = scene.reconstruction.without_images(without);
         let id = rest.images.iter().find(|(_, image)| image.name == name);
         let seen = rest.points.values().filter(|p| {

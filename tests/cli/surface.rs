@@ -433,3 +433,19 @@ fn dense_points_of_other_photos_are_refused() {
     let error = lumigraph(here, "render scene --path orbit -o out").error(1);
     assert!(error.starts_with(&said), "{error}");
 }
+
+#[test]
+fn a_photo_that_is_held_out_is_not_focused_on() {
+    let folder = with_wall();
+    let focus = |name: &str| {
+        let line = format!(
+            "proxy wall plane --focus {name}:48,36 --hold-out wall/split.json -o {name}.json"
+        );
+        lumigraph(folder.path(), &line)
+    };
+    let error = focus("0000.png").error(1);
+    let said = "cannot focus on 0000.png:48,36: 0000.png is held out by wall/split.json; focus on \
+                another photo";
+    assert_eq!(error, said);
+    focus("0001.png").ok();
+}
