@@ -112,7 +112,8 @@ impl FrameChoice {
 /// A film of the frames.
 #[derive(clap::Args)]
 pub(super) struct FilmArgs {
-    /// Also make a film of the frames, with ffmpeg: .mp4, .webm, .mkv, …
+    /// Also make a film of the frames, with ffmpeg: .mp4, .webm, .mkv, …. Where frames' width or height is odd
+    /// the film has one more of their last column or row
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
     /// Its frames a second [default: the path's own, else 30]

@@ -34,6 +34,21 @@ fn a_film_is_shared_resumed_and_made() {
     let probed = String::from_utf8_lossy(&probe.stdout).trim().to_owned();
     assert_eq!(probed, "48,36,12/1,6");
     assert_eq!(files(&folder.path().join("films")).len(), 1);
+    // It is larger by what the frames end in, not by black.
+    let shown = std::process::Command::new("ffmpeg")
+        .args(["-v", "error", "-i"])
+        .arg(&film)
+        .args(["-frames:v", "1", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
+        .output()
+        .unwrap();
+    assert_eq!(shown.stdout.len(), 3 * 48 * 36);
+    let brightness = |x: usize, y: usize| -> i32 {
+        let at = 3 * (48 * y + x);
+        shown.stdout[at..at + 3].iter().map(|c| i32::from(*c)).sum()
+    };
+    let beside = |off: i32| assert!(off.abs() < 3 * 32, "{off}");
+    (0..36).for_each(|y| beside(brightness(47, y) - brightness(46, y)));
+    (0..48).for_each(|x| beside(brightness(x, 35) - brightness(x, 34)));
 
     // In parts, and after an interruption, the bytes are the same.
     for part in ["0..2/6", "2..6/6"] {

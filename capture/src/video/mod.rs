@@ -69,8 +69,8 @@ pub fn ffmpeg() -> Tool {
 }
 
 /// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
-/// what else ffmpeg takes the file's name to mean. An odd width or height gains a black column or row.
-/// The video appears complete or not at all.
+/// what else ffmpeg takes the file's name to mean. Films have even sizes: an odd width or
+/// height gains one more of its last column or row. The video appears complete or not at all.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails; a frame cannot be had or has another size.
@@ -83,14 +83,16 @@ pub fn encode(
     let name = video.file_name().unwrap_or_default().to_string_lossy();
     let temporary = video.with_file_name(format!(".partial-{name}"));
     let mut arguments: Vec<OsString> = Vec::new();
-    let size = format!("{width}x{height}");
+    let own = [width as usize, height as usize];
+    let [even_width, even_height] = own.map(|side| side.next_multiple_of(2));
+    let size = format!("{even_width}x{even_height}");
     let rate = frames_per_second.to_string();
     let given = [
         "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size,
     ];
     arguments.extend(given.map(OsString::from));
     // The frames are sRGB with full range; players expect BT.709.
-    let filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv";
+    let filter = "scale=out_color_matrix=bt709:out_range=tv";
     let made = ["-r", &rate, "-i", "-", "-vf", filter, "-pix_fmt", "yuv420p"];
     arguments.extend(made.map(OsString::from));
     let marked = [
@@ -103,14 +105,13 @@ pub fn encode(
     ];
     arguments.extend(marked.map(OsString::from));
     arguments.push(scan::file(&temporary));
-    let expected = 3 * width as usize * height as usize;
     let made = ffmpeg().feed(&arguments, move |mut stdin| {
         for frame in frames {
             let frame = frame?;
-            if frame.len() != expected {
+            if frame.len() != 3 * own[0] * own[1] {
                 return Err(std::io::Error::other("a frame has another size"));
             }
-            stdin.write_all(&frame)?;
+            stdin.write_all(&made_even(frame, own))?;
         }
         Ok(())
     });
@@ -125,6 +126,23 @@ pub fn encode(
         let _ = std::fs::remove_file(&temporary);
     }
     renamed
+}
+
+/// A frame's RGB bytes with one more of its last column and row where these are odd in number.
+fn made_even(mut frame: Vec<u8>, [width, height]: [usize; 2]) -> Vec<u8> {
+    if width % 2 == 1 {
+        let rows = frame.chunks_exact(3 * width);
+        frame = rows
+            .flat_map(|row| [row, &row[3 * (width - 1)..]])
+            .flatten()
+            .copied()
+            .collect();
+    }
+    if height % 2 == 1 {
+        let last_row = 3 * width.next_multiple_of(2) * (height - 1);
+        frame.extend_from_within(last_row..);
+    }
+    frame
 }
 
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
@@ -291,6 +309,25 @@ fn literal(folder: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn odd_frames_gain_one_more_of_their_last_column_and_row() {
+        let frame = |pixels: &[u8]| -> Vec<u8> { pixels.iter().flat_map(|p| [*p; 3]).collect() };
+        let cases: [([usize; 2], &[u8], &[u8]); 5] = [
+            ([1, 2], &[1, 2], &[1, 1, 2, 2]),
+            ([2, 1], &[1, 2], &[1, 2, 1, 2]),
+            ([1, 1], &[1], &[1; 4]),
+            ([2, 2], &[1, 2, 3, 4], &[1, 2, 3, 4]),
+            (
+                [3, 3],
+                &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+                &[1, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 7, 8, 9, 9],
+            ),
+        ];
+        for (size, pixels, even) in cases {
+            assert_eq!(made_even(frame(pixels), size), frame(even), "{size:?}");
+        }
+    }
 
     #[test]
     fn frames_a_fraction_of_a_millisecond_apart_have_names_of_their_own() {
