@@ -6,7 +6,7 @@ use super::session::spinner;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lumigraph::scene::Scene;
-use render::{Lumigraph, Moment};
+use render::{Lumigraph, Moment, WINDOW_TURNS};
 use serde_json::{Value, json};
 use std::sync::Once;
 
@@ -56,6 +56,7 @@ pub(super) struct Clock {
     /// One moment for all views.
     time_s: Option<f64>,
     period_s: Option<f64>,
+    /// The one asked for, or the default of the period; `None` where just the k nearest photos count.
     window_s: Option<f64>,
     photos: Span,
 }
@@ -148,7 +149,7 @@ impl Clock {
         Ok(Some(Self {
             time_s,
             period_s,
-            window_s: args.time_window,
+            window_s: args.time_window.or(period_s.map(|p| WINDOW_TURNS * p)),
             photos,
         }))
     }

@@ -58,6 +58,8 @@ fn frames_show_their_moment() {
     assert_eq!(report["report"]["time"], serde_json::Value::Null);
     let (early, report) = render(" --period 1.37 --time 0.25", "early");
     assert_eq!(report["report"]["time"]["period_s"], 1.37);
+    // The one that is in force without --time-window.
+    assert_eq!(report["report"]["time"]["window_s"], 1.37 / 16.0);
     assert!(plain != early);
     assert!(
         render(" --period 1.37 --time 1.62", "turn").0 == early,
@@ -73,6 +75,7 @@ fn frames_show_their_moment() {
     assert!(frame(&own, 0) == frame(&zero, 0) && frame(&own, 1) != frame(&zero, 1));
     // Without a period: the photos nearest in time.
     let (_, report) = render(" --time 4", "nearest");
+    assert!(report["report"]["time"]["window_s"].is_null());
     assert!(report["report"]["time"]["photos_in_window"][1].as_u64() < Some(9));
     lumigraph(
         folder.path(),
