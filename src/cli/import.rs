@@ -3,6 +3,7 @@
 use super::Usage;
 use super::damaged::left_out_text;
 use super::exposure::ExposureArgs;
+use super::inputs::video_of;
 use super::interior::check_no_interior;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
 use super::output::{print, say};
@@ -199,7 +200,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     let (mut scene, warnings) = imported?;
-    scene.video = is_video.then(|| args.photos.clone());
+    scene.video = match is_video {
+        true => Some(args.photos.clone()),
+        false => video_of_frames(&args.photos),
+    };
     print_warnings(&warnings);
     let has_depth = scene.photos.iter().any(|photo| photo.depth_map.is_some());
     if args.depth_scale != DEPTH_UNITS_PER_STEP && !has_depth {
@@ -238,6 +242,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         scene.reconstruction.points.len(),
         beside_text(&scene)
     ))
+}
+
+/// The video that a folder's photos were taken out of, where they are those that a scene took out of one and keeps.
+fn video_of_frames(photos: &Path) -> Option<PathBuf> {
+    let photos = photos.canonicalize().ok()?;
+    let scene = photos.parent()?;
+    match Scene::frames_folder(scene) == photos {
+        true => video_of(scene),
+        false => None,
+    }
 }
 
 /// Fails of a scene whose photos lie elsewhere, and of a scene's file: there is nothing to import.

@@ -242,3 +242,27 @@ fn a_plane_by_hand_reads_back_to_the_last_digit() {
     assert_eq!(used["proxy"]["point"], own["point"]);
     assert_eq!(used["proxy"]["normal"], own["normal"]);
 }
+
+#[test]
+fn frames_that_are_imported_again_keep_the_name_of_their_video() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    // As if they had been taken out of one.
+    let file = here.join("scene/scene.json");
+    let mut scene = read(&file);
+    scene["settings"]["video"] = "../sweep.mp4".into();
+    fs::write(&file, scene.to_string()).unwrap();
+    fs::create_dir(here.join("scene/photos")).unwrap();
+    for (name, bytes) in files(&here.join("wall/images")) {
+        fs::write(here.join("scene/photos").join(name), bytes).unwrap();
+    }
+    let line = "import scene/photos --calibration wall/sparse/0 --force -o scene";
+    for _ in 0..2 {
+        lumigraph(here, line).ok();
+        assert_eq!(read(&file)["settings"]["video"], "../sweep.mp4");
+    }
+    // Others are of no video.
+    lumigraph(here, "import wall --force -o scene").ok();
+    assert!(read(&file)["settings"]["video"].is_null());
+}
