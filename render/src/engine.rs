@@ -1,6 +1,7 @@
 //! One door to the three engines.
 
 use crate::cpu::Cpu;
+use crate::edges::Edges;
 use crate::field::{self, TriangulatedField};
 use crate::frame::Frame;
 use crate::gpu::{self, Gpu};
@@ -243,6 +244,25 @@ impl Engine {
             }
             drawn => drawn,
         }
+    }
+
+    /// Draws the pixels of a picture at which its frame's surface jumps once more, as means of so many samples across
+    /// and down; how many they are. See [`Edges`].
+    ///
+    /// # Errors
+    /// As [`Self::draw_ready`].
+    pub fn smooth(
+        &mut self,
+        frame: &Frame<'_>,
+        across: u32,
+        picture: &mut RgbaImage,
+    ) -> Result<usize, RenderError> {
+        let Some(edges) = Edges::of(frame, picture, across) else {
+            return Ok(0);
+        };
+        let samples = self.render(&edges.samples, Method::Exact)?;
+        edges.put(&samples, picture);
+        Ok(edges.count())
     }
 
     fn draw_by_cpu(

@@ -8,7 +8,7 @@ use crate::options::{FieldOptions, Resolution, Skips};
 use crate::photos::PhotoError;
 use crate::planted::{Fault, is_planted};
 use crate::sight::{Views, within_sight};
-use crate::surface::{FacetMap, Surface};
+use crate::surface::{FacetMap, Surface, shown};
 use crate::tally::{Scored, Tally};
 use crate::time::Moment;
 use crate::view_tree::ViewTree;
@@ -276,6 +276,27 @@ impl<'a> Frame<'a> {
         facets: FacetMap,
     ) -> Self {
         Self::of(lumigraph, desired, options, gone, None, Some(facets))
+    }
+
+    /// The same source views, of the same weight, as another desired view from the same place has them, which
+    /// sees these facets of the mesh. `rays` are its own.
+    pub(crate) fn seeing(&self, desired: View, facets: FacetMap, rays: Option<&Rays>) -> Self {
+        Self {
+            lumigraph: self.lumigraph,
+            surface: Surface::Facets(shown(
+                facets,
+                self.lumigraph,
+                &desired,
+                rays,
+                &Views::new(&self.sources),
+            )),
+            desired,
+            options: self.options,
+            sources: self.sources.clone(),
+            skips: self.skips,
+            view_tree: OnceLock::new(),
+            tally: Tally::new(self.sources.len()),
+        }
     }
 
     fn of(

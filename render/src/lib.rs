@@ -8,6 +8,7 @@ pub mod blend;
 mod bounded;
 pub mod coverage;
 pub mod cpu;
+mod edges;
 mod engine;
 pub mod field;
 mod frame;
@@ -46,6 +47,7 @@ mod view_tree;
 mod visibility;
 
 pub use bounded::{Bounded, ErrorEstimate, GRIDS, Samples, prepare_within};
+pub use edges::Edges;
 pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, Part, ProxyPoint};

@@ -3,7 +3,7 @@
 use super::exposure::ExposureArgs;
 use super::film::write_picture;
 use super::inputs::files_behind_scene;
-use super::options::{DrawArgs, FieldArgs, SceneArgs, compared};
+use super::options::{DrawArgs, EdgeArgs, FieldArgs, SceneArgs, compared};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::Report;
@@ -53,6 +53,8 @@ pub(super) struct Args {
     exposure: ExposureArgs,
     #[command(flatten)]
     field: FieldArgs,
+    #[command(flatten)]
+    edges: EdgeArgs,
     #[command(flatten)]
     draw: DrawArgs,
     #[command(flatten)]
@@ -107,6 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.time,
         None,
     )?;
+    session.edge_samples = args.edges.across;
     let size = args.draw.size;
     let lines = score_photos(&mut session, &held_out, size, output, &kept)?;
     let report = Report::new(&session, &start);

@@ -19,16 +19,19 @@ pub(super) enum Stage {
     Load,
     /// Drawing. On the CPU photos that were not decoded ahead are decoded meanwhile.
     Draw,
+    /// Drawing pixels anew at which the proxy jumps.
+    Edges,
     /// Writing the picture.
     Write,
 }
 
-const STAGES: [(Stage, &str); 6] = [
+const STAGES: [(Stage, &str); 7] = [
     (Stage::Surface, "surface"),
     (Stage::Field, "field"),
     (Stage::Ahead, "ahead"),
     (Stage::Load, "load"),
     (Stage::Draw, "draw"),
+    (Stage::Edges, "edges"),
     (Stage::Write, "write"),
 ];
 

@@ -260,6 +260,16 @@ impl FieldArgs {
     }
 }
 
+/// How outlines are drawn.
+#[derive(Args)]
+pub(super) struct EdgeArgs {
+    /// Samples of a pixel, across and down, where a mesh jumps between it and one beside it that looks otherwise:
+    /// outlines without stairs; 1 draws them as all else
+    #[arg(long = "edges", value_name = "N", default_value_t = 2,
+        value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub(super) across: u32,
+}
+
 /// Where and how large.
 #[derive(Args)]
 pub(super) struct DrawArgs {

@@ -155,6 +155,8 @@ struct FrameCost {
     scorings: Option<u64>,
     scorings_omitted: u64,
     by_cpu: bool,
+    /// Drawn of several samples.
+    edge_pixels: usize,
     /// No pixel is covered, not even in part.
     is_empty: bool,
     /// And yet the proxy is seen: no photo shows what is seen of it.
@@ -207,10 +209,18 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
+            edge_pixels: 0,
             is_empty,
             is_unshown: is_empty && frame.sees_proxy(),
         };
         self.frames.insert(frame_idx, cost);
+    }
+
+    /// Notes how many pixels of that frame were drawn anew, of several samples.
+    pub(super) fn note_edges(&mut self, frame_idx: usize, edge_pixels: usize) {
+        if let Some(cost) = self.frames.get_mut(&frame_idx) {
+            cost.edge_pixels = edge_pixels;
+        }
     }
 
     /// Notes a view that was drawn by itself, however often; `frame` makes it ready again.
@@ -269,6 +279,7 @@ impl Costs {
             "photos_used": cost.photos_used,
             "parts": cost.parts,
             "drawn_by_cpu": cost.by_cpu,
+            "edge_pixels": cost.edge_pixels,
             "grid": cost.grid,
             "error_at_most": cost.error,
             "device_seconds": cost.device.map(|time| time.as_secs_f64()),

@@ -37,6 +37,8 @@ pub(super) struct Session {
     pub(super) method: Method,
     /// Steps of 255: in [`Self::draw_all`] it chooses each frame's method.
     pub(super) max_error: Option<f64>,
+    /// Across a pixel at which the proxy jumps.
+    pub(super) edge_samples: u32,
     /// Where time plays a part.
     pub(super) clock: Option<Clock>,
     pub(super) in_window: InWindow,
@@ -123,6 +125,7 @@ impl Session {
             options: field.options(),
             method: field.method(),
             max_error: None,
+            edge_samples: 1,
             without,
             left_out,
             uploaded: BTreeSet::new(),
@@ -241,7 +244,10 @@ impl Session {
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
-            let drawn = engine.render(&frame, self.method);
+            let drawn = engine.render(&frame, self.method).and_then(|mut picture| {
+                engine.smooth(&frame, self.edge_samples, &mut picture)?;
+                Ok(picture)
+            });
             say_notes(engine, &mut self.notes_said);
             match drawn {
                 Ok(picture) => {

@@ -213,6 +213,9 @@ impl<'a> Engine<'a> {
             );
         }
         let mut tile = Tile::nothing();
+        if self.frame.surface.is_nothing_of_tile(x0, y0) {
+            return tile;
+        }
         for (k, [x, y]) in PLACES.into_iter().enumerate() {
             let (x, y) = (x0 + x, y0 + y);
             if x < width && y < height && wanted(k) {

@@ -8,6 +8,7 @@ mod blend_continuity;
 mod blend_promises;
 mod bounded;
 mod common;
+mod edges;
 mod engines;
 mod engines_nothing;
 mod engines_photos;

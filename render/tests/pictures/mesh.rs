@@ -24,7 +24,7 @@ fn quad(corners: [DVec3; 4]) -> Mesh {
 }
 
 /// A wall with a pillar before it: a box of 1 × 2 × 0.3 in the middle, 1.5 off the wall.
-fn pillar() -> Mesh {
+pub(crate) fn pillar() -> Mesh {
     let mut mesh = wall();
     let corner = |x: f64, y: f64, z: f64| DVec3::new(0.5 * x, y, 2.35 + 0.15 * z);
     for (a, b, c) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
@@ -66,7 +66,7 @@ fn color(p: DVec3) -> [f64; 3] {
 }
 
 /// What a camera sees of the mesh, 4 × 4 rays a pixel.
-fn photo(solid: &Solid, view: &View) -> RgbaImage {
+pub(crate) fn photo(solid: &Solid, view: &View) -> RgbaImage {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let center = view.center();
     RgbaImage::from_fn(view.width, view.height, |x, y| {
@@ -96,7 +96,7 @@ fn views() -> Vec<View> {
     (0..7).map(view).collect()
 }
 
-fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
+pub(crate) fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
     let solid = Arc::new(Solid::new(kind, mesh));
     lumigraph_of(&solid, |view| photo(&solid, view))
 }
@@ -129,7 +129,7 @@ fn lumigraph_from(
     }
 }
 
-fn solid_of(lumigraph: &Lumigraph) -> &Solid {
+pub(crate) fn solid_of(lumigraph: &Lumigraph) -> &Solid {
     match &lumigraph.proxy {
         Proxy::Mesh(solid) => solid,
         _ => panic!("a mesh"),
@@ -137,7 +137,7 @@ fn solid_of(lumigraph: &Lumigraph) -> &Solid {
 }
 
 /// Between two photos, and nearer; through another lens, too.
-fn desired_views() -> Vec<(&'static str, View)> {
+pub(crate) fn desired_views() -> Vec<(&'static str, View)> {
     let from = |x: f64, z: f64| {
         let center = DVec3::new(x, 0.05, z);
         pinhole(center, center + DVec3::Z, 110.0, (160, 120))
@@ -295,7 +295,7 @@ fn colours_by_fragments_and_by_workgroups_have_the_same_bytes() {
 }
 
 /// Those that see no more than the photos do together.
-fn within_the_photos() -> Vec<(&'static str, View)> {
+pub(crate) fn within_the_photos() -> Vec<(&'static str, View)> {
     let all = desired_views().into_iter();
     all.filter(|(name, _)| *name != "fisheye").collect()
 }

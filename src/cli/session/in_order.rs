@@ -82,12 +82,15 @@ impl Session {
                 (picture, coming.map(ScopedJoinHandle::join))
             });
             say_notes(engine, &mut self.notes_said);
-            let (picture, was_ready) = picture?;
+            let (mut picture, was_ready) = picture?;
             if views[current].1.is_some() {
                 self.in_window.note(frame.taking_part().count());
             }
             self.costs
                 .note(current, &frame, &chosen, engine, &was_ready, &picture);
+            let smooth = || engine.smooth(&frame, self.edge_samples, &mut picture);
+            let edge_pixels = ledger.time(current, Stage::Edges, smooth)?;
+            self.costs.note_edges(current, edge_pixels);
             ledger.time(current, Stage::Write, || take(current, picture))?;
             *done += 1;
             next = match coming.transpose() {
