@@ -173,16 +173,24 @@ pub struct Portal {
 /// A semicircle's radius by default, in widths of its portal.
 pub const RADIUS_IN_WIDTHS: f64 = 1.5;
 
+/// An opening lies flat from this cosine of the angle between its normal and up on: 45°.
+const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 impl Portal {
+    /// Whether it lies rather than stands, as a hatch does and a window in a low roof: within 45° of level.
+    pub fn lies_flat(&self, up: DVec3) -> bool {
+        self.polygon.normal().dot(up).abs() > FLAT
+    }
+
     /// How wide it is, across `up`; where it lies flat, the longer side of what it spans.
     pub fn width(&self, up: DVec3) -> f64 {
         let normal = self.polygon.normal();
-        let (across, along) = match up.cross(normal).try_normalize() {
-            // As good as upright.
-            Some(across) if up.cross(normal).length() > 1e-3 => (across, None),
-            _ => {
-                let across = normal.any_orthonormal_vector();
-                (across, Some(normal.cross(across)))
+        let upright = (!self.lies_flat(up)).then(|| up.cross(normal).normalize());
+        let (across, along) = match upright {
+            Some(across) => (across, None),
+            None => {
+                let along = normal.cross(up.any_orthonormal_vector()).normalize();
+                (along.cross(normal), Some(along))
             }
         };
         let extent = |axis: DVec3| {

@@ -17,14 +17,11 @@ const CLEAR: [f64; 4] = [0.16, 0.1, 0.05, 0.0];
 /// How far inside of a room's openings one is surely in it, in eye heights.
 const INSIDE: [f64; 3] = [0.1, 0.2, 0.3];
 
-/// An opening lies flat where its normal has no more of a level direction.
-const FLAT: f64 = 1e-3;
-
 /// Which way an opening leads into one of its cells, level and of unit length; nothing of a hatch, which lies flat.
 pub(super) fn level_into(portal: &Portal, cell: CellId, up: DVec3) -> Option<DVec3> {
     let normal = portal.normal_into(Some(cell));
     let level = normal - up * normal.dot(up);
-    (level.length() > FLAT).then(|| level.normalize())
+    (!portal.lies_flat(up)).then(|| level.normalize())
 }
 
 /// A room's floor with what stands at eye height over it.

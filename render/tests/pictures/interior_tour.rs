@@ -432,6 +432,13 @@ fn tours_go_straight_through_hatches_and_say_where_one_is_closed() {
     let is_upstairs = |eye: &&DVec3| (eye.y - 4.2).abs() < 1e-9;
     let farthest = eyes.iter().filter(is_upstairs).map(|eye| eye.x);
     assert!(farthest.fold(0.0, f64::max) > 2.5);
+    // Measured a centimetre askew, it is a hatch all the same.
+    let mut askew = interior.clone();
+    let raised = |p: &DVec3| *p + DVec3::Y * if p.x > 1.5 { 0.01 } else { 0.0 };
+    let corners = interior.portals[0].polygon.corners().iter().map(raised);
+    askew.portals[0].polygon = Polygon::new(corners.collect()).unwrap();
+    assert_eq!(crossings(&askew, &model), (0, 3));
+    assert_eq!(amiss(&askew, &model), (vec![], vec![], vec![]));
     // Through a lid.
     let (interior, model) = storeys(true);
     assert!(crossings(&interior, &model).0 > 0);
