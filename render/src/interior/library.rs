@@ -75,9 +75,14 @@ pub struct Library {
 }
 
 impl Library {
-    /// Places of an interior; no image is made.
+    /// Places of an interior; no image is made. Where LDIs are of views, there are none before portals that lie flat
+    /// ([`Portal::lies_flat`](proxy::interior::Portal::lies_flat)): beyond those all is geometry.
     pub fn new(interior: &Interior, contents: &Contents, options: &LibraryOptions) -> Self {
-        let places = semicircles(interior, contents, &options.semicircles);
+        let mut places = semicircles(interior, contents, &options.semicircles);
+        if options.ldi_of == LdiSource::Views {
+            // Before those that lie flat no frame needs any; photos are where they are.
+            places.retain(|place| !interior.portal(place.portal).lies_flat(interior.up));
+        }
         let side = |place: &SemicircleView| (place.portal, place.from, place.into);
         let mut sides = Vec::new();
         let mut first = 0;

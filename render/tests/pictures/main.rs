@@ -22,6 +22,7 @@ mod interior_corner;
 mod interior_files;
 mod interior_geometry;
 mod interior_gpu;
+mod interior_hatch;
 mod interior_kept;
 mod interior_neighbourhood;
 mod interior_photos;

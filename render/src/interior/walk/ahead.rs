@@ -142,7 +142,9 @@ impl Walk<'_> {
                     continue;
                 };
                 if self.share_of_image(portal, eye, self.options.near) > 0.0 {
-                    with(from, id, into);
+                    if self.has_views(portal) {
+                        with(from, id, into);
+                    }
                 } else if !is_captured && !cells.contains(&into) {
                     cells.push(into);
                 }

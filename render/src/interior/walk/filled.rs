@@ -116,11 +116,15 @@ impl Walk<'_> {
                 continue;
             };
             let portal = self.interior.portal(pass.portal);
-            let of_image = match pass.into {
+            let by_distance = match pass.into {
                 Some(_) => self.share_of_image(portal, eye, near),
                 None => 0.0,
             };
-            let is_near = pass.into.is_some() && of_image <= 0.0;
+            let of_image = match is_of_photos || self.has_views(portal) {
+                true => by_distance,
+                false => 0.0,
+            };
+            let is_near = pass.into.is_some() && by_distance <= 0.0;
             let beyond = match is_near && !is_captured {
                 true => most * self.share_of_nested(fill, portal, eye, near),
                 false => 0.0,
@@ -208,6 +212,12 @@ impl Walk<'_> {
             .iter()
             .map(|f| Images::Ldis(ldis.by_ref().take(places(f).count()).collect()));
         Ok(of_fills.collect())
+    }
+
+    /// Whether images of views fill a portal: not one that lies flat. They are made in one plane across it, and one
+    /// looks through it from all around.
+    pub(super) fn has_views(&self, portal: &Portal) -> bool {
+        !portal.lies_flat(self.interior.up)
     }
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
