@@ -316,7 +316,7 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interior::{Content, RoomBox, parse_rooms};
+    use crate::interior::{Content, Polygon, RoomBox, parse_rooms};
     use std::path::Path;
 
     /// Two rooms, and a doorway in the wall between them; those that are asked for are nodes.
@@ -394,6 +394,23 @@ mod tests {
             told.contains("1 of 2 rooms, 1 of 1 portals found\n"),
             "{told}"
         );
+    }
+
+    #[test]
+    fn a_portal_is_where_it_is_however_many_corners_its_lintel_has() {
+        let mut found = rooms(&[]);
+        let [low, lower, high, higher] = [
+            DVec3::new(4.0, 0.0, 1.0),
+            DVec3::new(4.0, 0.0, 2.0),
+            DVec3::new(4.0, 2.0, 2.0),
+            DVec3::new(4.0, 2.0, 1.0),
+        ];
+        let lintel = (0..20).map(|k| high.lerp(higher, f64::from(k) / 20.0));
+        let corners = [low, lower].into_iter().chain(lintel).chain([higher]);
+        found.portals[0].polygon = Polygon::new(corners.collect()).unwrap();
+        let told = compare(&rooms(&[]), &found, 0.3, 1.0).to_string();
+        let line = "door: found; door is 0.00 m off and 0.00 m ";
+        assert!(told.contains(line), "{told}");
     }
 
     /// What is said of a room and a door in a world of which a metre has so many units; lengths are in metres.

@@ -99,16 +99,37 @@ impl Polygon {
                 return Err(PolygonError::NotPlanar { corner, off, size });
             }
         }
-        let polygon = Self {
+        let mut polygon = Self {
             center: origin + center,
             normal,
             size,
             corners,
         };
-        match crossing_sides(&polygon.flattened()) {
-            Some((a, b)) => Err(PolygonError::Crossing(a, b)),
-            None => Ok(polygon),
+        let flat = polygon.flattened();
+        if let Some((a, b)) = crossing_sides(&flat) {
+            return Err(PolygonError::Crossing(a, b));
         }
+        polygon.center = polygon.middle(&flat);
+        Ok(polygon)
+    }
+
+    /// The middle of its area, where `flat` are its corners on its plane, from their mean, which its centre is as yet.
+    /// Where that is as good, as of a rectangle, it stays to the last bit.
+    fn middle(&self, flat: &[DVec2]) -> DVec3 {
+        // In shares of the extent.
+        let (mut twice, mut moment) = (0.0, DVec2::ZERO);
+        for (i, a) in flat.iter().enumerate() {
+            let [a, b] = [*a, flat[(i + 1) % flat.len()]].map(|p| p / self.size);
+            twice += a.perp_dot(b);
+            moment += a.perp_dot(b) * (a + b);
+        }
+        let off = moment / (3.0 * twice);
+        // Farther off than its extent it is where lobes of an outline that touches itself cancel out.
+        if !(STRAIGHT_INSIDE..=1.0).contains(&off.length()) {
+            return self.center;
+        }
+        let (x, y) = self.axes();
+        self.center + self.size * (off.x * x + off.y * y)
     }
 
     /// Its corners, counter-clockwise around the normal.
@@ -116,7 +137,7 @@ impl Polygon {
         &self.corners
     }
 
-    /// The mean of its corners.
+    /// The middle of its area, however many corners there are on a side.
     pub fn center(&self) -> DVec3 {
         self.center
     }
@@ -367,6 +388,42 @@ mod tests {
         };
         let all = (0..corners.len()).flat_map(side);
         Polygon::new(all.map(|p| rounded(turned * p)).collect()).unwrap()
+    }
+
+    #[test]
+    fn its_centre_is_the_middle_of_its_area_however_many_corners_say_so() {
+        // Of a rectangle it is the mean of the corners, to the last bit.
+        let doorway = [
+            [4.05, 0.0, 1.1],
+            [4.05, 0.0, 2.3],
+            [4.05, 2.1, 2.3],
+            [4.05, 2.1, 1.1],
+        ];
+        let plain = polygon(&doorway).unwrap();
+        let offsets = doorway.map(|p| DVec3::from_array(p) - DVec3::from_array(doorway[0]));
+        let mean = DVec3::from_array(doorway[0]) + offsets.iter().sum::<DVec3>() / 4.0;
+        assert_eq!(plain.center(), mean);
+        // With corners along the lintel it is where it was.
+        let lintel = (1..20).map(|k| {
+            let [from, to] = [doorway[2], doorway[3]].map(DVec3::from_array);
+            from.lerp(to, f64::from(k) / 20.0).to_array()
+        });
+        let corners: Vec<[f64; 3]> = doorway[..3].iter().copied().chain(lintel).collect();
+        let with_lintel = polygon(&[&corners[..], &doorway[3..]].concat()).unwrap();
+        assert_eq!(with_lintel.corners().len(), 23);
+        assert!(with_lintel.center().distance(mean) < 1e-12);
+        assert!(with_lintel.reversed().center().distance(mean) < 1e-12);
+        // Of an L.
+        let l = [
+            [0.0, 0.0],
+            [2.0, 0.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [0.0, 3.0],
+        ];
+        let l = Polygon::new(l.map(|[x, y]| DVec3::new(x, y, 7.0)).to_vec()).unwrap();
+        assert!(l.center().distance(DVec3::new(0.75, 1.25, 7.0)) < 1e-12);
     }
 
     #[test]
