@@ -1,5 +1,6 @@
 //! How a found interior compares with a known one.
 
+use super::floors::extent;
 use super::{Cell, CellId, Interior};
 use crate::shown_name;
 use glam::DVec3;
@@ -54,9 +55,12 @@ pub struct Comparison {
 /// a side of the storey.
 const STEP: f64 = 0.25;
 const MOST: f64 = 2000.0;
+/// So much of the lower box's height two boxes have in common that are of one storey.
+const LEVEL: f64 = 0.5;
 
 /// Compares cells with boxes by the floor that they share, and portals by where their middles are and what they join: a
-/// cell is the same where half of the smaller one's floor is shared, or where one has no box.
+/// cell is the same where half of the smaller one's floor is shared, or where one has no box. Boxes share floor only where
+/// they share half of the lower one's height, too: rooms of two storeys have none in common.
 /// `tolerance` is in world units, of which a metre has so many; of interiors without any box there is nothing to
 /// compare but portals.
 pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -> Comparison {
@@ -211,7 +215,20 @@ fn shared_floor(known: &Interior, found: &Interior, tolerance: f64) -> Shared {
     if !(longest.is_finite() && longest > 0.0) {
         return shared;
     }
-    // 2. Which squares are whose.
+    // 2. Which cells are of one storey.
+    let heights = |interior: &Interior| -> Vec<Option<[f64; 2]>> {
+        let cells = interior.cells.iter();
+        let rooms = cells.map(|cell| cell.content.room());
+        rooms
+            .map(|room| Some(extent(&room?.corners(), up)))
+            .collect()
+    };
+    let [known_heights, found_heights] = [known, found].map(heights);
+    let is_beside = |t: usize, f: usize| match (known_heights[t], found_heights[f]) {
+        (Some([a, b]), Some([c, d])) => b.min(d) - a.max(c) >= LEVEL * (b - a).min(d - c),
+        _ => false,
+    };
+    // 3. Which squares are whose.
     let step = (STEP * tolerance).max(longest / MOST);
     let counts = [0, 1].map(|k| ((high[k] - low[k]) / step) as usize + 1);
     for i in 0..counts[0] * counts[1] {
@@ -227,7 +244,8 @@ fn shared_floor(known: &Interior, found: &Interior, tolerance: f64) -> Shared {
         a.iter().for_each(|t| shared.known[*t] += 1);
         b.iter().for_each(|f| shared.found[*f] += 1);
         for t in &a {
-            b.iter().for_each(|f| shared.both[t * m + f] += 1);
+            let beside = b.iter().filter(|f| is_beside(*t, **f));
+            beside.for_each(|f| shared.both[t * m + f] += 1);
         }
     }
     shared
@@ -394,6 +412,39 @@ mod tests {
             told.contains("1 of 2 rooms, 1 of 1 portals found\n"),
             "{told}"
         );
+    }
+
+    #[test]
+    fn rooms_of_other_storeys_are_others_whatever_order_they_are_in() {
+        let storeys = |rooms: &[(&str, f64, f64)]| {
+            let mut interior = self::rooms(&[]);
+            interior.portals.clear();
+            let cell = interior.cells.remove(0);
+            interior.cells = rooms
+                .iter()
+                .map(|(name, low, high)| Cell {
+                    name: (*name).to_owned(),
+                    content: Content::Box(RoomBox {
+                        min: DVec3::new(0.0, *low, 0.0),
+                        max: DVec3::new(4.0, *high, 3.0),
+                    }),
+                    ..cell.clone()
+                })
+                .collect();
+            interior
+        };
+        let [lower, upper] = [("lower", 0.0, 2.5), ("upper", 2.5, 5.0)];
+        let found = storeys(&[("room 1", 2.4, 5.08)]);
+        for known in [[lower, upper], [upper, lower]] {
+            let told = compare(&storeys(&known), &found, 0.3, 1.0).to_string();
+            let line = "upper: room 1, IoU 1.000, sides 0.10 m apart at most\n";
+            assert!(told.contains(line), "{told}");
+            assert!(told.contains("lower: not found\n"), "{told}");
+        }
+        // A hall of both storeys is the one room that was found of it.
+        let hall = storeys(&[("hall", 0.0, 5.0)]);
+        let told = compare(&hall, &found, 0.3, 1.0).to_string();
+        assert!(told.contains("hall: room 1, IoU 1.000"), "{told}");
     }
 
     #[test]

@@ -58,7 +58,7 @@ impl Contents {
 }
 
 /// How high the lowest and the highest of some points are.
-fn extent(points: &[DVec3], up: DVec3) -> [f64; 2] {
+pub(super) fn extent(points: &[DVec3], up: DVec3) -> [f64; 2] {
     let heights = points.iter().map(|p| p.dot(up));
     heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| {
         [low.min(h), high.max(h)]
