@@ -83,7 +83,7 @@ impl Opened {
 }
 
 /// The model of an interior whose file is `path`.
-fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
+pub(super) fn model_file(path: &Path, interior: &Interior) -> Option<PathBuf> {
     let name = interior.model.as_ref()?;
     Some(path.parent().unwrap_or(Path::new("")).join(name))
 }

@@ -1,7 +1,7 @@
 //! `lumigraph plan`
 
 use super::Usage;
-use super::captured::model_of;
+use super::captured::{model_file, model_of};
 use super::interior::open;
 use super::output::{print, print_json, say};
 use anyhow::Context;
@@ -135,16 +135,24 @@ fn remedy(interior: &Interior, poses: &[Pose<'_>]) -> anyhow::Result<String> {
     })
 }
 
-/// Where the cells of an interior are, whose file is `path`. Only that of cells that are nodes is told by the model.
+/// Where the cells of an interior are, whose file is `path`. Only of cells that are nodes must the model tell it; of
+/// others it tells which floors are before doors on upper storeys, if it is there.
 fn contents(path: &Path, interior: &Interior) -> anyhow::Result<Contents> {
-    let is_nodes = |cell: &Cell| matches!(cell.content, Content::Nodes(_));
-    let model = match interior.cells.iter().any(is_nodes) {
-        true => model_of(path, interior)?.0,
-        false => Model::default(),
+    let of = |model: &Model| {
+        let named = || path.display().to_string();
+        let found = Contents::new(interior, model).with_context(named);
+        found.map(|(contents, _)| contents)
     };
-    let named = || path.display().to_string();
-    let (contents, _) = Contents::new(interior, &model).with_context(named)?;
-    Ok(contents)
+    let is_nodes = |cell: &Cell| matches!(cell.content, Content::Nodes(_));
+    if interior.cells.iter().any(is_nodes) {
+        return of(&model_of(path, interior)?.0);
+    }
+    let by_boxes = of(&Model::default())?;
+    let is_there = || model_file(path, interior).is_some_and(|file| file.is_file());
+    match by_boxes.has_raised(interior) && is_there() {
+        true => of(&model_of(path, interior)?.0),
+        false => Ok(by_boxes),
+    }
 }
 
 fn poses<'a>(

@@ -2,7 +2,9 @@
 
 use crate::interior::with_house;
 use crate::run::lumigraph;
+use glam::DVec3;
 use proxy::interior::read_interior;
+use proxy::mesh::{Mesh, Model, model_to_glb};
 
 #[test]
 fn eyes_over_the_ceiling_are_told_and_no_smaller_semicircle_advised() {
@@ -88,6 +90,36 @@ fn where_cameras_stand_is_told_to_a_thousandth_of_the_eyes_height() {
         });
         assert!(places.any(|place| place == expected), "{told}");
     }
+}
+
+#[test]
+fn before_a_gallery_cameras_are_over_the_floor_of_the_hall_as_the_model_tells() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
+        "cells": [
+            {"name": "hall", "box": {"min": [0, 0, 0], "max": [6, 5, 4]}},
+            {"name": "gallery", "box": {"min": [6, 2.5, 0], "max": [10, 5, 4]}}],
+        "portals": [{"name": "rail", "cells": ["hall", "gallery"], "radius": 2.5,
+            "polygon": [[6, 2.5, 0.5], [6, 2.5, 3.5], [6, 4.5, 3.5], [6, 4.5, 0.5]]}]}"#;
+    std::fs::write(folder.path().join("interior.json"), text).unwrap();
+    let heights = || -> Vec<String> {
+        let told = lumigraph(folder.path(), "plan interior.json --views 1").ok();
+        let lines = told.stdout.lines().skip(1);
+        let height = |line: &str| line.split_whitespace().rev().nth(1).unwrap().to_owned();
+        lines.map(height).collect()
+    };
+    // Without the model there might be stairs in the hall.
+    assert_eq!(heights(), ["4.100", "4.100"]);
+    let corners = [[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]];
+    let floor = Mesh {
+        positions: corners.map(|[x, z]| DVec3::new(x, 0.0, z)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let mut model = Model::default();
+    model.append(&floor, "floor");
+    let file = folder.path().join("house.glb");
+    std::fs::write(file, model_to_glb(&model).unwrap()).unwrap();
+    assert_eq!(heights(), ["1.600", "4.100"]);
 }
 
 #[test]

@@ -31,6 +31,8 @@ pub struct Contents {
     pub elsewhere: Vec<u32>,
     /// What a viewer sees of the cells, where bounds do not tell which of them it is in.
     pub(super) seen: Option<Arc<Seen>>,
+    /// The sides of portals, by name and cell, before which the cell's triangles are far below.
+    pub(super) aloft: BTreeSet<(String, CellId)>,
 }
 
 impl Contents {
@@ -44,6 +46,7 @@ impl Contents {
     ) -> Result<(Self, Vec<InteriorWarning>), InteriorError> {
         let (mut contents, odd) = Self::listed(interior, model)?;
         contents.look_where_shared(interior, model);
+        contents.find_aloft(interior, model);
         Ok((contents, odd))
     }
 
@@ -60,6 +63,7 @@ impl Contents {
         }
         self.find_rest(is_opening);
         self.look_where_shared(interior, model);
+        self.find_aloft(interior, model);
     }
 
     fn look_where_shared(&mut self, interior: &Interior, model: &Model) {

@@ -1,10 +1,13 @@
 //! How high floors are, of cells and before portals, and which portals are doors.
 
 use super::{CellId, Contents, Interior, Portal, RoomBox};
+use crate::mesh::Model;
 use glam::DVec3;
 
 /// How high a threshold one steps over, in eye heights.
 const STEP: f64 = 0.25;
+/// How far before a portal its floor is looked for, in eye heights: beyond the wall, where one sets foot.
+const BEFORE: [f64; 3] = [0.2, 0.3, 0.4];
 
 impl Contents {
     /// How high a cell's floor is, along `up`: the lowest point of its outline, or where that is not
@@ -19,12 +22,20 @@ impl Contents {
         }
     }
 
-    /// How high the floor is before a portal on the side of a cell (none: the outside), along `up`.
+    /// How high the floor is before a portal on the side of a cell (none: the outside), along `up`: as high as in it
+    /// ([`Self::floor_within`]), but where the cell's triangles are far below, as a hall's before a gallery, its own.
+    pub fn floor_height(&self, interior: &Interior, from: Option<CellId>, portal: &Portal) -> f64 {
+        let side = from.filter(|id| self.aloft.contains(&(portal.name.clone(), *id)));
+        let own = side.and_then(|id| self.floor_of(interior, id));
+        own.unwrap_or_else(|| self.floor_within(interior, from, portal))
+    }
+
+    /// How high the floor is for one who passes a portal from the side of a cell (none: the outside), along `up`.
     ///
     /// It is the higher of the floors of the portal's two cells, if that is at most a step below its
     /// sill: a cell of several storeys has its own floor on the lowest. Else, as before a window, it
     /// is the lowest point of the viewer's cell, or where the place of that is unknown, of the portal.
-    pub fn floor_height(&self, interior: &Interior, from: Option<CellId>, portal: &Portal) -> f64 {
+    pub fn floor_within(&self, interior: &Interior, from: Option<CellId>, portal: &Portal) -> f64 {
         let [sill, head] = extent(portal.polygon.corners(), interior.up);
         // On a floor that is over the opening nobody looks through it.
         let threshold = self.threshold(interior, portal);
@@ -51,10 +62,79 @@ impl Contents {
         (sill - higher <= STEP * interior.eye_height).then_some(higher)
     }
 
+    /// Whether a portal is a step or more over the floor of one of its cells, and at the other's: only triangles tell
+    /// whether the one has something to stand on before it, as a stairwell has and a hall under a gallery has not.
+    pub fn has_raised(&self, interior: &Interior) -> bool {
+        self.raised(interior).next().is_some()
+    }
+
+    /// Finds the sides of portals before which a cell's triangles are far below.
+    pub(super) fn find_aloft(&mut self, interior: &Interior, model: &Model) {
+        let sides = self.raised(interior);
+        let aloft = sides.filter(|(portal, id, floor)| {
+            let highest = self.highest_before(interior, model, portal, *id, *floor);
+            // Where nothing is, nothing is known.
+            highest.is_some_and(|highest| floor - highest > STEP * interior.eye_height)
+        });
+        let aloft = aloft.map(|(portal, id, _)| (portal.name.clone(), id));
+        self.aloft = aloft.collect();
+    }
+
+    /// Sides of portals that stand a step or more over the floor of their cell, as high as the other's, which is told.
+    fn raised<'a>(
+        &'a self,
+        interior: &'a Interior,
+    ) -> impl Iterator<Item = (&'a Portal, CellId, f64)> + 'a {
+        let portals = interior.portals.iter();
+        let upright = portals.filter(move |portal| !portal.lies_flat(interior.up));
+        upright.flat_map(move |portal| {
+            let threshold = self.threshold(interior, portal);
+            let cells = portal.cells.into_iter().flatten();
+            cells.filter_map(move |id| {
+                let (floor, own) = (threshold?, self.floor_of(interior, id)?);
+                (floor - own > STEP * interior.eye_height).then_some((portal, id, floor))
+            })
+        })
+    }
+
+    /// How high what a cell has right before the middle of a portal is, of what is no more than a step over a floor.
+    fn highest_before(
+        &self,
+        interior: &Interior,
+        model: &Model,
+        portal: &Portal,
+        id: CellId,
+        floor: f64,
+    ) -> Option<f64> {
+        let (up, unit) = (interior.up, interior.eye_height);
+        let normal = portal.normal_into(Some(id));
+        let ahead = (normal - up * normal.dot(up)).normalize();
+        let places = BEFORE.map(|off| portal.polygon.center() + off * unit * ahead);
+        let triangles = self.triangles.get(id.0 as usize)?.iter();
+        let heights = triangles.flat_map(|i| {
+            let corners = model.mesh.corners(*i as usize);
+            places.map(|place| height_at(corners, place, up))
+        });
+        let low = heights.flatten().filter(|h| *h <= floor + STEP * unit);
+        low.reduce(f64::max)
+    }
+
     /// What bounds a cell, if that is known.
     pub(super) fn bounds_of(&self, id: CellId) -> Option<RoomBox> {
         self.bounds.get(id.0 as usize).copied().flatten()
     }
+}
+
+/// How high a triangle is over or under a point, along `up`; nothing where it is beside it, or upright.
+fn height_at(corners: [DVec3; 3], point: DVec3, up: DVec3) -> Option<f64> {
+    let offsets = corners.map(|p| p - point);
+    // Areas in the plan, of either sign.
+    let area = |i: usize| offsets[(i + 1) % 3].cross(offsets[(i + 2) % 3]).dot(up);
+    let areas = [area(0), area(1), area(2)];
+    let is_over = areas.iter().all(|a| *a >= 0.0) || areas.iter().all(|a| *a <= 0.0);
+    let all: f64 = areas.iter().sum();
+    let height: f64 = (0..3).map(|i| areas[i] / all * offsets[i].dot(up)).sum();
+    (is_over && height.is_finite()).then(|| point.dot(up) + height)
 }
 
 /// How high the lowest and the highest of some points are.
@@ -69,7 +149,7 @@ pub(super) fn extent(points: &[DVec3], up: DVec3) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::interior::{Content, SemicircleOptions, parse_rooms, semicircles};
-    use crate::mesh::Model;
+    use crate::mesh::Mesh;
     use std::path::Path;
 
     /// A stairwell of two storeys, a room beside each, and beside the lower one a landing two steps up;
@@ -153,6 +233,64 @@ mod tests {
             is_inside.push(view.is_inside);
         }
         assert!(is_inside.len() == 13 && !is_inside[6], "{is_inside:?}");
+    }
+
+    /// A hall of 5 m, and behind an opening half way up a gallery.
+    const HALL: &str = r#"{"version": 1, "rooms": [
+        {"name": "hall", "min": [0, 0, 0], "max": [6, 5, 4]},
+        {"name": "gallery", "min": [6, 2.5, 0], "max": [10, 5, 4]}],
+        "openings": [{"name": "rail", "between": ["hall", "gallery"],
+            "polygon": [[6, 2.5, 0.5], [6, 2.5, 3.5], [6, 4.5, 3.5], [6, 4.5, 0.5]]}]}"#;
+
+    /// Levels, each so high, from x to x.
+    fn levels(levels: &[[f64; 3]]) -> Model {
+        let mut model = Model::default();
+        for [height, from, to] in levels {
+            let corner = |x: f64, z: f64| DVec3::new(x, *height, z);
+            let mesh = Mesh {
+                positions: vec![
+                    corner(*from, 0.0),
+                    corner(*to, 0.0),
+                    corner(*to, 4.0),
+                    corner(*from, 4.0),
+                ],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+            };
+            model.append(&mesh, "level");
+        }
+        model
+    }
+
+    #[test]
+    fn before_a_gallery_the_floor_is_that_of_the_hall_but_where_a_landing_is() {
+        let (interior, _) = parse_rooms(Path::new("r.json"), HALL.as_bytes(), "m.glb").unwrap();
+        let [hall, gallery] = [0, 1].map(|i| Some(CellId(i)));
+        let rail = &interior.portals[0];
+        let (floor, ceiling, upper) = ([0.0, 0.0, 6.0], [5.0, 0.0, 10.0], [2.5, 6.0, 10.0]);
+        // The sill, as deep as half of the wall, is no landing; where nothing is known one is taken for granted.
+        let sill = [2.5, 5.9, 6.0];
+        for (model, expected) in [
+            (levels(&[floor, ceiling, upper]), 0.0),
+            (levels(&[floor, ceiling, upper, sill]), 0.0),
+            (levels(&[floor, ceiling, upper, [2.5, 4.8, 6.0]]), 2.5),
+            (levels(&[ceiling, upper]), 2.5),
+            (Model::default(), 2.5),
+        ] {
+            let (contents, _) = Contents::new(&interior, &model).unwrap();
+            assert!(contents.has_raised(&interior));
+            assert!(contents.is_door(&interior, rail));
+            assert_eq!(contents.floor_height(&interior, hall, rail), expected);
+            assert_eq!(contents.floor_height(&interior, gallery, rail), 2.5);
+            // Who passes it stands in it.
+            for side in [hall, gallery] {
+                assert_eq!(contents.floor_within(&interior, side, rail), 2.5);
+            }
+            for view in semicircles(&interior, &contents, &SemicircleOptions::default()) {
+                let floor = if view.from == hall { expected } else { 2.5 };
+                let height = view.camera_from_world.center().y;
+                assert!((height - floor - 1.6).abs() < 1e-9, "{view:?}");
+            }
+        }
     }
 
     #[test]

@@ -247,7 +247,7 @@ impl<'a> Rooms<'a> {
             return self.climb(id, from, into);
         };
         let center = portal.polygon.center();
-        let height = contents.floor_height(interior, Some(from), portal) + unit;
+        let height = contents.floor_within(interior, Some(from), portal) + unit;
         let center = center + up * (height - center.dot(up));
         let normal = portal.normal_into(Some(from));
         let off = BEFORE_DOOR * unit * level;
@@ -293,7 +293,7 @@ impl<'a> Rooms<'a> {
         let over = |cell: CellId| {
             let floor = contents.floor_of(interior, cell);
             let height =
-                floor.unwrap_or_else(|| contents.floor_height(interior, Some(cell), portal)) + unit;
+                floor.unwrap_or_else(|| contents.floor_within(interior, Some(cell), portal)) + unit;
             center + up * (height - center.dot(up))
         };
         let [before, after] = [from, into].map(over);
