@@ -5,7 +5,7 @@ use super::captured::{model_file, model_of};
 use super::interior::open;
 use super::output::{print, print_json, say};
 use anyhow::Context;
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use proxy::interior::{
     Cell, CellId, Content, Contents, Interior, InteriorWarning, SemicircleOptions, semicircles,
 };
@@ -46,6 +46,9 @@ struct Pose<'a> {
     angle_degrees: f64,
     /// Whether it stands in the cell `from`.
     inside: bool,
+    /// Whether it would not at any radius: before an upright portal, above or below that cell.
+    #[serde(skip)]
+    is_off: bool,
     center: [f64; 3],
     camera_from_world: [f64; 16],
 }
@@ -121,17 +124,50 @@ fn remedy(interior: &Interior, poses: &[Pose<'_>]) -> anyhow::Result<String> {
         _ => None,
     });
     let turned: BTreeSet<&str> = turned.collect();
-    let outside = poses.iter().filter(|pose| !pose.inside);
-    let outside: BTreeSet<&str> = outside.map(|pose| pose.portal).collect();
-    let named = outside.intersection(&turned);
+    let outside: Vec<&Pose<'_>> = poses.iter().filter(|pose| !pose.inside).collect();
+    let mut remedies = Vec::new();
+    let named: BTreeSet<&str> = outside.iter().map(|pose| pose.portal).collect();
+    let named = named.intersection(&turned);
     let named: Vec<String> = named
         .map(|portal| format!("`{}`", shown_name(portal)))
         .collect();
-    let reverse = format!("reverse the `polygon` of {}", named.join(", "));
-    Ok(match named.len() {
-        0 => "give portals a smaller `radius`".to_owned(),
-        count if count == outside.len() => reverse,
-        _ => format!("{reverse}, and give other portals a smaller `radius`"),
+    if !named.is_empty() {
+        remedies.push(format!("reverse the `polygon` of {}", named.join(", ")));
+    }
+    // Nor does it help where a cell is too low for eyes.
+    let others = outside
+        .into_iter()
+        .filter(|pose| !turned.contains(pose.portal));
+    let (off, beside): (Vec<&Pose<'_>>, Vec<&Pose<'_>>) = others.partition(|pose| pose.is_off);
+    let off: BTreeSet<&str> = off.iter().filter_map(|pose| pose.from).collect();
+    let cells = interior.cells.iter();
+    let cells = cells.filter(|cell| off.contains(cell.name.as_str()));
+    let cells: Vec<String> = cells
+        .map(|cell| {
+            let key = match cell.content {
+                Content::Nodes(_) => "nodes",
+                Content::Box(_) | Content::Scene { .. } => "box",
+            };
+            format!("the `{key}` of `{}`", shown_name(&cell.name))
+        })
+        .collect();
+    if !cells.is_empty() {
+        let cells = cells.join(", ");
+        remedies.push(format!("correct {cells} (eyes are above or below)"));
+    }
+    if !beside.is_empty() {
+        let which = if remedies.is_empty() { "" } else { "other " };
+        remedies.push(format!("give {which}portals a smaller `radius`"));
+    }
+    Ok(remedies.join(", and "))
+}
+
+/// Whether a place is above or below all of a cell, as far as that is known.
+fn is_off(interior: &Interior, contents: &Contents, id: CellId, place: DVec3) -> bool {
+    let room = contents.bounds.get(id.0 as usize).copied().flatten();
+    room.is_some_and(|room| {
+        let over = room.corners().map(|p| (place - p).dot(interior.up));
+        over.iter().all(|h| *h > 0.0) || over.iter().all(|h| *h < 0.0)
     })
 }
 
@@ -165,13 +201,16 @@ fn poses<'a>(
     views
         .map(|view| {
             let pose = view.camera_from_world;
+            let portal = interior.portal(view.portal);
+            let is_off = |id| is_off(interior, contents, id, pose.center());
             let matrix = DMat4::from_rotation_translation(pose.rotation, pose.translation);
             Pose {
-                portal: &interior.portal(view.portal).name,
+                portal: &portal.name,
                 from: view.from.map(name),
                 into: name(view.into),
                 angle_degrees: view.angle.to_degrees(),
                 inside: view.is_inside,
+                is_off: !portal.lies_flat(interior.up) && view.from.is_some_and(is_off),
                 center: pose.center().to_array(),
                 // Row by row.
                 camera_from_world: matrix.transpose().to_cols_array(),

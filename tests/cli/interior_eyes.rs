@@ -93,6 +93,35 @@ fn where_cameras_stand_is_told_to_a_thousandth_of_the_eyes_height() {
 }
 
 #[test]
+fn a_box_that_is_too_low_for_eyes_is_named_and_no_smaller_semicircle_advised() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |top: f64, radius: f64| {
+        let text = format!(
+            r#"{{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
+                "cells": [
+                    {{"name": "hall", "box": {{"min": [0, 0, 0], "max": [4, {top}, 3]}}}},
+                    {{"name": "study", "box": {{"min": [4, 0, 0], "max": [8, 2.5, 3]}}}}],
+                "portals": [
+                    {{"name": "door", "cells": ["hall", "study"], "radius": {radius},
+                        "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]]}}]}}"#
+        );
+        std::fs::write(folder.path().join("interior.json"), text).unwrap();
+        lumigraph(folder.path(), "plan interior.json").ok().stderr
+    };
+    assert_eq!(said(2.5, 1.5), "");
+    let low = "correct the `box` of `hall` (eyes are above or below)";
+    let told = said(1.0, 1.5);
+    let advised = format!("13 of 26 cameras stand outside their cell; {low} in interior.json");
+    assert!(told.contains(&advised), "{told}");
+    let told = said(1.0, 9.0);
+    let advised = format!(
+        "26 of 26 cameras stand outside their cell; {low}, and give other portals a smaller \
+         `radius` in interior.json"
+    );
+    assert!(told.contains(&advised), "{told}");
+}
+
+#[test]
 fn before_a_gallery_cameras_are_over_the_floor_of_the_hall_as_the_model_tells() {
     let folder = tempfile::tempdir().unwrap();
     let text = r#"{"version": 1, "model": "house.glb", "up": [0, 1, 0], "eye_height": 1.6,
