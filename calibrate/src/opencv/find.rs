@@ -3,7 +3,7 @@
 use super::calibration::{files, is_storage_name, read_calibration};
 use super::storage::FileStorage;
 use super::values::Values;
-use super::{Keys, OpenCvError, poses};
+use super::{Keys, OpenCvError, matrix, poses};
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -68,7 +68,6 @@ fn is_small(file: &Path) -> bool {
 
 /// Whether a file has the mark of OpenCV's matrices, as far as it can be unpacked.
 fn holds_matrices(file: &Path) -> bool {
-    const MARK: &[u8] = b"opencv-matrix";
     let Ok(packed) = fs::read(file) else {
         return false;
     };
@@ -80,7 +79,11 @@ fn holds_matrices(file: &Path) -> bool {
     } else {
         unpacked = packed;
     }
-    unpacked.windows(MARK.len()).any(|bytes| bytes == MARK)
+    let holds = |mark: &&str| {
+        let mut places = unpacked.windows(mark.len());
+        places.any(|bytes| bytes == mark.as_bytes())
+    };
+    matrix::TYPES.iter().any(holds)
 }
 
 /// Whether a file has the poses of views under a name known here.

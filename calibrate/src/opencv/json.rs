@@ -123,7 +123,7 @@ impl<'a> Reader<'a> {
             reader.skip_blanks()?;
             let node = reader.value(depth + 1)?;
             if key == "type_id" {
-                marked |= node.text() == Some("opencv-matrix");
+                marked |= node.text().is_some_and(matrix::is_type);
             } else {
                 entries.push((key, node));
             }

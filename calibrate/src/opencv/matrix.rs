@@ -42,6 +42,15 @@ pub(super) fn real(word: &str) -> Option<f64> {
     Some(if negative { -value } else { value })
 }
 
+/// What OpenCV calls matrices: those of rows and columns, and those of other numbers of dimensions, as OpenCV 5 writes
+/// plain lists of numbers.
+pub(super) const TYPES: [&str; 2] = ["opencv-matrix", "opencv-nd-matrix"];
+
+/// Whether a type's name is that of a matrix.
+pub(super) fn is_type(name: &str) -> bool {
+    TYPES.contains(&name)
+}
+
 /// A map; a matrix where it is marked as one, or has a matrix's keys.
 pub(super) fn map(line: usize, marked: bool, entries: Entries) -> Result<Value, Problem> {
     let like_one = || {
@@ -71,20 +80,31 @@ fn matrix(line: usize, entries: &Entries) -> Result<Matrix, Problem> {
             "whose {key} is {other:?}, expected a whole number"
         ))),
     };
-    let (rows, cols) = (size("rows")?, size("cols")?);
     // Without a type (calibrations by ROS): double.
     let (channels, dtype) = match get(entries, "dt").map(|node| &node.value) {
         None => (1, DataType::F64),
         Some(Value::Text(dt)) => element(dt).map_err(problem)?,
         Some(other) => return Err(problem(format!("of type {other:?}, expected one like d"))),
     };
-    let numbers = match &needed("data")?.value {
-        Value::Text(packed) => decode(packed, channels, dtype).map_err(problem)?,
-        Value::Sequence(items) => listed(items)?,
-        Value::Null => Vec::new(),
-        Value::Int(_) | Value::Real(_) => needed("data")?.number().into_iter().collect(),
-        _ => return Err(problem("whose data is no list of numbers".to_owned())),
+    let numbers = |key: &str, channels: usize, dtype: DataType| {
+        let node = needed(key)?;
+        match &node.value {
+            Value::Text(packed) => decode(packed, channels, dtype).map_err(problem),
+            Value::Sequence(items) => listed(items),
+            Value::Null => Ok(Vec::new()),
+            Value::Int(_) | Value::Real(_) => Ok(node.number().into_iter().collect()),
+            _ => Err(problem(format!("whose {key} is no list of numbers"))),
+        }
     };
+    let has = |key: &str| get(entries, key).is_some();
+    let (rows, cols) = if has("sizes") && !has("rows") {
+        let sizes = numbers("sizes", 1, DataType::I32)?;
+        let shape = rows_and_cols(&sizes);
+        shape.ok_or_else(|| problem(format!("of the sizes {sizes:?}, expected whole numbers")))?
+    } else {
+        (size("rows")?, size("cols")?)
+    };
+    let numbers = numbers("data", channels, dtype)?;
     let expected = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
     if expected != Some(numbers.len()) {
         return Err(problem(format!(
@@ -101,6 +121,19 @@ fn matrix(line: usize, entries: &Entries) -> Result<Matrix, Problem> {
         dtype,
         data: numbers.into_iter().map(|x| rounded(x, dtype)).collect(),
     })
+}
+
+/// The rows and columns of a matrix of any number of dimensions: the last is the columns, and those before it together
+/// the rows.
+fn rows_and_cols(sizes: &[f64]) -> Option<(usize, usize)> {
+    let whole = |size: &f64| {
+        let is_whole = size.fract() == 0.0 && (0.0..=f64::from(i32::MAX)).contains(size);
+        is_whole.then_some(*size as usize)
+    };
+    let mut sizes: Vec<usize> = sizes.iter().map(whole).collect::<Option<_>>()?;
+    let cols = sizes.pop().unwrap_or(1);
+    let rows = sizes.into_iter().try_fold(1_usize, usize::checked_mul)?;
+    Some((rows, cols))
 }
 
 fn listed(items: &[Node]) -> Result<Vec<f64>, Problem> {

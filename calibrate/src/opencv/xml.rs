@@ -87,7 +87,7 @@ impl Reader<'_> {
         }
         Ok(Node::new(
             line,
-            matrix::map(line, kind == "opencv-matrix", entries)?,
+            matrix::map(line, matrix::is_type(kind), entries)?,
         ))
     }
 

@@ -164,6 +164,65 @@ fn types_round_as_opencv_rounds() {
     assert!(storage.get("old").unwrap().number().unwrap().is_nan());
 }
 
+/// OpenCV 5 writes an array of one dimension so, as `dist.ravel()` is in Python: in each way of writing, as text and packed.
+#[test]
+fn matrices_of_any_number_of_dimensions_are_read() {
+    let packed =
+        "MWQgICAgICAgICAgICAgICAgICAgICAgmpmZmZmZub+4HoXrUbieP/p+arx0k3g/O99PjZdugr97FK5H4XqUPw==";
+    let size = "aSAgICAgICAgICAgICAgICAgICAgICAgBQAAAA==";
+    let yaml = |sizes: &str, data: &str| {
+        format!(
+            "%YAML 1.2\n---\nd: !!opencv-nd-matrix\n   sizes: {sizes}\n   dt: d\n   data: {data}\n"
+        )
+    };
+    let xml = |sizes: &str, data: &str| {
+        format!(
+            "<?xml version=\"1.0\"?>\n<opencv_storage>\n<d type_id=\"opencv-nd-matrix\">\n  {sizes}\n  \
+             <dt>d</dt>\n  {data}</d>\n</opencv_storage>\n"
+        )
+    };
+    let json = |sizes: &str, data: &str| {
+        format!(
+            "{{ \"d\": {{ \"type_id\": \"opencv-nd-matrix\", \"sizes\": {sizes}, \"dt\": \"d\", \
+             \"data\": {data} }} }}"
+        )
+    };
+    for text in [
+        yaml("[ 5 ]", "[ -0.1, 0.03, 0.006, -0.009, 0.02 ]"),
+        yaml(
+            &format!("!!binary |\n      {size}"),
+            &format!("!!binary |\n      {packed}"),
+        ),
+        xml(
+            "<sizes>\n    5</sizes>",
+            "<data>\n    -0.1 0.03 0.006 -0.009 0.02</data>",
+        ),
+        xml(
+            &format!("<sizes type_id=\"binary\">\n    {size}\n    </sizes>"),
+            &format!("<data type_id=\"binary\">\n    {packed}\n    </data>"),
+        ),
+        json("[ 5 ]", "[ -0.1, 0.03, 0.006, -0.009, 0.02 ]"),
+        json(
+            &format!("\"$base64${size}\""),
+            &format!("\"$base64${packed}\""),
+        ),
+    ] {
+        let d = numbers(&parse(&text), "d");
+        assert_eq!((d.rows, d.cols, d.channels), (1, 5, 1), "{text}");
+        assert_eq!(d.data, [-0.1, 0.03, 0.006, -0.009, 0.02], "{text}");
+    }
+    let d = numbers(&parse(&yaml("[ 2, 1, 3 ]", "[ 1, 2, 3, 4, 5, 6 ]")), "d");
+    assert_eq!((d.rows, d.cols), (2, 3));
+    assert!(
+        error(&yaml("[ 2, -1 ]", "[ 1, 2 ]")).contains("of the sizes [2.0, -1.0]"),
+        "sizes below zero"
+    );
+    assert!(
+        error(&yaml("[ 5 ]", "[ 1, 2 ]")).contains("has 2 numbers, expected 5"),
+        "too few numbers"
+    );
+}
+
 /// ROS writes YAML without a header or a type; people write lists of lists.
 #[test]
 fn yaml_by_hand() {

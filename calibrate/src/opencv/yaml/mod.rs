@@ -132,7 +132,7 @@ impl Reader<'_> {
         while let Some('!' | '&') = self.peek() {
             let rest = self.rest();
             let tag = &rest[..rest.find(char::is_whitespace).unwrap_or(rest.len())];
-            marked |= tag == "!!opencv-matrix";
+            marked |= tag.strip_prefix("!!").is_some_and(matrix::is_type);
             self.at += tag.len();
             self.skip_spaces();
         }
