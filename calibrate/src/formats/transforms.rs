@@ -7,7 +7,8 @@
 //!   ray of the first pixel through (0.5, 0.5). Without them the centre is w/2, h/2.
 //! - Focal lengths are `fl_x`, `fl_y` in pixels, else `x_fov`, `y_fov` in degrees, else
 //!   `camera_angle_x`, `camera_angle_y` in radians. What a frame says goes before what is
-//!   said for all. With only one of the two axes, pixels are square.
+//!   said for all; each may say one of the two axes. With only one of the two axes, or one here
+//!   before both for all, pixels are square.
 //! - Numbers that are no pixels but shares of the sides, as some scripts write them, are refused: which
 //!   they are shares of differs.
 //! - Distortion is OpenCV's; with `camera_model` OPENCV_FISHEYE or `is_fisheye` its
@@ -167,12 +168,24 @@ impl<'a> Intrinsics<'a> {
 
     /// The focal lengths in pixels along x and y.
     fn focals(&self, width: u32, height: u32) -> Result<(f64, f64), FormatError> {
-        for level in [self.frame, self.root] {
-            let x = focal(level, "x", width)?;
-            let y = focal(level, "y", height)?;
-            if let Some(known) = x.or(y) {
-                return Ok((x.unwrap_or(known), y.unwrap_or(known)));
+        let at = |level: &Json<'_>| -> Result<(Option<f64>, Option<f64>), FormatError> {
+            Ok((focal(level, "x", width)?, focal(level, "y", height)?))
+        };
+        let own = at(self.frame)?;
+        if let (Some(x), Some(y)) = own {
+            return Ok((x, y));
+        }
+        let (x, y) = match (own, at(self.root)?) {
+            // One axis here, the other for all frames.
+            ((Some(x), None), (None, Some(y))) | ((None, Some(y)), (Some(x), None)) => {
+                (Some(x), Some(y))
             }
+            ((None, None), shared) => shared,
+            // Both for all frames, and a focal length here that goes before them.
+            _ => own,
+        };
+        if let Some(known) = x.or(y) {
+            return Ok((x.unwrap_or(known), y.unwrap_or(known)));
         }
         Err(self.frame.error(Problem::new(
             "there is no focal length, neither here nor for all frames",

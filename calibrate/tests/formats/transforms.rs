@@ -173,6 +173,20 @@ fn a_frame_s_own_intrinsics_go_first() {
     assert_eq!(used, [1, 2, 2], "equal cameras are one");
 }
 
+/// nerfstudio looks for each key on its own, in the frame or for all.
+#[test]
+fn one_axis_of_a_frame_joins_the_other_of_all_frames() {
+    let own = |key: &str| FRAME.replacen('{', &format!("{{{key},"), 1);
+    for (shared, own) in [
+        (r#""fl_y": 146"#, own(r#""fl_x": 123"#)),
+        (r#""fl_x": 123"#, own(r#""fl_y": 146"#)),
+    ] {
+        let whole = parse(&format!(r#""w": 200, "h": 136, {shared}"#), &own).unwrap();
+        let camera = whole.cameras.values().next().unwrap();
+        assert_eq!(camera.params[..2], [123.0, 146.0], "{shared}");
+    }
+}
+
 /// nerfstudio's order: k1 k2 k3 k4 p1 p2.
 #[test]
 fn distortion_comes_as_a_list_too() {
