@@ -3,6 +3,7 @@
 pub(super) use super::source::{Source, find};
 
 use super::listed::Listed;
+use super::turned::Pixels;
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
@@ -129,13 +130,13 @@ pub(super) fn depth_bounds(
     Ok(names.zip(formats::read_llff_bounds(path)?).collect())
 }
 
-/// Reads an OpenCV calibration and finds which of the photos each pose is of.
+/// Reads an OpenCV calibration and finds which of the photos each pose is of. Says of which pixels it speaks.
 pub(super) fn read_opencv(
     path: &Path,
     options: &ImportOptions,
     photos: &PhotoSet,
     warnings: &mut Vec<Warning>,
-) -> Result<Reconstruction, SceneError> {
+) -> Result<(Reconstruction, Pixels), SceneError> {
     let calibration = opencv::read_calibration(path, &options.keys)?;
     let refuse = |problem: String| SceneError::Poses {
         path: path.to_owned(),
@@ -189,7 +190,12 @@ pub(super) fn read_opencv(
             source,
         })?;
     }
-    Ok(whole)
+    let pixels = if calibration.ignores_orientation {
+        Pixels::Stored
+    } else {
+        Pixels::Shown { is_sized: !is_open }
+    };
+    Ok((whole, pixels))
 }
 
 /// The photo of each pose: by the list that came with the calibration, else in the order

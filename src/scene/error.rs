@@ -43,6 +43,24 @@ pub enum SceneError {
         /// What it holds, what was expected, and what to do.
         problem: String,
     },
+    /// OpenCV's calibration speaks of a photo as it is shown, and no camera here sees it as it is stored.
+    #[error(
+        "{}: OpenCV reads it as it is shown (EXIF orientation {orientation}), and {problem}; store the photos as they \
+         are shown (`mogrify -auto-orient`) or, where the calibration speaks of them as they are stored, write \
+         `ignore_orientation: 1` into {}",
+        photo.display(),
+        file.display()
+    )]
+    Turned {
+        /// The photo.
+        photo: PathBuf,
+        /// As its EXIF data say.
+        orientation: u8,
+        /// What is wrong with that.
+        problem: &'static str,
+        /// The calibration.
+        file: PathBuf,
+    },
     /// A camera is unusable.
     #[error("camera of {name}: {source}")]
     Camera {

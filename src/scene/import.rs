@@ -8,7 +8,7 @@ use super::meant::Meant;
 use super::misfit;
 use super::named::Named;
 use super::times::{Clues, TimeSource, set_times, taken};
-use super::turned;
+use super::turned::{self, Pixels};
 use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
 use calibrate::Reconstruction;
 use calibrate::formats::Format;
@@ -104,10 +104,15 @@ impl Scene {
         let home = home_of(&source, capture);
         warnings.extend(note_of_home(&source, capture, &home));
         let found = Self::photos_of(&home)?;
+        let mut pixels = Pixels::Stored;
         let mut reconstruction = match &source {
             Source::Colmap(model) => calibration::read_colmap(model, &mut warnings)?,
             // OpenCV may leave it to the photos which is which.
-            Source::OpenCv(file) => calibration::read_opencv(file, options, &found, &mut warnings)?,
+            Source::OpenCv(file) => {
+                let read = calibration::read_opencv(file, options, &found, &mut warnings)?;
+                pixels = read.1;
+                read.0
+            }
             Source::Other(format, file) => {
                 calibration::read_other(*format, file, &found, &mut warnings)?
             }
@@ -146,7 +151,10 @@ impl Scene {
         let times = &options.times;
         set_times(&mut scene.photos, times, &taken, &clues, &mut warnings)?;
         turned::set(&mut scene.photos, &taken);
-        warnings.extend(turned::note(&scene.photos));
+        warnings.extend(match pixels {
+            Pixels::Stored => turned::note(&scene.photos),
+            Pixels::Shown { is_sized } => turned::undo(&mut scene, source.path(), is_sized)?,
+        });
 
         // 3. Are they what was calibrated?
         warnings.extend(misfit::of(&scene.reconstruction));

@@ -55,6 +55,8 @@ pub fn opencv_yaml(
     yaml.value("nframes", images.len());
     yaml.value("image_width", camera.width);
     yaml.value("image_height", camera.height);
+    // Of pixels as stored, which OpenCV turns as EXIF data say unless it is told not to.
+    yaml.value("ignore_orientation", 1);
     yaml.value("fisheye_model", u8::from(is_fisheye));
     yaml.matrix("camera_matrix", (3, 3, 1), &matrix);
     let shape = (coefficients.len(), 1, 1);

@@ -11,6 +11,7 @@ mod invert;
 mod pixel;
 mod plane;
 mod sensor;
+mod turn;
 
 pub use distortion::Distortion;
 pub use pixel::Pixel;

@@ -26,6 +26,9 @@ pub struct OpenCvCalibration {
     pub image_names: Vec<String>,
     /// The board, where the file says how its corners were found.
     pub board: Option<Board>,
+    /// Whether it speaks of photos as they are stored, not turned as their EXIF data say, which is how OpenCV reads
+    /// them: where the file says `ignore_orientation: 1`, after `cv::IMREAD_IGNORE_ORIENTATION`.
+    pub ignores_orientation: bool,
     /// What had to be guessed or looked for elsewhere, for people.
     pub notes: Vec<String>,
 }
@@ -73,6 +76,8 @@ pub fn calibration(
         [camera] => board::board(&values, camera, &poses, &mut notes),
         _ => None,
     };
+    let ignores_orientation = values.find_within(&["ignoreorientation"]);
+    let ignores_orientation = ignores_orientation.and_then(|named| named.node.number());
     let mut image_names = names_within(&values);
     if image_names.len() != views(&poses) {
         image_names.clear();
@@ -83,6 +88,7 @@ pub fn calibration(
         right_from_left,
         image_names,
         board,
+        ignores_orientation: ignores_orientation.is_some_and(|flag| flag != 0.0),
         notes,
     })
 }
