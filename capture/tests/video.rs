@@ -1,7 +1,7 @@
 //! Taking photos out of videos: with ffmpeg itself where it is installed, and with
 //! scripts in its place.
 
-use capture::video::{self, FrameCount, VideoError, VideoProgress};
+use capture::video::{self, FrameCount, FrameShape, VideoError, VideoProgress};
 use capture::{Tool, ToolError};
 use image::{Rgb, RgbImage, imageops};
 use std::fs;
@@ -68,7 +68,9 @@ fn the_sharp_frames_are_taken_with_their_times() {
                 scored = frames;
             }
         };
-        let frames = video::extract(&ffmpeg, &video, count, &photos, &mut on_progress).unwrap();
+        let shape = FrameShape::Square;
+        let frames =
+            video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
         (frames, std::mem::take(&mut scored))
     };
 
@@ -121,6 +123,49 @@ fn the_sharp_frames_are_taken_with_their_times() {
     );
 }
 
+/// HDV cameras and DVDs store frames that players show wider, or higher.
+#[test]
+fn frames_are_drawn_out_to_square_pixels_unless_they_are_calibrated_as_stored() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    for (filter, stored) in [
+        ("scale=240:240,setsar=4/3", (240, 240)),
+        ("scale=320:160,setsar=2/3", (320, 160)),
+    ] {
+        let video = write_video(&ffmpeg, here.path(), &[2, 18], &["-vf", filter]);
+        let photos = here.path().join("photos");
+        let extract = |shape: FrameShape| {
+            let mut stretched = None;
+            let mut on_progress = |progress| {
+                if let VideoProgress::Stretched { from, to } = progress {
+                    stretched = Some((from, to));
+                }
+            };
+            let count = FrameCount::Frames(2);
+            let frames =
+                video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
+            let size = capture::photo_size(&photos.join(&frames[0].name)).unwrap();
+            (size, stretched)
+        };
+        let shown = (320, 240);
+        let drawn_out = (shown, Some((stored, shown)));
+        assert_eq!(extract(FrameShape::Square), drawn_out);
+        let pixels = capture::decode(&photos.join("000000.250s.jpg"), Some(shown)).unwrap();
+        let expected = frame(2);
+        let pairs = pixels.pixels().zip(expected.pixels());
+        let off: f64 = pairs.map(|(a, b)| f64::from(a[1].abs_diff(b[1]))).sum();
+        let mean = off / f64::from(320 * 240);
+        assert!(mean < 8.0, "{filter}: {mean} levels off");
+        assert_eq!(extract(FrameShape::Calibrated(320, 240)), drawn_out);
+        assert_eq!(extract(FrameShape::Stored), (stored, None));
+        assert_eq!(extract(FrameShape::Square), drawn_out, "no earlier run's");
+        assert_eq!(
+            extract(FrameShape::Calibrated(stored.0, stored.1)),
+            (stored, None)
+        );
+    }
+}
+
 #[test]
 fn a_variable_rate_keeps_its_times() {
     let Some(ffmpeg) = ffmpeg() else { return };
@@ -159,7 +204,8 @@ fn hundreds_of_frames_are_taken_into_a_folder_of_any_name() {
     // Neither a number nor a protocol.
     let photos = here.path().join("50%d: 7%").join("a:b%d");
     let count = FrameCount::Frames(130);
-    let frames = video::extract(&ffmpeg, &video, count, &photos, &mut |_| {}).unwrap();
+    let shape = FrameShape::Square;
+    let frames = video::extract(&ffmpeg, &video, count, shape, &photos, &mut |_| {}).unwrap();
     assert_eq!(frames.len(), 130);
     for (i, frame) in (0..).zip(&frames) {
         let stretch_s = 2.0 / 25.0;
@@ -214,7 +260,8 @@ fn damaged_frames_are_no_photos_and_what_is_wrong_is_told() {
     let photos = here.path().join("photos");
     let extract = |video: &Path| {
         let mut told = Vec::new();
-        let frames = video::extract(&ffmpeg, video, FrameCount::Frames(3), &photos, &mut |at| {
+        let (count, shape) = (FrameCount::Frames(3), FrameShape::Square);
+        let frames = video::extract(&ffmpeg, video, count, shape, &photos, &mut |at| {
             if let VideoProgress::Damaged(damage) = at {
                 told.push(damage);
             }
@@ -269,7 +316,8 @@ fn what_is_no_video_is_refused() {
     let error = |file: &str| {
         let file = here.path().join(file);
         let count = FrameCount::Auto;
-        video::extract(&ffmpeg, &file, count, &photos, &mut |_| {}).unwrap_err()
+        let shape = FrameShape::Square;
+        video::extract(&ffmpeg, &file, count, shape, &photos, &mut |_| {}).unwrap_err()
     };
     fs::write(here.path().join("notes.mp4"), "no video").unwrap();
     assert!(matches!(error("notes.mp4"), VideoError::Decode { .. }));
@@ -296,7 +344,8 @@ fn a_missing_program_says_how_to_install_it() {
     let file = here.path().join("a.mp4");
     fs::write(&file, "").unwrap();
     let photos = here.path().join("photos");
-    let error = video::extract(&gone, &file, FrameCount::Auto, &photos, &mut |_| {}).unwrap_err();
+    let (count, shape) = (FrameCount::Auto, FrameShape::Square);
+    let error = video::extract(&gone, &file, count, shape, &photos, &mut |_| {}).unwrap_err();
     assert!(matches!(error, VideoError::Tool(ToolError::Missing { .. })));
     assert!(
         error.to_string().contains("apt-get install ffmpeg"),
@@ -383,8 +432,8 @@ mod scripts {
         fs::create_dir(&photos).unwrap();
         fs::write(photos.join("earlier.jpg"), "").unwrap();
         let extract = || {
-            let count = FrameCount::Auto;
-            let frames = video::extract(&tool, &video, count, &photos, &mut |_| {});
+            let (count, shape) = (FrameCount::Auto, FrameShape::Square);
+            let frames = video::extract(&tool, &video, count, shape, &photos, &mut |_| {});
             frames.unwrap_err().to_string()
         };
         let error = extract();

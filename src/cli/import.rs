@@ -12,11 +12,12 @@ use super::targets::check_folder;
 use super::uncalibrated::UncalibratedArgs;
 use anyhow::bail;
 use calibrate::{colmap, formats, opencv};
+use capture::video::FrameShape;
 use capture::{as_argument, find_photos_folder};
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
     DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
-    relative, remedy_of_model,
+    calibrated_size, relative, remedy_of_model,
 };
 use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
@@ -155,7 +156,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let (capture, frames) = if is_video {
         let folder = Scene::frames_folder(&args.output);
-        let frames = args.uncalibrated.extract(&args.photos, &folder)?;
+        let shape = frame_shape(args);
+        let frames = args.uncalibrated.extract(&args.photos, shape, &folder)?;
         (folder, frames)
     } else {
         (args.photos.clone(), Vec::new())
@@ -267,6 +269,18 @@ fn check_no_scene(photos: &Path) -> anyhow::Result<()> {
         "{}: {what}; to import its photos anew, give the folder that they lie in",
         photos.display()
     )
+}
+
+/// Which shape a video's frames are to have where its pixels are not square: a calibration that was made of other
+/// programs' frames speaks of them as they are stored, unless it is of another size.
+fn frame_shape(args: &Args) -> FrameShape {
+    let Some(calibration) = &args.calibration else {
+        return FrameShape::Square;
+    };
+    match calibrated_size(calibration, &args.keys.keys()) {
+        Some((width, height)) => FrameShape::Calibrated(width, height),
+        None => FrameShape::Stored,
+    }
 }
 
 /// Fails where PHOTOS is a file that is no video: the photos' calibration, maybe, or what else is written as

@@ -4,7 +4,7 @@ use super::options::WARNINGS_SHOWN;
 use super::output::say;
 use super::session::{progress, spinner};
 use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
-use capture::video::{self, Damage, FrameCount, VideoFrame, VideoProgress};
+use capture::video::{self, Damage, FrameCount, FrameShape, VideoFrame, VideoProgress};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 use lumigraph::scene::Scene;
@@ -57,19 +57,27 @@ impl UncalibratedArgs {
     }
 
     /// Writes a video's sharpest frames into a folder.
-    pub(super) fn extract(&self, video: &Path, folder: &Path) -> anyhow::Result<Vec<VideoFrame>> {
+    pub(super) fn extract(
+        &self,
+        video: &Path,
+        shape: FrameShape,
+        folder: &Path,
+    ) -> anyhow::Result<Vec<VideoFrame>> {
         let count = match (self.frames, self.fps) {
             (Some(frames), _) => FrameCount::Frames(frames),
             (None, Some(fps)) => FrameCount::PerSecond(fps),
             (None, None) => FrameCount::Auto,
         };
         let bar = spinner("scoring frames");
-        let frames = video::extract(&video::ffmpeg(), video, count, folder, &mut |at| match at {
+        let mut report = |at: VideoProgress| match at {
             VideoProgress::Scored { frames, time_s } => {
                 bar.set_message(format!("scoring frames: {frames}, up to {time_s:.1} s"));
             }
             VideoProgress::Damaged(damage) => bar.suspend(|| {
                 say!("note: {}: {}", video.display(), damaged(&damage));
+            }),
+            VideoProgress::Stretched { from, to } => bar.suspend(|| {
+                say!("note: {}: {}", video.display(), stretched(from, to));
             }),
             VideoProgress::Writing { frames } => {
                 bar.set_message(format!("writing {frames} frames"));
@@ -77,7 +85,9 @@ impl UncalibratedArgs {
             VideoProgress::Done { frames } => bar.suspend(|| {
                 say!("note: the {frames} frames were taken by an earlier run");
             }),
-        });
+        };
+        let ffmpeg = video::ffmpeg();
+        let frames = video::extract(&ffmpeg, video, count, shape, folder, &mut report);
         bar.finish_and_clear();
         let frames = frames?;
         let (count, folder) = (frames.len(), folder.display());
@@ -117,6 +127,14 @@ impl UncalibratedArgs {
         report(&made, photos.photos.len(), options.matching);
         Ok(made.model)
     }
+}
+
+/// What is said of a video whose pixels are not square.
+fn stretched(from: (u32, u32), to: (u32, u32)) -> String {
+    let [from, to] = [from, to].map(|(width, height)| format!("{width} × {height}"));
+    format!(
+        "its pixels are not square, so its frames of {from} are drawn out to {to}, as players show them"
+    )
 }
 
 /// What is said of a video that could not all be decoded.

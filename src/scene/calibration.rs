@@ -6,7 +6,7 @@ use super::listed::Listed;
 use super::turned::Pixels;
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
-use calibrate::opencv::{self, OpenCvCalibration, OpenCvError};
+use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvError};
 use calibrate::{Reconstruction, colmap};
 use capture::{PhotoSet, find_photos_folder, photo_size};
 use std::cell::{Cell, OnceCell};
@@ -118,6 +118,36 @@ pub fn read_bare(format: Format, path: &Path) -> Result<(Reconstruction, Sizes),
     };
     let whole = formats::read(format, path, &size_of, &[], &mut Vec::new())?;
     Ok((whole, sizes.get()))
+}
+
+/// The size of the pictures that a calibration is of, a file or a folder, where it says one for all of them.
+pub fn calibrated_size(calibration: &Path, keys: &Keys) -> Option<(u32, u32)> {
+    let options = ImportOptions {
+        calibration: Some(calibration.to_owned()),
+        keys: keys.clone(),
+        ..ImportOptions::default()
+    };
+    let source = find(calibration, &options, &mut Vec::new()).ok()?;
+    let of_cameras = |whole: &Reconstruction| -> BTreeSet<(u32, u32)> {
+        let cameras = whole.cameras.values();
+        cameras
+            .map(|camera| (camera.width, camera.height))
+            .collect()
+    };
+    let sizes = match source {
+        Source::Colmap(model) => of_cameras(&colmap::read_model(&model).ok()?),
+        Source::OpenCv(file) => {
+            let calibration = opencv::read_calibration(&file, keys).ok()?;
+            let sizes = calibration.cameras.iter().map(|camera| camera.size);
+            sizes.collect::<Option<_>>()?
+        }
+        Source::Other(format, file) => match read_bare(format, &file).ok()? {
+            (whole, Sizes::Known) => of_cameras(&whole),
+            (_, Sizes::Unknown) => return None,
+        },
+    };
+    let first = sizes.first().copied();
+    first.filter(|_| sizes.len() == 1)
 }
 
 /// The nearest and farthest depth that LLFF's file says of each photo.

@@ -46,7 +46,7 @@ mod undistort;
 
 pub use auto::{Trial, trials_text};
 pub use beside::DEPTH_UNITS_PER_STEP;
-pub use calibration::{Sizes, read_bare};
+pub use calibration::{Sizes, calibrated_size, read_bare};
 pub use error::{SceneError, Warning, remedy_of_model};
 pub use exposure::Matched;
 pub use fit::{Fitted, Kind};

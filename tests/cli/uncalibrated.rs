@@ -1,7 +1,7 @@
 //! Photos without a calibration, and videos, with COLMAP and ffmpeg themselves.
 
 use crate::run::{files, lumigraph, run, with_wall};
-use calibrate::{Reconstruction, Rigid3, colmap};
+use calibrate::{Camera, Reconstruction, Rigid3, colmap};
 use capture::Tool;
 use glam::{DQuat, DVec3, DVec4};
 use std::collections::BTreeMap;
@@ -250,4 +250,42 @@ fn a_video_becomes_a_scene_with_times() {
     );
     lumigraph(here.path(), &format!("{line} --force")).ok();
     assert!(files(&here.path().join("scene/photos")) == frames);
+}
+
+/// What other programs calibrate is mostly frames as they are stored, whatever players make of them.
+#[test]
+fn frames_that_are_not_square_have_the_shape_that_is_calibrated() {
+    let ffmpeg = capture::video::ffmpeg();
+    if !is_installed(&ffmpeg) {
+        return;
+    }
+    let folder = with_wall();
+    let here = folder.path();
+    let pictures = here.join("wall/images/%04d.png").display().to_string();
+    let video = here.join("squeezed.mp4").display().to_string();
+    let words = format!(
+        "-v error -framerate 2 -i {pictures} -vf scale=72:72,setsar=4/3 -crf 12 -pix_fmt yuv420p {video}"
+    );
+    let words: Vec<&str> = words.split(' ').collect();
+    ffmpeg.run(&words, &here.join("log"), &mut |_| {}).unwrap();
+    let mut shown = colmap::read_model(&here.join("wall/sparse/0")).unwrap();
+    for image in shown.images.values_mut() {
+        let number: f64 = image.name.trim_end_matches(".png").parse().unwrap();
+        image.name = format!("{:010.3}s.jpg", number / 2.0);
+    }
+    colmap::write_text(&shown, &here.join("shown")).unwrap();
+    let mut stored = shown.clone();
+    for camera in stored.cameras.values_mut() {
+        let lens = camera.lens().unwrap().scaled(0.75, 1.0);
+        *camera = Camera::of(&lens, 72, 72);
+    }
+    colmap::write_text(&stored, &here.join("stored")).unwrap();
+    let note = "its pixels are not square, so its frames of 72 × 72 are drawn out to 96 × 72";
+    for (model, size, is_told) in [("shown", (96, 72), true), ("stored", (72, 72), false)] {
+        let line = format!("import squeezed.mp4 --frames 9 --calibration {model} -o {model}-scene");
+        let said = lumigraph(here, &line).ok().stderr;
+        assert_eq!(said.contains(note), is_told, "{said}");
+        let photo = here.join(format!("{model}-scene/photos/000002.000s.jpg"));
+        assert_eq!(capture::photo_size(&photo).unwrap(), size, "{model}");
+    }
 }

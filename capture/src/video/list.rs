@@ -1,7 +1,7 @@
 //! `frames.txt`: what was taken out of which video. Its first line says where from, each
 //! other has a frame's time in seconds and its name.
 
-use super::{FrameCount, VideoError};
+use super::{FrameCount, FrameShape, VideoError};
 use crate::fingerprint;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -12,6 +12,9 @@ use std::path::Path;
 /// Beside the frames.
 const FILE: &str = "frames.txt";
 
+/// Said of frames that are not drawn out to square pixels.
+const AS_STORED: &str = "as stored";
+
 /// A frame that was written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoFrame {
@@ -21,14 +24,23 @@ pub struct VideoFrame {
     pub time_s: f64,
 }
 
-/// The first line: the video as it is now, and how many frames are asked for.
-pub(super) fn source(video: &Path, count: FrameCount) -> Result<String, VideoError> {
+/// The first line: the video as it is now, and how many frames are asked for, of which shape.
+pub(super) fn source(
+    video: &Path,
+    count: FrameCount,
+    shape: FrameShape,
+) -> Result<String, VideoError> {
     let now = fingerprint(video).map_err(|source| VideoError::Read {
         path: video.to_owned(),
         source,
     })?;
     let name = video.file_name().unwrap_or_default().to_string_lossy();
-    Ok(format!("# {count:?} of {name:?}, {now}"))
+    let shape = match shape {
+        FrameShape::Square => String::new(),
+        FrameShape::Calibrated(width, height) => format!(", for {width}x{height}"),
+        FrameShape::Stored => format!(", {AS_STORED}"),
+    };
+    Ok(format!("# {count:?} of {name:?}, {now}{shape}"))
 }
 
 /// Whether a line is one that [`source`] makes, of any video.
@@ -42,7 +54,15 @@ fn is_source(line: &str) -> bool {
             || number("Frames").is_some_and(|n| n.parse::<usize>().is_ok())
             || number("PerSecond").is_some_and(|n| n.parse::<f64>().is_ok())
     };
+    let is_size = |text: &str| {
+        let sides = text.split_once('x').map(|(width, height)| [width, height]);
+        sides.is_some_and(|sides| sides.iter().all(|n| n.parse::<u32>().is_ok()))
+    };
     let is_fingerprint = |text: &str| {
+        let (text, shape) = text.split_once(", ").unwrap_or((text, AS_STORED));
+        if shape != AS_STORED && !shape.strip_prefix("for ").is_some_and(is_size) {
+            return false;
+        }
         let numbers = text
             .split_once(" bytes of ")
             .and_then(|(bytes, time)| Some([bytes, time.strip_suffix(" ns")?]));
@@ -120,12 +140,12 @@ mod tests {
         // A name that looks like the rest of the line.
         let video = here.path().join("# Auto of b, 1 bytes of 2 ns.mp4");
         fs::write(&video, "video").unwrap();
-        for count in [
-            FrameCount::Auto,
-            FrameCount::Frames(7),
-            FrameCount::PerSecond(0.5),
+        for (count, shape) in [
+            (FrameCount::Auto, FrameShape::Square),
+            (FrameCount::Frames(7), FrameShape::Stored),
+            (FrameCount::PerSecond(0.5), FrameShape::Calibrated(640, 480)),
         ] {
-            let line = source(&video, count).unwrap();
+            let line = source(&video, count, shape).unwrap();
             assert!(is_source(&line), "{line}");
         }
         for line in [
@@ -133,6 +153,7 @@ mod tests {
             "# frames of my film",
             "# Auto of \"a.mp4\"",
             "# Auto of \"a.mp4\", 5 bytes of long ago",
+            "# Auto of \"a.mp4\", 5 bytes of 6 ns, for people",
             "# Frames(some) of \"a.mp4\", 5 bytes of 6 ns",
             "Auto of \"a.mp4\", 5 bytes of 6 ns",
         ] {

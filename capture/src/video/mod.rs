@@ -2,15 +2,16 @@
 //!
 //! The video is decoded twice: once small and grey, to score how sharp every frame is, and
 //! once at full size for the chosen ones alone. Times are those of presentation, so a
-//! variable frame rate is no matter; frames come turned as the video asks for.
+//! variable frame rate is no matter; frames come turned as the video asks for, and with square pixels.
 //!
 //! ```no_run
-//! use capture::video::{self, FrameCount};
+//! use capture::video::{self, FrameCount, FrameShape};
 //! use std::path::Path;
 //!
 //! let ffmpeg = video::ffmpeg();
 //! let (video, folder) = (Path::new("desk.mp4"), Path::new("photos"));
-//! let frames = video::extract(&ffmpeg, video, FrameCount::Auto, folder, &mut |_| {})?;
+//! let (count, shape) = (FrameCount::Auto, FrameShape::Square);
+//! let frames = video::extract(&ffmpeg, video, count, shape, folder, &mut |_| {})?;
 //! println!("{} at {} s", frames[0].name, frames[0].time_s);
 //! # Ok::<(), video::VideoError>(())
 //! ```
@@ -20,12 +21,14 @@ mod damage;
 mod error;
 mod list;
 mod scan;
+mod shape;
 
 pub use choose::{FrameCount, ScoredFrame, choose};
 pub use damage::Damage;
 pub use error::VideoError;
 pub use list::VideoFrame;
 pub use scan::{scan, sharpness};
+pub use shape::FrameShape;
 
 use crate::folder::{beside, place_of, take_place};
 use crate::{Tool, ToolError};
@@ -47,6 +50,13 @@ pub enum VideoProgress {
     },
     /// Not all of the video could be decoded; frames that are damaged are passed over.
     Damaged(Damage),
+    /// Its pixels are not square: frames are drawn out to the width and height at which players show them.
+    Stretched {
+        /// As they are stored.
+        from: (u32, u32),
+        /// As they are written.
+        to: (u32, u32),
+    },
     /// So many of the chosen frames are being written.
     Writing {
         /// How many in all.
@@ -152,7 +162,7 @@ fn made_even(mut frame: Vec<u8>, [width, height]: [usize; 2]) -> Vec<u8> {
 /// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt, and
 /// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
 /// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
-/// whole frames ([`choose()`]).
+/// whole frames ([`choose()`]). Frames whose pixels are not square are drawn out as `shape` says.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame; a folder that
@@ -161,10 +171,11 @@ pub fn extract(
     ffmpeg: &Tool,
     video: &Path,
     count: FrameCount,
+    shape: FrameShape,
     folder: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Vec<VideoFrame>, VideoError> {
-    let source = list::source(video, count)?;
+    let source = list::source(video, count, shape)?;
     if let Some(frames) = list::read(folder, &source) {
         report(VideoProgress::Done {
             frames: frames.len(),
@@ -200,6 +211,11 @@ pub fn extract(
         }
         report(VideoProgress::Damaged(damage));
     }
+    let stored = scanned.shape;
+    let stretched = stored.and_then(|stored| Some((stored.size, stored.stretched(shape)?)));
+    if let Some((from, to)) = stretched {
+        report(VideoProgress::Stretched { from, to });
+    }
     let chosen = choose(&scored, count);
     report(VideoProgress::Writing {
         frames: chosen.len(),
@@ -214,7 +230,8 @@ pub fn extract(
     }
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
     let from = scan::input(video, scanned.decoding);
-    write_frames(ffmpeg, spelling, from, &chosen, &partial)?;
+    let size = stretched.map(|(_, to)| to);
+    write_frames(ffmpeg, spelling, from, &chosen, size, &partial)?;
     let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     let mut frames = Vec::new();
     for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
@@ -236,18 +253,24 @@ pub fn extract(
     Ok(frames)
 }
 
-/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, …. `arguments` say of which video.
+/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, …, drawn out to a size if one is given. `arguments`
+/// say of which video.
 fn write_frames(
     ffmpeg: &Tool,
     spelling: scan::Spelling,
     mut arguments: Vec<OsString>,
     chosen: &[usize],
+    size: Option<(u32, u32)>,
     folder: &Path,
 ) -> Result<(), VideoError> {
     // 1. The filter, in a file: an argument must not be as long as many frames make it.
     // JPEG's colours are BT.601 in full range whatever the video's are.
+    let (size, square) = match size {
+        Some((width, height)) => (format!("w={width}:h={height}:"), ",setsar=1"),
+        None => (String::new(), ""),
+    };
     let filter = format!(
-        "select='{}',scale=out_color_matrix=bt601:out_range=full,format=yuvj420p",
+        "select='{}',scale={size}out_color_matrix=bt601:out_range=full{square},format=yuvj420p",
         is_any_of(chosen)
     );
     let filter_file = folder.join("filter.txt");

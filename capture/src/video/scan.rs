@@ -1,4 +1,5 @@
 use super::damage::{Damage, Log};
+use super::shape::Shape;
 use super::{ScoredFrame, VideoError, VideoProgress};
 use crate::{Tool, ToolError};
 use std::ffi::OsString;
@@ -29,6 +30,8 @@ pub fn scan(
 pub(super) struct Scan {
     pub(super) frames: Vec<ScoredFrame>,
     pub(super) damage: Option<Damage>,
+    /// How the first of them is stored, where ffmpeg tells.
+    pub(super) shape: Option<Shape>,
     /// How they were decoded: to have the same ones again, as many of a damaged video.
     pub(super) decoding: Decoding,
 }
@@ -63,10 +66,10 @@ fn scan_once(
     decoding: Decoding,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Scan, VideoError> {
-    // Frames come on stdout, each with its size, and what they are on stderr, line by line.
+    // Frames come on stdout, each with its size, and what they are on stderr, line by line, as they are stored.
     let filter = format!(
-        "scale=w={SCORED_SIDE}:h={SCORED_SIDE}:force_original_aspect_ratio=decrease:flags=area,\
-         format=gray,showinfo=checksum=0"
+        "showinfo=checksum=0,scale=w={SCORED_SIDE}:h={SCORED_SIDE}:\
+         force_original_aspect_ratio=decrease:flags=area,format=gray"
     );
     let mut arguments = input(video, decoding);
     arguments.extend(["-vf", &filter].map(Into::into));
@@ -74,6 +77,7 @@ fn scan_once(
     arguments.extend("-c:v pgm -f image2pipe pipe:1".split(' ').map(Into::into));
     let mut times_s: Vec<f64> = Vec::new();
     let mut log = Log::default();
+    let mut shape = None;
     let mut is_text = false;
     let mut on_line = |line: &str| {
         log.read(line);
@@ -81,6 +85,9 @@ fn scan_once(
         let Some(time_s) = shown_at_s(line) else {
             return;
         };
+        if times_s.is_empty() {
+            shape = Shape::parse(line);
+        }
         times_s.push(time_s);
         report(VideoProgress::Scored {
             frames: times_s.len(),
@@ -118,6 +125,7 @@ fn scan_once(
     Ok(Scan {
         frames,
         damage: log.damage(damaged),
+        shape,
         decoding,
     })
 }
