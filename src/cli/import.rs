@@ -16,8 +16,8 @@ use capture::video::FrameShape;
 use capture::{as_argument, find_photos_folder};
 use lumigraph::scene::file::Extra;
 use lumigraph::scene::{
-    DEPTH_UNITS_PER_STEP, ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning,
-    calibrated_size, relative, remedy_of_model,
+    ImportOptions, Kind, Scene, SceneError, SceneProxy, TimeSource, Warning, calibrated_size,
+    relative, remedy_of_model,
 };
 use proxy::hull::TURNTABLE_STEPS;
 use std::collections::BTreeSet;
@@ -85,10 +85,9 @@ pub(super) struct Args {
     /// Use no depth maps
     #[arg(long, conflicts_with_all = ["depth", "depth_scale"])]
     no_depth: bool,
-    /// World units a step of the depth maps
-    #[arg(long, value_name = "UNITS", default_value_t = DEPTH_UNITS_PER_STEP,
-        value_parser = positive)]
-    depth_scale: f64,
+    /// World units a step of the depth maps [default: what a transforms.json that names them says, else 0.001]
+    #[arg(long, value_name = "UNITS", value_parser = positive)]
+    depth_scale: Option<f64>,
     /// When each photo was taken: lines of name,seconds [default: PHOTOS/times.csv, else
     /// what cameras wrote into the photos or into their names]
     #[arg(long, value_name = "FILE.csv")]
@@ -208,7 +207,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     print_warnings(&warnings);
     let has_depth = scene.photos.iter().any(|photo| photo.depth_map.is_some());
-    if args.depth_scale != DEPTH_UNITS_PER_STEP && !has_depth {
+    if args.depth_scale.is_some() && !has_depth {
         say!("note: --depth-scale changes nothing: no photo has a depth map");
     }
     if args.strict {

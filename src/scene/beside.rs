@@ -224,7 +224,8 @@ impl Scene {
                 Beside::IgnoreMask => photo.ignore_mask = path,
                 Beside::ObjectMatte => photo.object_matte = path,
                 Beside::DepthMap => {
-                    photo.depth_scale = path.is_some().then_some(options.depth_scale);
+                    let scale = options.depth_scale.unwrap_or(DEPTH_UNITS_PER_STEP);
+                    photo.depth_scale = path.is_some().then_some(scale);
                     photo.depth_map = path;
                 }
             }

@@ -9,7 +9,7 @@ use super::misfit;
 use super::named::Named;
 use super::times::{Clues, TimeSource, set_times, taken};
 use super::turned::{self, Pixels};
-use super::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, Warning};
+use super::{Photo, Scene, SceneError, Warning};
 use calibrate::Reconstruction;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
@@ -20,7 +20,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// How photos are imported.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     /// Where the calibration is: a COLMAP model or a folder with one, or a file by OpenCV
     /// or another program that [`calibrate::formats`] knows;
@@ -45,25 +45,9 @@ pub struct ImportOptions {
     pub depth: Option<PathBuf>,
     /// Without [`Self::depth`], use none.
     pub no_depth: bool,
-    /// World units a step of the depth maps.
-    pub depth_scale: f64,
-}
-
-impl Default for ImportOptions {
-    fn default() -> Self {
-        Self {
-            calibration: None,
-            keys: Keys::default(),
-            strict: false,
-            masks: None,
-            no_masks: false,
-            mattes: None,
-            depth: None,
-            no_depth: false,
-            depth_scale: DEPTH_UNITS_PER_STEP,
-            times: TimeSource::default(),
-        }
-    }
+    /// World units a step of the depth maps; `None`: what a calibration that names them says, else
+    /// [`DEPTH_UNITS_PER_STEP`](super::DEPTH_UNITS_PER_STEP).
+    pub depth_scale: Option<f64>,
 }
 
 /// Photos that must remain for others to be left out.

@@ -80,12 +80,8 @@ impl Scene {
         }
         if options.depth.is_none() && !options.no_depth {
             // A scale that was asked for is that of the scene's units.
-            let is_asked = options.depth_scale != DEPTH_UNITS_PER_STEP;
-            let scale = match depth_scale {
-                _ if is_asked => options.depth_scale,
-                Some(scale) => scale,
-                None => options.depth_scale * applied_scale,
-            };
+            let scale = options.depth_scale.or(depth_scale);
+            let scale = scale.unwrap_or(DEPTH_UNITS_PER_STEP * applied_scale);
             let unused = self.add_depth_maps(&depth_maps, scale);
             if let Some(reason) = unused.first() {
                 note(format!(

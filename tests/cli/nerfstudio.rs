@@ -98,7 +98,10 @@ fn depth_maps_of_instant_ngp_are_read_in_its_scale() {
     };
     let scaled = "\"integer_depth_scale\": 0.002, \"applied_scale\": 0.5, ";
     assert_eq!(scale_of(scaled, "").0, Some(0.002));
-    assert_eq!(scale_of(scaled, "--depth-scale 0.25 ").0, Some(0.25));
+    for asked in [0.25, 0.001] {
+        let (scale, _) = scale_of(scaled, &format!("--depth-scale {asked} "));
+        assert_eq!(scale, Some(asked));
+    }
     let note =
         "note: wall/transforms.json names 9 depth maps (depth_path) that are not used: it lacks";
     let (scale, said) = scale_of("", "");
