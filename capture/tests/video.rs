@@ -166,6 +166,26 @@ fn frames_are_drawn_out_to_square_pixels_unless_they_are_calibrated_as_stored() 
     }
 }
 
+/// As telephones and all of HD have them; rounded down, every channel lost a level.
+#[test]
+fn colours_of_bt_709_are_not_darkened() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let words = "-vf scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp \
+                 -colorspace bt709 -color_primaries bt709 -color_trc bt709 -crf 12";
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let video = write_video(&ffmpeg, here.path(), &[2, 18], &words);
+    let photos = here.path().join("photos");
+    let (count, shape) = (FrameCount::Frames(2), FrameShape::Square);
+    let frames = video::extract(&ffmpeg, &video, count, shape, &photos, &mut |_| {}).unwrap();
+    let pixels = capture::decode(&photos.join(&frames[0].name), Some((320, 240))).unwrap();
+    let expected = frame(2);
+    let pairs = pixels.pixels().zip(expected.pixels());
+    let bias: f64 = pairs.map(|(a, b)| f64::from(a[1]) - f64::from(b[1])).sum();
+    let bias = bias / f64::from(320 * 240);
+    assert!(bias.abs() < 0.7, "green is off by {bias} levels");
+}
+
 #[test]
 fn a_variable_rate_keeps_its_times() {
     let Some(ffmpeg) = ffmpeg() else { return };

@@ -78,6 +78,9 @@ pub fn ffmpeg() -> Tool {
     }
 }
 
+/// How colours are converted: else ffmpeg rounds them down, by a level and more where the matrix changes.
+const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp";
+
 /// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
 /// what else ffmpeg takes the file's name to mean. Films have even sizes: an odd width or
 /// height gains one more of its last column or row. The video appears complete or not at all.
@@ -269,10 +272,8 @@ fn write_frames(
         Some((width, height)) => (format!("w={width}:h={height}:"), ",setsar=1"),
         None => (String::new(), ""),
     };
-    let filter = format!(
-        "select='{}',scale={size}out_color_matrix=bt601:out_range=full{square},format=yuvj420p",
-        is_any_of(chosen)
-    );
+    let scale = format!("scale={size}out_color_matrix=bt601:out_range=full:{EXACT}{square}");
+    let filter = format!("select='{}',{scale},format=yuvj420p", is_any_of(chosen));
     let filter_file = folder.join("filter.txt");
     let failed = VideoError::write_at(&filter_file);
     fs::write(&filter_file, filter).map_err(&failed)?;
