@@ -186,6 +186,29 @@ fn colours_of_bt_709_are_not_darkened() {
     assert!(bias.abs() < 0.7, "green is off by {bias} levels");
 }
 
+/// Which matrix a film's colours are in can be said in some files only.
+#[test]
+fn films_show_the_colours_of_their_frames_whatever_they_are_called() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let color = [200, 90, 60];
+    for name in ["film.mp4", "film.avi", "film.AVI"] {
+        let film = here.path().join(name);
+        let frames = [(); 3].map(|()| Ok(color.repeat(64 * 64)));
+        video::encode(&film, (64, 64), 8.0, frames.into_iter()).unwrap();
+        let picture = here.path().join("shown.png");
+        let [from, to] = [&film, &picture].map(|path| path.to_str().unwrap());
+        let arguments = ["-y", "-v", "error", "-i", from, "-frames:v", "1", to];
+        ffmpeg
+            .run(&arguments, &here.path().join("log"), &mut |_| {})
+            .unwrap();
+        let shown = image::open(&picture).unwrap().into_rgb8();
+        let middle = shown.get_pixel(32, 32).0;
+        let off = (0..3).map(|c| middle[c].abs_diff(color[c])).max();
+        assert!(off <= Some(4), "{name}: {middle:?}");
+    }
+}
+
 #[test]
 fn a_variable_rate_keeps_its_times() {
     let Some(ffmpeg) = ffmpeg() else { return };

@@ -104,13 +104,16 @@ pub fn encode(
         "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size,
     ];
     arguments.extend(given.map(OsString::from));
-    // The frames are sRGB with full range; players expect BT.709.
-    let filter = "scale=out_color_matrix=bt709:out_range=tv";
-    let made = ["-r", &rate, "-i", "-", "-vf", filter, "-pix_fmt", "yuv420p"];
+    // The frames are sRGB with full range.
+    let (matrix, mark) = matrix_of(video);
+    let filter = format!("scale=out_color_matrix={matrix}:out_range=tv:{EXACT}");
+    let made = [
+        "-r", &rate, "-i", "-", "-vf", &filter, "-pix_fmt", "yuv420p",
+    ];
     arguments.extend(made.map(OsString::from));
     let marked = [
         "-colorspace",
-        "bt709",
+        mark,
         "-color_primaries",
         "bt709",
         "-color_trc",
@@ -156,6 +159,17 @@ fn made_even(mut frame: Vec<u8>, [width, height]: [usize; 2]) -> Vec<u8> {
         frame.extend_from_within(last_row..);
     }
     frame
+}
+
+/// What a film's colours are written in, and what ffmpeg marks it by: BT.709, which players expect, in files that can
+/// say so. Of all that do not (.avi, .wmv), players take BT.601 for granted.
+fn matrix_of(video: &Path) -> (&'static str, &'static str) {
+    const TOLD: [&str; 5] = ["mp4", "m4v", "mov", "mkv", "webm"];
+    let end = video.extension().unwrap_or_default();
+    match TOLD.iter().any(|told| end.eq_ignore_ascii_case(told)) {
+        true => ("bt709", "bt709"),
+        false => ("bt601", "smpte170m"),
+    }
 }
 
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
