@@ -4,6 +4,7 @@ pub(super) use super::source::{Source, find};
 
 use super::listed::Listed;
 use super::turned::Pixels;
+use super::turntable::by_numbers;
 use super::{ImportOptions, SceneError, Warning};
 use calibrate::formats::{self, Format};
 use calibrate::opencv::{self, Keys, OpenCvCalibration, OpenCvError};
@@ -251,14 +252,61 @@ fn photo_names(
             photos.photos.len()
         ));
     }
+    let names: Vec<String> = photos.photos.iter().map(|p| p.name.clone()).collect();
     warnings.push(Warning::Note(format!(
-        "the {count} poses in {} are taken to be of the photos in the order of their names; if \
+        "the {count} poses in {} are taken to be of the photos in the order of their names{}; if \
          that is wrong, put the list of photos beside it as images.yml",
-        path.display()
+        path.display(),
+        which_order(&names)
     )));
-    Ok(photos
-        .photos
-        .iter()
-        .map(|photo| photo.name.clone())
-        .collect())
+    Ok(names)
+}
+
+/// What to add where names, which are in the order of their characters, are in another by the numbers within.
+fn which_order(names: &[String]) -> String {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut numbered = names.clone();
+    numbered.sort_by(|a, b| by_numbers(a, b));
+    let Some(first) = (0..names.len()).find(|&i| numbered[i] != names[i]) else {
+        return String::new();
+    };
+    // From one before the first that differs.
+    let from = first.saturating_sub(1);
+    let to = names.len().min(from + 3);
+    let shown = |names: &[&str]| {
+        let before = if from > 0 { "…, " } else { "" };
+        let after = if to < names.len() { ", …" } else { "" };
+        format!("({before}{}{after})", names[from..to].join(", "))
+    };
+    format!(
+        " as OpenCV's glob has them {}, not of the numbers in them {}",
+        shown(&names),
+        shown(&numbered)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::which_order;
+
+    #[test]
+    fn names_whose_numbers_are_in_another_order_are_shown_in_both() {
+        let said = |numbers: std::ops::RangeInclusive<u32>| {
+            let mut names: Vec<String> = numbers.map(|n| format!("img{n}.png")).collect();
+            names.sort();
+            which_order(&names)
+        };
+        assert_eq!(said(1..=9), "");
+        assert_eq!(said(10..=20), "");
+        assert_eq!(
+            said(1..=12),
+            " as OpenCV's glob has them (img1.png, img10.png, img11.png, …), not of the numbers in them (img1.png, \
+             img2.png, img3.png, …)"
+        );
+        assert_eq!(
+            said(8..=10),
+            " as OpenCV's glob has them (img10.png, img8.png, img9.png), not of the numbers in them (img8.png, \
+             img9.png, img10.png)"
+        );
+    }
 }

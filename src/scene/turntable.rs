@@ -148,7 +148,8 @@ fn in_order(found: &PhotoSet) -> Vec<String> {
     names
 }
 
-fn by_numbers(a: &str, b: &str) -> Ordering {
+/// The order of names in which the numbers within count as numbers: `2.jpg` before `10.jpg`.
+pub(super) fn by_numbers(a: &str, b: &str) -> Ordering {
     let key = |name: &str| -> Vec<(String, usize, String)> {
         let is_digit = |c: char| c.is_ascii_digit();
         let mut parts = Vec::new();
