@@ -165,6 +165,21 @@ pub enum SceneError {
          that holds the photos, and their calibration with `import --calibration`", .0.display()
     )]
     NoPhotos(PathBuf),
+    /// Nor are there photos beside a calibration that names some elsewhere.
+    #[error(
+        "{}: there are no photos beside it, and those that it names are in {}; give that folder: `lumigraph import {} \
+         --calibration {} -o SCENE`",
+        file.display(),
+        folder.display(),
+        as_argument(folder),
+        as_argument(file)
+    )]
+    PhotosElsewhere {
+        /// The calibration.
+        file: PathBuf,
+        /// The folder around the photos.
+        folder: PathBuf,
+    },
     /// A folder of masks, mattes or depth maps has none for any photo.
     #[error(
         "{}: no {kind} for any photo here; that of {example} would be called {example}.png, or \

@@ -1,8 +1,8 @@
 //! Which folder's photos a calibration is of: COLMAP leaves those that it undistorts beside their model.
 
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
-use super::calibration::Source;
-use super::{Scene, Warning};
+use super::calibration::{Source, read_bare};
+use super::{Scene, SceneError, Warning};
 use capture::as_argument;
 use std::path::{Path, PathBuf};
 
@@ -60,6 +60,32 @@ fn own_folder(source: &Source) -> Option<&Path> {
         around => around,
     };
     around.join(IMAGES).is_dir().then_some(around)
+}
+
+/// The error of a capture without photos; where those that its calibration names are elsewhere, it says so.
+pub(super) fn error_of_photos(source: &Source, error: SceneError) -> SceneError {
+    let (Source::Other(format, file), SceneError::NoPhotos(_)) = (source, &error) else {
+        return error;
+    };
+    let Ok((whole, _)) = read_bare(*format, file) else {
+        return error;
+    };
+    let around = file.parent().unwrap_or(Path::new(""));
+    let photos = whole.images.values().map(|image| around.join(&image.name));
+    let mut photos = photos.filter(|photo| photo.is_file());
+    let Some(first) = photos.next() else {
+        return error;
+    };
+    let common = |folder: PathBuf, photo: PathBuf| -> PathBuf {
+        let mut up = folder.ancestors();
+        let shared = up.find(|up| photo.starts_with(up));
+        shared.unwrap_or(Path::new("")).to_owned()
+    };
+    let folder = first.parent().unwrap_or(Path::new("")).to_owned();
+    SceneError::PhotosElsewhere {
+        file: file.clone(),
+        folder: photos.fold(folder, common),
+    }
 }
 
 fn absolute(path: &Path) -> PathBuf {

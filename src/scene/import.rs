@@ -3,7 +3,7 @@
 use super::beside;
 use super::calibration::{self, Source};
 use super::file::{Extra, Settings};
-use super::home::{home_of, note_of_home};
+use super::home::{error_of_photos, home_of, note_of_home};
 use super::meant::Meant;
 use super::misfit;
 use super::named::Named;
@@ -87,7 +87,7 @@ impl Scene {
         // 2. The photos, matched by name.
         let home = home_of(&source, capture);
         warnings.extend(note_of_home(&source, capture, &home));
-        let found = Self::photos_of(&home)?;
+        let found = Self::photos_of(&home).map_err(|error| error_of_photos(&source, error))?;
         let mut pixels = Pixels::Stored;
         let mut reconstruction = match &source {
             Source::Colmap(model) => calibration::read_colmap(model, &mut warnings)?,

@@ -60,6 +60,26 @@ fn a_transforms_file_gives_the_pictures_of_the_model_it_was_made_from() {
     }
 }
 
+/// `export` writes the file where it is told to, and names photos where they are.
+#[test]
+fn photos_that_a_calibration_names_elsewhere_are_told_of() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::create_dir(here.join("other")).unwrap();
+    lumigraph(
+        here,
+        "export wall --format transforms -o other/transforms.json",
+    )
+    .ok();
+    let error = lumigraph(here, "import other -o scene").error(1);
+    let line = "import other/../wall/images --calibration other/transforms.json -o";
+    assert!(
+        error.contains(&format!("`lumigraph {line} SCENE`")),
+        "{error}"
+    );
+    lumigraph(here, &format!("{line} scene")).ok();
+}
+
 #[test]
 fn frames_of_a_transforms_file_are_views() {
     let folder = with_wall();
