@@ -34,6 +34,8 @@ use std::path::{Path, PathBuf};
 /// An OpenCV calibration is a file in YAML, XML or JSON as its calibration sample writes it:
 /// camera matrix, distortion, and extrinsic parameters. Its poses are given to the photos in
 /// the order of a list within or beside it (images.yml), else in the order of their names.
+/// It speaks of photos as their EXIF orientation has them shown, which is how OpenCV reads them,
+/// unless it says `ignore_orientation: 1`.
 ///
 /// Masks and depth maps in PHOTOS/masks and PHOTOS/depth are found by the photos' names, others
 /// where a transforms.json names them.
