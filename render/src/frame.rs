@@ -3,6 +3,7 @@
 #[cfg(test)]
 pub(crate) mod every_lens;
 
+use crate::lens_edge::{LensEdge, lens_edges};
 use crate::lumigraph::{Lumigraph, SourceView};
 use crate::options::{FieldOptions, Resolution, Skips};
 use crate::photos::PhotoError;
@@ -88,6 +89,8 @@ pub struct FrameSource {
     pub footprint_ratio: f64,
     /// Pixels from the border over which it fades in.
     pub feather_px: f64,
+    /// Where its lens ends, if that is within its image: there it fades in, too.
+    pub(crate) lens_edge: Option<LensEdge>,
     /// What red, green and blue are multiplied by to bring it to the frame's exposure; see
     /// `exposed`.
     pub exposure: [f64; 3],
@@ -101,8 +104,8 @@ impl FrameSource {
         self.time_penalty < f64::INFINITY
     }
 
-    /// fovBlend: rises smoothly from 0 at the image's border to 1 at the feather's width;
-    /// negative outside the image.
+    /// fovBlend: rises smoothly from 0 at the image's border, and from next to nothing where the
+    /// lens ends within it, to 1 at the feather's width; negative outside the image.
     pub fn fov_blend(&self, pixel: Pixel) -> f64 {
         let [width, height] = self.size;
         let border = pixel
@@ -113,6 +116,10 @@ impl FrameSource {
         if border < 0.0 {
             return -1.0;
         }
+        let border = match &self.lens_edge {
+            None => border,
+            Some(edge) => border.min(edge.distance_px(pixel)),
+        };
         if border >= self.feather_px {
             return 1.0;
         }
@@ -146,6 +153,7 @@ impl FrameSource {
             size: [f64::from(width), f64::from(height)],
             footprint_ratio: 1.0,
             feather_px: 0.0,
+            lens_edge: None,
             exposure: [1.0; 3],
             time_penalty: 0.0,
         }
@@ -323,7 +331,8 @@ impl<'a> Frame<'a> {
             .iter()
             .zip(places(&lumigraph.sources, desired.center()))
             .zip(penalties)
-            .map(|((source, center), time_penalty)| {
+            .zip(lens_edges(&lumigraph.sources))
+            .map(|(((source, center), time_penalty), lens_edge)| {
                 let View { width, height, .. } = source.view;
                 FrameSource {
                     time_penalty,
@@ -332,6 +341,7 @@ impl<'a> Frame<'a> {
                         Resolution::Distance | Resolution::Length => 1.0,
                     },
                     feather_px: options.feather * f64::from(width.min(height)),
+                    lens_edge,
                     ..FrameSource::at(center, &source.view, &desired)
                 }
             })

@@ -17,6 +17,7 @@ mod held;
 mod image_out;
 pub mod interior;
 pub mod ldi;
+mod lens_edge;
 mod lumigraph;
 mod mask;
 mod near;

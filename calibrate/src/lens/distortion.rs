@@ -1,6 +1,9 @@
 use super::{closed, fisheye, plane, sensor};
-use glam::DMat3;
-use std::f64::consts::{FRAC_PI_4, PI};
+use glam::{DMat3, DVec2};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+
+/// Directions in which the edge of a lens is looked for where it is no circle.
+const EDGE_DIRECTIONS: u32 = 64;
 
 /// How a lens bends rays away from the pinhole's.
 ///
@@ -163,6 +166,61 @@ impl Distortion {
             Distortion::Eucm { alpha, beta } => closed::eucm_limit(*alpha, *beta),
             Distortion::Equirectangular => PI,
         }
+    }
+
+    /// See [`super::Lens::edge`].
+    pub(super) fn edge(&self, limit: f64) -> f64 {
+        let edge = match *self {
+            Self::None | Self::Equirectangular => f64::INFINITY,
+            Self::Fov { omega } => FRAC_PI_2 / omega.abs(),
+            Self::Division { k } if k > 0.0 => k.sqrt().recip(),
+            Self::InverseRadial { k } if k < 0.0 => (-3.0 * k).sqrt().recip(),
+            Self::Eucm { alpha, beta } if alpha > 0.5 => {
+                ((2.0 * alpha - 1.0) * beta).sqrt().recip()
+            }
+            // Growing without end, as far as they see.
+            Self::Division { .. } | Self::InverseRadial { .. } | Self::Eucm { .. } => f64::INFINITY,
+            _ if !limit.is_finite() => f64::INFINITY,
+            Self::Fisheye { k } => fisheye::polynomial(limit, &k).0,
+            Self::Rational { .. }
+            | Self::Tilted { .. }
+            | Self::SkewedFisheye { .. }
+            | Self::ThinPrismFisheye { .. }
+            | Self::RadTanThinPrismFisheye { .. } => self.least_edge(limit),
+        };
+        // Of coefficients that are no numbers nothing is known.
+        if edge.is_nan() { f64::INFINITY } else { edge }
+    }
+
+    /// The least distance of the image of a circle around the axis from the principal point, for lenses that
+    /// distort it.
+    fn least_edge(&self, limit: f64) -> f64 {
+        let sensor = self.sensor();
+        let radius = |direction: u32| {
+            let angle = TAU / f64::from(EDGE_DIRECTIONS) * f64::from(direction);
+            let on_edge = limit * DVec2::from_angle(angle);
+            let distorted = match *self {
+                Self::Rational { k, p } => plane::rational(on_edge, &k, &p).0,
+                Self::Tilted { k, p, s, .. } => plane::rational_prism(on_edge, &k, &p, &s).0,
+                Self::SkewedFisheye { k, .. } => {
+                    DVec2::from_angle(angle) * fisheye::polynomial(limit, &k).0
+                }
+                Self::ThinPrismFisheye { k, p, s } => fisheye::thin_prism(on_edge, &k, &p, &s).0,
+                Self::RadTanThinPrismFisheye { k, p, s } => {
+                    fisheye::rad_tan_thin_prism(on_edge, &k, &p, &s).0
+                }
+                _ => return f64::INFINITY,
+            };
+            let on_sensor = match sensor {
+                None => Some(distorted),
+                Some(homography) => sensor::apply(homography, distorted).map(|(at, _)| at),
+            };
+            // Beyond a sensor's horizon there is no edge.
+            on_sensor.map_or(f64::INFINITY, DVec2::length)
+        };
+        (0..EDGE_DIRECTIONS)
+            .map(radius)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// See [`super::Lens::is_wide`].

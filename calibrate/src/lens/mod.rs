@@ -39,6 +39,7 @@ pub struct Lens {
     pub principal: DVec2,
     distortion: Distortion,
     limit: f64,
+    edge: f64,
     wide: bool,
 }
 
@@ -56,11 +57,13 @@ impl Lens {
     /// coefficients are zero, [`Lens::distortion`] is the simplest variant without them.
     pub fn new(focal: DVec2, principal: DVec2, distortion: Distortion) -> Self {
         let distortion = distortion.simplest();
+        let limit = distortion.limit();
         Self {
             focal,
             principal,
             distortion,
-            limit: distortion.limit(),
+            limit,
+            edge: distortion.edge(limit),
             wide: distortion.is_wide(),
         }
     }
@@ -80,6 +83,13 @@ impl Lens {
     /// all others an angle in radians, π/2 or less for those that see only what is in front.
     pub fn limit(&self) -> f64 {
         self.limit
+    }
+
+    /// How far from the principal point, in focal lengths, everything on the image is seen by the lens:
+    /// the radius at which the image ends, or the least where that is no circle. Infinite where it ends
+    /// nowhere, and for [`Distortion::Equirectangular`], whose image is a rectangle.
+    pub fn edge(&self) -> f64 {
+        self.edge
     }
 
     /// How much the lens bends what is straight: the most that the second derivative of the pixel can

@@ -171,6 +171,103 @@ fn new_models_see_as_far_as_their_formula_is_one_to_one() {
     assert_eq!(sphere.unproject(Pixel::new(0.0, 150.1 * PI)), None);
 }
 
+/// Within its edge a lens has a ray for every pixel; beyond, none where the image is round.
+#[test]
+fn an_image_reaches_to_its_lenses_edge_and_no_farther() {
+    let barrel = [-0.2, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let (p, tau) = ([0.004, -0.003], [0.05, -0.06]);
+    let fisheye = [-0.09, 0.0, 0.0, 0.0];
+    let [round, uneven, endless] = [
+        vec![
+            Distortion::Rational {
+                k: barrel,
+                p: [0.0; 2],
+            },
+            Distortion::Fisheye { k: fisheye },
+            Distortion::Fov { omega: -0.9 },
+            Distortion::Division { k: 0.25 },
+            Distortion::InverseRadial { k: -0.2 },
+            Distortion::Eucm {
+                alpha: 0.62,
+                beta: 1.1,
+            },
+        ],
+        vec![
+            Distortion::Rational { k: barrel, p },
+            Distortion::Tilted {
+                k: barrel,
+                p,
+                s: [0.002, 0.0, -0.001, 0.0],
+                tau,
+            },
+            Distortion::SkewedFisheye {
+                k: fisheye,
+                alpha: 0.03,
+            },
+            Distortion::ThinPrismFisheye {
+                k: fisheye,
+                p,
+                s: [0.002, -0.001],
+            },
+            Distortion::RadTanThinPrismFisheye {
+                k: [-0.09, 0.0, 0.0, 0.0, 0.0, 0.0],
+                p,
+                s: [0.002, 0.0, -0.001, 0.0],
+            },
+        ],
+        vec![
+            Distortion::None,
+            Distortion::Rational {
+                k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0],
+                p: [0.0; 2],
+            },
+            Distortion::Division { k: -0.25 },
+            Distortion::InverseRadial { k: 0.2 },
+            Distortion::Eucm {
+                alpha: 0.4,
+                beta: 1.1,
+            },
+            Distortion::Equirectangular,
+        ],
+    ]
+    .map(|all| {
+        all.into_iter()
+            .map(|distortion| (distortion, lens_of(distortion)))
+    });
+
+    let seen = |lens: &Lens, share: f64| {
+        let at = |i: u32| {
+            let radius = share * lens.edge();
+            let at = lens.principal + lens.focal * radius * DVec2::from_angle(f64::from(i));
+            lens.unproject(Pixel::new(at.x, at.y)).is_some()
+        };
+        (0..100).filter(|i| at(*i)).count()
+    };
+    for (distortion, lens) in round {
+        assert_eq!(seen(&lens, 0.9999), 100, "{distortion:?}");
+        assert_eq!(seen(&lens, 1.0001), 0, "{distortion:?}");
+    }
+    for (distortion, lens) in uneven {
+        assert_eq!(seen(&lens, 0.998), 100, "{distortion:?}");
+        // It touches the image's end somewhere.
+        assert!(seen(&lens, 1.005) < 100, "{distortion:?}");
+    }
+    for (distortion, lens) in endless {
+        assert_eq!(lens.edge(), f64::INFINITY, "{distortion:?}");
+    }
+    // It goes with the image's size.
+    let lens = lens_of(Distortion::Fisheye { k: fisheye });
+    assert_eq!(lens.scaled(2.0, 3.0).edge(), lens.edge());
+}
+
+fn lens_of(distortion: Distortion) -> Lens {
+    Lens::new(
+        DVec2::new(300.0, 310.0),
+        DVec2::new(400.0, 300.0),
+        distortion,
+    )
+}
+
 /// A tilted sensor is a plane that rays meet from in front; the formula goes on behind it.
 #[test]
 fn a_tilted_sensor_is_not_seen_from_behind() {

@@ -5,6 +5,7 @@ mod lens;
 use super::lanes::{LANES, Lane, each, vectorised};
 use super::scalar::Scalar;
 use crate::frame::{Frame, LEVEL_BIAS};
+use crate::lens_edge::{LEAST_PX, LensEdge};
 use crate::options::Resolution;
 use glam::DVec3;
 use lens::LensOf;
@@ -68,6 +69,8 @@ pub(crate) struct Source<T = f32> {
     lens: LensOf<T>,
     size: [T; 2],
     inverse_feather: T,
+    /// Where the lens ends within the photo.
+    lens_edge: Option<EdgeOf<T>>,
     footprint_ratio: T,
     footprint_ratio_squared_less_one: T,
     /// Of focal lengths, source to desired.
@@ -115,6 +118,39 @@ impl<T: Scalar> Sight<T> {
 /// to be seen beside any.
 pub(crate) const EDGE: f32 = 1e-12;
 
+/// A [`LensEdge`] in numbers of a kind.
+struct EdgeOf<T> {
+    principal: [T; 2],
+    inverse_focal: [T; 2],
+    radius: T,
+    pixels_per_unit: T,
+}
+
+impl<T: Scalar> EdgeOf<T> {
+    fn new(edge: &LensEdge) -> Self {
+        Self {
+            principal: edge.principal.to_array().map(T::rounded),
+            inverse_focal: edge.focal.recip().to_array().map(T::rounded),
+            radius: T::rounded(edge.radius),
+            pixels_per_unit: T::rounded(edge.pixels_per_unit()),
+        }
+    }
+
+    /// Distances of pixels from the photo's border, or from the lens's edge where that is nearer.
+    #[inline(always)]
+    fn nearer(&self, border: &Lane<T>, u: &Lane<T>, v: &Lane<T>) -> Lane<T> {
+        each(
+            #[inline(always)]
+            |k| {
+                let x = (u[k] - self.principal[0]) * self.inverse_focal[0];
+                let y = (v[k] - self.principal[1]) * self.inverse_focal[1];
+                let left = self.radius - (x.squared() + y.squared()).sqrt();
+                border[k].min((left * self.pixels_per_unit).max(T::of(LEAST_PX)))
+            },
+        )
+    }
+}
+
 /// A row of a source's transform applied to a tile's points.
 #[inline(always)]
 fn turned<T: Scalar>(tile: &Tile<T>, row: [T; 3], translation: T) -> Lane<T> {
@@ -137,6 +173,7 @@ impl<T: Scalar> Source<T> {
             lens: LensOf::new(&source.lens, frame.skips.lenses),
             size: source.size.map(T::rounded),
             inverse_feather: T::rounded(1.0 / source.feather_px.max(1e-9)),
+            lens_edge: source.lens_edge.as_ref().map(EdgeOf::new),
             footprint_ratio: T::rounded(g),
             footprint_ratio_squared_less_one: T::rounded(g * g - 1.0),
             focal_ratio_squared: T::rounded(frame.area_scale(source_idx, DVec3::ZERO)),
@@ -172,12 +209,19 @@ impl<T: Scalar> Source<T> {
 
         // 2. fovBlend.
         let [width, height] = self.size;
+        let border = each(
+            #[inline(always)]
+            |k| u[k].min(width - u[k]).min(v[k].min(height - v[k])),
+        );
+        let within = match &self.lens_edge {
+            None => border,
+            Some(edge) => edge.nearer(&border, &u, &v),
+        };
         let mut seen = false;
         for k in 0..LANES {
-            let border = u[k].min(width - u[k]).min(v[k].min(height - v[k]));
-            let f = (border * self.inverse_feather).clamp01();
+            let f = (within[k] * self.inverse_feather).clamp01();
             let fov = (f.squared() * (T::of(3.0) - T::of(2.0) * f)).max(T::of(EDGE));
-            let inside = border.at_least(zero) & tile.s[k].at_least(zero);
+            let inside = border[k].at_least(zero) & tile.s[k].at_least(zero);
             sight.a[k] = T::either(inside, fov, zero);
             seen |= T::may(inside);
         }

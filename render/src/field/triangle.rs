@@ -400,6 +400,14 @@ impl<'a> Triangle<'a> {
                 _ => return Sees::Part,
             }
         }
+        // Within a disc, what is between the corners is no nearer to its edge than one of them.
+        let inside = match &source.lens_edge {
+            None => inside,
+            Some(edge) => [a, b, c]
+                .into_iter()
+                .map(|corner| edge.distance_px(corner))
+                .fold(inside, f64::min),
+        };
         if inside < source.feather_px + CLEARANCE_PX {
             return Sees::Part;
         }

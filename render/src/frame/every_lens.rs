@@ -82,6 +82,34 @@ pub(crate) fn lumigraph() -> Lumigraph {
                 562.1, 563.4, 640.7, 481.9, -0.0237, 0.0118, -0.0073, 0.0015, 0.0231,
             ],
         ),
+        // Those that end within their photos: a circular fisheye, and some that turn back.
+        (
+            OpenCvFisheye,
+            vec![350.0, 350.0, 641.2, 478.3, -0.09, 0.0, 0.0, 0.0],
+        ),
+        (SimpleRadial, vec![530.0, 640.0, 480.0, -0.2]),
+        (
+            OpenCv,
+            vec![545.0, 538.0, 640.0, 480.0, -0.2, 0.0, 0.0012, -0.0007],
+        ),
+        (Eucm, vec![240.0, 250.0, 639.2, 482.6, 0.62, 1.1]),
+        (
+            ThinPrismFisheye,
+            vec![
+                352.0, 352.0, 645.3, 474.6, -0.09, 0.0, 0.0011, -0.0008, 0.0, 0.0, 0.0009, -0.0006,
+            ],
+        ),
+        (
+            OpenCvTilted,
+            vec![
+                550.0, 547.0, 633.5, 486.4, -0.2, 0.0, 0.00082, -0.00127, 0.0, 0.0, 0.0, 0.0,
+                0.0007, 0.0, -0.0011, 0.0, 0.0423, -0.0547,
+            ],
+        ),
+        (
+            OpenCvSkewedFisheye,
+            vec![354.0, 354.0, 640.7, 481.9, -0.09, 0.0, 0.0, 0.0, 0.0231],
+        ),
     ] {
         let (width, height) = (1280, 960);
         let camera = Camera {
@@ -170,6 +198,14 @@ pub(crate) fn points(frame: &Frame<'_>, source_idx: usize) -> Vec<([f32; 4], Pix
     }
     assert!(points.len() > 1000, "{}", points.len());
     points
+}
+
+/// That fovBlend is the f64 model's at the pixel where an engine sees a point.
+pub(crate) fn check_fov(source: &FrameSource, [u, v]: [f32; 2], found: f32, name: &str) {
+    // Less than nothing where it is beyond the border by rounding.
+    let expected = source.fov_blend(Pixel::new(u.into(), v.into())).max(0.0);
+    let error = (f64::from(found) - expected).abs();
+    assert!(error < 1e-3, "{name}: {found} is not {expected}");
 }
 
 /// How far apart two pixels of a source view are.

@@ -54,8 +54,9 @@ const LENS = 4u;
 const LENS_REST = 5u;
 // Image size; inverse feather; limit of the squared radius, or of theta for a fisheye.
 const IMAGE = 6u;
-// LENS_*; layer of the photos' array; g squared less one; of the rarer lenses 1 where the
-// level of detail follows the distance.
+// LENS_*; layer of the photos' array; g squared less one; radius of the lens's edge in bent
+// coordinates, 1e30 where it is not within the photo, negative unless the level of detail follows
+// the distance.
 const KIND = 7u;
 // The source's centre in the desired camera's frame; w: footprint ratio g.
 const CENTER = 8u;
@@ -77,6 +78,8 @@ const REST = 12u;
 override COMMON_LENS: f32 = -1.0;
 // Whether all source views have the same IMAGE.
 override SAME_IMAGES: bool = false;
+// Whether any source view's lens ends within its photo.
+override LENS_EDGES: bool = false;
 // Whether any source view has an ignore mask.
 override MASKED: bool = false;
 // Whether the proxy can hide a part of itself.
@@ -147,6 +150,8 @@ struct Sight {
     reach: f32,
     // 1/distance; only where something can hide the point.
     inverse_distance: f32,
+    // Pixels to the lens's edge, where it is within the photo; see lens_edge.rs.
+    to_edge: f32,
 }
 
 // atan2 for y >= 0; the polynomial is Cephes' atanf.
@@ -377,7 +382,7 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
     if COMMON_LENS < 0.0 {
         lens = source_data(source_idx, KIND).x;
     }
-    var sight = Sight(vec2f(0.0), 0.0, 0.0, 0.0);
+    var sight = Sight(vec2f(0.0), 0.0, 0.0, 0.0, INFINITY);
     if OCCLUDED {
         sight.inverse_distance = s / length(ray - s * source_data(source_idx, CENTER).xyz);
     }
@@ -408,7 +413,7 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
             return sight;
         }
         bent = rare.at;
-        sight.depth = select(p.z, length(p), source_data(source_idx, KIND).w == 1.0);
+        sight.depth = select(p.z, length(p), source_data(source_idx, KIND).w > 0.0);
         sight.reach = rare.reach;
     } else {
         if p.z <= 0.0 {
@@ -421,8 +426,16 @@ fn see(source_idx: u32, ray: vec3f, s: f32) -> Sight {
     }
     let pinhole = source_data(source_idx, PINHOLE);
     sight.pixel = bent * pinhole.xy + pinhole.zw;
+    if LENS_EDGES {
+        let radius = abs(source_data(source_idx, KIND).w);
+        let pixels = min(abs(pinhole.x), abs(pinhole.y));
+        sight.to_edge = max((radius - length(bent)) * pixels, LEAST_PX);
+    }
     return sight;
 }
+
+// Of lens_edge.rs.
+const LEAST_PX: f32 = 1e-4;
 
 // fovBlend: 0 where the photo does not see the point. On the photo's very edge a view
 // counts where there is no other.
@@ -436,7 +449,11 @@ fn fov_blend(source_idx: u32, sight: Sight) -> f32 {
     if sight.depth <= 0.0 || sight.reach > image.w || border < 0.0 {
         return 0.0;
     }
-    let f = clamp(border * image.z, 0.0, 1.0);
+    var within = border;
+    if LENS_EDGES {
+        within = min(border, sight.to_edge);
+    }
+    let f = clamp(within * image.z, 0.0, 1.0);
     return max(f * f * (3.0 - 2.0 * f), 1e-12);
 }
 

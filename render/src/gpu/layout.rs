@@ -50,7 +50,8 @@ pub(crate) struct Source {
     pub kind: f32,
     pub layer: f32,
     pub footprint_excess: f32,
-    pub wide: f32,
+    /// See KIND of common.wgsl.
+    pub edge: f32,
     pub center: [f32; 4],
     pub exposure: [f32; 3],
     /// How many source views there are; their table says, when it is made.
@@ -208,7 +209,7 @@ impl Source {
             kind: lens_kind(source.lens.distortion()),
             layer: photo.unwrap_or(0) as f32,
             footprint_excess: f(g * g - 1.0),
-            wide: f32::from(u8::from(source.lens.is_wide())),
+            edge: edge(source),
             center: source.center.as_vec3().extend(f(g)).to_array(),
             exposure: source.exposure.map(f),
             count: 0.0,
@@ -239,6 +240,17 @@ fn image(source: &FrameSource) -> [f32; 4] {
     [width, height, inverse_feather, limit.min(1e30)].map(|v| v as f32)
 }
 
+/// The radius of the lens's edge within its photo, 1e30 where it has none; negative unless the level of
+/// detail follows the distance.
+fn edge(source: &FrameSource) -> f32 {
+    let radius = source.lens_edge.map_or(1e30, |edge| edge.radius as f32);
+    if source.lens.is_wide() {
+        radius
+    } else {
+        -radius
+    }
+}
+
 /// The plane that all pixels see; zero where there are many.
 fn common_plane(frame: &Frame<'_>) -> DVec3 {
     match frame.surface {
@@ -254,6 +266,7 @@ pub(crate) struct Special {
     /// them.
     common_lens: Option<u8>,
     same_images: bool,
+    lens_edges: bool,
     masked: bool,
     occluded: bool,
     facets: bool,
@@ -279,6 +292,7 @@ impl Special {
         Self {
             common_lens: first.filter(|first| kinds.all(|kind| kind == *first)),
             same_images: images.all(|image| Some(image) == first_image),
+            lens_edges: frame.sources.iter().any(|s| s.lens_edge.is_some()),
             masked: frame.lumigraph.photos.any_masked(),
             occluded: frame.lumigraph.visibility.is_some(),
             facets: matches!(frame.surface, Surface::Facets(_)),
@@ -292,11 +306,12 @@ impl Special {
     }
 
     /// The shaders' constants.
-    pub(super) fn constants(self) -> [(&'static str, f64); 11] {
+    pub(super) fn constants(self) -> [(&'static str, f64); 12] {
         let flag = |set: bool| f64::from(u8::from(set));
         [
             ("COMMON_LENS", self.common_lens.map_or(-1.0, f64::from)),
             ("SAME_IMAGES", flag(self.same_images)),
+            ("LENS_EDGES", flag(self.lens_edges)),
             ("MASKED", flag(self.masked)),
             ("OCCLUDED", flag(self.occluded)),
             ("FACETS", flag(self.facets)),

@@ -152,7 +152,7 @@ fn a_source_is_the_texels_that_the_shaders_name() {
     let kind = offset_of!(Source, kind);
     assert_eq!(within(offset_of!(Source, layer), kind), 1);
     assert_eq!(within(offset_of!(Source, footprint_excess), kind), 2);
-    assert_eq!(within(offset_of!(Source, wide), kind), 3);
+    assert_eq!(within(offset_of!(Source, edge), kind), 3);
     let rest = offset_of!(Source, mask_layer);
     assert_eq!(within(offset_of!(Source, time_penalty), rest), 1);
     let pinhole = offset_of!(Source, focal);
@@ -195,6 +195,7 @@ fn shared_numbers_are_the_same() {
             ("LEVEL_BIAS", crate::LEVEL_BIAS),
             ("SHOULDER", crate::frame::SHOULDER),
             ("TRANSPARENT", crate::frame::TRANSPARENT),
+            ("LEAST_PX", f64::from(crate::lens_edge::LEAST_PX)),
             ("IGNORED", f64::from(crate::mask::IGNORED)),
             ("LENS_PINHOLE", f64::from(layout::LENS_PINHOLE)),
             ("LENS_RATIONAL", f64::from(layout::LENS_RATIONAL)),

@@ -31,6 +31,7 @@ mod interior_walk;
 mod invariance;
 mod ldi;
 mod ldi_order;
+mod lens_edge;
 mod limits;
 mod masks;
 mod mattes;

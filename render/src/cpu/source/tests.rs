@@ -29,6 +29,8 @@ fn every_lens_projects_as_the_f64_model_does() {
                 let error = every_lens::distance(&frame.sources[source_idx], found, *pixel);
                 worst = worst.max(error);
                 assert!(sight.a[k] > 0.0, "{}: {pixel:?}", view.name);
+                let of_frame = &frame.sources[source_idx];
+                every_lens::check_fov(of_frame, found, sight.a[k], &view.name);
             }
         }
         println!("{}: {} points, {worst:.5} px", view.name, points.len());
@@ -77,6 +79,11 @@ fn every_lens_stays_within_its_bounds() {
                     assert!(within, "{}: {values:?} not in {lo} to {hi}", view.name);
                     widest.push(hi - lo);
                 }
+                let (lo, hi) = (bound.a[k].lo, bound.a[k].hi);
+                let fov = frame.fov_blend(source_idx, *pixel).max(f64::from(EDGE));
+                let values = [fov, f64::from(sight.a[k])];
+                let within = values.iter().all(|v| lo <= *v && *v <= hi);
+                assert!(within, "{}: {values:?} not in {lo} to {hi}", view.name);
             }
         }
         widest.sort_by(f64::total_cmp);

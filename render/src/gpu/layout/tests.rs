@@ -91,6 +91,7 @@ impl<'a> Projector<'a> {
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &[
                     ("COMMON_LENS", f64::from(lens)),
+                    ("LENS_EDGES", 1.0),
                     ("SOURCE_IDX", source_idx as f64),
                 ],
                 ..Default::default()
@@ -161,6 +162,7 @@ fn every_lens_projects_as_the_f64_model_does() {
                 let [u, v, fov, depth] = *sight;
                 worst = worst.max(every_lens::distance(source, [u, v], *pixel));
                 assert!(fov > 0.0, "{name}: {pixel:?}");
+                every_lens::check_fov(source, [u, v], fov, name);
                 // The depth that levels of detail go by, in the areas' scale.
                 if at % 97 == 0 {
                     let ray: DVec3 = Vec3::from_slice(point).as_dvec3();
