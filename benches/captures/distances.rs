@@ -1,6 +1,6 @@
 //! How far a proxy is from the truth, pixel by pixel of the held-out photos.
 
-use calibrate::{Pixel, View};
+use calibrate::{DepthAlong, Pixel, View};
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError};
 use render::{FieldOptions, Frame, Lumigraph};
@@ -28,7 +28,7 @@ pub(super) struct Distances {
 /// A held-out photo's camera, and what it truly shows.
 pub(super) struct Depths {
     view: View,
-    /// Where the depth is known: the pixel, the ray in the camera's frame with z = 1, the depth.
+    /// Where the depth is known: the pixel, the ray in the camera's frame as [`DepthAlong::ray`] has it, the depth.
     known: Vec<(Pixel, DVec3, f64)>,
 }
 
@@ -43,12 +43,13 @@ pub(super) fn truths(
         let Some(map) = photo.decode_depth((view.width, view.height))? else {
             continue;
         };
+        let along = DepthAlong::of_view(&view);
         let places = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
         let known = places.filter_map(|(column, row)| {
             let depth = map.at(column, row)?;
             let pixel = Pixel::center_of(column, row);
-            let ray = view.lens.unproject(pixel).filter(|ray| ray.z > 0.0)?;
-            Some((pixel, ray / ray.z, f64::from(depth)))
+            let ray = along.ray(view.lens.unproject(pixel)?)?;
+            Some((pixel, ray, f64::from(depth)))
         });
         all.push(Depths {
             known: known.collect(),

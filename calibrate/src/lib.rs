@@ -10,6 +10,7 @@
 
 mod camera;
 pub mod colmap;
+mod depth_along;
 mod excerpt;
 pub mod export;
 pub mod exposure;
@@ -25,6 +26,7 @@ pub mod undistort;
 mod view;
 
 pub use camera::{Camera, CameraError, CameraId, ModelKind};
+pub use depth_along::DepthAlong;
 pub use lens::{Distortion, Lens, Pixel, Projection};
 pub use period::{MIN_PHOTOS, Period, PeriodError, Snapshot, find_period};
 pub use reconstruction::{Image, ImageId, Keypoint, Point3D, Point3DId, Reconstruction};

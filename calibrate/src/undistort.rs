@@ -150,6 +150,11 @@ impl Undistortion {
         self.lens.distortion() == Distortion::None
     }
 
+    /// The photo's lens.
+    pub fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
     /// The pinhole camera.
     pub fn camera(&self) -> Camera {
         let Lens {

@@ -19,7 +19,7 @@ pub enum Beside {
     IgnoreMask,
     /// The object that the photo is about: its coverage, as an alpha channel.
     ObjectMatte,
-    /// Depth along z, in steps of 16 bits; 0 = none.
+    /// Depth along z, or along the ray of a lens that sees behind itself, in steps of 16 bits; 0 = none.
     DepthMap,
 }
 
@@ -260,7 +260,8 @@ pub fn apply_matte(photo: &mut RgbaImage, matte: &GrayImage) {
     }
 }
 
-/// Depth at each pixel's centre, along the camera's z axis.
+/// Depth at each pixel's centre: along the camera's z axis, or along the pixel's ray where the photo reaches
+/// behind the camera (`calibrate::DepthAlong`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     /// Pixels.

@@ -3,7 +3,7 @@
 use crate::Scene;
 use crate::scene::Seen;
 use crate::shading::Light;
-use calibrate::{Pixel, View};
+use calibrate::{DepthAlong, Pixel, View};
 use glam::DVec3;
 use image::RgbaImage;
 use rayon::prelude::*;
@@ -159,7 +159,7 @@ impl LensRays {
     }
 }
 
-/// The depth along the camera's z axis at every pixel's centre, row by row, in world
+/// The depth at every pixel's centre, along what [`DepthAlong`] says, row by row, in world
 /// units; NaN where the pixel's ray meets nothing.
 pub fn render_depth(scene: &Scene, view: &View) -> Vec<f64> {
     depth_through(scene, view, &LensRays::of(view))
@@ -170,13 +170,14 @@ pub(crate) fn depth_through(scene: &Scene, view: &View, lens_rays: &LensRays) ->
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let center = view.center();
     let order = scene.by_distance(center);
+    let along = DepthAlong::of_view(view);
     lens_rays
         .centers
         .par_iter()
         .map(|ray| {
             let ray = (*ray)?;
             let seen = scene.look_in_order(center, world_from_camera * ray, &order)?;
-            Some(seen.distance * ray.z)
+            Some(along.depth(seen.distance * ray))
         })
         .map(|depth| depth.unwrap_or(f64::NAN))
         .collect()

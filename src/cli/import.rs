@@ -80,7 +80,8 @@ pub(super) struct Args {
     /// masks
     #[arg(long, value_name = "DIR")]
     mattes: Option<PathBuf>,
-    /// Depth maps, named likewise: 16-bit grey PNG, depth along z, 0 = none
+    /// Depth maps, named likewise: 16-bit grey PNG, depth along z (of panoramas and photos
+    /// that reach beyond 90° from their axis: along the ray), 0 = none
     /// [default: PHOTOS/depth, if there]
     #[arg(long, value_name = "DIR")]
     depth: Option<PathBuf>,

@@ -3,7 +3,7 @@
 
 use super::beside::{DEPTH_FOLDER, DEPTH_UNITS_PER_STEP};
 use super::{ImportOptions, Photo, Scene, Warning};
-use calibrate::Image;
+use calibrate::{DepthAlong, Image, Lens};
 use capture::{Beside, CaptureError, DepthMap, check_beside};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -82,11 +82,14 @@ impl Scene {
             let Ok(Some(map)) = photo.decode_depth((camera.width, camera.height)) else {
                 continue;
             };
+            let Ok(lens) = camera.lens() else {
+                continue;
+            };
             judged += 1;
             if is_often_largest(&map, scale_of(photo)) {
                 at_largest.push(photo);
             }
-            ratios.extend(self.depths_over_points(&map, image));
+            ratios.extend(self.depths_over_points(&map, image, &lens));
         }
         warnings.extend(note_of_largest(&at_largest, judged, with_maps.len()));
         if ratios.len() < ENOUGH {
@@ -108,10 +111,11 @@ impl Scene {
     }
 
     /// What a photo's map says, over how deep the sparse points are that were observed there.
-    fn depths_over_points(&self, map: &DepthMap, image: &Image) -> Vec<f64> {
+    fn depths_over_points(&self, map: &DepthMap, image: &Image, lens: &Lens) -> Vec<f64> {
+        let along = DepthAlong::of(lens, map.width, map.height);
         let ratio = |keypoint: &calibrate::Keypoint| {
             let point = self.reconstruction.points.get(&keypoint.point?)?;
-            let depth = (image.camera_from_world * point.position).z;
+            let depth = along.depth(image.camera_from_world * point.position);
             let is_within = |at: f64, side: u32| at >= 0.0 && at < f64::from(side);
             let is_seen = is_within(keypoint.x, map.width) && is_within(keypoint.y, map.height);
             let measured = is_seen.then(|| map.at(keypoint.x as u32, keypoint.y as u32))??;

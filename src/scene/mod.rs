@@ -111,7 +111,7 @@ pub struct Photo {
     /// A mask that shows the object but neither cuts it out nor ignores the rest, if any: for
     /// the visual hull.
     pub silhouette: Option<PathBuf>,
-    /// Depth along z, if known.
+    /// Depth, as [`calibrate::DepthAlong`] says, if known.
     pub depth_map: Option<PathBuf>,
     /// World units a step of the depth map.
     pub depth_scale: Option<f64>,

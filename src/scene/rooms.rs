@@ -3,7 +3,7 @@
 use super::fit::{fuse_depth, unfit};
 use super::import::ENOUGH;
 use super::{Photo, Scene, SceneError, SceneProxy};
-use calibrate::{Pixel, View};
+use calibrate::{DepthAlong, Pixel, View};
 use capture::DepthMap;
 use glam::DVec3;
 use proxy::depth::Fusion;
@@ -223,14 +223,15 @@ fn model_of(mesh: Mesh, colors: Vec<[u8; 4]>) -> Model {
     }
 }
 
-/// What a view sees of a mesh: depths along z, below 0 where a very wide lens looks behind its camera.
+/// What a view sees of a mesh: depths as [`DepthAlong`] has them.
 fn depth_of(solid: &Solid, view: &View) -> DepthMap {
+    let along = DepthAlong::of_view(view);
     let depths = match solid.scan(view, 1) {
-        Some(scan) => {
+        Some(scan) if along == DepthAlong::Axis => {
             let depth = |s: &f64| if *s > 0.0 { (1.0 / s) as f32 } else { 0.0 };
             scan.inverse_depth.iter().map(depth).collect()
         }
-        None => depths_by_rays(solid, view),
+        _ => depths_by_rays(solid, view, along),
     };
     DepthMap {
         width: view.width,
@@ -240,13 +241,13 @@ fn depth_of(solid: &Solid, view: &View) -> DepthMap {
 }
 
 /// The same where some pixels look aside or back: ray by ray.
-fn depths_by_rays(solid: &Solid, view: &View) -> Vec<f32> {
+fn depths_by_rays(solid: &Solid, view: &View, along: DepthAlong) -> Vec<f32> {
     let center = view.center();
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let depth = |x: u32, y: u32| {
         let ray = view.lens.unproject(Pixel::center_of(x, y))?;
         let hit = solid.first_hit(center, world_from_camera * ray)?;
-        Some((hit.along * ray.z) as f32)
+        Some(along.depth(hit.along * ray).max(0.0) as f32)
     };
     let row = |y: u32| -> Vec<f32> {
         let columns = 0..view.width;
@@ -332,12 +333,10 @@ mod tests {
             for (i, depth) in map.depths.iter().enumerate().filter(|(_, d)| **d != 0.0) {
                 let pixel = Pixel::center_of(i as u32 % size.0, i as u32 / size.0);
                 let ray = view.lens.unproject(pixel).unwrap();
-                if ray.z.abs() > 0.1 {
-                    let point = world_from_camera * (ray * (f64::from(*depth) / ray.z));
-                    let off = (point.abs() / DVec3::new(2.0, 1.5, 2.5)).max_element() - 1.0;
-                    assert!(off.abs() < 1e-4, "{point} in pixel {i}");
-                }
-                behind += usize::from(*depth < 0.0);
+                let point = world_from_camera * (ray * f64::from(*depth));
+                let off = (point.abs() / DVec3::new(2.0, 1.5, 2.5)).max_element() - 1.0;
+                assert!(off.abs() < 1e-4, "{point} in pixel {i}");
+                behind += usize::from(ray.z < 0.0);
             }
             assert!(behind > 0);
             let lines = sights(&view, &map, 4);
@@ -360,7 +359,8 @@ mod tests {
         let solid = Solid::new(MeshKind::Mesh, room());
         let pinhole = Lens::pinhole(DVec2::splat(40.0), DVec2::new(48.0, 36.0));
         let view = seen_by(pinhole, (96, 72));
-        let (map, by_rays) = (depth_of(&solid, &view), depths_by_rays(&solid, &view));
+        let map = depth_of(&solid, &view);
+        let by_rays = depths_by_rays(&solid, &view, DepthAlong::Axis);
         for (a, b) in map.depths.iter().zip(&by_rays) {
             assert!(*a > 0.0 && (a / b - 1.0).abs() < 1e-5, "{a} {b}");
         }

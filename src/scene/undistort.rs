@@ -4,12 +4,12 @@
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::{Photo, Scene, SceneError, Warning, picture_files};
 use calibrate::undistort::{Undistortion, undistort};
-use calibrate::{Camera, Pixel};
+use calibrate::{Camera, DepthAlong, Lens, Pixel};
 use capture::{
     Beside, CaptureError, Footprint, Kernel, copy_photo, decode_depth_steps, warp,
     warp_depth_steps, write_depth_steps, write_mask, write_png,
 };
-use image::{DynamicImage, GrayImage, Luma};
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,8 @@ impl Scene {
     /// [`calibrate::undistort`] chooses, called as [`picture_files`] says; [`Photo::original`]
     /// is what they were called. Masks, mattes and silhouettes are undistorted likewise, as
     /// `masks/NAME.png`, `mattes/NAME.png` and `silhouettes/NAME.png`, and depth maps by their nearest pixels, as
-    /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z.
+    /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z; that
+    /// along rays becomes it.
     /// Where a photo does not fill its picture, that is ignored. `progress` is called after
     /// each photo.
     ///
@@ -185,6 +186,7 @@ fn write_photo(
     let depth_map = match &photo.depth_map {
         Some(path) => {
             let steps = decode_depth_steps(path, &photo.name, photo_size)?;
+            let steps = along_axis(steps, undistortion.lens());
             let file = beside(DEPTH_FOLDER);
             let steps = warp_depth_steps(&steps, size, footprint_of);
             write_depth_steps(&folder.join(&file), &steps)?;
@@ -201,6 +203,27 @@ fn write_photo(
         depth_map,
         ..photo.clone()
     })
+}
+
+/// A depth map's steps along the axis, 0 for what lies aside or behind.
+fn along_axis(
+    mut steps: ImageBuffer<Luma<u16>, Vec<u16>>,
+    lens: &Lens,
+) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let along = DepthAlong::of(lens, steps.width(), steps.height());
+    if along == DepthAlong::Ray {
+        for (column, row, step) in steps.enumerate_pixels_mut() {
+            let ray = lens.unproject(Pixel::center_of(column, row));
+            let inverse = ray.map_or(0.0, |ray| {
+                along.inverse_along_axis(ray, f64::from(step.0[0]).recip())
+            });
+            step.0[0] = match inverse > 0.0 {
+                true => inverse.recip().round() as u16,
+                false => 0,
+            };
+        }
+    }
+    steps
 }
 
 fn footprint(undistortion: &Undistortion, column: u32, row: u32) -> Option<Footprint> {

@@ -2,7 +2,7 @@
 
 use super::frame::{Frame, Inverse, Rays, Statistics, Trust};
 use super::{DepthError, JUDGED, check_frame};
-use calibrate::View;
+use calibrate::{DepthAlong, View};
 use capture::DepthMap;
 
 /// How sure depth maps are.
@@ -41,7 +41,7 @@ pub fn noise<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     })
 }
 
-/// The inverse depths of a map that its neighbours confirm, row by row; 0 where a pixel saw two
+/// The inverse depths of a map along its camera's axis that neighbours confirm, row by row; 0 where a pixel saw two
 /// surfaces mixed, or one that slants by more than `max_slant` radians, or nothing.
 ///
 /// # Errors
@@ -63,5 +63,9 @@ pub fn believed(
         unit_depth: noise.depth,
     };
     let frame = Frame::new(&Inverse::new(view.clone(), depth, rays), &trust);
-    Ok(frame.samples.iter().map(|sample| sample.inverse).collect())
+    let along = DepthAlong::of_view(view);
+    let samples = frame.samples.iter().zip(rays);
+    let inverse =
+        samples.map(|(sample, ray)| along.inverse_along_axis(*ray, sample.inverse.into()) as f32);
+    Ok(inverse.collect())
 }

@@ -2,7 +2,7 @@
 
 use super::frame::Frame;
 use super::volume::Band;
-use glam::{DVec2, DVec3, IVec3};
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 /// Voxels along a block's side.
@@ -38,7 +38,7 @@ pub(super) fn add_touched(
     keys: &mut Vec<IVec3>,
     grid: &Grid,
     frame: &Frame,
-    rays: &[DVec2],
+    rays: &[DVec3],
     band: &Band,
 ) {
     let world_from_camera = frame.view.camera_from_world.inverse();
@@ -48,7 +48,8 @@ pub(super) fn add_touched(
             // The band is as thick as it should be across the surface.
             let along = point.normalize() / cos;
             // What is nearer than the camera is behind it.
-            let front = match along.z * band.before < point.z {
+            let depth = |p: DVec3| frame.along.depth(p);
+            let front = match depth(along) * band.before < depth(point) {
                 true => point - along * band.before,
                 false => DVec3::ZERO,
             };

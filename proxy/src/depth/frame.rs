@@ -1,28 +1,27 @@
 //! A depth map made ready: inverse depths, their slopes, and how far each is believed.
 
-use calibrate::{Lens, Pixel, View};
+use calibrate::{DepthAlong, Lens, Pixel, View};
 use capture::DepthMap;
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-/// The rays of all pixels of a lens as (x, y) at z = 1, made anew only for another lens; NaN
-/// where a pixel has none that a depth along z could lie on.
+/// The rays of all pixels of a lens, as [`DepthAlong::ray`] has them, made anew only for another lens; NaN
+/// where a pixel has none that a depth could lie on.
 #[derive(Default)]
 pub(super) struct Rays {
     of: Option<(Lens, u32, u32)>,
-    rays: Vec<DVec2>,
+    rays: Vec<DVec3>,
 }
 
 impl Rays {
-    pub(super) fn of(&mut self, lens: &Lens, width: u32, height: u32) -> &[DVec2] {
+    pub(super) fn of(&mut self, lens: &Lens, width: u32, height: u32) -> &[DVec3] {
         let wanted = Some((*lens, width, height));
         if self.of != wanted {
+            let along = DepthAlong::of(lens, width, height);
             let ray = |i: usize| {
                 let (column, row) = (i as u32 % width, i as u32 / width);
                 let ray = lens.unproject(Pixel::center_of(column, row));
-                // Beyond 87° from the axis a depth along z says nothing.
-                let ray = ray.filter(|ray| ray.z > 0.05);
-                ray.map_or(DVec2::NAN, |ray| ray.truncate() / ray.z)
+                ray.and_then(|ray| along.ray(ray)).unwrap_or(DVec3::NAN)
             };
             self.rays = (0..width as usize * height as usize)
                 .into_par_iter()
@@ -37,16 +36,17 @@ impl Rays {
 /// A depth map's inverse depths, 0 where unknown.
 pub(super) struct Inverse<'a> {
     pub(super) view: View,
+    along: DepthAlong,
     width: usize,
     height: usize,
     values: Vec<f64>,
-    pub(super) rays: &'a [DVec2],
+    pub(super) rays: &'a [DVec3],
 }
 
 impl<'a> Inverse<'a> {
     /// The depth map must be as large as the view and have all its values.
-    pub(super) fn new(view: View, depth: &DepthMap, rays: &'a [DVec2]) -> Self {
-        let inverse = |(&depth, ray): (&f32, &DVec2)| {
+    pub(super) fn new(view: View, depth: &DepthMap, rays: &'a [DVec3]) -> Self {
+        let inverse = |(&depth, ray): (&f32, &DVec3)| {
             let inverse = f64::from(depth).recip();
             let is_known = depth > 0.0 && depth.is_finite() && ray.is_finite();
             if is_known && inverse.is_finite() {
@@ -56,6 +56,7 @@ impl<'a> Inverse<'a> {
             }
         };
         Self {
+            along: DepthAlong::of_view(&view),
             view,
             width: depth.width as usize,
             height: depth.height as usize,
@@ -71,7 +72,7 @@ impl<'a> Inverse<'a> {
         (column < self.width && row < self.height).then_some(row * self.width + column)
     }
 
-    /// How far apart the rays of neighbouring pixels are around one, at z = 1.
+    /// How far apart the rays of neighbouring pixels are around one, at a depth of 1.
     fn step(&self, i: usize) -> f64 {
         let ways = [(1, 0), (-1, 0), (0, 1), (0, -1)];
         let beside = ways.iter().filter_map(|way| self.beside(i, *way));
@@ -183,6 +184,8 @@ pub(super) struct Extremes {
 /// A depth map ready to be fused.
 pub(super) struct Frame {
     pub(super) view: View,
+    /// What its depths are along.
+    pub(super) along: DepthAlong,
     pub(super) samples: Vec<Sample>,
     pub(super) tiles: Vec<Extremes>,
     pub(super) tiles_across: usize,
@@ -230,6 +233,7 @@ impl Frame {
         let tiles = (0..across * down).into_par_iter().map(extremes).collect();
         Self {
             view: inverse.view.clone(),
+            along: inverse.along,
             samples,
             tiles,
             tiles_across: across,
@@ -248,7 +252,7 @@ fn sample(map: &Inverse, i: usize, trust: &Trust) -> Sample {
     if here == 0.0 {
         return Sample::default();
     }
-    let ray = map.rays[i].extend(1.0);
+    let ray = map.rays[i];
     let steepest = trust.max_slant.tan();
     let beside = |way| {
         let j = map.beside(i, way)?;
@@ -257,7 +261,7 @@ fn sample(map: &Inverse, i: usize, trust: &Trust) -> Sample {
         let step = map.rays[i].distance(map.rays[j]);
         let most = here.max(there) * step * steepest + 4.0 * trust.noise;
         let is_same = there > 0.0 && (here - there).abs() <= most;
-        is_same.then(|| (map.rays[j].extend(1.0) / there, there))
+        is_same.then(|| (map.rays[j] / there, there))
     };
     let point = ray / here;
     let tangent = |back: (isize, isize), on: (isize, isize)| {
@@ -312,7 +316,7 @@ impl Frame {
     /// the cosine of its slant.
     pub(super) fn surface<'a>(
         &'a self,
-        rays: &'a [DVec2],
+        rays: &'a [DVec3],
         row: usize,
     ) -> impl Iterator<Item = (DVec3, f64)> + 'a {
         let width = self.view.width as usize;
@@ -320,7 +324,7 @@ impl Frame {
         let believed = pixels.filter(|i| self.samples[*i].cos > 0.0);
         believed.map(|i| {
             let sample = &self.samples[i];
-            let point = rays[i].extend(1.0) / f64::from(sample.inverse);
+            let point = rays[i] / f64::from(sample.inverse);
             (point, f64::from(sample.cos))
         })
     }

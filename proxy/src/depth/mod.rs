@@ -108,7 +108,7 @@ pub enum DepthError {
     /// Nothing but zeros, NaN and edges.
     #[error(
         "none of the {0} depth maps has a depth that neighbours confirm; are they 16-bit \
-         pictures with depth along z, and is their scale right?"
+         pictures with depth along z (of panoramas, along the ray), and is their scale right?"
     )]
     NoDepth(usize),
     /// An option is out of range.

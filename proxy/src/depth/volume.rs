@@ -2,7 +2,7 @@
 
 use super::blocks::{Grid, SIDE};
 use super::frame::{Frame, TILE};
-use calibrate::View;
+use calibrate::{DepthAlong, View};
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -127,8 +127,9 @@ fn reach(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band) -> Reach {
     let (mut low, mut high) = (glam::DVec2::INFINITY, glam::DVec2::NEG_INFINITY);
     let mut all_seen = true;
     for point in corners {
-        near = near.min(point.z);
-        far = far.max(point.z);
+        let depth = frame.along.depth(point);
+        near = near.min(depth);
+        far = far.max(depth);
         match view.lens.project(point) {
             Some(pixel) => {
                 let pixel = glam::DVec2::new(pixel.x, pixel.y);
@@ -136,6 +137,14 @@ fn reach(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band) -> Reach {
             }
             None => all_seen = false,
         }
+    }
+    if frame.along == DepthAlong::Ray {
+        // A block's corners are neither its nearest points nor, around the vertical axis, those whose pixels lie
+        // outermost.
+        let middle = view.camera_from_world * (corner + DVec3::splat(0.5 * extent));
+        let half = 0.5 * extent * 3_f64.sqrt();
+        (near, far) = (middle.length() - half, middle.length() + half);
+        all_seen &= middle.x.hypot(middle.z) > 4.0 * half;
     }
     if far <= 0.0 {
         return Reach::None;
@@ -195,7 +204,8 @@ fn vote(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band, block: &mut 
             (i / (SIDE * SIDE)) as f64,
         );
         let point = origin + axes * at;
-        let Some(pixel) = lens.project(point).filter(|_| point.z > 0.0) else {
+        let there = frame.along.depth(point);
+        let Some(pixel) = lens.project(point).filter(|_| there > 0.0) else {
             continue;
         };
         if !(pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < columns && pixel.y < rows) {
@@ -212,17 +222,17 @@ fn vote(frame: &Frame, corner: DVec3, voxel_size: f64, band: &Band, block: &mut 
         let inverse =
             here + off[0] * f64::from(sample.slope[0]) + off[1] * f64::from(sample.slope[1]);
         let depth = inverse.clamp(0.5 * here, 2.0 * here).recip();
-        let along_ray = (depth - point.z) * (point.length() / point.z);
+        let along_ray = (depth - there) * (point.length() / there);
         if sample.cos == 0.0 {
             if along_ray > 0.1 * depth + band.before {
-                voxel.free += free_weight(frame, point.z);
+                voxel.free += free_weight(frame, there);
             }
             continue;
         }
         // 2. The distance from that plane.
         let distance = along_ray * f64::from(sample.cos);
         if distance > band.before {
-            voxel.free += free_weight(frame, point.z);
+            voxel.free += free_weight(frame, there);
             continue;
         }
         // 3. Behind the surface, less and less is said.

@@ -1,7 +1,7 @@
 //! A mesh's corners coloured from photos.
 
 use super::Mesh;
-use calibrate::{Pixel, View};
+use calibrate::{DepthAlong, Pixel, View};
 use capture::DepthMap;
 use glam::DVec3;
 use image::RgbaImage;
@@ -53,18 +53,18 @@ impl<'a> Painting<'a> {
     }
 
     /// Takes in a photo where its depth map shows the mesh: frontal and near is better. The
-    /// photo and the map are as large as the view; what is behind its camera has depths below 0.
+    /// photo and the map are as large as the view; depths are what [`DepthAlong`] says.
     pub fn add(&mut self, view: &View, photo: &RgbaImage, depth: &DepthMap) {
         let size = (view.width, view.height);
         if photo.dimensions() != size || (depth.width, depth.height) != size {
             return;
         }
-        let center = view.center();
+        let (center, along) = (view.center(), DepthAlong::of_view(view));
         let (tolerance, front_only) = (self.tolerance, self.front_only);
         let corners = self.mesh.positions.par_iter().zip(&self.normals);
         let corners = self.best.par_iter_mut().zip(corners);
         corners.for_each(|(best, (position, normal))| {
-            let z = (view.camera_from_world * *position).z;
+            let depth_there = along.depth(view.camera_from_world * *position);
             let Some(pixel) = view.project(*position).filter(|p| view.contains(*p)) else {
                 return;
             };
@@ -72,7 +72,8 @@ impl<'a> Painting<'a> {
             let (x, y) = (x.min(size.0 - 1), y.min(size.1 - 1));
             let i = y as usize * depth.width as usize + x as usize;
             let shown = f64::from(depth.depths[i]);
-            let is_shown = (shown - z).abs() <= tolerance.max(SAME_DEPTH * z.abs());
+            let is_shown =
+                (shown - depth_there).abs() <= tolerance.max(SAME_DEPTH * depth_there.abs());
             if shown == 0.0 || !is_shown {
                 return;
             }

@@ -2,12 +2,12 @@
 
 use crate::common;
 
-use calibrate::{Lens, Pixel, Rigid3, View};
+use calibrate::{DepthAlong, Distortion, Lens, Pixel, Rigid3, View};
 use capture::DepthMap;
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::Mesh;
-use proxy::depth::{DepthError, Fusion, Options, fuse};
+use proxy::depth::{DepthError, DepthNoise, Fusion, Options, believed, fuse};
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -27,12 +27,13 @@ fn view(center: DVec3, target: DVec3) -> View {
 /// What a view sees of a shape: the distance along a unit ray to its nearest point.
 fn seen(view: &View, distance: impl Fn(DVec3, DVec3) -> Option<f64>) -> (View, DepthMap) {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
+    let along = DepthAlong::of_view(view);
     let mut depths = Vec::new();
     for row in 0..view.height {
         for column in 0..view.width {
             let ray = view.lens.unproject(Pixel::center_of(column, row)).unwrap();
             let distance = distance(view.center(), world_from_camera * ray);
-            depths.push(distance.map_or(0.0, |d| (d * ray.z) as f32));
+            depths.push(distance.map_or(0.0, |d| along.depth(d * ray) as f32));
         }
     }
     let (width, height) = (view.width, view.height);
@@ -209,6 +210,89 @@ fn a_room_is_flat_and_turned_inwards() {
     let count = (0..mesh.triangles.len()).filter(inwards).count();
     let share = count as f64 / mesh.triangles.len() as f64;
     assert!(share > 0.999, "{share}");
+}
+
+/// All round, and 324° from corner to corner: what lies behind has no depth along the axis.
+#[test]
+fn a_room_is_whole_by_photos_that_look_behind_themselves() {
+    let half = DVec3::new(2.0, 1.5, 1.2);
+    let all_round = Lens::new(
+        DVec2::splat(320.0 / std::f64::consts::TAU),
+        DVec2::new(160.0, 80.0),
+        Distortion::Equirectangular,
+    );
+    let fisheye = Lens::new(
+        DVec2::splat(60.0),
+        DVec2::splat(120.0),
+        Distortion::Fisheye { k: [0.0; 4] },
+    );
+    for (lens, width, height) in [(all_round, 320, 160), (fisheye, 240, 240)] {
+        let views = [0.3, 1.7, 3.3, 4.9].map(|angle: f64| {
+            let ahead = DVec3::new(angle.cos(), angle.sin(), 0.1);
+            View {
+                lens,
+                width,
+                height,
+                camera_from_world: Rigid3::looking_at(ahead * 0.4, ahead * 2.0, DVec3::Z),
+            }
+        });
+        let frames: Vec<_> = views.iter().map(|v| seen(v, room(half))).collect();
+        let mesh = fused(&frames, &voxels(0.05)).unwrap().mesh;
+        let mut errors: Vec<f64> = mesh
+            .positions
+            .iter()
+            .map(|p| (half - p.abs()).min_element().abs())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let [median, most] = [50, 95].map(|p| errors[errors.len() * p / 100]);
+        eprintln!("{width} × {height}: median {median:.6}, 95 % {most:.6}");
+        assert!(median < 2e-3 && most < 0.03, "{median} {most}");
+        // As much of each wall as there is.
+        for k in 0..3 {
+            for side in [-1.0, 1.0] {
+                let is_on = |p: &&DVec3| (p[k] * side - half[k]).abs() < 0.02;
+                let count = mesh.positions.iter().filter(is_on).count() as f64;
+                let area = 4.0 * half[(k + 1) % 3] * half[(k + 2) % 3];
+                let share = count * 0.05 * 0.05 / area;
+                assert!(
+                    share > 0.8,
+                    "{width} × {height}: {share} of wall {k}, {side}"
+                );
+            }
+        }
+    }
+}
+
+/// What others ask for are depths along the axis, whatever the maps say.
+#[test]
+fn believed_depths_are_along_the_axis() {
+    let lens = Lens::new(
+        DVec2::splat(160.0 / std::f64::consts::TAU),
+        DVec2::new(80.0, 40.0),
+        Distortion::Equirectangular,
+    );
+    let view = View {
+        lens,
+        width: 160,
+        height: 80,
+        camera_from_world: Rigid3::looking_at(DVec3::ZERO, DVec3::X, DVec3::Z),
+    };
+    let half = DVec3::new(2.0, 1.5, 1.2);
+    let (view, map) = seen(&view, room(half));
+    let noise = DepthNoise {
+        inverse_depth: 1e-3,
+        depth: 1.5,
+    };
+    let inverse = believed(&view, &map, noise, 1.4).unwrap();
+    let at = |column: usize, row: usize| f64::from(inverse[row * 160 + column]);
+    // Ahead all of the wall is as deep; behind nothing is.
+    for (column, row) in [(80, 40), (72, 44), (90, 36)] {
+        let depth = at(column, row).recip();
+        assert!((depth - half.x).abs() < 1e-4, "{column}, {row}: {depth}");
+    }
+    for column in [0, 20, 140] {
+        assert_eq!(at(column, 40), 0.0, "{column}");
+    }
 }
 
 /// A square before a wall, seen from a few places; `spoil` changes depth maps.

@@ -25,8 +25,8 @@ pub struct DepthMaps {
 }
 
 impl DepthMaps {
-    /// Of the source views of which `has` says so. `load` decodes one, along z in world units and as
-    /// large as the photo, or says what is wrong, naming the file.
+    /// Of the source views of which `has` says so. `load` decodes one, in world units (as
+    /// [`calibrate::DepthAlong`] says) and as large as the photo, or says what is wrong, naming the file.
     pub fn new(
         has: Vec<bool>,
         load: impl Fn(usize) -> Result<DepthMap, String> + Send + Sync + 'static,
