@@ -1,5 +1,7 @@
 //! Flat polygons in space.
 
+mod pieces;
+
 use glam::{DVec2, DVec3};
 
 /// A flat, simple polygon of three corners or more, convex or not.
@@ -47,11 +49,6 @@ const MAX_CORNERS: usize = 256;
 const FLATNESS: f64 = 1e-3;
 /// What counts as nothing, in shares of the extent.
 const NOTHING: f64 = 1e-9;
-/// A corner that is no farther inside the line between its neighbours is on it, in shares of the
-/// extent: files round positions to f32. Without it the polygon is larger by as much.
-const STRAIGHT_INSIDE: f64 = 1e-6;
-/// The same outside of it: without that corner the polygon is smaller, and nothing may be hidden.
-const STRAIGHT_OUTSIDE: f64 = 1e-12;
 
 impl Polygon {
     /// A polygon of corners in order around it.
@@ -185,56 +182,6 @@ impl Polygon {
         }
     }
 
-    /// Convex pieces, each counter-clockwise around the normal: itself, or triangles. Corners on a
-    /// straight side are left out, as rounding would bend it inwards there.
-    pub fn convex_pieces(&self) -> Vec<Vec<DVec3>> {
-        let flat = self.flattened();
-        let mut left = self.bends(&flat);
-        let is_convex = |i: usize| {
-            let corner = |k: usize| flat[left[(i + k) % left.len()]];
-            cross(corner(0), corner(1), corner(2)) >= 0.0
-        };
-        if (0..left.len()).all(is_convex) {
-            return vec![left.iter().map(|k| self.corners[*k]).collect()];
-        }
-        // Ears, one after the other.
-        let mut pieces = Vec::new();
-        while left.len() > 3 {
-            let n = left.len();
-            let ear = |i: usize| {
-                let [a, b, c] = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
-                let (p, q, r) = (flat[a], flat[b], flat[c]);
-                let others = left.iter().filter(|o| ![a, b, c].contains(o));
-                cross(p, q, r) > 0.0
-                    && others.clone().all(|o| {
-                        let o = flat[*o];
-                        let is_outside =
-                            cross(p, q, o) < 0.0 || cross(q, r, o) < 0.0 || cross(r, p, o) < 0.0;
-                        is_outside || o == p || o == q || o == r
-                    })
-            };
-            // A simple polygon has one; rounding may hide it in a sliver, which then goes.
-            let i = (0..n).find(|i| ear(*i)).unwrap_or(0);
-            let triangle = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
-            pieces.push(triangle.map(|k| self.corners[k]).to_vec());
-            left.remove(i);
-        }
-        pieces.push(left.iter().map(|k| self.corners[*k]).collect());
-        pieces
-    }
-
-    /// The corners that are not on a straight side, in order; `flat` are all of them on the plane.
-    fn bends(&self, flat: &[DVec2]) -> Vec<usize> {
-        let straight = -STRAIGHT_INSIDE * self.size..=STRAIGHT_OUTSIDE * self.size;
-        let mut left: Vec<usize> = (0..flat.len()).collect();
-        thin(&mut left, |corners| {
-            let [a, b, c] = corners.map(|k| flat[k]);
-            // How far it is outside the line between its neighbours; NaN where these are one.
-            straight.contains(&(cross(a, b, c) / a.distance(c)))
-        });
-        left
-    }
-
     /// Two axes of its plane, right-handed with the normal.
     fn axes(&self) -> (DVec3, DVec3) {
         let x = self.normal.any_orthonormal_vector();
@@ -343,7 +290,6 @@ pub(super) fn thin<T: Copy>(outline: &mut Vec<T>, is_needless: impl Fn([T; 3]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DQuat;
 
     fn polygon(corners: &[[f64; 3]]) -> Result<Polygon, PolygonError> {
         Polygon::new(corners.iter().map(|p| DVec3::from_array(*p)).collect())
@@ -367,27 +313,6 @@ mod tests {
         assert!(message(&bent).contains("off the plane of the others"));
         let eight = [[0.0; 3], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         assert!(message(&eight).contains("cross"), "{}", message(&eight));
-    }
-
-    /// What convex pieces of a polygon cover together.
-    fn area(of: &Polygon, pieces: &[Vec<DVec3>]) -> f64 {
-        let twice = |p: &Vec<DVec3>| {
-            let across = |i: usize| (p[i] - p[0]).cross(p[i + 1] - p[0]);
-            let fan = (1..p.len() - 1).map(|i| across(i).dot(of.normal()));
-            fan.inspect(|a| assert!(*a > 0.0)).sum::<f64>()
-        };
-        0.5 * pieces.iter().map(twice).sum::<f64>()
-    }
-
-    /// An outline with four more corners on each side, turned, so that rounding bends the sides.
-    fn with_corners_on_sides(corners: &[[f64; 2]], rounded: impl Fn(DVec3) -> DVec3) -> Polygon {
-        let turned = DQuat::from_rotation_y(30_f64.to_radians());
-        let side = |i: usize| {
-            let [a, b] = [i, (i + 1) % corners.len()].map(|k| DVec2::from_array(corners[k]));
-            (0..5).map(move |k| a.lerp(b, f64::from(k) / 5.0).extend(3.0))
-        };
-        let all = (0..corners.len()).flat_map(side);
-        Polygon::new(all.map(|p| rounded(turned * p)).collect()).unwrap()
     }
 
     #[test]
@@ -427,35 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_on_its_sides_do_not_take_it_to_pieces() {
-        let doorway = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]];
-        let exact = with_corners_on_sides(&doorway, |p| p);
-        assert_eq!(exact.corners().len(), 20);
-        let pieces = exact.convex_pieces();
-        assert_eq!((pieces.len(), pieces[0].len()), (1, 4));
-        assert!((area(&exact, &pieces) - 2.0).abs() < 1e-12);
-        // As files have it.
-        let coarse = with_corners_on_sides(&doorway, |p| p.as_vec3().as_dvec3());
-        let pieces = coarse.convex_pieces();
-        assert_eq!(pieces.len(), 1);
-        assert!((area(&coarse, &pieces) - 2.0).abs() < 1e-5);
-        // What is concave stays so.
-        let l = [
-            [0.0, 0.0],
-            [2.0, 0.0],
-            [2.0, 1.0],
-            [1.0, 1.0],
-            [1.0, 3.0],
-            [0.0, 3.0],
-        ];
-        let l = with_corners_on_sides(&l, |p| p);
-        let pieces = l.convex_pieces();
-        assert_eq!(pieces.len(), 4);
-        assert!((area(&l, &pieces) - 4.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn pieces_are_convex_and_cover_it() {
+    fn what_is_inside_and_how_far_off_it_is() {
         // An L, far from the origin.
         let far = DVec3::new(5e5, 5e6, 100.0);
         let l = [
@@ -468,9 +365,6 @@ mod tests {
         ];
         let l = Polygon::new(l.iter().map(|p| far + DVec3::from_array(*p)).collect()).unwrap();
         assert!((l.normal() - DVec3::Z).length() < 1e-12);
-        let pieces = l.convex_pieces();
-        assert_eq!(pieces.len(), 4);
-        assert!((area(&l, &pieces) - 4.0).abs() < 1e-9);
         let covers = |x, y| l.covers(far + DVec3::new(x, y, 7.0), 0.0);
         assert!(covers(0.5, 2.0) && covers(1.5, 0.5) && !covers(1.5, 1.5));
         assert!(l.covers(far + DVec3::new(1.1, 2.0, 0.0), 0.2));
