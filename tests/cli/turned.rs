@@ -135,8 +135,8 @@ fn cameras_that_opencv_calibrated_see_photos_as_they_are_stored() {
     let model = || colmap::read_model(&here.join("scene/model")).unwrap();
     let note = "cv/calibration.yml is taken to speak of them so, and their cameras are turned";
 
-    let turns: [(u8, u8, fn(&RgbImage) -> RgbImage); 3] =
-        [(6, 1, rotate270), (3, 2, rotate180), (8, 3, rotate90)];
+    type Turn = fn(&RgbImage) -> RgbImage;
+    let turns: [(u8, u8, Turn); 3] = [(6, 1, rotate270), (3, 2, rotate180), (8, 3, rotate90)];
     for (orientation, quarters, stored) in turns {
         for text in [&of_shown, &without_size] {
             capture(orientation, stored, text);

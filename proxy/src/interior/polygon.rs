@@ -3,6 +3,7 @@
 mod pieces;
 
 use glam::{DVec2, DVec3};
+use pieces::STRAIGHT_INSIDE;
 
 /// A flat, simple polygon of three corners or more, convex or not.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,6 +14,7 @@ mod asked;
 mod compose;
 mod files;
 mod filled;
+mod openings;
 
 use super::background::Background;
 use super::recipe::Made;
@@ -27,7 +28,9 @@ use asked::Asked;
 use calibrate::View;
 use filled::Filled;
 use glam::DVec3;
-use proxy::interior::{CellId, Contents, Interior, Pass, Region, Visibility, VisibleCell, visible};
+use proxy::interior::{
+    CellId, Contents, Interior, Pass, PortalId, Region, Visibility, VisibleCell, visible,
+};
 use proxy::mesh::Model;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -271,7 +274,10 @@ impl<'a> Walk<'a> {
         cost.visible_cells = visibility.cells.len();
         let passes = &visibility.passes;
         let is_open = |pass: &&Pass| pass.depth == 0 && pass.into.is_some();
-        cost.portals = passes.iter().filter(is_open).count();
+        // Convex pieces of one portal follow one another.
+        let mut own: Vec<PortalId> = passes.iter().filter(is_open).map(|p| p.portal).collect();
+        own.dedup();
+        cost.portals = own.len();
         // Where there are too many portals to tell what one sees through them, all is geometry.
         let is_known = !passes.is_empty() || visibility.cells.len() <= 1;
         let has_images = fill.references() > 0 || fill == PortalFill::Ldi;

@@ -57,6 +57,18 @@ impl Window {
         }
     }
 
+    /// Takes in another window of the same image, and in each row what lies between the two.
+    pub(super) fn take_in(&mut self, other: &Self) {
+        self.rows.resize(other.rows.len(), (0, 0));
+        for (row, &(first, end)) in self.rows.iter_mut().zip(&other.rows) {
+            if row.0 >= row.1 {
+                *row = (first, end);
+            } else if first < end {
+                *row = (row.0.min(first), row.1.max(end));
+            }
+        }
+    }
+
     /// Whether it has all pixels of an image so wide.
     pub(crate) fn is_whole(&self, width: u32) -> bool {
         self.rows.iter().all(|row| *row == (0, width))

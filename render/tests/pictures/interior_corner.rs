@@ -26,7 +26,7 @@ const END: &str = r#"{"name": "end", "between": ["corner", "end"],
   "polygon": [[6, 0, 0.5], [6, 0, 1.5], [6, 2, 1.5], [6, 2, 0.5]]}"#;
 
 /// Four corners of a wall.
-fn quad(model: &mut Model, node: &str, corners: [[f64; 3]; 4], color: [u8; 4]) {
+pub(crate) fn quad(model: &mut Model, node: &str, corners: [[f64; 3]; 4], color: [u8; 4]) {
     let mesh = Mesh {
         positions: corners.map(DVec3::from_array).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],

@@ -18,6 +18,7 @@ mod goals;
 mod hard_places;
 mod house;
 mod interior_captured;
+mod interior_concave;
 mod interior_corner;
 mod interior_files;
 mod interior_geometry;

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 /// A corner that is no farther inside the line between its neighbours is on it, in shares of the
 /// extent: files round positions to f32. Without it the polygon is larger by as much.
-const STRAIGHT_INSIDE: f64 = 1e-6;
+pub(super) const STRAIGHT_INSIDE: f64 = 1e-6;
 /// The same outside of it: without that corner the polygon is smaller, and nothing may be hidden.
 const STRAIGHT_OUTSIDE: f64 = 1e-12;
 /// A piece of more than three corners is convex from wherever one looks if all of them are outside the line

@@ -1,7 +1,8 @@
 //! The triangles that a frame asks for.
 
 use super::everywhere;
-use super::filled::{Filled, Opening};
+use super::filled::Filled;
+use super::openings::Opening;
 use crate::interior::{CellGeometry, Pinhole, Runs, Window};
 use proxy::interior::{Interior, Region, Visibility, VisibleCell, visible_through};
 
@@ -43,20 +44,23 @@ impl<'g> Asked<'g> {
         }
         let eye = self.camera.center;
         for opening in openings {
-            let (id, region) = (opening.pass.portal, &opening.pass.region);
+            let (id, regions) = (opening.pass.portal, opening.regions.iter());
             let share = opening.fill.map_or(0.0, |k| fills[k].share);
             let Some(into) = opening.pass.into.filter(|_| share < 1.0) else {
                 continue;
             };
-            let beyond = match opening.is_entered {
+            let beyond = match opening.is_entered() {
                 // What is beyond its own portals is theirs to say.
                 true => only(Some(VisibleCell {
                     cell: into,
-                    regions: vec![region.clone()],
+                    regions: regions.copied().cloned().collect(),
                 })),
-                false => visible_through(self.interior, id, into, eye, region),
+                false => regions
+                    .map(|region| visible_through(self.interior, id, into, eye, region))
+                    .reduce(together)
+                    .unwrap_or_default(),
             };
-            windows.push((self.seen(beyond), Window::of(region, self.camera)));
+            windows.push((self.seen(beyond), opening.window(self.camera)));
         }
         windows
     }
@@ -70,6 +74,18 @@ impl<'g> Asked<'g> {
                 .seen(eye, &everywhere(visibility), &Region::ALL),
         }
     }
+}
+
+/// The cells that either has, each where it is seen in either.
+fn together(mut visibility: Visibility, more: Visibility) -> Visibility {
+    for cell in more.cells {
+        let mut known = visibility.cells.iter_mut();
+        match known.find(|known| known.cell == cell.cell) {
+            Some(known) => known.regions.extend(cell.regions),
+            None => visibility.cells.push(cell),
+        }
+    }
+    visibility
 }
 
 /// One cell, or none.
