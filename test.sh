@@ -88,9 +88,9 @@ if [ "$(uname -s)" = Linux ]; then
     export WGPU_BACKEND=gl LUMIGRAPH_REQUIRE_GPU=1
     cargo test --workspace --lib gpu::
     # Of these, what a device draws.
-    cargo test --workspace --test pictures -- engines:: limits:: residency:: exposure:: ldi::device:: \
+    cargo test --workspace --test pictures -- edges::every_engine engines lens_edge:: limits:: residency:: exposure:: ldi::device:: \
         invariance::moving invariance::a_batch \
-        masks::at masks::masked masks::mattes masks::triangulated masks::soft masks::what_every \
+        masks::at masks::masked masks::triangulated masks::what_every mattes::mattes mattes::soft \
         mesh::every_engine mesh::a_view points::every_engine points::a_view \
         time::engines time::triangulated time::a_whole_period
     cargo test --workspace --test cli -- gpu:: a_graphics_device

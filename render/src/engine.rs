@@ -7,6 +7,7 @@ use crate::frame::Frame;
 use crate::gpu::{self, Gpu};
 use crate::options::Method;
 use crate::photos::PhotoStore;
+use crate::sight::Views;
 use crate::{RenderError, reference};
 use image::RgbaImage;
 
@@ -246,22 +247,30 @@ impl Engine {
         }
     }
 
-    /// Draws the pixels of a picture at which its frame's surface jumps once more, as means of so many samples across
-    /// and down; how many they are. See [`Edges`].
+    /// Draws the pixels of a picture at which its frame's surface jumps anew, as means of so many samples across
+    /// and down: outlines without stairs. How many they are. The CPU does so whatever has drawn the picture, with the photos
+    /// that were prepared for it; 0 and 1 leave it as it is.
     ///
     /// # Errors
-    /// As [`Self::draw_ready`].
+    /// A photo that is needed cannot be decoded.
     pub fn smooth(
         &mut self,
         frame: &Frame<'_>,
+        prepared: &Prepared,
         across: u32,
         picture: &mut RgbaImage,
     ) -> Result<usize, RenderError> {
-        let Some(edges) = Edges::of(frame, picture, across) else {
+        let views = Views::new(&frame.sources);
+        let Some(edges) = Edges::of(frame, &views, picture, across) else {
             return Ok(0);
         };
-        let samples = self.render(&edges.samples, Method::Exact)?;
-        edges.put(&samples, picture);
+        match self.by {
+            By::Reference => reference::smooth(frame, prepared.field(), &edges, picture)?,
+            By::Cpu { .. } | By::Gpu(_) => {
+                self.spare
+                    .smooth(frame, prepared.field(), &edges, picture)?;
+            }
+        }
         Ok(edges.count())
     }
 

@@ -9,7 +9,7 @@ use crate::options::{FieldOptions, Resolution, Skips};
 use crate::photos::PhotoError;
 use crate::planted::{Fault, is_planted};
 use crate::sight::{Views, within_sight};
-use crate::surface::{FacetMap, Surface, shown};
+use crate::surface::{FacetMap, Surface};
 use crate::tally::{Scored, Tally};
 use crate::time::Moment;
 use crate::view_tree::ViewTree;
@@ -243,6 +243,8 @@ pub struct Frame<'a> {
     pub sources: Vec<FrameSource>,
     /// The proxy from there.
     pub surface: Surface,
+    /// Samples of a pixel, across and down, each of which is as much smaller than the pixel.
+    across: f64,
     /// What is left out.
     pub(crate) skips: Skips,
     /// Made when first asked for.
@@ -286,23 +288,18 @@ impl<'a> Frame<'a> {
         Self::of(lumigraph, desired, options, gone, None, Some(facets))
     }
 
-    /// The same source views, of the same weight, as another desired view from the same place has them, which
-    /// sees these facets of the mesh. `rays` are its own.
-    pub(crate) fn seeing(&self, desired: View, facets: FacetMap, rays: Option<&Rays>) -> Self {
+    /// For so many samples of a pixel, across and down: photos weigh as they do in this frame, and are sampled from finer
+    /// mip levels. What samples look at they bring with them.
+    pub(crate) fn of_samples(&self, across: usize) -> Self {
         Self {
             lumigraph: self.lumigraph,
-            surface: Surface::Facets(shown(
-                facets,
-                self.lumigraph,
-                &desired,
-                rays,
-                &Views::new(&self.sources),
-            )),
-            desired,
+            desired: self.desired.clone(),
             options: self.options,
             sources: self.sources.clone(),
+            surface: Surface::Nothing,
+            across: across as f64,
             skips: self.skips,
-            view_tree: OnceLock::new(),
+            view_tree: self.view_tree.clone(),
             tally: Tally::new(self.sources.len()),
         }
     }
@@ -364,6 +361,7 @@ impl<'a> Frame<'a> {
             options,
             sources,
             surface,
+            across: 1.0,
             skips: Skips::ALL,
             view_tree: OnceLock::new(),
             tally: Tally::new(lumigraph.sources.len()),
@@ -565,7 +563,7 @@ impl<'a> Frame<'a> {
     /// for a facet in the plane with vector `q`.
     pub fn area_scale(&self, source_idx: usize, q: DVec3) -> f64 {
         let source = &self.sources[source_idx];
-        let focal = source.lens.mean_focal() / self.desired.lens.mean_focal();
+        let focal = source.lens.mean_focal() / (self.across * self.desired.lens.mean_focal());
         // q · x = 1 on the plane, so 1 − q · c is c's distance from it over the viewer's.
         focal * focal * (1.0 - q.dot(source.center)).abs()
     }

@@ -29,10 +29,19 @@ impl<'a> Held<'a> {
     /// asks. Where it is too small for what is wanted, all are held without their finest mip
     /// levels.
     pub fn new(frame: &Frame<'a>, wanted: &[usize]) -> Self {
+        Self::of(frame, wanted, false)
+    }
+
+    /// The same for more of a frame that was drawn before, which the store is not told of.
+    pub(crate) fn again(frame: &Frame<'a>, wanted: &[usize]) -> Self {
+        Self::of(frame, wanted, true).uncounted()
+    }
+
+    fn of(frame: &Frame<'a>, wanted: &[usize], is_again: bool) -> Self {
         let store = &frame.lumigraph.photos;
         let sizes = sizes_of(frame, wanted);
         let finest = finest_level(store.residency().budget, sizes.clone());
-        store.make_room(wanted, sizes, finest);
+        store.make_room(wanted, sizes, finest, is_again);
         Self {
             store,
             finest,

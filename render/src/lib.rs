@@ -48,7 +48,7 @@ mod view_tree;
 mod visibility;
 
 pub use bounded::{Bounded, ErrorEstimate, GRIDS, Samples, prepare_within};
-pub use edges::Edges;
+pub use edges::EDGE_SAMPLES;
 pub use engine::{DeviceChoice, Engine, Prepared, Ready};
 pub use field::TriangulatedField;
 pub use frame::{Frame, FrameSource, LEVEL_BIAS, Part, ProxyPoint};

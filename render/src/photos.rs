@@ -371,15 +371,18 @@ impl PhotoStore {
 
     /// Makes room for the photos `wanted`, of the given sizes, from a mip level on. Of those
     /// that are there, levels that are finer go, and what is coarser goes as a whole, so that
-    /// all that is there is as it will be sampled.
+    /// all that is there is as it will be sampled. Whether a frame is drawn again, of which note was taken.
     pub(crate) fn make_room(
         &self,
         wanted: &[usize],
         sizes: impl Iterator<Item = [u32; 2]>,
         finest: usize,
+        is_again: bool,
     ) {
         let mut shelf = self.shelf();
-        shelf.residency.note_frame(finest);
+        if !is_again {
+            shelf.residency.note_frame(finest);
+        }
         shelf.slots.iter_mut().for_each(|slot| slot.awaited = 0);
         shelf.awaited = 0;
         shelf.frame_began = shelf.clock;

@@ -3,6 +3,8 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
+use crate::edges::{Edges, Sample};
+use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint, exposed, trust};
 use crate::held::Held;
 use crate::image_out::straight_rgba8;
@@ -15,14 +17,55 @@ use rayon::prelude::*;
 
 /// The exact blending field at a proxy point: who paints it, and how much.
 pub fn blend_at(frame: &Frame<'_>, point: &ProxyPoint) -> Vec<Contributor> {
+    blend_among(frame, point, 0..frame.sources.len())
+}
+
+/// The same of some source views, in order.
+fn blend_among(
+    frame: &Frame<'_>,
+    point: &ProxyPoint,
+    among: impl Iterator<Item = usize>,
+) -> Vec<Contributor> {
     let seen = |source_idx: usize| {
         let pixel = frame.project(source_idx, point)?;
         candidate(frame, source_idx, point, pixel, || {
             frame.difference(source_idx, point)
         })
     };
-    let candidates: Vec<Candidate> = (0..frame.sources.len()).filter_map(seen).collect();
+    let candidates: Vec<Candidate> = among.filter_map(seen).collect();
     blend(&candidates, &frame.options)
+}
+
+/// Draws edges into their frame's picture, of the photos that its field lists, if it has one.
+///
+/// # Errors
+/// A photo or mask that is needed cannot be decoded.
+pub(crate) fn smooth(
+    frame: &Frame<'_>,
+    field: Option<&TriangulatedField>,
+    edges: &Edges<'_>,
+    picture: &mut RgbaImage,
+) -> Result<(), PhotoError> {
+    let among = field.map_or_else(|| frame.taking_part().collect(), TriangulatedField::listed);
+    let photos = Held::again(frame, &among);
+    let frame_of_samples = edges.frame_of_samples();
+    let frame = &frame_of_samples;
+    let color = |Sample { ray, plane }: &Sample| {
+        let point = ProxyPoint {
+            ray: *ray,
+            inverse_distance: plane.dot(*ray),
+            plane: *plane,
+        };
+        if point.inverse_distance < 0.0 {
+            return Ok(None);
+        }
+        let contributors = blend_among(frame, &point, among.iter().copied());
+        let color = color_at(frame, &photos, &point, &contributors)?;
+        Ok((!contributors.is_empty()).then(|| straight_rgba8(color)))
+    };
+    let draw = |(): &mut (), samples: &[Sample]| samples.iter().map(color).collect();
+    edges.put(|| (), draw, picture)?;
+    frame.check_masks()
 }
 
 /// A source view as a candidate for a proxy point that falls on a pixel of its image; `None`

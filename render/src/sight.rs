@@ -16,6 +16,7 @@ use crate::tiles::TILE;
 use crate::visibility::Visibility;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
+pub(crate) use hidden::{Between, Seen};
 use known::Known;
 use proxy::Rays;
 use rayon::prelude::*;

@@ -94,7 +94,14 @@ impl Surface {
             Proxy::Mesh(solid) => {
                 let (rays, views) = (rays(), Views::new(sources));
                 let map = FacetMap::of_mesh(solid, desired, rays.as_ref());
-                Self::Facets(shown(map, lumigraph, desired, rays.as_ref(), &views))
+                let map = within_sight(map, desired, rays.as_ref(), &views);
+                Self::Facets(match &lumigraph.visibility {
+                    None => map,
+                    Some(seen) => {
+                        let photos = &lumigraph.photos;
+                        out_of_hiding(map, desired, rays.as_ref(), &views, seen, photos)
+                    }
+                })
             }
         }
     }
@@ -139,15 +146,6 @@ impl Surface {
         }
     }
 
-    /// Whether all pixels of the tile around a pixel see nothing, as far as that is known at once.
-    pub(crate) fn is_nothing_of_tile(&self, column: usize, row: usize) -> bool {
-        match self {
-            Self::Nothing => true,
-            Self::Plane(_) => false,
-            Self::Facets(map) => map.tiles.at(column, row) == Some(NO_FACET),
-        }
-    }
-
     /// q at the centre of a pixel.
     #[inline]
     pub(crate) fn plane_of(&self, column: usize, row: usize) -> Option<DVec3> {
@@ -156,21 +154,6 @@ impl Surface {
             Self::Plane(q) => Some(*q),
             Self::Facets(map) => map.plane_of(map.facet_of[row * map.size[0] as usize + column]),
         }
-    }
-}
-
-/// What pixels see of a mesh, moved to where photos have it and show it; see `sight.rs`.
-pub(crate) fn shown(
-    map: FacetMap,
-    lumigraph: &Lumigraph,
-    desired: &View,
-    rays: Option<&Rays>,
-    views: &Views<'_>,
-) -> FacetMap {
-    let map = within_sight(map, desired, rays, views);
-    match &lumigraph.visibility {
-        None => map,
-        Some(seen) => out_of_hiding(map, desired, rays, views, seen, &lumigraph.photos),
     }
 }
 
@@ -186,7 +169,7 @@ impl FacetMap {
         (self.moved_from as usize) < self.planes.len()
     }
 
-    fn is_moved(&self, facet: u32) -> bool {
+    pub(crate) fn is_moved(&self, facet: u32) -> bool {
         facet != NO_FACET && facet >= self.moved_from
     }
 
@@ -442,43 +425,6 @@ impl FacetMap {
             let hit = solid.first_hit(center, world_from_camera * ray);
             hit.map_or(NO_FACET, |hit| hit.triangle_idx)
         });
-        Self::of_pixels(planes, facet_of, desired)
-    }
-
-    /// What of a mesh that this is of a finer picture of the same camera sees in the pixels that are wanted, and nothing
-    /// elsewhere: `is_wanted` tells of some columns and rows whether any of their pixels is.
-    pub(crate) fn finer(
-        &self,
-        solid: &Solid,
-        desired: &View,
-        rays: Option<&Rays>,
-        is_wanted: impl Fn(&Range<usize>, &Range<usize>) -> bool + Sync,
-    ) -> Self {
-        let (width, height) = (desired.width as usize, desired.height as usize);
-        let mut facet_of = vec![NO_FACET; width * height];
-        if let Some(rays) = rays {
-            solid.triangles_where(desired, rays, &is_wanted, &mut facet_of);
-        }
-        let center = desired.center();
-        let world_from_camera = desired.camera_from_world.rotation.conjugate();
-        let hit = |x: usize, y: usize| {
-            let ray = desired
-                .lens
-                .unproject(Pixel::center_of(x as u32, y as u32))?;
-            let hit = solid.first_hit(center, world_from_camera * ray)?;
-            Some(hit.triangle_idx)
-        };
-        let rows = facet_of.par_chunks_mut(width.max(1)).enumerate();
-        rows.for_each(|(y, row)| {
-            for (x, facet) in row.iter_mut().enumerate() {
-                if !is_wanted(&(x..x + 1), &(y..y + 1)) {
-                    *facet = NO_FACET;
-                } else if rays.is_none() {
-                    *facet = hit(x, y).unwrap_or(NO_FACET);
-                }
-            }
-        });
-        let planes = self.planes[..self.moved_from as usize].to_vec();
         Self::of_pixels(planes, facet_of, desired)
     }
 

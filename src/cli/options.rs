@@ -9,7 +9,9 @@ use calibrate::opencv::Keys;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{DOUBTFUL_PX, Photo, Scene, Warning};
-use render::{Blend, DeviceChoice, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
+use render::{
+    Blend, DeviceChoice, EDGE_SAMPLES, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips,
+};
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -265,7 +267,7 @@ impl FieldArgs {
 pub(super) struct EdgeArgs {
     /// Samples of a pixel, across and down, where a mesh jumps between it and one beside it that looks otherwise:
     /// outlines without stairs; 1 draws them as all else
-    #[arg(long = "edges", value_name = "N", default_value_t = 2,
+    #[arg(long = "edges", value_name = "N", default_value_t = EDGE_SAMPLES,
         value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(super) across: u32,
 }

@@ -20,7 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoError,
-    RenderError, Residency, Skips,
+    Prepared, RenderError, Residency, Skips,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -244,8 +244,9 @@ impl Session {
             let Some(engine) = &mut self.engine else {
                 bail!("the engine was opened above");
             };
-            let drawn = engine.render(&frame, self.method).and_then(|mut picture| {
-                engine.smooth(&frame, self.edge_samples, &mut picture)?;
+            let drawn = Prepared::new(&frame, self.method).and_then(|prepared| {
+                let mut picture = engine.draw(&frame, &prepared)?;
+                engine.smooth(&frame, &prepared, self.edge_samples, &mut picture)?;
                 Ok(picture)
             });
             say_notes(engine, &mut self.notes_said);

@@ -12,13 +12,16 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared, RenderError, Skips,
-    TriangulatedField, picture,
+    EDGE_SAMPLES, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared,
+    RenderError, Skips, TriangulatedField, picture,
 };
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
+/// The stage in which outlines are drawn anew, where nothing moves.
+pub(crate) const EDGES: &str = "edges";
 /// More triangles than this are thinned out before their edges are shown.
 const MOST_EDGED: usize = 6000;
 /// More points than this are.
@@ -44,6 +47,8 @@ struct Ready<'a> {
     moment: Option<Moment>,
     frame: Frame<'a>,
     prepared: Prepared,
+    /// The picture with its outlines drawn anew, once it was.
+    smooth: OnceCell<RgbaImage>,
 }
 
 /// A picture as files have it, and as it is shown.
@@ -171,10 +176,14 @@ impl<'a> SceneDrawer<'a> {
                 moment: look.moment,
                 frame,
                 prepared,
+                smooth: OnceCell::new(),
             });
         }
         let Some(Ready {
-            frame, prepared, ..
+            frame,
+            prepared,
+            smooth,
+            ..
         }) = &self.ready
         else {
             unreachable!("made above");
@@ -184,7 +193,21 @@ impl<'a> SceneDrawer<'a> {
         // 2. The layer.
         let picture = match look.layer {
             Layer::Picture | Layer::Coverage => {
-                timed(&mut stages, "draw", || engine.draw(frame, prepared))?
+                match smooth.get().filter(|_| !request.is_moving) {
+                    Some(picture) => picture.clone(),
+                    None => {
+                        let draw = || engine.draw(frame, prepared);
+                        let mut picture = timed(&mut stages, "draw", draw)?;
+                        // As files have it, where one looks long enough to see stairs.
+                        if !request.is_moving {
+                            let draw =
+                                || engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture);
+                            timed(&mut stages, EDGES, draw)?;
+                            smooth.get_or_init(|| picture.clone());
+                        }
+                        picture
+                    }
+                }
             }
             Layer::Field => timed(&mut stages, "field picture", || {
                 if self.palette.is_empty() {

@@ -3,7 +3,7 @@
 
 use crate::content::{Content, House, Space};
 use crate::draw_house::draw_house;
-use crate::draw_scene::{Drawn, SceneDrawer};
+use crate::draw_scene::{Drawn, EDGES, SceneDrawer};
 use crate::picture::{Request, Shown};
 use crate::shot::{self, Shot, Subject};
 use image::RgbaImage;
@@ -333,9 +333,11 @@ impl<'s> Desk<'s> {
                     match draw(self.tell, &request, reduction) {
                         Ok((picture, mut shown)) => {
                             shown.revision = self.revision;
+                            let edges = shown.stages.iter().find(|(stage, _)| *stage == EDGES);
+                            let edges_ms = edges.map_or(0.0, |(_, ms)| *ms);
                             (self.tell)(News::Shown(Box::new(shown)));
-                            self.adapt(&request, start.elapsed());
-                            if reduction == 1 {
+                            self.adapt(&request, 1e3 * start.elapsed().as_secs_f64() - edges_ms);
+                            if reduction == 1 && !request.is_moving {
                                 kept = Some((*request, picture));
                             }
                         }
@@ -343,9 +345,10 @@ impl<'s> Desk<'s> {
                     }
                 }
                 Job::Shoot => {
-                    let Some(request) = self.last.clone() else {
+                    let Some(mut request) = self.last.clone() else {
                         continue;
                     };
+                    request.is_moving = false;
                     if !kept.as_ref().is_some_and(|(of, _)| is_alike(of, &request)) {
                         match draw(self.tell, &request, 1) {
                             Ok((picture, _)) => kept = Some((request.clone(), picture)),
@@ -365,9 +368,9 @@ impl<'s> Desk<'s> {
         }
     }
 
-    /// How large the next picture will be that is drawn while one moves.
-    fn adapt(&mut self, request: &Request, time: Duration) {
-        let ms = 1e3 * time.as_secs_f64();
+    /// How large the next picture will be that is drawn while one moves, where one took so long to draw, without what
+    /// is only drawn where nothing moves.
+    fn adapt(&mut self, request: &Request, ms: f64) {
         let drawn = if request.is_moving { self.reduction } else { 1 };
         if ms > SLOW_MS {
             // As if time went by pixels.

@@ -79,11 +79,7 @@ impl Solid {
     }
 
     fn scan_by(&self, threads: Threads, view: &View, rays: &Rays) -> Scan {
-        let mut scan = Scan::of(
-            self.prepared(threads, view, rays, |_, _| true),
-            threads,
-            rays,
-        );
+        let mut scan = Scan::of(self.prepared(threads, view, rays), threads, rays);
         if let Some(hull) = self.within() {
             let kept = hull.keep_by(threads, view, rays, &scan.inverse_depth);
             scan.keep(&kept, self.mesh().triangles.len() as u32);
@@ -96,46 +92,24 @@ impl Solid {
     /// # Panics
     /// There are not as many as pixels.
     pub fn triangles_along(&self, view: &View, rays: &Rays, triangle_of: &mut [u32]) {
-        self.triangles_where(view, rays, |_, _| true, triangle_of);
-    }
-
-    /// The same where it is wanted: `is_wanted` tells of some columns and rows whether any of their pixels is. Of all
-    /// others some nearest of the triangles that may be seen where it is, or none.
-    ///
-    /// # Panics
-    /// There are not as many as pixels.
-    pub fn triangles_where(
-        &self,
-        view: &View,
-        rays: &Rays,
-        is_wanted: impl Fn(&Range<usize>, &Range<usize>) -> bool + Sync,
-        triangle_of: &mut [u32],
-    ) {
         let [width, height] = rays.size;
         assert_eq!(triangle_of.len(), width * height, "a number for each pixel");
         if self.within().is_some() {
             triangle_of.copy_from_slice(&self.scan_along(view, rays).triangle_of);
         } else {
-            let triangles = self.prepared(Threads::All, view, rays, is_wanted);
+            let triangles = self.prepared(Threads::All, view, rays);
             draw_all(&triangles, Threads::All, rays, triangle_of, None);
         }
     }
 
-    /// The triangles that rays may meet where that is wanted, in order.
-    fn prepared(
-        &self,
-        threads: Threads,
-        view: &View,
-        rays: &Rays,
-        is_wanted: impl Fn(&Range<usize>, &Range<usize>) -> bool + Sync,
-    ) -> Vec<Prepared> {
+    /// The triangles that rays may meet, in order.
+    fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> Vec<Prepared> {
         let front_only = self.kind().has_front_sides_only();
         self.in_sight_of(threads, view, rays, |i, corners| {
-            let prepared = Prepared::new(i, corners, rays, |sides| {
+            Prepared::new(i, corners, rays, |sides| {
                 let is_seen = !(front_only && sides.volume >= 0.0);
                 is_seen.then(|| sides.inverse_depth())
-            });
-            prepared.filter(|triangle| is_wanted(&triangle.columns, &triangle.rows))
+            })
         })
     }
 

@@ -1,10 +1,12 @@
 //! Frames of the exact field.
 
 use super::asked::{Asked, Extent, in_f32};
-use super::lanes::{LANES, any};
+use super::lanes::{LANES, any, each};
 use super::source::Tile;
 use super::{BAND, Engine, Seen, TILE, draw, mark, put, tiles_of_band};
+use crate::edges::Sample;
 use crate::frame::Frame;
+use crate::held::Held;
 use crate::photos::PhotoError;
 use crate::rays::RayMap;
 use crate::view_tree::Ball;
@@ -17,8 +19,7 @@ const TILES_OF_BLOCK: usize = 4 * BAND / TILE[1];
 pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, PhotoError> {
     frame.view_tree();
     let engine = Engine::new(frame, rays);
-    let sources: Vec<usize> = frame.taking_part().collect();
-    let photos = mark::hold(&engine, &sources);
+    let photos = Held::new(frame, &mark::wanted(&engine, frame.taking_part().collect()));
     let pitch = frame.desired.width as usize * 4;
     draw(frame, |band, scratch: &mut (Asked, Seen), pixels| {
         engine.weigh_band(band, scratch, |at, seen| {
@@ -43,19 +44,66 @@ impl Engine<'_> {
         for block in places.chunks(TILES_OF_BLOCK) {
             let tile = |&[x, y]: &[usize; 2]| self.tile([x, band * BAND + y], |_| true);
             let tiles: Vec<Tile> = block.iter().map(tile).collect();
-            let extents: Vec<Extent> = tiles.iter().map(Extent::of).collect();
-            let balls = tiles.iter().zip(&extents);
-            let balls: Vec<Option<Ball>> = balls.map(|(tile, all)| all.ball_of(tile)).collect();
-            let around = extents.iter().copied().fold(Extent::EMPTY, Extent::and);
-            asked.enter(around.ball_of_all(&balls));
-            for (((tile, extent), ball), at) in tiles.iter().zip(&extents).zip(&balls).zip(block) {
-                if !extent.is_empty() {
-                    self.weigh(tile, ball.as_ref(), asked, seen);
-                    then(*at, seen)?;
-                }
+            self.weigh_block(&tiles, asked, seen, |i, seen| then(block[i], seen))?;
+        }
+        Ok(())
+    }
+
+    /// The exact field of tiles that are near one another: for each in which there is something, its number, the source
+    /// views that see it, and what they weigh.
+    fn weigh_block(
+        &self,
+        tiles: &[Tile],
+        asked: &mut Asked,
+        seen: &mut Seen,
+        mut then: impl FnMut(usize, &Seen) -> Result<(), PhotoError>,
+    ) -> Result<(), PhotoError> {
+        let extents: Vec<Extent> = tiles.iter().map(Extent::of).collect();
+        let balls = tiles.iter().zip(&extents);
+        let balls: Vec<Option<Ball>> = balls.map(|(tile, all)| all.ball_of(tile)).collect();
+        let around = extents.iter().copied().fold(Extent::EMPTY, Extent::and);
+        asked.enter(around.ball_of_all(&balls));
+        for (i, ((tile, extent), ball)) in tiles.iter().zip(&extents).zip(&balls).enumerate() {
+            if !extent.is_empty() {
+                self.weigh(tile, ball.as_ref(), asked, seen);
+                then(i, seen)?;
             }
         }
         Ok(())
+    }
+
+    /// The exact picture where some samples look that are near one another, straight RGBA; `None` where no photo has
+    /// what they see.
+    pub(super) fn draw_samples(
+        &self,
+        photos: &Held<'_>,
+        (asked, seen): &mut (Asked, Seen),
+        samples: &[Sample],
+    ) -> Result<Vec<Option<[u8; 4]>>, PhotoError> {
+        let tile = |samples: &[Sample]| {
+            let mut tile = Tile::nothing();
+            for (k, Sample { ray, plane }) in samples.iter().enumerate() {
+                tile.set(k, ray.as_vec3().to_array(), *plane);
+            }
+            tile
+        };
+        let tiles: Vec<Tile> = samples.chunks(LANES).map(tile).collect();
+        let mut colors = vec![None; tiles.len() * LANES];
+        asked.forget(self.frame);
+        self.weigh_block(&tiles, asked, seen, |i, seen| {
+            let mut weight = [0.0_f32; LANES];
+            for (_, _, term) in seen.iter() {
+                weight = each(|k| weight[k] + term.weight[k]);
+            }
+            let tile = self.shade(photos, seen, |_, term| &term.weight)?;
+            let tile = tile.iter().zip(weight);
+            for (color, (shown, weight)) in colors[i * LANES..].iter_mut().zip(tile) {
+                *color = (weight > 0.0).then_some(*shown);
+            }
+            Ok(())
+        })?;
+        colors.truncate(samples.len());
+        Ok(colors)
     }
 
     /// The exact field of a tile, of more source views where those asked first don't settle it.
@@ -94,6 +142,9 @@ impl Engine<'_> {
                 return asked;
             }
             let source_idx = view as usize;
+            if self.among.as_ref().is_some_and(|among| !among[source_idx]) {
+                continue;
+            }
             let source = self.source(source_idx);
             let (sight, term) = seen.next();
             let diff = source.difference(tile);

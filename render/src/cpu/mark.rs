@@ -6,13 +6,13 @@ use crate::held::Held;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Holds the photos that the exact field samples. `sources` are those that take part. Where
-/// the store has room for all of them, nothing needs to be found out.
-pub(super) fn hold<'a>(engine: &Engine<'a>, sources: &[usize]) -> Held<'a> {
-    if Held::fit(engine.frame, sources) {
-        return Held::new(engine.frame, sources);
+/// Those of `sources`, which take part, that the exact field samples. Where the store has room for all of them, nothing
+/// needs to be found out.
+pub(super) fn wanted(engine: &Engine<'_>, sources: Vec<usize>) -> Vec<usize> {
+    match Held::fit(engine.frame, &sources) {
+        true => sources,
+        false => marked(engine),
     }
-    Held::new(engine.frame, &marked(engine))
 }
 
 /// The source views that have any weight at any pixel, in order.

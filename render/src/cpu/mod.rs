@@ -15,6 +15,7 @@ mod triangulated;
 mod weights;
 
 use crate::RenderError;
+use crate::edges::{Edges, Sample};
 use crate::field::TriangulatedField;
 use crate::frame::Frame;
 use crate::held::Held;
@@ -22,6 +23,7 @@ use crate::near::is_time_to_see;
 use crate::options::{FieldOptions, Method};
 use crate::photos::PhotoError;
 use crate::rays::{RayCache, RayMap};
+use asked::Asked;
 use exact::draw_exact;
 use glam::Vec4;
 use image::RgbaImage;
@@ -81,6 +83,38 @@ impl Cpu {
         field: &TriangulatedField,
     ) -> Result<RgbaImage, RenderError> {
         Ok(draw_field(frame, field, self.rays.of(&frame.desired))?)
+    }
+
+    /// Draws edges into their frame's picture, of the photos that its field lists, if it has one.
+    ///
+    /// # Errors
+    /// A photo that is needed cannot be decoded.
+    pub(crate) fn smooth(
+        &mut self,
+        frame: &Frame<'_>,
+        field: Option<&TriangulatedField>,
+        edges: &Edges<'_>,
+        picture: &mut RgbaImage,
+    ) -> Result<(), PhotoError> {
+        frame.view_tree();
+        let rays = self.rays.of(&frame.desired);
+        let wanted = match field {
+            Some(field) => field.listed(),
+            None => mark::wanted(&Engine::new(frame, rays), frame.taking_part().collect()),
+        };
+        let samples = edges.frame_of_samples();
+        let mut engine = Engine::new(&samples, rays);
+        let photos = Held::again(frame, &wanted);
+        if field.is_some() {
+            let mut among = vec![false; frame.sources.len()];
+            wanted.iter().for_each(|i| among[*i] = true);
+            engine.among = Some(among);
+        }
+        let draw = |scratch: &mut (Asked, Seen), samples: &[Sample]| {
+            engine.draw_samples(&photos, scratch, samples)
+        };
+        edges.put(Default::default, draw, picture)?;
+        frame.check_masks()
     }
 }
 
@@ -166,6 +200,8 @@ struct Engine<'a> {
     /// Each made when first asked for: of many photos a frame mostly needs few.
     sources: Vec<OnceLock<Box<Source>>>,
     rays: &'a RayMap,
+    /// The source views of which alone the exact field is made, where it is not of all.
+    among: Option<Vec<bool>>,
 }
 
 impl<'a> Engine<'a> {
@@ -175,6 +211,7 @@ impl<'a> Engine<'a> {
             frame,
             sources: sources.map(|_| OnceLock::new()).collect(),
             rays,
+            among: None,
         }
     }
 
@@ -213,9 +250,6 @@ impl<'a> Engine<'a> {
             );
         }
         let mut tile = Tile::nothing();
-        if self.frame.surface.is_nothing_of_tile(x0, y0) {
-            return tile;
-        }
         for (k, [x, y]) in PLACES.into_iter().enumerate() {
             let (x, y) = (x0 + x, y0 + y);
             if x < width && y < height && wanted(k) {

@@ -168,13 +168,7 @@ pub(super) fn hidden(
     visibility: &Visibility,
     photos: &PhotoStore,
 ) -> Vec<Vec<Moved>> {
-    let looks = Looks {
-        map,
-        desired,
-        rays,
-        asked: Asked::new(views, visibility, photos),
-        near: vec![OnceLock::new(); map.tiles.count()],
-    };
+    let looks = Looks::new(map, desired, rays, views, visibility, photos);
     let [width, height] = map.size.map(|side| side as usize);
     // 1. One pixel of each block.
     let of_row = |top: usize| -> Vec<bool> {
@@ -201,6 +195,72 @@ struct Looks<'a> {
     asked: Asked<'a>,
     /// By tile, row by row; see [`Self::near`].
     near: Vec<OnceLock<Vec<u32>>>,
+}
+
+/// The same of what is looked at between the pixels of a picture.
+pub(crate) struct Between<'a>(Looks<'a>);
+
+impl<'a> Between<'a> {
+    pub(crate) fn new(
+        map: &'a FacetMap,
+        desired: &'a View,
+        views: &'a Views<'a>,
+        visibility: &'a Visibility,
+        photos: &'a PhotoStore,
+    ) -> Self {
+        Self(Looks::new(map, desired, None, views, visibility, photos))
+    }
+
+    /// Whether anyone sees the point at ray / s, of a ray through a pixel.
+    pub(crate) fn is_seen(&self, (x, y): (usize, usize), ray: DVec3, s: f64) -> Seen {
+        let mut is_hidden = false;
+        let mut near = self.0.near(x, y).iter();
+        let is_seen = near.any(|view| {
+            let says = self.0.asked.says(*view as usize, ray, s);
+            is_hidden |= says == Says::Hidden;
+            says == Says::Seen
+        });
+        match (is_seen, is_hidden) {
+            (true, _) => Seen::ByOne,
+            (false, true) => Seen::ByNone,
+            (false, false) => Seen::Beside,
+        }
+    }
+
+    /// The plane across the ray at the nearest place before that point which one shows.
+    pub(crate) fn shown_before(&self, (x, y): (usize, usize), ray: DVec3, s: f64) -> Option<DVec3> {
+        let shown = self.0.asked.nearest_shown(self.0.near(x, y), ray, s, 1)?;
+        Some(ray * (s * shown.times / ray.length_squared()))
+    }
+}
+
+/// Who sees a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Seen {
+    ByOne,
+    /// Every photo that has it in its image has something before it.
+    ByNone,
+    /// No photo has it in its image.
+    Beside,
+}
+
+impl<'a> Looks<'a> {
+    fn new(
+        map: &'a FacetMap,
+        desired: &'a View,
+        rays: Option<&'a Rays>,
+        views: &'a Views<'a>,
+        visibility: &'a Visibility,
+        photos: &'a PhotoStore,
+    ) -> Self {
+        Self {
+            map,
+            desired,
+            rays,
+            asked: Asked::new(views, visibility, photos),
+            near: vec![OnceLock::new(); map.tiles.count()],
+        }
+    }
 }
 
 impl Looks<'_> {

@@ -2,13 +2,14 @@
 
 use crate::{common, mesh};
 
-use calibrate::View;
-use common::{METHODS, assert_close, by_all, pinhole, psnr};
-use glam::DVec3;
-use image::RgbaImage;
-use mesh::{desired_views, lumigraph, photo, pillar, solid_of, within_the_photos};
+use calibrate::{Distortion, Lens, View};
+use common::{METHODS, assert_close, pinhole};
+use glam::{DVec2, DVec3};
+use image::{Rgba, RgbaImage};
+use mesh::{desired_views, lumigraph, pillar, solid_of, within_the_photos};
 use proxy::MeshKind;
-use render::{DeviceChoice, Edges, Engine, FieldOptions, Frame, Lumigraph, Method};
+use render::{DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared};
+use std::f64::consts::TAU;
 
 fn frame<'a>(lumigraph: &'a Lumigraph, desired: &View) -> Frame<'a> {
     Frame::new(lumigraph, desired.clone(), FieldOptions::default())
@@ -18,46 +19,106 @@ fn open() -> Engine {
     Engine::open(DeviceChoice::Cpu).unwrap()
 }
 
+/// Each pixel the mean of 2 × 2 of a picture twice as large.
+fn halved(fine: &RgbaImage) -> RgbaImage {
+    RgbaImage::from_fn(fine.width() / 2, fine.height() / 2, |x, y| {
+        let mut sum = [0_u32; 4];
+        for k in 0..4 {
+            let pixel = fine.get_pixel(2 * x + k % 2, 2 * y + k / 2);
+            (0..4).for_each(|c| sum[c] += u32::from(pixel.0[c]));
+        }
+        Rgba(sum.map(|sum| ((sum + 2) / 4) as u8))
+    })
+}
+
 #[test]
-fn outlines_are_nearer_the_truth_and_all_else_is_as_without() {
+fn outlines_are_those_of_a_larger_picture_and_all_else_is_as_without() {
     let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
     let mut engine = open();
     for (name, desired) in within_the_photos() {
-        let truth = photo(solid_of(&lumigraph), &desired);
+        // Its pixels are no larger than the photos', so that in the larger picture photos weigh alike.
+        let (width, height) = (desired.width, desired.height);
+        let larger = desired.resized(2 * width, 2 * height);
+        let larger = frame(&lumigraph, &larger);
+        let expected = halved(&engine.render(&larger, Method::Exact).unwrap());
         let frame = frame(&lumigraph, &desired);
-        for method in METHODS {
-            let without = engine.render(&frame, method).unwrap();
-            let mut smooth = without.clone();
-            let count = engine.smooth(&frame, 2, &mut smooth).unwrap();
-            let [before, after] = [&without, &smooth].map(|picture| psnr(picture, &truth));
-            println!("{name}, {method:?}: {before:.2} -> {after:.2} dB, {count} pixels");
-            assert!(after > before + 0.5, "{name}: {before}, {after}");
-            // The pillar's outlines, each two pixels wide.
-            assert!((200..1200).contains(&count), "{name}: {count}");
-            let changed = without.pixels().zip(smooth.pixels());
-            let changed = changed.filter(|(a, b)| a != b).count();
-            assert!(changed <= count, "{name}: {changed}, {count}");
-        }
+        let without = engine.render(&frame, Method::Exact).unwrap();
+        let mut smooth = without.clone();
+        let count = engine
+            .smooth(&frame, &Prepared::Exact, 2, &mut smooth)
+            .unwrap();
+        // The pillar's outlines, each two pixels wide.
+        assert!((200..1200).contains(&count), "{name}: {count}");
+        let changed = without.pixels().zip(smooth.pixels()).zip(expected.pixels());
+        let changed: Vec<_> = changed.filter(|((a, b), _)| a != b).collect();
+        assert!(
+            (count / 2..=count).contains(&changed.len()),
+            "{name}: {count}"
+        );
+        let is_off = |a: &Rgba<u8>, b: &Rgba<u8>| (0..4).any(|c| a.0[c].abs_diff(b.0[c]) > 3);
+        let off = changed.iter().filter(|((_, b), e)| is_off(b, e)).count();
+        println!("{name}: {off} of {} pixels", changed.len());
+        assert!(
+            50 * off <= changed.len(),
+            "{name}: {off} of {}",
+            changed.len()
+        );
     }
+}
+
+#[test]
+fn where_a_photo_was_taken_its_pixels_stay() {
+    let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
+    let desired = lumigraph.sources[2].view.clone();
+    let frame = frame(&lumigraph, &desired);
+    let mut engine = open();
+    let mut picture = engine.render(&frame, Method::Exact).unwrap();
+    assert_eq!(
+        engine
+            .smooth(&frame, &Prepared::Exact, 2, &mut picture)
+            .unwrap(),
+        0
+    );
 }
 
 #[test]
 fn every_engine_draws_the_same_outlines() {
     let lumigraph = lumigraph(pillar(), MeshKind::Mesh);
-    for (name, desired) in desired_views() {
+    let mut engines = vec![DeviceChoice::Reference, DeviceChoice::Cpu];
+    let gpu = common::gpu();
+    engines.extend(gpu.is_some().then_some(DeviceChoice::Gpu));
+    drop(gpu);
+    let panorama = View {
+        lens: Lens::new(
+            DVec2::splat(320.0 / TAU),
+            DVec2::new(160.0, 80.0),
+            Distortion::Equirectangular,
+        ),
+        width: 320,
+        height: 160,
+        ..desired_views()[0].1.clone()
+    };
+    for (name, desired) in desired_views().into_iter().chain([("panorama", panorama)]) {
         let frame = frame(&lumigraph, &desired);
-        let mut smooth = Vec::new();
-        for (engine, picture) in by_all(&frame, Method::Exact) {
-            let mut picture = picture.unwrap();
-            let edges = Edges::of(&frame, &picture, 2).unwrap();
-            let samples = by_all(&edges.samples, Method::Exact);
-            let samples = samples.into_iter().find(|(other, _)| *other == engine);
-            edges.put(&samples.unwrap().1.unwrap(), &mut picture);
-            smooth.push((engine, picture));
-        }
-        let (_, reference) = smooth.remove(0);
-        for (engine, picture) in smooth {
-            assert_close(&picture, &reference, &format!("{name}, {engine}"));
+        for method in METHODS {
+            let prepared = Prepared::new(&frame, method).unwrap();
+            // Of one picture, as which pixels are edges is a matter of a step.
+            let without = common::by_reference(&frame, method).unwrap();
+            let smooth = engines.iter().map(|device| {
+                let mut picture = without.clone();
+                let mut engine = Engine::open(*device).unwrap();
+                let count = engine.smooth(&frame, &prepared, 2, &mut picture).unwrap();
+                assert!(count > 100, "{name}: {count}");
+                picture
+            });
+            let smooth: Vec<RgbaImage> = smooth.collect();
+            for (picture, device) in smooth.iter().zip(&engines).skip(1) {
+                assert_close(
+                    picture,
+                    &smooth[0],
+                    &format!("{name}, {method:?}, {device:?}"),
+                );
+            }
         }
     }
 }
@@ -95,7 +156,9 @@ fn coverage_at_a_silhouette_is_what_of_a_pixel_is_covered() {
     let without = engine.render(&frame, Method::Exact).unwrap();
     let mut off = |across: u32| -> f64 {
         let mut picture = without.clone();
-        engine.smooth(&frame, across, &mut picture).unwrap();
+        engine
+            .smooth(&frame, &Prepared::Exact, across, &mut picture)
+            .unwrap();
         let covered = picture.enumerate_pixels();
         let off = covered.map(|(x, y, p)| (f64::from(p.0[3]) / 255.0 - share(x, y)).powi(2));
         (off.sum::<f64>() / f64::from(96 * 128)).sqrt()
@@ -114,7 +177,12 @@ fn nothing_is_drawn_anew_where_nothing_jumps_or_nobody_asks() {
     let same = |engine: &mut Engine, frame: &Frame<'_>, across: u32| {
         let without = engine.render(frame, Method::Exact).unwrap();
         let mut picture: RgbaImage = without.clone();
-        assert_eq!(engine.smooth(frame, across, &mut picture).unwrap(), 0);
+        assert_eq!(
+            engine
+                .smooth(frame, &Prepared::Exact, across, &mut picture)
+                .unwrap(),
+            0
+        );
         assert!(picture == without);
     };
     same(&mut engine, &frame(&lumigraph, &desired), 1);

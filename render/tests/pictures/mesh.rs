@@ -66,7 +66,7 @@ fn color(p: DVec3) -> [f64; 3] {
 }
 
 /// What a camera sees of the mesh, 4 × 4 rays a pixel.
-pub(crate) fn photo(solid: &Solid, view: &View) -> RgbaImage {
+fn photo(solid: &Solid, view: &View) -> RgbaImage {
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     let center = view.center();
     RgbaImage::from_fn(view.width, view.height, |x, y| {

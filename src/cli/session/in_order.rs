@@ -88,7 +88,7 @@ impl Session {
             }
             self.costs
                 .note(current, &frame, &chosen, engine, &was_ready, &picture);
-            let smooth = || engine.smooth(&frame, self.edge_samples, &mut picture);
+            let smooth = || engine.smooth(&frame, prepared, self.edge_samples, &mut picture);
             let edge_pixels = ledger.time(current, Stage::Edges, smooth)?;
             self.costs.note_edges(current, edge_pixels);
             ledger.time(current, Stage::Write, || take(current, picture))?;
