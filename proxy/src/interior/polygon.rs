@@ -3,7 +3,7 @@
 mod pieces;
 
 use glam::{DVec2, DVec3};
-use pieces::STRAIGHT_INSIDE;
+use pieces::{Pieces, STRAIGHT_INSIDE};
 
 /// A flat, simple polygon of three corners or more, convex or not.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +12,7 @@ pub struct Polygon {
     center: DVec3,
     normal: DVec3,
     size: f64,
+    pieces: Pieces,
 }
 
 /// Why corners make no polygon.
@@ -102,6 +103,7 @@ impl Polygon {
             normal,
             size,
             corners,
+            pieces: Pieces::default(),
         };
         let flat = polygon.flattened();
         if let Some((a, b)) = crossing_sides(&flat) {
@@ -154,6 +156,7 @@ impl Polygon {
     pub fn reversed(mut self) -> Self {
         self.corners.reverse();
         self.normal = -self.normal;
+        self.pieces = Pieces::default();
         self
     }
 

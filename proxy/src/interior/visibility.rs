@@ -289,8 +289,6 @@ struct TooMany;
 struct Search<'a> {
     interior: &'a Interior,
     eye: DVec3,
-    /// Of each portal's polygon.
-    pieces: Vec<Vec<Vec<DVec3>>>,
     /// Whether a portal is part of the way that is being followed.
     is_passed: Vec<bool>,
     /// How many portals were looked at, each as often as it was; and how many may be.
@@ -301,13 +299,9 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(interior: &'a Interior, eye: DVec3) -> Self {
-        let portals = interior.portals.iter();
         Self {
             interior,
             eye,
-            pieces: portals
-                .map(|portal| portal.polygon.convex_pieces())
-                .collect(),
             is_passed: vec![false; interior.portals.len()],
             looked_at: 0,
             most: usize::MAX,
@@ -335,7 +329,7 @@ impl<'a> Search<'a> {
                 return Err(TooMany);
             }
             let into = portal.beyond(Some(cell)).flatten();
-            for seen in self.through(id, portal, cell, region, entrance) {
+            for seen in self.through(portal, cell, region, entrance) {
                 if self.found.passes.len() >= MAX_PASSES || depth >= MAX_DEPTH {
                     return Err(TooMany);
                 }
@@ -360,7 +354,6 @@ impl<'a> Search<'a> {
     /// Where one sees through a portal out of a cell, in convex pieces.
     fn through(
         &self,
-        id: PortalId,
         portal: &Portal,
         cell: CellId,
         region: &Region,
@@ -377,7 +370,7 @@ impl<'a> Search<'a> {
         if !(height > 0.0) {
             return Vec::new();
         }
-        let pieces = self.pieces[id.0 as usize].iter();
+        let pieces = portal.polygon.convex_pieces().iter();
         pieces
             .filter_map(|piece| {
                 let mut seen: Vec<DVec3> = piece.iter().map(|p| *p - self.eye).collect();

@@ -218,7 +218,7 @@ fn before(portal: &Portal, place: &SemicircleView, point: DVec3) -> f64 {
 /// Whether any of a portal may be in a view's image.
 fn sees(view: &View, portal: &Portal) -> bool {
     let (region, eye) = (Region::of(view), view.center());
-    portal.polygon.convex_pieces().into_iter().any(|piece| {
+    portal.polygon.convex_pieces().iter().any(|piece| {
         let all: Vec<DVec3> = piece.iter().map(|p| *p - eye).collect();
         let sides = region.sides().iter();
         let left = sides.fold(all, |left, side| clip(&left, |p| side.dot(p)));
@@ -245,7 +245,7 @@ impl Opening {
         let mut cones = Vec::new();
         for place in order.into_iter().map(|i| &side[i]) {
             let eye = place.camera_from_world.center();
-            for piece in &pieces {
+            for piece in pieces {
                 let mut edges: Vec<DVec3> = piece.iter().map(|p| *p - eye).collect();
                 // Counter-clockwise as the eye sees them.
                 if portal.polygon.height(eye) < 0.0 {

@@ -120,7 +120,7 @@ impl Reference {
         };
         let runs = geometry.seen(eye, &visibility, &region);
         let beyond = plane_of(&camera, portal, Some(place.into));
-        let pieces = portal.polygon.convex_pieces().into_iter().map(|piece| {
+        let pieces = portal.polygon.convex_pieces().iter().map(|piece| {
             let mut edges: Vec<DVec3> = piece.iter().map(|p| *p - eye).collect();
             // Counter-clockwise as the eye sees it.
             if portal.polygon.height(eye) < 0.0 {

@@ -6,6 +6,7 @@
 
 use super::{Polygon, cross, thin};
 use glam::{DVec2, DVec3};
+use std::sync::OnceLock;
 
 /// A corner that is no farther inside the line between its neighbours is on it, in shares of the
 /// extent: files round positions to f32. Without it the polygon is larger by as much.
@@ -16,10 +17,26 @@ const STRAIGHT_OUTSIDE: f64 = 1e-12;
 /// between their neighbours by so many times what any is off the plane.
 const ASLANT: f64 = 100.0;
 
+/// A polygon's convex pieces once somebody has asked for them. They follow from its corners, so that they make no
+/// difference between polygons.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pieces(OnceLock<Vec<Vec<DVec3>>>);
+
+impl PartialEq for Pieces {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 impl Polygon {
     /// Convex pieces, each counter-clockwise around the normal: itself, or what it takes. Corners on a
-    /// straight side are left out, as rounding would bend it inwards there.
-    pub fn convex_pieces(&self) -> Vec<Vec<DVec3>> {
+    /// straight side are left out, as rounding would bend it inwards there. They are found once, when they are first
+    /// asked for.
+    pub fn convex_pieces(&self) -> &[Vec<DVec3>] {
+        self.pieces.0.get_or_init(|| self.find_pieces())
+    }
+
+    fn find_pieces(&self) -> Vec<Vec<DVec3>> {
         let flat = self.flattened();
         let outline = self.bends(&flat);
         let is_convex = |i: usize| {
@@ -188,17 +205,17 @@ mod tests {
         assert_eq!(exact.corners().len(), 20);
         let pieces = exact.convex_pieces();
         assert_eq!((pieces.len(), pieces[0].len()), (1, 4));
-        assert!((area(&exact, &pieces) - 2.0).abs() < 1e-12);
+        assert!((area(&exact, pieces) - 2.0).abs() < 1e-12);
         // As files have it.
         let coarse = with_corners_on_sides(&doorway, |p| p.as_vec3().as_dvec3());
         let pieces = coarse.convex_pieces();
         assert_eq!(pieces.len(), 1);
-        assert!((area(&coarse, &pieces) - 2.0).abs() < 1e-5);
+        assert!((area(&coarse, pieces) - 2.0).abs() < 1e-5);
         // What is concave stays so.
         let l = with_corners_on_sides(&L, |p| p);
         let pieces = l.convex_pieces();
         assert_eq!(pieces.len(), 2);
-        assert!((area(&l, &pieces) - 4.0).abs() < 1e-12);
+        assert!((area(&l, pieces) - 4.0).abs() < 1e-12);
     }
 
     #[test]
@@ -209,7 +226,20 @@ mod tests {
         let l = Polygon::new(l.to_vec()).unwrap();
         let pieces = l.convex_pieces();
         assert_eq!(pieces.len(), 2);
-        assert!((area(&l, &pieces) - 4.0).abs() < 1e-9);
+        assert!((area(&l, pieces) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pieces_are_found_once_and_make_no_difference() {
+        let l = Polygon::new(L.map(|p| DVec2::from_array(p).extend(0.0)).to_vec()).unwrap();
+        let unasked = l.clone();
+        let pieces = l.convex_pieces();
+        assert!(std::ptr::eq(pieces, l.convex_pieces()));
+        assert_eq!(l, unasked);
+        assert_eq!(pieces, unasked.convex_pieces());
+        // From behind they are others.
+        let behind = l.reversed();
+        assert!((area(&behind, behind.convex_pieces()) - 4.0).abs() < 1e-12);
     }
 
     #[test]
@@ -224,11 +254,11 @@ mod tests {
             let corner = |p: DVec2| p.extend(bulge * p.x * p.y);
             Polygon::new(arc.clone().chain(post).map(corner).collect()).unwrap()
         };
-        let flat = arch(0.0).convex_pieces();
-        assert!(flat.len() <= 4, "{}", flat.len());
+        let flat = arch(0.0).convex_pieces().len();
+        assert!(flat <= 4, "{flat}");
         // Seen aslant its corners move beside their places by more than it bends.
-        let bent = arch(1e-3).convex_pieces();
-        assert!(bent.len() > 16, "{}", bent.len());
+        let bent = arch(1e-3).convex_pieces().len();
+        assert!(bent > 16, "{bent}");
     }
 
     /// Numbers from 0 to 1.
