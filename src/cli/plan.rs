@@ -156,7 +156,8 @@ fn remedy(interior: &Interior, poses: &[Pose<'_>]) -> anyhow::Result<String> {
         remedies.push(format!("correct {cells} (eyes are above or below)"));
     }
     if !beside.is_empty() {
-        let which = if remedies.is_empty() { "" } else { "other " };
+        // Than those to be reversed, none of which is among them.
+        let which = if named.is_empty() { "" } else { "other " };
         remedies.push(format!("give {which}portals a smaller `radius`"));
     }
     Ok(remedies.join(", and "))

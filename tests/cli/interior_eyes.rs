@@ -115,7 +115,7 @@ fn a_box_that_is_too_low_for_eyes_is_named_and_no_smaller_semicircle_advised() {
     assert!(told.contains(&advised), "{told}");
     let told = said(1.0, 9.0);
     let advised = format!(
-        "26 of 26 cameras stand outside their cell; {low}, and give other portals a smaller \
+        "26 of 26 cameras stand outside their cell; {low}, and give portals a smaller \
          `radius` in interior.json"
     );
     assert!(told.contains(&advised), "{told}");
