@@ -156,13 +156,64 @@ fn frames_are_drawn_out_to_square_pixels_unless_they_are_calibrated_as_stored() 
         let off: f64 = pairs.map(|(a, b)| f64::from(a[1].abs_diff(b[1]))).sum();
         let mean = off / f64::from(320 * 240);
         assert!(mean < 8.0, "{filter}: {mean} levels off");
-        assert_eq!(extract(FrameShape::Calibrated(320, 240)), drawn_out);
+        // The same frames, which are there.
+        assert_eq!(extract(FrameShape::Calibrated(320, 240)), (shown, None));
         assert_eq!(extract(FrameShape::Stored), (stored, None));
         assert_eq!(extract(FrameShape::Square), drawn_out, "no earlier run's");
         assert_eq!(
             extract(FrameShape::Calibrated(stored.0, stored.1)),
             (stored, None)
         );
+    }
+}
+
+/// As they were before colours were exact and pixels square.
+#[test]
+fn frames_of_an_earlier_version_are_taken_again_where_they_would_be_others() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let photos = here.path().join("photos");
+    let list = photos.join("frames.txt");
+    for (words, is_same) in [
+        (
+            "-vf scale=out_color_matrix=bt601 -colorspace smpte170m",
+            true,
+        ),
+        ("-vf scale=out_color_matrix=bt709 -colorspace bt709", false),
+        ("-vf scale=240:240,setsar=4/3", false),
+    ] {
+        let words: Vec<&str> = words.split(' ').collect();
+        let video = write_video(&ffmpeg, here.path(), &[2, 18], &words);
+        let extract = |shape: FrameShape| {
+            let (mut is_done, mut is_scanned) = (false, false);
+            let count = FrameCount::Frames(2);
+            let mut on_progress = |progress| match progress {
+                VideoProgress::Done { .. } => is_done = true,
+                VideoProgress::Scored { .. } => is_scanned = true,
+                _ => {}
+            };
+            let frames =
+                video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
+            (frames, is_done, is_scanned)
+        };
+        let (frames, is_done, _) = extract(FrameShape::Square);
+        assert!(!is_done, "{words:?}");
+        let text = fs::read_to_string(&list).unwrap();
+        let (first, rest) = text.split_once('\n').unwrap();
+        let (source, _) = first.split_once(", version 2").unwrap();
+        let photo = photos.join(&frames[0].name);
+        fs::write(&photo, "as it was").unwrap();
+        fs::write(&list, format!("{source}\n{rest}")).unwrap();
+
+        let again = extract(FrameShape::Square);
+        assert_eq!(again, (frames.clone(), is_same, true), "{words:?}");
+        let is_kept = fs::read(&photo).unwrap() == b"as it was";
+        assert_eq!(is_kept, is_same, "{words:?}");
+        // Then the list says so, and pixels that are square have no other shape for a calibration.
+        assert_eq!(fs::read_to_string(&list).unwrap(), text);
+        assert_eq!(extract(FrameShape::Square), (frames, true, false));
+        let (_, is_done, _) = extract(FrameShape::Stored);
+        assert_eq!(is_done, !words[1].contains("setsar"), "{words:?}");
     }
 }
 

@@ -175,7 +175,8 @@ fn matrix_of(video: &Path) -> (&'static str, &'static str) {
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
 /// named by their time in seconds, and a list of them. A folder that holds anything else is
 /// left alone. Where an earlier run did the same
-/// with the same video, nothing is done; another video's frames are replaced. An
+/// with the same video, nothing is done; another video's frames are replaced, and those of an earlier version where
+/// they would be others now. An
 /// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt, and
 /// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
 /// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
@@ -192,8 +193,8 @@ pub fn extract(
     folder: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Vec<VideoFrame>, VideoError> {
-    let source = list::source(video, count, shape)?;
-    if let Some(frames) = list::read(folder, &source) {
+    let source = list::source(video, count)?;
+    if let Some(frames) = list::read(folder, &source, shape) {
         report(VideoProgress::Done {
             frames: frames.len(),
         });
@@ -228,12 +229,25 @@ pub fn extract(
         }
         report(VideoProgress::Damaged(damage));
     }
-    let stored = scanned.shape;
-    let stretched = stored.and_then(|stored| Some((stored.size, stored.stretched(shape)?)));
+    let oblong = scanned.shape.and_then(|stored| stored.oblong());
+    let stretched = oblong.and_then(|oblong| Some((oblong.stored, oblong.drawn_out(shape)?)));
     if let Some((from, to)) = stretched {
         report(VideoProgress::Stretched { from, to });
     }
     let chosen = choose(&scored, count);
+    let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
+    // The first version took the same ones if nothing of them was to be changed.
+    let first = list::read_first_version(folder, &source).filter(|frames| {
+        let times = frames.iter().map(|frame| frame.time_s);
+        stretched.is_none() && scanned.is_jpeg_like && times.eq(times_s.iter().copied())
+    });
+    if let Some(frames) = first {
+        list::write(folder, &source, oblong, shape, &frames)?;
+        report(VideoProgress::Done {
+            frames: frames.len(),
+        });
+        return Ok(frames);
+    }
     report(VideoProgress::Writing {
         frames: chosen.len(),
     });
@@ -249,7 +263,6 @@ pub fn extract(
     let from = scan::input(video, scanned.decoding);
     let size = stretched.map(|(_, to)| to);
     write_frames(ffmpeg, spelling, from, &chosen, size, &partial)?;
-    let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     let mut frames = Vec::new();
     for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
         let time_s = times_s[i];
@@ -263,7 +276,7 @@ pub fn extract(
         fs::rename(&written, partial.join(&name)).map_err(failed(&written))?;
         frames.push(VideoFrame { name, time_s });
     }
-    list::write(&partial, &source, &frames)?;
+    list::write(&partial, &source, oblong, shape, &frames)?;
 
     // 3. It takes its place.
     take_place(&partial, &place).map_err(failed(folder))?;

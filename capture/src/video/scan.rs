@@ -14,6 +14,13 @@ const SCORED_SIDE: u32 = 480;
 /// are no photos.
 const OF_TEXT: &str = "[info] Input #0, tty, ";
 
+/// What begins the lines of the filter `showinfo` about a frame.
+const OF_FRAME: &str = "[Parsed_showinfo";
+/// What these say of frames whose colours are converted as JPEG's are: how pixels are stored, and which matrix they are
+/// in. ffmpeg takes BT.601 for granted where a video does not say so.
+const JPEG_PIXELS: [&str; 2] = ["yuv420p", "yuvj420p"];
+const JPEG_MATRICES: [&str; 3] = ["unknown", "smpte170m", "bt470bg"];
+
 /// Decodes a video once, reduced, and scores every frame.
 ///
 /// # Errors
@@ -32,6 +39,8 @@ pub(super) struct Scan {
     pub(super) damage: Option<Damage>,
     /// How the first of them is stored, where ffmpeg tells.
     pub(super) shape: Option<Shape>,
+    /// Whether its colours are those of photos, but for their range, as ffmpeg tells.
+    pub(super) is_jpeg_like: bool,
     /// How they were decoded: to have the same ones again, as many of a damaged video.
     pub(super) decoding: Decoding,
 }
@@ -78,9 +87,11 @@ fn scan_once(
     let mut times_s: Vec<f64> = Vec::new();
     let mut log = Log::default();
     let mut shape = None;
+    let mut colors = JpegColors::default();
     let mut is_text = false;
     let mut on_line = |line: &str| {
         log.read(line);
+        colors.read(line);
         is_text |= line.starts_with(OF_TEXT);
         let Some(time_s) = shown_at_s(line) else {
             return;
@@ -126,8 +137,39 @@ fn scan_once(
         frames,
         damage: log.damage(damaged),
         shape,
+        is_jpeg_like: colors.are_all(),
         decoding,
     })
+}
+
+/// Whether all that is told of frames' colours is what JPEG's are.
+#[derive(Default)]
+struct JpegColors {
+    /// Whether so far pixels, and matrices, were told, and as JPEG has them.
+    pixels: Option<bool>,
+    matrix: Option<bool>,
+}
+
+impl JpegColors {
+    fn read(&mut self, line: &str) {
+        if !line.starts_with(OF_FRAME) {
+            return;
+        }
+        let told = |key: &str| line.split_once(key)?.1.split_whitespace().next();
+        for (so_far, found, of_jpeg) in [
+            (&mut self.pixels, told(" fmt:"), &JPEG_PIXELS[..]),
+            (&mut self.matrix, told(" color_space:"), &JPEG_MATRICES[..]),
+        ] {
+            if let Some(found) = found {
+                *so_far = Some(so_far.unwrap_or(true) && of_jpeg.contains(&found));
+            }
+        }
+    }
+
+    /// Not where nothing is told.
+    fn are_all(&self) -> bool {
+        self.pixels == Some(true) && self.matrix == Some(true)
+    }
 }
 
 /// What all calls begin with. Each line that is printed has its level.
@@ -268,6 +310,27 @@ mod tests {
         assert!(read_pgm(&mut pipe).unwrap().is_none());
         assert!(read_pgm(&mut &b"P5\n3 2\n255\nab"[..]).is_err());
         assert!(read_pgm(&mut &b"P6\n3 2\n255\nabcdef"[..]).is_err());
+    }
+
+    #[test]
+    fn colours_are_as_jpegs_where_all_frames_say_so() {
+        let are_all = |frames: &[[&str; 2]]| {
+            let mut colors = JpegColors::default();
+            colors.read("[info]     title           : fmt:gray color_space:gbr");
+            for [pixels, matrix] in frames {
+                let of_frame = "[Parsed_showinfo_0 @ 0x55] [info]";
+                colors.read(&format!("{of_frame} n: 0 pts_time:0 fmt:{pixels} sar:1/1"));
+                colors.read(&format!(
+                    "{of_frame} color_range:tv color_space:{matrix} color_primaries:unknown"
+                ));
+            }
+            colors.are_all()
+        };
+        let [plain, phone] = [["yuv420p", "smpte170m"], ["yuv420p", "bt709"]];
+        assert!(are_all(&[plain, ["yuvj420p", "unknown"]]));
+        assert!(!are_all(&[plain, phone, plain]));
+        assert!(!are_all(&[["yuv422p", "unknown"], plain]));
+        assert!(!are_all(&[]));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Frames whose pixels are not square, as HDV's, DV's and DVDs' are.
 
+use std::fmt;
+
 /// How frames whose pixels are not square are taken out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrameShape {
@@ -32,32 +34,74 @@ impl Shape {
         let (_, told) = line.split_once(" sar:")?;
         let mut words = told.split_whitespace();
         let (wide, high) = words.next()?.split_once('/')?;
-        let (width, height) = words.next()?.strip_prefix("s:")?.split_once('x')?;
         Some(Self {
-            size: (width.parse().ok()?, height.parse().ok()?),
+            size: size(words.next()?.strip_prefix("s:")?)?,
             aspect: wide.parse::<f64>().ok()? / high.parse::<f64>().ok()?,
         })
     }
 
-    /// The size to draw frames out to; `None` where they stay as they are stored.
-    pub(super) fn stretched(&self, wanted: FrameShape) -> Option<(u32, u32)> {
+    /// The frames' sizes where their pixels are not square.
+    pub(super) fn oblong(&self) -> Option<Oblong> {
         let (width, height) = self.size;
-        let is_kept = match wanted {
-            FrameShape::Square => false,
-            FrameShape::Calibrated(w, h) => (w, h) == self.size,
-            FrameShape::Stored => true,
-        };
         let by = self.aspect.max(1.0 / self.aspect);
-        if is_kept || !(LEAST_STRETCH..=MOST_STRETCH).contains(&by) {
+        if !(LEAST_STRETCH..=MOST_STRETCH).contains(&by) {
             return None;
         }
         let longer = |side: u32| (f64::from(side) * by).round() as u32;
-        Some(if self.aspect > 1.0 {
+        let shown = if self.aspect > 1.0 {
             (longer(width), height)
         } else {
             (width, longer(height))
+        };
+        Some(Oblong {
+            stored: self.size,
+            shown,
         })
     }
+}
+
+/// Frames whose pixels are not square: their width and height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Oblong {
+    pub(super) stored: (u32, u32),
+    /// As players show them.
+    pub(super) shown: (u32, u32),
+}
+
+impl Oblong {
+    /// The size to draw frames out to; `None` where they stay as they are stored.
+    pub(super) fn drawn_out(&self, wanted: FrameShape) -> Option<(u32, u32)> {
+        let is_kept = match wanted {
+            FrameShape::Square => false,
+            FrameShape::Calibrated(width, height) => (width, height) == self.stored,
+            FrameShape::Stored => true,
+        };
+        (!is_kept).then_some(self.shown)
+    }
+
+    /// From the text that it is printed as.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let (stored, shown) = text.split_once(SHOWN_AS)?;
+        Some(Self {
+            stored: size(stored)?,
+            shown: size(shown)?,
+        })
+    }
+}
+
+impl fmt::Display for Oblong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [(width, height), (shown_width, shown_height)] = [self.stored, self.shown];
+        write!(f, "{width}x{height}{SHOWN_AS}{shown_width}x{shown_height}")
+    }
+}
+
+const SHOWN_AS: &str = " shown as ";
+
+/// A width and height out of `1920x1080`.
+pub(super) fn size(text: &str) -> Option<(u32, u32)> {
+    let (width, height) = text.split_once('x')?;
+    Some((width.parse().ok()?, height.parse().ok()?))
 }
 
 #[cfg(test)]
@@ -70,7 +114,8 @@ mod tests {
             let line = format!(
                 "[Parsed_showinfo_0 @ 0x5] n: 0 pts_time:0 fmt:yuv420p sar:{sar} s:{size} i:P"
             );
-            Shape::parse(&line).unwrap().stretched(wanted)
+            let oblong = Shape::parse(&line).unwrap().oblong();
+            oblong.and_then(|oblong| oblong.drawn_out(wanted))
         };
         let square = |sar: &str, size: &str| stretched(sar, size, FrameShape::Square);
         assert_eq!(square("4/3", "1440x1080"), Some((1920, 1080)));
