@@ -34,13 +34,32 @@ pub(super) fn files_behind_scene(given: &Path, scene: &Scene) -> Vec<PathBuf> {
     let origin = scene.calibration.as_deref().or(scene.capture.as_deref());
     let origin = origin.and_then(calibration_in);
     all.extend(origin.iter().flat_map(|path| parts_of(path)));
-    for folder in [&scene.folder, &scene.capture].into_iter().flatten() {
-        all.push(folder.join("split.json"));
-        // What cannot be listed holds none that could be told from other files.
-        let found = find_photos_folder(folder).and_then(|folder| PhotoSet::open(&folder).ok());
-        all.extend(found.into_iter().flat_map(|set| set.photos).map(|p| p.path));
-    }
+    let folders = [&scene.folder, &scene.capture].into_iter().flatten();
+    all.extend(folders.map(|folder| folder.join("split.json")));
+    // What cannot be listed holds none that could be told from other files.
+    let found = photo_folders(scene).into_iter();
+    let found = found.filter_map(|folder| PhotoSet::open(&folder).ok());
+    all.extend(found.flat_map(|set| set.photos).map(|p| p.path));
     all
+}
+
+/// The folders of which all pictures, in whatever folders within, are photos to an import: that of a scene's capture,
+/// and its own if it has copies of them.
+pub(super) fn photo_folders(scene: &Scene) -> Vec<PathBuf> {
+    let of_capture = scene.capture.as_ref().and_then(|capture| {
+        let of_cameras = || Some(Scene::photos_of(capture).ok()?.root);
+        find_photos_folder(capture).or_else(of_cameras)
+    });
+    let own = scene.folder.as_ref().and_then(|folder| {
+        let images = find_photos_folder(folder).filter(|images| images != folder)?;
+        // Pictures may have been drawn there.
+        let real = images.canonicalize().ok()?;
+        let photos = scene.photos.iter();
+        let folders: BTreeSet<&Path> = photos.filter_map(|photo| photo.path.parent()).collect();
+        let is_within = |folder: &Path| folder.canonicalize().is_ok_and(|f| f.starts_with(&real));
+        folders.into_iter().any(is_within).then_some(images)
+    });
+    own.into_iter().chain(of_capture).collect()
 }
 
 /// The files that frames are made of, besides photos and what lies beside these: those that options name (of a

@@ -1,8 +1,8 @@
 //! What a command is about to write: not over what it reads, and only where it can.
 
+use super::inputs::photo_folders;
 use super::interior::check_outside;
 use anyhow::{Context, bail};
-use capture::find_photos_folder;
 use lumigraph::scene::{Photo, Scene};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -127,14 +127,11 @@ pub(super) fn holder(path: &Path, is_such: impl Fn(&Path) -> bool) -> Option<Pat
 /// Fails where pictures would lie among a scene's photos, masks or depth maps, for more of which an import would
 /// take them.
 pub(super) fn check_no_photos(folder: &Path, scene: &Scene) -> anyhow::Result<()> {
-    // 1. Folders that hold nothing but photos, in whatever folders within.
-    let captures = [&scene.folder, &scene.capture].into_iter().flatten();
-    let of_photos = captures.filter_map(|capture| {
-        let photos = find_photos_folder(capture).filter(|photos| photos != capture);
-        photos?.canonicalize().ok()
-    });
-    let of_photos: BTreeSet<PathBuf> = of_photos.collect();
-    // 2. Those that some lie in directly, as where a capture is one flat folder.
+    // 1. Folders that hold nothing but photos, in whatever folders within. One flat folder, or one with a folder for each
+    // camera, is such a one as a whole.
+    let of_photos = photo_folders(scene).into_iter();
+    let of_photos: BTreeSet<PathBuf> = of_photos.filter_map(|f| f.canonicalize().ok()).collect();
+    // 2. Those that some lie in directly, as masks.
     let folders_of = |photo: &Photo| {
         let beside = [
             &photo.ignore_mask,

@@ -304,9 +304,37 @@ fn photos_are_not_written_over() {
     fs::rename(here.join("wall/images"), here.join("flat")).unwrap();
     fs::rename(here.join("wall/sparse"), here.join("flat/sparse")).unwrap();
     let line = format!("render flat --path sweep --frames 1 {size} -o flat");
-    let error = lumigraph(here, &line).error(1);
-    assert!(error.contains("of this scene lie in"), "{error}");
-    lumigraph(here, &format!("{line}/frames")).ok();
+    for within in ["", "/frames", "/new/frames"] {
+        let error = lumigraph(here, &format!("{line}{within}")).error(1);
+        assert!(error.contains("of this scene lie in"), "{error}");
+    }
+    assert!(!here.join("flat/frames").exists());
+    lumigraph(here, &format!("{line}-frames")).ok();
+}
+
+/// A folder of photos is one by what lies there, and not by its name.
+#[test]
+fn pictures_may_be_drawn_again_into_a_folder_called_images() {
+    let folder = with_wall();
+    let here = folder.path();
+    let options = "--proxy plane --size 48x36";
+    lumigraph(here, "import wall -o scene").ok();
+    for line in [
+        format!("render scene --path sweep --frames 2 {options} -o scene/images"),
+        format!("evaluate scene --every 3 {options} -o scene/images"),
+        format!("render scene --path sweep --frames 2 {options} -o scene"),
+    ] {
+        lumigraph(here, &line).ok();
+        lumigraph(here, &line).ok();
+    }
+    // Where there are copies of the photos, they and the capture's are not to be joined by others.
+    lumigraph(here, "import wall --undistort -o copies").ok();
+    for folder in ["copies", "wall"] {
+        let line = "render copies --path sweep --frames 2";
+        let line = format!("{line} {options} -o {folder}/images");
+        let error = lumigraph(here, &line).error(1);
+        assert!(error.contains("of this scene lie in"), "{error}");
+    }
 }
 
 /// As with photos that are links into the scene's folder.
