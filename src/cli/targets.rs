@@ -127,11 +127,12 @@ pub(super) fn holder(path: &Path, is_such: impl Fn(&Path) -> bool) -> Option<Pat
 /// Fails where pictures would lie among a scene's photos, masks or depth maps, for more of which an import would
 /// take them.
 pub(super) fn check_no_photos(folder: &Path, scene: &Scene) -> anyhow::Result<()> {
-    // 1. Folders that hold nothing but photos, in whatever folders within. One flat folder, or one with a folder for each
-    // camera, is such a one as a whole.
+    // 1. Folders that hold nothing but photos, in whatever folders within. (Who keeps photos and model in one folder draws
+    // beside them, too: an import tells of what is no photo there.)
     let of_photos = photo_folders(scene).into_iter();
+    let of_photos = of_photos.filter(|folder| scene.capture.as_ref() != Some(folder));
     let of_photos: BTreeSet<PathBuf> = of_photos.filter_map(|f| f.canonicalize().ok()).collect();
-    // 2. Those that some lie in directly, as masks.
+    // 2. Those that some lie in directly, as masks, or photos of a flat capture.
     let folders_of = |photo: &Photo| {
         let beside = [
             &photo.ignore_mask,

@@ -47,8 +47,8 @@ struct Ready<'a> {
     moment: Option<Moment>,
     frame: Frame<'a>,
     prepared: Prepared,
-    /// The picture with its outlines drawn anew, once it was.
-    smooth: OnceCell<RgbaImage>,
+    /// The picture with its outlines drawn anew, once it was, and what want of memory did to it.
+    smooth: OnceCell<(RgbaImage, String)>,
 }
 
 /// A picture as files have it, and as it is shown.
@@ -191,22 +191,25 @@ impl<'a> SceneDrawer<'a> {
         let (width, height) = (frame.desired.width, frame.desired.height);
         let memories = Memories::now(&self.lumigraph.photos, engine);
         // 2. The layer.
+        let mut known = None;
         let picture = match look.layer {
             Layer::Picture | Layer::Coverage => {
-                match smooth.get().filter(|_| !request.is_moving) {
-                    Some(picture) => picture.clone(),
-                    None => {
-                        let draw = || engine.draw(frame, prepared);
-                        let mut picture = timed(&mut stages, "draw", draw)?;
-                        // As files have it, where one looks long enough to see stairs.
-                        if !request.is_moving {
-                            let draw =
-                                || engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture);
-                            timed(&mut stages, EDGES, draw)?;
-                            smooth.get_or_init(|| picture.clone());
-                        }
-                        picture
+                // As files have it, where one looks long enough to see stairs.
+                let kept = smooth.get().filter(|_| !request.is_moving);
+                if let Some((picture, coarse)) = kept {
+                    known = Some(coarse.clone());
+                    picture.clone()
+                } else {
+                    let draw = || engine.draw(frame, prepared);
+                    let mut picture = timed(&mut stages, "draw", draw)?;
+                    if !request.is_moving {
+                        let draw = || engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture);
+                        timed(&mut stages, EDGES, draw)?;
+                        let coarse =
+                            Memories::now(&self.lumigraph.photos, engine).told_since(memories);
+                        smooth.get_or_init(|| (picture.clone(), coarse));
                     }
+                    picture
                 }
             }
             Layer::Field => timed(&mut stages, "field picture", || {
@@ -255,7 +258,7 @@ impl<'a> SceneDrawer<'a> {
         let hover = request.hover.map(|pixel| hover(frame, asked, pixel));
         let image = timed(&mut stages, "compose", || over_background(&picture, look));
         let store = &self.lumigraph.photos;
-        let coarse = Memories::now(store, engine).told_since(memories);
+        let coarse = known.unwrap_or_else(|| Memories::now(store, engine).told_since(memories));
         let scored = frame.scored();
         let shown = Shown {
             id: request.id,
