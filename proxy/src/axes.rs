@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 const LEAST_SPREAD: f64 = 0.035;
 /// Centres nearer to one another than this share of how far they are from the world's origin are one place: a rotation
 /// and a translation, as they are written, tell them no better. Paths stand still by the same.
-const ONE_PLACE: f64 = 1e-10;
+pub const PLACE_ROUNDING: f64 = 1e-10;
 /// How far from photos of one place their plane lies, in world units: as good as any other.
 const ANY_DISTANCE: f64 = 100.0;
 /// Cosine of the widest angle between where photos of one place look and where they do on the whole, for one plane to
@@ -109,7 +109,7 @@ pub fn is_one_place(reconstruction: &Reconstruction) -> bool {
     };
     centers.all(|center| {
         let apart = center.distance(first);
-        apart.is_finite() && apart <= ONE_PLACE * center.length().max(first.length())
+        apart.is_finite() && apart <= PLACE_ROUNDING * center.length().max(first.length())
     })
 }
 

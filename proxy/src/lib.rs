@@ -29,7 +29,7 @@ pub mod tunnel;
 
 use std::sync::Arc;
 
-pub use axes::{is_one_place, plane_across_axes, plane_of_one_place};
+pub use axes::{PLACE_ROUNDING, is_one_place, plane_across_axes, plane_of_one_place};
 pub use cloud::{CloudStatistics, geometric_median, isolated_points, statistics};
 pub use condition::ILL_CONDITIONED;
 pub use dense::DensePoints;

@@ -4,11 +4,12 @@
 //! one beside it, and the two do not look alike, both are the mean of samples of the exact field: nearly all of what a
 //! picture of four times the pixels gains, for a fraction of its cost. All other pixels stay as they are.
 
-use crate::frame::{Frame, FrameSource};
+use crate::frame::{Frame, FrameSource, ProxyPoint};
 use crate::photos::PhotoError;
 use crate::rays::ray_of;
 use crate::sight::{Between, Seen, Views};
 use crate::surface::{FacetMap, NO_FACET, Surface};
+use crate::tiles::TILE;
 use crate::visibility::TOLERANCE;
 use calibrate::Pixel;
 use glam::DVec3;
@@ -23,19 +24,8 @@ pub const EDGE_SAMPLES: u32 = 2;
 /// Where neighbours differ by no more than so many steps of 255, in each channel, stairs are not seen.
 const ALIKE: i32 = 20;
 
-/// Pixels across and down that are drawn one after the other, as the same source views matter to them.
-const TILE: usize = 8;
-
 /// Samples that are drawn together, about.
 const TOGETHER: usize = 512;
-
-/// Where one looks, and the plane of the proxy that one sees there.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
-    /// As a [`ProxyPoint`](crate::ProxyPoint) has them.
-    pub ray: DVec3,
-    pub plane: DVec3,
-}
 
 /// The pixels of a frame at which its surface jumps, to be looked at more closely.
 pub(crate) struct Edges<'f> {
@@ -44,7 +34,7 @@ pub(crate) struct Edges<'f> {
     solid: &'f Solid,
     /// Where something can hide what they look at.
     between: Option<Between<'f>>,
-    /// Their places in the picture, row by row; near one another.
+    /// Their places in the picture, tile by tile, as the same source views matter to those that are near one another.
     pixels: Vec<usize>,
     /// Samples of each, across and down.
     across: usize,
@@ -95,30 +85,29 @@ impl<'f> Edges<'f> {
         self.pixels.len()
     }
 
-    /// Puts the means of samples into the frame's picture, of colours by their alpha. `draw` gives the colours of
-    /// some that see the proxy, straight RGBA; `None` where no photo has what is seen: for those the others of their pixel
-    /// stand.
+    /// Puts the means of samples into the frame's picture, of colours by their alpha. `draw` gives the colours of what
+    /// some see of the proxy, straight RGBA; `None` where no photo has it: for those the others of their pixel stand.
     ///
     /// # Errors
     /// Those of `draw`.
     pub(crate) fn put<S: Send>(
         &self,
         scratch: impl Fn() -> S + Sync + Send,
-        draw: impl Fn(&mut S, &[Sample]) -> Result<Vec<Option<[u8; 4]>>, PhotoError> + Sync + Send,
+        draw: impl Fn(&mut S, &[ProxyPoint]) -> Result<Vec<Option<[u8; 4]>>, PhotoError> + Sync + Send,
         picture: &mut RgbaImage,
     ) -> Result<(), PhotoError> {
         let run = (TOGETHER / (self.across * self.across)).max(1);
         let runs = self.pixels.par_chunks(run);
         let colors = runs.map_init(scratch, |scratch, pixels| {
-            let of_pixels: Vec<Vec<Option<Sample>>> =
+            let of_pixels: Vec<Vec<Option<ProxyPoint>>> =
                 pixels.iter().map(|i| self.samples_of(*i)).collect();
-            let seeing: Vec<Sample> = of_pixels.iter().flatten().flatten().copied().collect();
+            let seeing: Vec<ProxyPoint> = of_pixels.iter().flatten().flatten().copied().collect();
             let mut drawn = draw(scratch, &seeing)?.into_iter();
-            let mut color = |sample: Option<Sample>| match sample {
+            let mut color = |sample: Option<ProxyPoint>| match sample {
                 None => Some([0; 4]),
                 Some(_) => drawn.next().flatten(),
             };
-            let mean_of = |samples: Vec<Option<Sample>>| {
+            let mean_of = |samples: Vec<Option<ProxyPoint>>| {
                 let colors: Vec<[u8; 4]> = samples.into_iter().filter_map(&mut color).collect();
                 (!colors.is_empty()).then(|| mean(&colors))
             };
@@ -138,7 +127,7 @@ impl<'f> Edges<'f> {
     }
 
     /// What the samples of a pixel look at, row by row.
-    fn samples_of(&self, i: usize) -> Vec<Option<Sample>> {
+    fn samples_of(&self, i: usize) -> Vec<Option<ProxyPoint>> {
         let width = self.frame.desired.width as usize;
         let (x, y) = (i % width, i / width);
         let moved = self.moved_around(x, y);
@@ -150,7 +139,7 @@ impl<'f> Edges<'f> {
             let own = self.plane_along(ray)?;
             let s = own.dot(ray);
             let seen = match &self.between {
-                Some(between) if s > 0.0 => between.is_seen((x, y), ray, s),
+                Some(between) if s > 0.0 => between.who_sees((x, y), ray, s),
                 _ => Seen::Beside,
             };
             let as_nearby = || moved_with(&moved, own, ray);
@@ -161,7 +150,11 @@ impl<'f> Edges<'f> {
                 Seen::Beside => as_nearby(),
             };
             let plane = moved.unwrap_or(own);
-            Some(Sample { ray, plane })
+            Some(ProxyPoint {
+                ray,
+                inverse_distance: plane.dot(ray),
+                plane,
+            })
         };
         (0..self.across * self.across).map(sample).collect()
     }

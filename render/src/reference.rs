@@ -3,7 +3,7 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
-use crate::edges::{Edges, Sample};
+use crate::edges::Edges;
 use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint, exposed, trust};
 use crate::held::Held;
@@ -50,20 +50,15 @@ pub(crate) fn smooth(
     let photos = Held::again(frame, &among);
     let frame_of_samples = edges.frame_of_samples();
     let frame = &frame_of_samples;
-    let color = |Sample { ray, plane }: &Sample| {
-        let point = ProxyPoint {
-            ray: *ray,
-            inverse_distance: plane.dot(*ray),
-            plane: *plane,
-        };
+    let color = |point: &ProxyPoint| {
         if point.inverse_distance < 0.0 {
             return Ok(None);
         }
-        let contributors = blend_among(frame, &point, among.iter().copied());
-        let color = color_at(frame, &photos, &point, &contributors)?;
+        let contributors = blend_among(frame, point, among.iter().copied());
+        let color = color_at(frame, &photos, point, &contributors)?;
         Ok((!contributors.is_empty()).then(|| straight_rgba8(color)))
     };
-    let draw = |(): &mut (), samples: &[Sample]| samples.iter().map(color).collect();
+    let draw = |(): &mut (), points: &[ProxyPoint]| points.iter().map(color).collect();
     edges.put(|| (), draw, picture)?;
     frame.check_masks()
 }

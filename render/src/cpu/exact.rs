@@ -4,8 +4,7 @@ use super::asked::{Asked, Extent, in_f32};
 use super::lanes::{LANES, any, each};
 use super::source::Tile;
 use super::{BAND, Engine, Seen, TILE, draw, mark, put, tiles_of_band};
-use crate::edges::Sample;
-use crate::frame::Frame;
+use crate::frame::{Frame, ProxyPoint};
 use crate::held::Held;
 use crate::photos::PhotoError;
 use crate::rays::RayMap;
@@ -72,22 +71,21 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// The exact picture where some samples look that are near one another, straight RGBA; `None` where no photo has
-    /// what they see.
-    pub(super) fn draw_samples(
+    /// The exact picture of some proxy points that are near one another, straight RGBA; `None` where no photo has one.
+    pub(super) fn draw_points(
         &self,
         photos: &Held<'_>,
         (asked, seen): &mut (Asked, Seen),
-        samples: &[Sample],
+        points: &[ProxyPoint],
     ) -> Result<Vec<Option<[u8; 4]>>, PhotoError> {
-        let tile = |samples: &[Sample]| {
+        let tile = |points: &[ProxyPoint]| {
             let mut tile = Tile::nothing();
-            for (k, Sample { ray, plane }) in samples.iter().enumerate() {
-                tile.set(k, ray.as_vec3().to_array(), *plane);
+            for (k, point) in points.iter().enumerate() {
+                tile.set(k, point.ray.as_vec3().to_array(), point.plane);
             }
             tile
         };
-        let tiles: Vec<Tile> = samples.chunks(LANES).map(tile).collect();
+        let tiles: Vec<Tile> = points.chunks(LANES).map(tile).collect();
         let mut colors = vec![None; tiles.len() * LANES];
         asked.forget(self.frame);
         self.weigh_block(&tiles, asked, seen, |i, seen| {
@@ -102,7 +100,7 @@ impl Engine<'_> {
             }
             Ok(())
         })?;
-        colors.truncate(samples.len());
+        colors.truncate(points.len());
         Ok(colors)
     }
 

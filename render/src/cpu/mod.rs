@@ -15,9 +15,9 @@ mod triangulated;
 mod weights;
 
 use crate::RenderError;
-use crate::edges::{Edges, Sample};
+use crate::edges::Edges;
 use crate::field::TriangulatedField;
-use crate::frame::Frame;
+use crate::frame::{Frame, ProxyPoint};
 use crate::held::Held;
 use crate::near::is_time_to_see;
 use crate::options::{FieldOptions, Method};
@@ -110,8 +110,8 @@ impl Cpu {
             wanted.iter().for_each(|i| among[*i] = true);
             engine.among = Some(among);
         }
-        let draw = |scratch: &mut (Asked, Seen), samples: &[Sample]| {
-            engine.draw_samples(&photos, scratch, samples)
+        let draw = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
+            engine.draw_points(&photos, scratch, points)
         };
         edges.put(Default::default, draw, picture)?;
         frame.check_masks()

@@ -149,6 +149,13 @@ struct Shown {
     view: usize,
 }
 
+impl Shown {
+    /// The plane across the ray there, of the point at ray / s.
+    fn plane(&self, ray: DVec3, s: f64) -> DVec3 {
+        ray * (s * self.times / ray.length_squared())
+    }
+}
+
 /// Whether inverse distances may be of the same surface.
 fn are_near(a: f64, b: f64) -> bool {
     (a - b).abs() <= TOLERANCE * a.max(b)
@@ -211,26 +218,15 @@ impl<'a> Between<'a> {
         Self(Looks::new(map, desired, None, views, visibility, photos))
     }
 
-    /// Whether anyone sees the point at ray / s, of a ray through a pixel.
-    pub(crate) fn is_seen(&self, (x, y): (usize, usize), ray: DVec3, s: f64) -> Seen {
-        let mut is_hidden = false;
-        let mut near = self.0.near(x, y).iter();
-        let is_seen = near.any(|view| {
-            let says = self.0.asked.says(*view as usize, ray, s);
-            is_hidden |= says == Says::Hidden;
-            says == Says::Seen
-        });
-        match (is_seen, is_hidden) {
-            (true, _) => Seen::ByOne,
-            (false, true) => Seen::ByNone,
-            (false, false) => Seen::Beside,
-        }
+    /// Who sees the point at ray / s, of a ray through a pixel.
+    pub(crate) fn who_sees(&self, (x, y): (usize, usize), ray: DVec3, s: f64) -> Seen {
+        self.0.who_sees((x, y), ray, s, &mut None)
     }
 
     /// The plane across the ray at the nearest place before that point which one shows.
     pub(crate) fn shown_before(&self, (x, y): (usize, usize), ray: DVec3, s: f64) -> Option<DVec3> {
         let shown = self.0.asked.nearest_shown(self.0.near(x, y), ray, s, 1)?;
-        Some(ray * (s * shown.times / ray.length_squared()))
+        Some(shown.plane(ray, s))
     }
 }
 
@@ -283,8 +279,19 @@ impl Looks<'_> {
         let Some((ray, s)) = self.at(x, y).filter(|(_, s)| *s > 0.0) else {
             return true;
         };
+        self.who_sees((x, y), ray, s, last) != Seen::ByNone
+    }
+
+    /// Who sees the point at ray / s, of a ray through a pixel. Who saw the `last` is asked first.
+    fn who_sees(
+        &self,
+        (x, y): (usize, usize),
+        ray: DVec3,
+        s: f64,
+        last: &mut Option<usize>,
+    ) -> Seen {
         if last.is_some_and(|view| self.asked.says(view, ray, s) == Says::Seen) {
-            return true;
+            return Seen::ByOne;
         }
         let mut is_hidden = false;
         let mut near = self.near(x, y).iter().map(|view| *view as usize);
@@ -293,7 +300,11 @@ impl Looks<'_> {
             is_hidden |= says == Says::Hidden;
             says == Says::Seen
         });
-        last.is_some() || !is_hidden
+        match (*last, is_hidden) {
+            (Some(_), _) => Seen::ByOne,
+            (None, true) => Seen::ByNone,
+            (None, false) => Seen::Beside,
+        }
     }
 
     /// What is moved of a row of tiles, by row. Of each block it is known whether its first pixel is seen.
@@ -360,7 +371,7 @@ impl Looks<'_> {
         let shown = shown?;
         Some(Moved {
             x,
-            plane: ray * (s * shown.times / ray.length_squared()),
+            plane: shown.plane(ray, s),
             source_idx: shown.view as u32,
         })
     }

@@ -5,7 +5,7 @@ use crate::lumigraph::SourceView;
 use crate::path::{fitted_rotation, mean_rotation};
 use calibrate::{Rigid3, View, outer, principal_axes};
 use glam::{DMat3, DQuat, DVec3};
-use proxy::{Proxy, geometric_median};
+use proxy::{PLACE_ROUNDING, Proxy, geometric_median};
 
 /// Positions here are relative to the reference camera's centre, axes are the world's.
 pub(super) struct Capture {
@@ -88,7 +88,7 @@ impl Capture {
                 - along().fold(f64::INFINITY, f64::min))
         });
         let farthest = centers.iter().map(|c| c.length()).fold(0.0, f64::max);
-        let rounding = 1e-10 * origin_in_world.length();
+        let rounding = PLACE_ROUNDING * origin_in_world.length();
 
         // 3. How far the scene is ahead of the reference camera.
         let (to_points, to_proxy) = distances_ahead(reference, forward, points_in_world, proxy);
