@@ -4,8 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-/// Size of the first part of a JPEG in which its size is looked for; more only where
-/// that does not hold it.
+/// Size of the first part of a JPEG in which its size and EXIF data are looked for; more only
+/// where that does not hold them.
 const HEAD_BYTES: u64 = 1 << 16;
 
 /// Width and height of a photo as stored, from the start of the file alone.
@@ -27,31 +27,42 @@ pub fn content_size(
     mut file: impl BufRead + Seek,
 ) -> Result<(u32, u32), CaptureError> {
     let failed = read_failed(path);
+    let start = start(&mut file).map_err(&failed)?;
+    match format_of(path, &start)? {
+        ImageFormat::Jpeg => find_in_head(&mut file, jpeg::size)
+            .map_err(&failed)?
+            .ok_or_else(|| decode_error(path, "the JPEG data do not state a size")),
+        format => ImageReader::with_format(file, format)
+            .into_dimensions()
+            .map_err(|error| decode_failed(path, &error, None)),
+    }
+}
+
+/// A file's first bytes, as many as tell its format; it stands at its beginning again.
+pub(crate) fn start(file: &mut (impl Read + Seek)) -> io::Result<Vec<u8>> {
+    let mut start = Vec::new();
+    Read::by_ref(file).take(64).read_to_end(&mut start)?;
+    file.rewind()?;
+    Ok(start)
+}
+
+/// What `find` makes of a file's first part, of which it is given more until it finds something; `None` where it
+/// finds nothing in the whole file.
+pub(crate) fn find_in_head<T>(
+    file: &mut impl Read,
+    find: impl Fn(&[u8]) -> Option<T>,
+) -> io::Result<Option<T>> {
     let mut head = Vec::new();
     let mut wanted = HEAD_BYTES;
     loop {
         let missing = wanted - head.len() as u64;
-        let got = Read::by_ref(&mut file)
-            .take(missing)
-            .read_to_end(&mut head)
-            .map_err(&failed)?;
-        match format_of(path, &head)? {
-            ImageFormat::Jpeg => {
-                if let Some(size) = jpeg::size(&head) {
-                    return Ok(size);
-                }
-            }
-            format => {
-                drop(head);
-                file.rewind().map_err(&failed)?;
-                return ImageReader::with_format(file, format)
-                    .into_dimensions()
-                    .map_err(|error| decode_failed(path, &error, None));
-            }
+        let got = Read::by_ref(file).take(missing).read_to_end(&mut head)?;
+        if let Some(found) = find(&head) {
+            return Ok(Some(found));
         }
         if (got as u64) < missing {
             // That was the whole file.
-            return Err(decode_error(path, "the JPEG data do not state a size"));
+            return Ok(None);
         }
         wanted *= 4;
     }
@@ -172,17 +183,6 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
-}
-
-/// A file's first part, which holds the EXIF data of a JPEG.
-pub(crate) fn head(path: &Path) -> Result<Vec<u8>, CaptureError> {
-    let failed = read_failed(path);
-    let file = open(path).map_err(&failed)?;
-    let mut head = Vec::new();
-    // An EXIF segment has at most 64 KiB; a JFIF header may come before it.
-    let read = file.take(2 * HEAD_BYTES).read_to_end(&mut head);
-    read.map_err(&failed)?;
-    Ok(head)
 }
 
 /// JPEG or PNG, by a file's first bytes: its extension may be wrong.

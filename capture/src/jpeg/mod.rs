@@ -1,5 +1,5 @@
-//! The markers of a JPEG file and the codes between them: enough to know its size, whether it
-//! is complete, and whether it is damaged on the way.
+//! The markers of a JPEG file and the codes between them: enough to know its size, its EXIF data,
+//! whether it is complete, and whether it is damaged on the way.
 //!
 //! Decoders fill up what is missing at the end of a file with grey. A photo half grey is
 //! worse than none, so we look for the end ourselves: walking from marker to marker, as
@@ -28,6 +28,7 @@ const END_OF_IMAGE: u8 = 0xD9;
 const START_OF_SCAN: u8 = 0xDA;
 const NUMBER_OF_LINES: u8 = 0xDC;
 const RESTART_INTERVAL: u8 = 0xDD;
+const APPLICATION_1: u8 = 0xE1;
 const TEMPORARY: u8 = 0x01;
 
 /// Whether the picture's end is there. What follows it does not matter: some cameras
@@ -44,6 +45,16 @@ pub(crate) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
     let (width, height) = (u16::from_be_bytes([w1, w0]), u16::from_be_bytes([h1, h0]));
     // A height of zero is stated later, by rare files.
     (width > 0 && height > 0).then_some((width.into(), height.into()))
+}
+
+/// What the EXIF segment holds behind its name, nothing where the picture begins without one; `None` if the part of the
+/// file in `bytes` ends before that is known.
+pub(crate) fn exif(bytes: &[u8]) -> Option<&[u8]> {
+    markers(bytes).find_map(|(marker, segment)| match marker {
+        APPLICATION_1 => segment.strip_prefix(b"Exif\0\0"),
+        START_OF_SCAN | END_OF_IMAGE => Some(&segment[..0]),
+        _ => None,
+    })
 }
 
 /// Whether a marker begins a frame, of whatever coding.
