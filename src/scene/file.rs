@@ -103,7 +103,7 @@ pub struct PhotoEntry {
     /// Exposure of red, green and blue, relative to the other photos.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<[f64; 3]>,
-    /// The nearest and farthest depth along z that it shows.
+    /// The nearest and farthest depth along z that it shows: 0 < nearest < farthest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_bounds: Option<[f64; 2]>,
     /// EXIF's orientation of its stored pixels, 1 to 8; absent where nothing says that they are turned or mirrored.

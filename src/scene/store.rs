@@ -96,6 +96,22 @@ impl Scene {
                 let problem = format!("photo {}: the depth scale must be positive", entry.name);
                 return Err(inconsistent(problem));
             }
+            if let Some([near, far]) = entry.depth_bounds
+                && !(near > 0.0 && near < far && far.is_finite())
+            {
+                let name = &entry.name;
+                return Err(inconsistent(format!(
+                    "photo {name}: the depth bounds are {near} and {far}, expected 0 < nearest < farthest"
+                )));
+            }
+            if let Some(orientation) = entry.orientation
+                && !(1..=8).contains(&orientation)
+            {
+                let name = &entry.name;
+                return Err(inconsistent(format!(
+                    "photo {name}: the orientation is {orientation}, expected EXIF's 1 to 8"
+                )));
+            }
             photos.push(Photo {
                 path: folder.join(&entry.path),
                 original: entry.original,

@@ -168,6 +168,22 @@ fn a_scene_whose_photos_went_or_that_lies_says_so() {
     let mut file = whole.clone();
     file["photos"][0] = file["photos"][1].clone();
     assert!(error(&file).contains("photo 0001.png is listed twice"));
+    for [near, far] in [[0.0, 0.0], [4.5, 2.5], [-1.0, 3.0], [3.0, 3.0]] {
+        let mut file = whole.clone();
+        file["photos"][1]["depth_bounds"] = json!([near, far]);
+        let said = format!(
+            "scene/scene.json: photo 0001.png: the depth bounds are {near} and {far}, expected 0 < nearest < farthest; \
+             import the photos again"
+        );
+        assert_eq!(error(&file), said);
+    }
+    for orientation in [0, 9] {
+        let mut file = whole.clone();
+        file["photos"][1]["orientation"] = json!(orientation);
+        let said =
+            format!("photo 0001.png: the orientation is {orientation}, expected EXIF's 1 to 8");
+        assert!(error(&file).contains(&said));
+    }
     let mut file = whole.clone();
     file.as_object_mut().unwrap().remove("photos");
     assert!(error(&file).contains("missing field `photos`"));

@@ -79,15 +79,15 @@ pub fn parse_llff(
 /// The nearest and farthest depth along z that each row of a `poses_bounds.npy` gives.
 ///
 /// # Errors
-/// An unreadable file, an array of another type or shape, bounds that are not 0 < near ≤ far.
+/// An unreadable file, an array of another type or shape, bounds that are not 0 < near < far.
 pub fn read_llff_bounds(path: &Path) -> Result<Vec<[f64; 2]>, FormatError> {
     let rows = rows(&build::read(path)?).map_err(|problem| problem.at(path, "header"))?;
     let bounds = |(index, row): (usize, &[f64; COLUMNS])| {
         let [near, far] = [row[15], row[16]];
-        if near > 0.0 && near <= far && far.is_finite() {
+        if near > 0.0 && near < far && far.is_finite() {
             return Ok([near, far]);
         }
-        let problem = format!("the depths are {near} and {far}, expected 0 < nearest ≤ farthest");
+        let problem = format!("the depths are {near} and {far}, expected 0 < nearest < farthest");
         Err(Problem::broken(problem).at(path, format!("row {index}")))
     };
     rows.iter().enumerate().map(bounds).collect()

@@ -1,7 +1,7 @@
 use crate::broken::damage;
 use crate::captures::{angle_between, capture};
 use calibrate::colmap::{find_model, read_model};
-use calibrate::formats::{FormatError, read_llff};
+use calibrate::formats::{FormatError, read_llff, read_llff_bounds};
 use calibrate::{Reconstruction, Rigid3};
 use glam::DVec3;
 use std::path::Path;
@@ -143,6 +143,24 @@ fn errors_name_the_row_and_a_remedy() {
     row[14] = -1.0;
     let negative = npy("<f8", "(1, 17)", &doubles(&[row]));
     assert!(error(&negative, &["a.jpg"], None).contains("must be positive"));
+}
+
+#[test]
+fn depths_lie_before_the_camera_and_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses_bounds.npy");
+    let bounds = |near: f64, far: f64| {
+        let mut row = ROW;
+        (row[15], row[16]) = (near, far);
+        std::fs::write(&path, npy("<f8", "(1, 17)", &doubles(&[row]))).unwrap();
+        read_llff_bounds(&path).map_err(|error| error.to_string())
+    };
+    assert_eq!(bounds(0.5, 9.0), Ok(vec![[0.5, 9.0]]));
+    for (near, far) in [(0.0, 9.0), (9.0, 0.5), (3.0, 3.0), (0.5, f64::INFINITY)] {
+        let error = bounds(near, far).unwrap_err();
+        let said = "expected 0 < nearest < farthest";
+        assert!(error.contains("row 0") && error.contains(said), "{error}");
+    }
 }
 
 #[test]
