@@ -7,6 +7,7 @@ use crate::{MeshKind, Plane, PlaneError, Proxy, Solid, SparsePoint, glb};
 use calibrate::View;
 use capture::without_byte_order_mark;
 use glam::DVec3;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +26,7 @@ pub enum FileError {
     Json(PathBuf, serde_json::Error),
     /// It is from a later version.
     #[error("{path}: proxy file version {found}; this program reads version 1", path = .0.display(), found = .1)]
-    Version(PathBuf, u32),
+    Version(PathBuf, u64),
     /// Its plane is not one.
     #[error("{path}: {error}", path = .0.display(), error = .1)]
     Plane(PathBuf, PlaneError),
@@ -103,6 +104,13 @@ impl Form {
             _ => Err(FileError::Extension(path.to_owned())),
         }
     }
+}
+
+/// What is read first: of a later version nothing else need be readable.
+#[derive(Deserialize)]
+struct Head {
+    version: Option<u64>,
+    kind: Option<IgnoredAny>,
 }
 
 /// What the files say. Unknown keys are kept out of the way, not refused.
@@ -196,6 +204,16 @@ fn hull_of(mesh: mesh::Mesh) -> Result<Arc<Solid>, String> {
 }
 
 impl Stored {
+    /// Of a file's JSON.
+    fn parse(path: &Path, text: &[u8]) -> Result<Self, FileError> {
+        let json = |e| FileError::Json(path.to_owned(), e);
+        let Head { version, .. } = serde_json::from_slice(text).map_err(json)?;
+        if let Some(found) = version.filter(|version| *version != 1) {
+            return Err(FileError::Version(path.to_owned(), found));
+        }
+        serde_json::from_slice(text).map_err(json)
+    }
+
     fn of(proxy: &Proxy) -> Self {
         let surface = match proxy {
             Proxy::Plane(plane) => StoredSurface::Plane {
@@ -236,9 +254,6 @@ impl Stored {
         path: &Path,
         mesh: impl FnOnce() -> Result<mesh::Mesh, FileError>,
     ) -> Result<Proxy, FileError> {
-        if self.version != 1 {
-            return Err(FileError::Version(path.to_owned(), self.version));
-        }
         let within = self.within.map(StoredMesh::solid).transpose();
         let bad = |kind| move |reason| FileError::Points(path.to_owned(), kind, reason);
         let kind = match self.surface {
@@ -330,19 +345,21 @@ pub fn read(path: &Path) -> Result<Proxy, FileError> {
 /// # Errors
 /// As for [`read()`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
-    let json = |e| FileError::Json(path.to_owned(), e);
     let mesh = || Ok(mesh::parse(path, bytes)?);
     match extension(path).as_str() {
         "json" => {
-            let text = without_byte_order_mark(bytes);
-            let stored: Stored = serde_json::from_slice(text).map_err(json)?;
+            let stored = Stored::parse(path, without_byte_order_mark(bytes))?;
             stored.proxy(path, || Err(FileError::NoMesh(path.to_owned())))
         }
         "glb" => {
             let extras = glb::extras(bytes).map_err(|e| FileError::Glb(path.to_owned(), e))?;
             // Extras of somebody else's are none of ours.
-            match extras.and_then(|text| serde_json::from_str::<Stored>(&text).ok()) {
-                Some(stored) => stored.proxy(path, mesh),
+            let is_ours = |text: &String| {
+                let head = serde_json::from_str::<Head>(text);
+                head.is_ok_and(|head| head.version.is_some() && head.kind.is_some())
+            };
+            match extras.filter(is_ours) {
+                Some(text) => Stored::parse(path, text.as_bytes())?.proxy(path, mesh),
                 None => Ok(solid(MeshKind::Mesh, mesh()?, true, None)),
             }
         }
@@ -470,6 +487,40 @@ mod tests {
         let text = "\u{feff}{\"version\": 1, \"kind\": \"view-plane\"}";
         let read = parse(Path::new("p.json"), text.as_bytes()).unwrap();
         assert_eq!(read, Proxy::ViewPlane);
+    }
+
+    #[test]
+    fn later_versions_are_told_whatever_else_they_say() {
+        let triangle = mesh::Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]],
+        };
+        let glb = |extras: &str| {
+            let bytes = mesh::to_glb(&triangle, &[], Some(extras.to_owned())).unwrap();
+            parse(Path::new("p.glb"), &bytes)
+        };
+        for later in [
+            r#"{"version": 2, "kind": "later"}"#,
+            r#"{"version": 2, "kind": {"of": "plane"}}"#,
+            r#"{"version": 2, "kind": "points", "within": [1]}"#,
+        ] {
+            let said = "proxy file version 2; this program reads version 1";
+            let error = parse(Path::new("p.json"), later.as_bytes()).unwrap_err();
+            assert_eq!(error.to_string(), format!("p.json: {said}"));
+            let error = glb(later).unwrap_err();
+            assert_eq!(error.to_string(), format!("p.glb: {said}"));
+        }
+        // Of a plane that cannot be read the square that only stands for it is no proxy.
+        let error = glb(r#"{"version": 1, "kind": "plane", "point": [0, 0, 0]}"#).unwrap_err();
+        let said = "p.glb: not a proxy file: missing field `normal`";
+        assert!(error.to_string().starts_with(said), "{error}");
+        for others in [
+            r#"{"version": "2", "kind": "plane"}"#,
+            r#"{"version": 2}"#,
+            "7",
+        ] {
+            assert_eq!(glb(others).unwrap().kind(), "mesh", "{others}");
+        }
     }
 
     #[test]
