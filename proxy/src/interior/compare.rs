@@ -6,7 +6,7 @@ use crate::shown_name;
 use glam::DVec3;
 use std::fmt;
 
-/// A cell of the known interior, and the found one that shares most with it.
+/// A cell of the known interior, and the found one that is the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComparedCell {
     /// The known one's name.
@@ -15,6 +15,8 @@ pub struct ComparedCell {
     pub found: Option<String>,
     /// Floor area that both have, over floor area that either has.
     pub iou: f64,
+    /// Where none is: the one that shares most with it all the same, and floor that both have over floor that either has.
+    pub nearest: Option<(String, f64)>,
     /// How far apart the same sides of their boxes are at most, in world units.
     pub apart: Option<f64>,
 }
@@ -70,9 +72,12 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
         let both = shared.both[t * m + f];
         both as f64 / (shared.known[t] + shared.found[f] - both).max(1) as f64
     };
+    // A sliver is shared by neighbours, too.
+    let share_half =
+        |t: usize, f: usize| 2 * shared.both[t * m + f] >= shared.known[t].min(shared.found[f]);
     // 1. Cells, those that share most first.
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
-    pairs.retain(|(t, f)| iou(*t, *f) > 0.0);
+    pairs.retain(|(t, f)| iou(*t, *f) > 0.0 && share_half(*t, *f));
     pairs.sort_by(|a, b| iou(b.0, b.1).total_cmp(&iou(a.0, a.1)));
     let (mut of_known, mut is_matched) = (vec![None; n], vec![false; m]);
     for (t, f) in pairs {
@@ -91,10 +96,16 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
     let unmatched = (0..m).filter(|f| !is_matched[*f]);
     let (extra, uncertain): (Vec<usize>, Vec<usize>) =
         unmatched.partition(|f| is_all_known && has_box(&found.cells[*f]));
+    let nearest = |t: usize| {
+        let sharing = (0..m).map(|f| (f, iou(t, f))).filter(|(_, iou)| *iou > 0.0);
+        let (f, iou) = sharing.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some((name(f), iou))
+    };
     let cells = told.into_iter().map(|t| ComparedCell {
         name: name_of_known(t),
         found: of_known[t].map(name),
         iou: of_known[t].map_or(0.0, |f| iou(t, f)),
+        nearest: nearest(t).filter(|_| of_known[t].is_none()),
         apart: of_known[t].and_then(|f| apart(&known.cells[t], &found.cells[f])),
     });
     let cells = cells.collect();
@@ -107,9 +118,7 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
     let is_same = |t: Option<CellId>, f: Option<CellId>| match (t, f) {
         (Some(t), Some(f)) => {
             let have_boxes = has_box(known.cell(t)) && has_box(found.cell(f));
-            let (t, f) = (t.0 as usize, f.0 as usize);
-            let least = shared.known[t].min(shared.found[f]);
-            !have_boxes || 2 * shared.both[t * m + f] >= least
+            !have_boxes || share_half(t.0 as usize, f.0 as usize)
         }
         (t, f) => t.is_none() && f.is_none(),
     };
@@ -275,7 +284,12 @@ impl fmt::Display for Comparison {
                     let [name, found] = [&cell.name, found].map(|name| shown_name(name));
                     write!(f, "{name}: {found}, IoU {:.3}", cell.iou)?;
                 }
-                None => write!(f, "{}: not found", shown_name(&cell.name))?,
+                None => {
+                    write!(f, "{}: not found", shown_name(&cell.name))?;
+                    if let Some((nearest, iou)) = &cell.nearest {
+                        write!(f, "; {} has IoU {iou:.3}", shown_name(nearest))?;
+                    }
+                }
             }
             match cell.apart {
                 Some(apart) => writeln!(f, ", sides {:.2} m apart at most", apart / self.meter)?,
@@ -415,6 +429,27 @@ mod tests {
     }
 
     #[test]
+    fn a_room_that_shares_a_sliver_is_another() {
+        let mut found = rooms(&[]);
+        let beside = &mut found.cells[1];
+        beside.name = "attic".to_owned();
+        beside.floor = None;
+        beside.content = Content::Box(RoomBox {
+            min: DVec3::new(7.75, 0.0, 0.0),
+            max: DVec3::new(11.75, 2.5, 3.0),
+        });
+        let told = compare(&rooms(&[]), &found, 0.3, 1.0).to_string();
+        for line in [
+            "hall: hall, IoU 1.000, sides 0.00 m apart at most\n",
+            "study: not found; attic has IoU 0.0",
+            "attic: no such room\n",
+            "1 of 2 rooms, 0 of 1 portals found\n",
+        ] {
+            assert!(told.contains(line), "{told}");
+        }
+    }
+
+    #[test]
     fn rooms_of_other_storeys_are_others_whatever_order_they_are_in() {
         let storeys = |rooms: &[(&str, f64, f64)]| {
             let mut interior = self::rooms(&[]);
@@ -470,6 +505,7 @@ mod tests {
             name: "hall".to_owned(),
             found: Some("room 1".to_owned()),
             iou: 0.97,
+            nearest: None,
             apart: Some(0.13 * meter),
         };
         let portal = ComparedPortal {
