@@ -9,6 +9,7 @@ use capture::without_byte_order_mark;
 use glam::DVec3;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -258,11 +259,15 @@ impl Stored {
         let bad = |kind| move |reason| FileError::Points(path.to_owned(), kind, reason);
         let kind = match self.surface {
             StoredSurface::Plane { point, normal } => {
+                within.map_err(bad("plane"))?;
                 return Plane::new(DVec3::from_array(point), DVec3::from_array(normal))
                     .map(Proxy::Plane)
                     .map_err(|e| FileError::Plane(path.to_owned(), e));
             }
-            StoredSurface::ViewPlane => return Ok(Proxy::ViewPlane),
+            StoredSurface::ViewPlane => {
+                within.map_err(bad("view-plane"))?;
+                return Ok(Proxy::ViewPlane);
+            }
             StoredSurface::Points {} => {
                 let within = within.map_err(bad("points"))?;
                 return Ok(Proxy::Points { within });
@@ -311,10 +316,24 @@ fn dense(
         let (points, seen) = (points.len(), seen_by.len());
         return Err(format!("{points} points, and who sees {seen} of them"));
     }
+    if points.is_empty() {
+        return Err("it has no points".to_owned());
+    }
+    if seen_by.iter().all(Vec::is_empty) {
+        return Err(format!("no view sees any of its {} points", points.len()));
+    }
+    let mut named = BTreeSet::new();
+    if let Some(name) = names.iter().find(|name| !named.insert(name.as_str())) {
+        return Err(format!("it names the view {name} twice"));
+    }
     let point = |(i, (position, seen_by)): (usize, (&[f64; 3], Vec<u32>))| {
         if let Some(view) = seen_by.iter().find(|&&view| view as usize >= names.len()) {
             let views = names.len();
             return Err(format!("point {i} is seen by view {view} of {views}"));
+        }
+        let mut seen = BTreeSet::new();
+        if let Some(view) = seen_by.iter().find(|view| !seen.insert(**view)) {
+            return Err(format!("point {i} is seen by view {view} twice"));
         }
         let position = DVec3::from_array(*position);
         Ok(SparsePoint { position, seen_by })
@@ -689,6 +708,18 @@ mod tests {
             let is_said = error.starts_with("p.json: the hull around it ") && error.contains(said);
             assert!(is_said, "{error}");
         }
+        // So it is where nothing is bounded.
+        for surface in [
+            r#""kind": "view-plane""#,
+            r#""kind": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]"#,
+        ] {
+            let within =
+                r#"{"positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}"#;
+            let text = format!(r#"{{"version": 1, {surface}, "within": {within}}}"#);
+            let error = parse(Path::new("p.json"), text.as_bytes()).unwrap_err();
+            let said = "p.json: the hull around it is not closed";
+            assert!(error.to_string().starts_with(said), "{error}");
+        }
         // So it is of a mesh's.
         let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n\
                    property double z\nelement face 1\nproperty list uchar uint vertex_indices\n\
@@ -718,5 +749,23 @@ mod tests {
             error.contains("1 points, and who sees 0 of them"),
             "{error}"
         );
+        let points = |count: usize| vec!["[0,0,1]"; count].join(",");
+        for (views, count, seen_by, said) in [
+            (r#""a""#, 0, "", "it has no points; find the points anew"),
+            (r#""a""#, 2, "[], []", "no view sees any of its 2 points"),
+            (r#""a", "b", "a""#, 1, "[0]", "it names the view a twice"),
+            (
+                r#""a", "b""#,
+                2,
+                "[0], [1, 0, 1]",
+                "point 1 is seen by view 1 twice",
+            ),
+        ] {
+            let points = points(count);
+            let error = told(&format!(
+                r#"{{"version": 1, "kind": "dense", "views": [{views}], "points": [{points}], "seen_by": [{seen_by}]}}"#
+            ));
+            assert!(error.contains(said), "{error}");
+        }
     }
 }
