@@ -161,6 +161,9 @@ impl Interior {
             if !has_portal && self.cells.len() > 1 {
                 found.push(InteriorWarning::NoPortal(cell.name.clone()));
             }
+            if cell.other.contains_key("held_out") {
+                found.push(InteriorWarning::HeldOut(cell.name.clone()));
+            }
         }
         for cell in &self.cells {
             let Some(floor) = &cell.floor else {

@@ -196,6 +196,13 @@ pub enum InteriorWarning {
         shown_name(.0)
     )]
     FloorSteep(String),
+    /// A cell names photos that are to be held out, which only the whole file does.
+    #[error(
+        "cell `{}` has a `held_out`, which counts for the whole file alone: these photos are not held out; move it out \
+         of the cell, beside `cells`",
+        shown_name(.0)
+    )]
+    HeldOut(String),
     /// A portal's outline goes the other way round.
     #[error(
         "portal `{}` seems to be turned round: its corners are to be counter-clockwise as seen \

@@ -15,13 +15,14 @@
 //!     {"name": "door", "polygon": [[4, 0, 1], [4, 0, 2], [4, 2, 2], [4, 2, 1]],
 //!      "cells": ["hall", "study"], "radius": 1.5},
 //!     {"name": "window", "polygon": […], "cells": ["hall", null]}
-//!   ]
+//!   ],
+//!   "held_out": ["b.jpg"]
 //! }
 //! ```
 //!
 //! A polygon is counter-clockwise as the first of its cells sees it. Paths are relative to the
 //! file's folder, with `/` between their parts. The photos of a `scene` colour the model's triangles
-//! in the box beside it; those that `held_out` names are not drawn from. Keys that this version does
+//! in the box beside it; those that the whole file's `held_out` names are not drawn from. Keys that this version does
 //! not know are kept when the file is written again.
 
 use super::arrays::{exactly, points, points_or_none};

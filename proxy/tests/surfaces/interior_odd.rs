@@ -48,6 +48,19 @@ fn what_is_odd_is_told() {
 }
 
 #[test]
+fn a_cell_that_holds_photos_out_is_told() {
+    let mut interior = two_rooms();
+    interior.held_out = vec!["b.jpg".to_owned()];
+    assert_eq!(interior.check().unwrap(), []);
+    let names = serde_json::from_str(r#"["b.jpg"]"#).unwrap();
+    interior.cells[1].other.insert("held_out".to_owned(), names);
+    let warnings = interior.check().unwrap();
+    assert_eq!(warnings, [InteriorWarning::HeldOut("east".to_owned())]);
+    let said = "cell `east` has a `held_out`, which counts for the whole file alone";
+    assert!(warnings[0].to_string().starts_with(said), "{}", warnings[0]);
+}
+
+#[test]
 fn eyes_over_all_ceilings_or_on_the_floor_are_told() {
     // Both rooms are 3 high.
     for (eye_height, is_told) in [
