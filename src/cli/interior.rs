@@ -9,7 +9,7 @@ use super::output::{print, say};
 use super::session::spinner;
 use super::targets::{check_new_folder, holder};
 use anyhow::{Context, bail};
-use calibrate::colmap;
+use calibrate::{Distortion, colmap};
 use capture::as_argument;
 use datasets::in_new_folder;
 use glam::DVec3;
@@ -22,7 +22,7 @@ use proxy::interior::{
 };
 use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
 use proxy::shown_name;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::io::Cursor;
 use std::mem::discriminant;
@@ -158,6 +158,7 @@ fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     super::options::print_warnings(&warnings);
     super::options::drop_weak_of_interior(&mut scene);
     let without = args.hold_out.names(&scene)?;
+    say_distorted(&scene, &without);
     // 1. The surface.
     let start = Instant::now();
     let busy = spinner("fusing depth maps");
@@ -195,6 +196,20 @@ fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     };
     say!("{surface} in {fused_s:.1} s, rooms in {rooms_s:.1} s");
     Ok(())
+}
+
+/// Says so where pictures of the interior cannot be compared with photos that are held out.
+fn say_distorted(scene: &Scene, held_out: &BTreeSet<String>) {
+    let is_distorted = |name: &&String| {
+        let view = scene.view(name);
+        view.is_ok_and(|view| view.lens.distortion() != Distortion::None)
+    };
+    if let Some(name) = held_out.iter().find(is_distorted) {
+        say!(
+            "note: photo {name} is held out, and its lens is distorted, for which `walk --held-out` draws nothing: import \
+             the photos with --undistort, and make the interior of that scene"
+        );
+    }
 }
 
 fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<()> {

@@ -25,7 +25,7 @@ use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
-use render::interior::{Painter, Pinhole, PortalFill, Splat, Walk, WalkOptions};
+use render::interior::{Painter, Pinhole, PinholeError, PortalFill, Splat, Walk, WalkOptions};
 use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
@@ -57,7 +57,8 @@ pub(super) struct Args {
     /// Walk through all rooms [default, where there is no --path]
     #[arg(long)]
     tour: bool,
-    /// Draw and score the photos that were held out when the interior was made
+    /// Draw and score the photos that were held out when the interior was made; distorted ones are not drawn:
+    /// make it of what `import --undistort` writes
     #[arg(
         long,
         conflicts_with_all = ["tour", "path", "frames", "video", "fps", "resume", "persist"]
@@ -508,10 +509,22 @@ fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
 /// Fails where a frame's view is none that interiors are drawn for, before any is drawn.
 fn check_views(args: &Args, frames: &[Named]) -> anyhow::Result<()> {
     for Named { name, view, .. } in frames {
-        Pinhole::new(view).with_context(|| match &args.path {
+        let Err(error) = Pinhole::new(view) else {
+            continue;
+        };
+        let named = match &args.path {
             Some(path) => format!("{}: frame {name}", path.display()),
+            None if args.held_out => format!("{}: photo {name}", args.interior.display()),
             None => format!("frame {name}"),
-        })?;
+        };
+        let remedy = match error {
+            PinholeError::Distorted if args.held_out => {
+                ": import the photos with --undistort, and make the interior of that scene"
+            }
+            PinholeError::Distorted => ": give the frame the model PINHOLE",
+            PinholeError::NotFinite | PinholeError::Size(..) => "",
+        };
+        bail!("{named}: {error}{remedy}");
     }
     Ok(())
 }

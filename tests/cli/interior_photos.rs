@@ -3,6 +3,7 @@
 use crate::interior::{HALVES, apart, corners, names, with_house};
 use crate::run::lumigraph;
 use crate::uncalibrated::is_installed;
+use calibrate::{ModelKind, colmap};
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{surface_of, write_interior};
 use proxy::mesh::read_model;
@@ -63,6 +64,43 @@ fn photos_of_another_house_do_so_too() {
     let folder = tempfile::tempdir().unwrap();
     let survey = "--photos 160 --size 192x144";
     same_from_model_and_photos(folder.path(), &model, survey);
+}
+
+#[test]
+fn held_out_photos_of_lenses_that_bend_are_told_with_what_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 48x36 -o hall").ok();
+    let model = here.join("hall/sparse/0");
+    let mut whole = colmap::read_model(&model).unwrap();
+    for camera in whole.cameras.values_mut() {
+        assert_eq!(camera.model, ModelKind::SimplePinhole);
+        camera.model = ModelKind::SimpleRadial;
+        camera.params.push(0.01);
+    }
+    colmap::write_binary(&whole, &model).unwrap();
+    std::fs::write(here.join("halves.json"), HALVES).unwrap();
+    let made = "--rooms halves.json --hold-out hall/split.json";
+    let remedy = "import the photos with --undistort, and make the interior of that scene";
+    let ran = lumigraph(here, &format!("interior hall {made} -o bent")).ok();
+    let note = "note: photo 0000.png is held out, and its lens is distorted";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    assert!(ran.stderr.contains(remedy), "{}", ran.stderr);
+    let walk = |interior: &str| {
+        let line = format!("walk {interior} --held-out --portals geometry -o {interior}-scored");
+        lumigraph(here, &line)
+    };
+    let error = walk("bent").error(1);
+    let said = "bent: photo 0000.png: its lens is distorted; ";
+    assert!(
+        error.starts_with(said) && error.ends_with(remedy),
+        "{error}"
+    );
+    // It does help.
+    lumigraph(here, "import hall --undistort -o flat").ok();
+    let ran = lumigraph(here, &format!("interior flat {made} -o straight")).ok();
+    assert!(!ran.stderr.contains("distorted"), "{}", ran.stderr);
+    walk("straight").ok();
 }
 
 #[test]

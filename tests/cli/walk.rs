@@ -154,7 +154,10 @@ fn a_house_is_walked_through() {
     let mut large = path;
     large["frames"][1]["width"] = 100_000.into();
     for (path, said) in [
-        (bent, "its lens is distorted"),
+        (
+            bent,
+            "its lens is distorted; interiors are drawn for cameras without distortion: give the frame the model PINHOLE",
+        ),
         (large, "its picture has 100000 × 48 pixels"),
     ] {
         std::fs::write(here.join("odd.json"), path.to_string()).unwrap();
