@@ -92,6 +92,17 @@ pub enum LdiFileError {
     /// Its bytes are not those that were written.
     #[error("{}: damaged: its checksum is another; make it again", .0.display())]
     Checksum(PathBuf),
+    /// The quaternion of its camera's rotation is none.
+    #[error(
+        "{}: its camera's rotation is a quaternion of length {length}, expected 1; make it again",
+        .path.display()
+    )]
+    Rotation {
+        /// Of the file.
+        path: PathBuf,
+        /// As in the file.
+        length: f64,
+    },
     /// What it holds is no LDI.
     #[error("{}: {source}; make it again", .path.display())]
     Content {
@@ -257,11 +268,12 @@ pub fn parse(path: &Path, content: &[u8]) -> Result<Layered, LdiFileError> {
         path: path(),
         source,
     };
-    let is_turn = (pose.rotation.length() - 1.0).abs() < 1e-6;
-    if !is_turn {
-        return Err(content_error(
-            crate::interior::PinholeError::NotFinite.into(),
-        ));
+    let length = pose.rotation.length();
+    if !((length - 1.0).abs() < 1e-6) {
+        return Err(LdiFileError::Rotation {
+            path: path(),
+            length,
+        });
     }
     let view = pinhole_view(
         pose,

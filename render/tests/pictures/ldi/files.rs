@@ -55,6 +55,13 @@ fn files_read_back_the_same_and_bad_ones_are_refused() {
     assert!(text(&changed(128 + 4, &[255; 4])).contains("row 1 begins at sample 4294967295"));
     assert!(text(&changed(72, &f64::NAN.to_le_bytes())).contains("camera"));
     assert!(text(&changed(16, &f64::NAN.to_le_bytes())).contains("camera"));
+    assert_eq!(
+        text(&changed(
+            16,
+            &[2.0_f64, 2.0, 1.0, 0.0].map(f64::to_le_bytes).concat()
+        )),
+        "a.ldi: its camera's rotation is a quaternion of length 3, expected 1; make it again"
+    );
     let last = good.len() - 8;
     assert!(text(&changed(last, &(-1.0_f32).to_le_bytes())).contains("expected a positive number"));
 }
