@@ -9,6 +9,7 @@
 
 use glam::DVec3;
 use std::collections::BinaryHeap;
+use std::ops::RangeInclusive;
 
 /// What one photo shows of places common to all.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +57,22 @@ pub enum PeriodError {
         /// The most that any period explained of times dealt at random.
         chance: f64,
     },
+    /// A multiple of the best explains clearly more, but of too few photos.
+    #[error(
+        "the photos show no clear period: the best, {best_s:.4} s, explains {:.0} % of how they \
+         differ, and {longer_s:.4} s {:.0} %, but too few photos tell; give the period in seconds, \
+         or take photos of more turns", 100.0 * explained, 100.0 * of_longer
+    )]
+    Multiple {
+        /// The best candidate, in seconds.
+        best_s: f64,
+        /// What it explains.
+        explained: f64,
+        /// The multiple, in seconds.
+        longer_s: f64,
+        /// What that explains.
+        of_longer: f64,
+    },
 }
 
 /// Different times needed.
@@ -78,6 +95,11 @@ const NEARLY_AT_ONCE: f64 = 0.1;
 const DEALS: u64 = 19;
 /// A period explains at least this much.
 const MIN_EXPLAINED: f64 = 0.15;
+/// Multiples of the best period that are asked, too: of what looks alike several times a turn, as a rotor's blades do,
+/// a part of the turn explains something, and more pairs of photos are that far apart.
+const MULTIPLES: RangeInclusive<u32> = 2..=4;
+/// One explains clearly more that leaves less than this part of what the best leaves unexplained.
+const CLEARER: f64 = 0.5;
 
 /// Two photos.
 struct Pair {
@@ -95,7 +117,8 @@ struct Pair {
 /// shortest periods are left out.
 ///
 /// # Errors
-/// Too few photos; no period explains more than chance would.
+/// Too few photos; no period explains more than chance would; a multiple of the best would explain clearly more, if
+/// more photos told of it.
 ///
 /// # Panics
 /// If the photos do not all list the same number of places.
@@ -115,7 +138,8 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
     // 3. The best of all candidates, and of as many for times that mean nothing.
     let scores = |times_s: &[f64]| -> Vec<f64> {
         let lags = lags(&pairs, times_s);
-        candidates.iter().map(|&hz| explained(&lags, hz)).collect()
+        let explained = |&hz: &f64| explained(&lags, hz, MIN_IN_BIN);
+        candidates.iter().map(explained).collect()
     };
     let own = scores(&times_s);
     let largest = |scores: &[f64]| scores.iter().copied().fold(0.0, f64::max);
@@ -141,21 +165,47 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
     }
 
     // 4. Between the candidates around it.
-    const FINE: i32 = 32;
     let lags = lags(&pairs, &times_s);
+    let found = refined(&lags, candidates[at], step_hz, MIN_IN_BIN);
+
+    // 5. A multiple of it may not have filled all bins, and so have had no score.
+    let is_clearer = |other: &Period| 1.0 - other.explained < CLEARER * (1.0 - found.explained);
+    let longer = MULTIPLES
+        .map(|times| 1.0 / (f64::from(times) * found.period_s))
+        .filter(|hz| *hz >= candidates[0])
+        .map(|hz| refined(&lags, hz, step_hz, 0))
+        .max_by(|a, b| a.explained.total_cmp(&b.explained));
+    let Some(longer) = longer.filter(is_clearer) else {
+        return Ok(found);
+    };
+    let sure = refined(&lags, 1.0 / longer.period_s, step_hz, MIN_IN_BIN);
+    if is_clearer(&sure) {
+        return Ok(sure);
+    }
+    Err(PeriodError::Multiple {
+        best_s: found.period_s,
+        explained: found.explained,
+        longer_s: longer.period_s,
+        of_longer: longer.explained,
+    })
+}
+
+/// The best of the periods around one over a frequency, to a step between candidates either way.
+fn refined(lags: &Lags, hz: f64, step_hz: f64, least_in_bin: usize) -> Period {
+    const FINE: i32 = 32;
     let fine = (-FINE..=FINE).map(|i| {
-        let hz = candidates[at] + step_hz * f64::from(i) / f64::from(FINE);
-        (hz, explained(&lags, hz))
+        let hz = hz + step_hz * f64::from(i) / f64::from(FINE);
+        (hz, explained(lags, hz, least_in_bin))
     });
     let fine: Vec<(f64, f64)> = fine.collect();
     let top = fine.iter().map(|(_, score)| *score).fold(0.0, f64::max);
     // The middle of the top, which is flat where no pair changes its bin.
     let flat = fine.iter().filter(|(_, score)| *score >= 0.995 * top);
     let (sum, count) = flat.fold((0.0, 0.0), |(sum, n), (hz, _)| (sum + hz, n + 1.0));
-    Ok(Period {
+    Period {
         period_s: count / sum,
         explained: top,
-    })
+    }
 }
 
 /// One over the periods to try.
@@ -297,7 +347,9 @@ fn mean((sum, count): Bin) -> f64 {
 /// photos at even steps so do the aliases that deal the same lags in another order. From
 /// each difference its mean over the period around its lag is taken off, or what changes
 /// slowly would repeat, too; lags within half a period of the ends have no such mean.
-fn explained(lags: &Lags, hz: f64) -> f64 {
+///
+/// Nothing where a bin has fewer than `least_in_bin` pairs, or all bins together too few.
+fn explained(lags: &Lags, hz: f64, least_in_bin: usize) -> f64 {
     let half_s = 0.5 / hz;
     let longest_s = lags.pairs.last().map_or(0.0, |pair| pair.0);
     let mut bins = [(0.0, 0_usize); BINS];
@@ -323,22 +375,22 @@ fn explained(lags: &Lags, hz: f64) -> f64 {
         sum += difference;
         squares += difference * difference;
     }
-    if bins.iter().any(|(_, count)| *count < MIN_IN_BIN) {
-        return 0.0;
-    }
-    let of_bins = |bins: &[Bin]| -> f64 { bins.iter().map(|bin| bin.0 * mean(*bin)).sum() };
     let all = bins
         .iter()
         .fold((0.0, 0), |all, bin| (all.0 + bin.0, all.1 + bin.1));
+    if all.1 < BINS * MIN_IN_BIN || bins.iter().any(|(_, count)| *count < least_in_bin) {
+        return 0.0;
+    }
+    let of_bins = |bins: &[Bin]| -> f64 { bins.iter().map(|bin| bin.0 * mean(*bin)).sum() };
     let between = of_bins(&ascending(&bins)) - of_bins(&[all]);
     (between / (squares - of_bins(&[(sum, all.1)]))).max(0.0)
 }
 
 /// Bins whose means ascend, of neighbours joined where they do not: isotonic regression by
-/// pooling adjacent violators (Ayer et al. 1955).
+/// pooling adjacent violators (Ayer et al. 1955). Those that are empty are left out.
 fn ascending(bins: &[Bin]) -> Vec<Bin> {
     let mut joined: Vec<Bin> = Vec::new();
-    for &next in bins {
+    for &next in bins.iter().filter(|bin| bin.1 > 0) {
         let mut next = next;
         while let Some(last) = joined.pop_if(|last| mean(*last) >= mean(next)) {
             next = (next.0 + last.0, next.1 + last.1);

@@ -82,6 +82,22 @@ fn the_order_of_photos_and_the_origin_of_time_do_not_matter() {
     assert!((later.period_s / found.period_s - 1.0).abs() < 1e-3);
 }
 
+/// A third of it explains something, and the photos hardly reach over three turns.
+#[test]
+fn a_part_of_a_period_is_not_taken_for_it() {
+    let error = find_period(&photos(&every(0.2, 30), running_light(2.0))).unwrap_err();
+    println!("{error}");
+    let PeriodError::Multiple {
+        best_s, longer_s, ..
+    } = error
+    else {
+        panic!("{error:?}");
+    };
+    assert!(best_s < 1.0, "{best_s}");
+    assert!((longer_s / 2.0 - 1.0).abs() < 0.03, "{longer_s}");
+    assert!(error.to_string().contains("give the period in seconds"));
+}
+
 #[test]
 fn what_does_not_repeat_has_no_period() {
     type Shows<'a> = &'a dyn Fn(usize, f64) -> f64;

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use calibrate::{Pixel, View, find_period};
+use calibrate::{PeriodError, Pixel, View, find_period};
 use common::{Random, Shot, assert_close, gpu, psnr, psnr_covered};
 use image::RgbaImage;
 use render::{
@@ -397,6 +397,26 @@ fn the_frozen_phase_beats_ignoring_time_with_the_period_given_or_found() {
     assert!(given > ignoring + 2.0, "{given}, {ignoring} dB");
     assert!(automatic > ignoring + 2.0, "{automatic}, {ignoring} dB");
     assert!(wrong < given - 2.0, "{wrong}, {given} dB");
+}
+
+/// Its blades are of one shape: half a turn, or a third, explains something of a few turns' photos.
+#[test]
+fn no_part_of_a_turn_is_taken_for_the_period() {
+    let shot = helicopter();
+    let of_first = |count: usize| {
+        let which: Vec<usize> = (0..count).collect();
+        find_period(&snapshots(&lumigraph_of(shot, &which)))
+    };
+    let error = of_first(31).unwrap_err();
+    println!("{error}");
+    let PeriodError::Multiple { longer_s, .. } = error else {
+        panic!("{error:?}");
+    };
+    assert!((longer_s / PERIOD_S - 1.0).abs() < 0.03, "{longer_s}");
+    // The third was told here, as the candidates missed the turn.
+    let found = of_first(38).unwrap();
+    println!("found {found:?}");
+    assert!((found.period_s / PERIOD_S - 1.0).abs() < 0.03, "{found:?}");
 }
 
 /// What does not repeat has no period: the shelf, with times.
