@@ -34,7 +34,8 @@ pub(super) fn read_colmap(
     Ok(whole)
 }
 
-/// Reads another program's calibration. Its photos are found by the ends of their paths.
+/// Reads another program's calibration. Its photos are found by the ends of their paths; what they are called is
+/// told by these, too.
 ///
 /// Where the calibration leaves their sizes to the photos, one that is missing or corrupt is
 /// taken to be as large as the others: it is not left out here, but once it is known why.
@@ -43,7 +44,7 @@ pub(super) fn read_other(
     path: &Path,
     photos: &PhotoSet,
     warnings: &mut Vec<Warning>,
-) -> Result<Reconstruction, SceneError> {
+) -> Result<(Reconstruction, BTreeMap<String, String>), SceneError> {
     let some_size = OnceCell::new();
     let any_size = || {
         let mut sizes = photos.photos.iter().map(|photo| photo_size(&photo.path));
@@ -59,14 +60,10 @@ pub(super) fn read_other(
     let mut notes = Vec::new();
     let mut whole = formats::read(format, path, &size_of, &names, &mut notes)?;
     warnings.extend(notes.into_iter().map(Warning::Note));
+    let called = listed.names(whole.images.values().map(|image| image.name.as_str()));
     let mut named = BTreeSet::new();
     for image in whole.images.values_mut() {
-        let mut name = listed.name(&image.name);
-        // The paths of photos that are missing may end alike.
-        if photos.find(&name).is_none() && named.contains(&name) {
-            name = image.name.trim_start_matches('/').to_owned();
-        }
-        image.name = name;
+        image.name.clone_from(&called[&image.name]);
         if !named.insert(image.name.clone()) {
             return Err(SceneError::Poses {
                 path: path.to_owned(),
@@ -77,7 +74,7 @@ pub(super) fn read_other(
             });
         }
     }
-    Ok(whole)
+    Ok((whole, called))
 }
 
 /// Whether the cameras' image sizes are those of the photos.
@@ -240,8 +237,9 @@ fn photo_names(
 ) -> Result<Vec<String>, String> {
     if calibration.image_names.len() == count {
         let listed = Listed::of(photos);
-        let names = calibration.image_names.iter();
-        return Ok(names.map(|path| listed.name(path)).collect());
+        let names = &calibration.image_names;
+        let called = listed.names(names.iter().map(String::as_str));
+        return Ok(names.iter().map(|path| called[path].clone()).collect());
     }
     if photos.photos.len() != count {
         return Err(format!(

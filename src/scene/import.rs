@@ -89,6 +89,7 @@ impl Scene {
         warnings.extend(note_of_home(&source, capture, &home));
         let found = Self::photos_of(&home).map_err(|error| error_of_photos(&source, error))?;
         let mut pixels = Pixels::Stored;
+        let mut called = BTreeMap::new();
         let mut reconstruction = match &source {
             Source::Colmap(model) => calibration::read_colmap(model, &mut warnings)?,
             // OpenCV may leave it to the photos which is which.
@@ -98,7 +99,9 @@ impl Scene {
                 read.0
             }
             Source::Other(format, file) => {
-                calibration::read_other(*format, file, &found, &mut warnings)?
+                let read = calibration::read_other(*format, file, &found, &mut warnings)?;
+                called = read.1;
+                read.0
             }
         };
         let bounds = match &source {
@@ -124,7 +127,7 @@ impl Scene {
                 example: example.name.clone(),
             });
         }
-        let named = Named::of(&source, &found)?;
+        let named = Named::of(&source, &called)?;
         let clues = Clues {
             capture,
             found: &found,

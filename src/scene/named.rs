@@ -1,10 +1,9 @@
 //! Masks, depth maps and times that the calibration names.
 
 use super::calibration::Source;
-use super::listed::Listed;
 use super::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, Warning};
 use calibrate::formats::{self, FilesBeside, Format};
-use capture::{Beside, CaptureError, PhotoSet, check_beside};
+use capture::{Beside, CaptureError, check_beside};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,16 +14,18 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// `None` of any other calibration.
-    pub(super) fn of(source: &Source, found: &PhotoSet) -> Result<Option<Self>, SceneError> {
+    /// `None` of any other calibration. `called` has the photos' names by the calibration's paths.
+    pub(super) fn of(
+        source: &Source,
+        called: &BTreeMap<String, String>,
+    ) -> Result<Option<Self>, SceneError> {
         let Source::Other(Format::Transforms, file) = source else {
             return Ok(None);
         };
         let mut beside = formats::read_files_beside(file)?;
-        let listed = Listed::of(found);
-        beside.masks = by_photo(beside.masks, &listed);
-        beside.depth_maps = by_photo(beside.depth_maps, &listed);
-        beside.times = by_photo(beside.times, &listed);
+        beside.masks = by_photo(beside.masks, called);
+        beside.depth_maps = by_photo(beside.depth_maps, called);
+        beside.times = by_photo(beside.times, called);
         let file = file.clone();
         Ok(Some(Self { file, beside }))
     }
@@ -39,9 +40,13 @@ impl Named {
     }
 }
 
-fn by_photo<T>(named: BTreeMap<String, T>, listed: &Listed<'_>) -> BTreeMap<String, T> {
+fn by_photo<T>(
+    named: BTreeMap<String, T>,
+    called: &BTreeMap<String, String>,
+) -> BTreeMap<String, T> {
     let named = named.into_iter();
-    named.map(|(path, it)| (listed.name(&path), it)).collect()
+    let by_name = named.filter_map(|(path, it)| Some((called.get(&path)?.clone(), it)));
+    by_name.collect()
 }
 
 impl Scene {

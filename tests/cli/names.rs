@@ -48,6 +48,73 @@ fn rig() -> TempDir {
     folder
 }
 
+/// The same with a `transforms.json` in place of COLMAP's model, and with the cameras' folders in `images`.
+fn listed_rig() -> TempDir {
+    let folder = rig();
+    let line = "export wall --format transforms -o wall/transforms.json";
+    lumigraph(folder.path(), line).ok();
+    fs::remove_dir_all(at(&folder, "wall/sparse")).unwrap();
+    fs::create_dir(at(&folder, "wall/images")).unwrap();
+    for camera in ["cam0", "cam1"] {
+        let place = at(&folder, "wall/images").join(camera);
+        fs::rename(at(&folder, "wall").join(camera), place).unwrap();
+    }
+    rewrite(&folder, "\"cam", "\"images/cam");
+    folder
+}
+
+/// Replaces text in its `transforms.json`.
+fn rewrite(folder: &TempDir, from: &str, to: &str) {
+    let file = at(folder, "wall/transforms.json");
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(text.contains(from), "{text}");
+    fs::write(file, text.replace(from, to)).unwrap();
+}
+
+#[test]
+fn another_photo_does_not_stand_in_for_one_that_is_missing() {
+    let folder = listed_rig();
+    let ran = lumigraph(folder.path(), "import wall --strict -o whole").ok();
+    assert!(ran.stdout.contains("9 photos"), "{}", ran.stdout);
+    fs::remove_file(at(&folder, "wall/images/cam0/0004.png")).unwrap();
+    for stray in ["0004.png", "0004.jpg"] {
+        let stray = at(&folder, "wall/images").join(stray);
+        image::RgbImage::new(96, 72).save(&stray).unwrap();
+        let error = lumigraph(folder.path(), "import wall --strict -o scene").error(1);
+        assert!(error.contains("photo cam0/0004.png: "), "{error}");
+        let ran = lumigraph(folder.path(), "import wall --force -o scene").ok();
+        assert!(ran.stdout.contains("8 photos"), "{}", ran.stdout);
+        let warning = "photo cam0/0004.png is left out: wall/images/cam0/0004.png: ";
+        assert!(ran.stderr.contains(warning), "{}", ran.stderr);
+        fs::remove_file(stray).unwrap();
+    }
+}
+
+#[test]
+fn missing_photos_are_called_as_the_others_are() {
+    let folder = listed_rig();
+    // Two that are called alike but for their folders.
+    fs::remove_file(at(&folder, "wall/images/cam0/0004.png")).unwrap();
+    fs::remove_file(at(&folder, "wall/images/cam1/0003.png")).unwrap();
+    rewrite(&folder, "cam1/0003", "cam1/0004");
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    for name in ["cam0/0004.png", "cam1/0004.png"] {
+        let warning = format!("photo {name} is left out: wall/images/{name}: ");
+        assert!(ran.stderr.contains(&warning), "{}", ran.stderr);
+    }
+
+    // None is where the file says.
+    fs::rename(at(&folder, "wall/images"), at(&folder, "wall/photos")).unwrap();
+    let error = lumigraph(folder.path(), "info wall").error(1);
+    let line = "import wall/photos --calibration wall/transforms.json -o";
+    assert!(
+        error.contains(&format!("`lumigraph {line} SCENE`")),
+        "{error}"
+    );
+    let ran = lumigraph(folder.path(), &format!("{line} scene --force")).ok();
+    assert!(ran.stdout.contains("7 photos"), "{}", ran.stdout);
+}
+
 #[test]
 fn pictures_of_an_earlier_run_are_told_of_in_each_cameras_folder() {
     let folder = rig();
