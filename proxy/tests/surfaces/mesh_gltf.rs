@@ -257,3 +257,72 @@ fn nodes_cannot_repeat_a_mesh_without_end() {
         "{error}"
     );
 }
+
+#[test]
+fn gltf_targets_move_corners_by_their_weights() {
+    // Targets that move each corner by its own place: the square grows.
+    let plain = gltf(
+        5,
+        None,
+        &SQUARE,
+        r#"[{"mesh": 0, "translation": [0, 0, 5]}]"#,
+    );
+    let whole = plain.replace(
+        r#""attributes": {"POSITION": 0}"#,
+        r#""attributes": {"POSITION": 0}, "targets": [{"NORMAL": 7}, {"POSITION": 0}, {"POSITION": 0}]"#,
+    );
+    let of_mesh = |weights: &str| {
+        let from = r#""meshes": [{"#;
+        whole.replace(from, &format!(r#"{from}"weights": {weights}, "#))
+    };
+    let of_node = |text: &str, weights: &str| {
+        text.replace(
+            r#""mesh": 0"#,
+            &format!(r#""mesh": 0, "weights": {weights}"#),
+        )
+    };
+    let times = |text: String| {
+        let read = parse("a.gltf", text).unwrap();
+        let times = read.positions[3].x / f64::from(SQUARE[3][0]);
+        for (position, corner) in read.positions.iter().zip(SQUARE) {
+            let expected = times * DVec3::from(corner.map(f64::from)) + 5.0 * DVec3::Z;
+            assert!((*position - expected).length() < 1e-12, "{position}");
+        }
+        times
+    };
+    assert_eq!(times(whole.clone()), 1.0);
+    assert_eq!(times(of_mesh("[1, 0, 0]")), 1.0);
+    assert_eq!(times(of_mesh("[0, 0.5, 2]")), 3.5);
+    assert_eq!(times(of_node(&whole, "[0, 1]")), 2.0);
+    assert_eq!(times(of_node(&of_mesh("[0, 1, 1]"), "[0, 0, 0]")), 1.0);
+
+    // A target that lists the corners that it moves: the last alone, by the third's place.
+    let sparse = |index: &str| {
+        let from = r#""accessors": ["#;
+        let place = format!(
+            r#"{{"componentType": 5126, "type": "VEC3", "count": 4, "sparse": {{"count": 1,
+            "indices": {{"bufferView": 1, "byteOffset": 2, "componentType": {index}}},
+            "values": {{"bufferView": 0, "byteOffset": 24}}}}}}"#
+        );
+        let text = gltf(4, Some(&[0, 3, 2, 0, 1, 3]), &SQUARE, ONE_NODE);
+        let text = text.replace(from, &format!("{from}{place}, "));
+        let text = text.replace(r#""indices": 1"#, r#""indices": 2"#);
+        text.replace(
+            r#""attributes": {"POSITION": 0}"#,
+            r#""attributes": {"POSITION": 1}, "targets": [{"POSITION": 0}]"#,
+        )
+    };
+    let read = parse("a.gltf", of_node(&sparse("5123"), "[2]")).unwrap();
+    let corner = |i: usize| DVec3::from(SQUARE[i].map(f64::from));
+    let moved = corner(3) + 2.0 * corner(2);
+    assert_eq!(read.positions, [corner(0), corner(1), corner(2), moved]);
+    // Without weight it is not read.
+    parse("a.gltf", sparse("5126")).unwrap();
+    let said = message("a.gltf", &of_node(&sparse("5126"), "[2]"));
+    let expected = "a.gltf, accessor 0: indices must be unsigned whole numbers";
+    assert_eq!(said, expected);
+    let short = of_node(&sparse("5123"), "[2]").replacen(r#""count": 4"#, r#""count": 3"#, 1);
+    let said = message("a.gltf", &short);
+    let expected = "a.gltf, accessor 0: 3 moves of a target for 4 corners";
+    assert_eq!(said, expected);
+}

@@ -18,7 +18,26 @@ pub(super) struct Accessor {
     count: usize,
     #[serde(rename = "type")]
     kind: Kind,
-    sparse: Option<serde::de::IgnoredAny>,
+    sparse: Option<Box<Sparse>>,
+}
+
+/// Elements of an accessor that are not where the others are, which may all be 0.
+#[derive(Deserialize)]
+struct Sparse {
+    count: usize,
+    /// Which they are.
+    indices: SparsePart,
+    values: SparsePart,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct SparsePart {
+    buffer_view: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    /// Of values, the accessor's.
+    component_type: Option<u32>,
 }
 
 #[derive(Deserialize, PartialEq)]
@@ -60,6 +79,16 @@ pub(super) struct Accessors<'a> {
     pub(super) buffers: Buffers<'a>,
 }
 
+/// Where numbers are in the file, as it says.
+struct Layout {
+    view: Option<usize>,
+    byte_offset: usize,
+    component_type: u32,
+    /// Of each element.
+    components: usize,
+    count: usize,
+}
+
 /// Where the elements of an accessor lie.
 struct Elements<'a> {
     bytes: &'a [u8],
@@ -71,6 +100,37 @@ impl Elements<'_> {
     /// The bytes of one, from its beginning.
     fn at(&self, i: usize) -> &[u8] {
         self.bytes.get(i * self.stride..).unwrap_or_default()
+    }
+
+    /// The first three numbers of one.
+    fn triple(&self, i: usize) -> DVec3 {
+        let (kind, is_normalized) = (self.accessor.component_type, self.accessor.normalized);
+        let component = |k: usize| real(self.at(i), kind, is_normalized, k);
+        DVec3::new(component(0), component(1), component(2))
+    }
+}
+
+impl Accessor {
+    fn layout(&self) -> Layout {
+        Layout {
+            view: self.buffer_view,
+            byte_offset: self.byte_offset,
+            component_type: self.component_type,
+            components: self.kind.components(),
+            count: self.count,
+        }
+    }
+}
+
+impl SparsePart {
+    fn layout(&self, component_type: u32, components: usize, count: usize) -> Layout {
+        Layout {
+            view: Some(self.buffer_view),
+            byte_offset: self.byte_offset,
+            component_type,
+            components,
+            count,
+        }
     }
 }
 
@@ -90,21 +150,31 @@ impl Accessors<'_> {
     }
 
     fn elements(&mut self, number: usize) -> Result<Elements<'_>, MeshFileError> {
-        let Some(accessor) = self.accessors.get(number) else {
+        let accessors = self.accessors;
+        let Some(accessor) = accessors.get(number) else {
             return Err(self.failed(number, "there is no such accessor"));
         };
         if accessor.sparse.is_some() {
-            let problem = "it is sparse, which is not read; export the mesh again without \
-                           sparse accessors (or shape keys)";
+            let problem =
+                "it is sparse, which is not read; export the mesh again without sparse accessors";
             return Err(self.failed(number, problem));
         }
-        let view = accessor.buffer_view.and_then(|i| self.views.get(i));
+        self.located(number, accessor, &accessor.layout())
+    }
+
+    /// The elements of an accessor that lie so.
+    fn located<'b>(
+        &'b mut self,
+        number: usize,
+        accessor: &'b Accessor,
+        layout: &Layout,
+    ) -> Result<Elements<'b>, MeshFileError> {
+        let view = layout.view.and_then(|i| self.views.get(i));
         let Some(view) = view else {
             return Err(self.failed(number, "it has no numbers in the file (no buffer view)"));
         };
-        let components = accessor.kind.components();
-        let Some(size) = size(accessor.component_type).map(|size| components * size) else {
-            let problem = format!("unknown component type {}", accessor.component_type);
+        let Some(size) = size(layout.component_type).map(|size| layout.components * size) else {
+            let problem = format!("unknown component type {}", layout.component_type);
             return Err(self.failed(number, problem));
         };
         let stride = view.byte_stride.unwrap_or(size);
@@ -113,12 +183,12 @@ impl Accessors<'_> {
             return Err(self.failed(number, problem));
         }
         // Of the accessor within the view, and of the view within the buffer.
-        let length = match accessor.count.checked_sub(1) {
+        let length = match layout.count.checked_sub(1) {
             None => Some(0),
             Some(others) => others.checked_mul(stride).and_then(|n| n.checked_add(size)),
         };
-        let end = length.and_then(|n| n.checked_add(accessor.byte_offset));
-        let from = view.byte_offset.checked_add(accessor.byte_offset);
+        let end = length.and_then(|n| n.checked_add(layout.byte_offset));
+        let from = view.byte_offset.checked_add(layout.byte_offset);
         let is_within = end.is_some_and(|end| end <= view.byte_length);
         let (buffer, views) = (view.buffer, self.views.len());
         let range = match (from, length, is_within) {
@@ -127,7 +197,7 @@ impl Accessors<'_> {
                 let problem = format!(
                     "its {} elements do not fit into their buffer view (of {views}); is the \
                      file cut off?",
-                    accessor.count
+                    layout.count
                 );
                 return Err(self.failed(number, problem));
             }
@@ -161,11 +231,57 @@ impl Accessors<'_> {
         self.check_kind(number, Kind::Vec3, what)?;
         let elements = self.elements(number)?;
         let accessor = elements.accessor;
-        let (kind, is_normalized) = (accessor.component_type, accessor.normalized);
-        Ok((0..accessor.count).map(move |i| {
-            let component = |k: usize| real(elements.at(i), kind, is_normalized, k);
-            DVec3::new(component(0), component(1), component(2))
-        }))
+        Ok((0..accessor.count).map(move |i| elements.triple(i)))
+    }
+
+    /// Three numbers each of so many elements, which may be sparse; `what` they are.
+    pub(super) fn filled_triples(
+        &mut self,
+        number: usize,
+        count: usize,
+        what: &str,
+    ) -> Result<Vec<DVec3>, MeshFileError> {
+        self.check_kind(number, Kind::Vec3, what)?;
+        let accessors = self.accessors;
+        let Some(accessor) = accessors.get(number) else {
+            return Err(self.failed(number, "there is no such accessor"));
+        };
+        if accessor.count != count {
+            let problem = format!("{} {what} for {count} corners", accessor.count);
+            return Err(self.failed(number, problem));
+        }
+        let Some(sparse) = &accessor.sparse else {
+            return Ok(self.triples(number, what)?.collect());
+        };
+        // 1. What all are that are not listed.
+        let mut filled: Vec<DVec3> = match accessor.buffer_view {
+            Some(_) => {
+                let elements = self.located(number, accessor, &accessor.layout())?;
+                (0..count).map(|i| elements.triple(i)).collect()
+            }
+            None => vec![DVec3::ZERO; count],
+        };
+        // 2. Those that are.
+        let kind = sparse.indices.component_type.unwrap_or_default();
+        if !INDEX_KINDS.contains(&kind) {
+            return Err(self.failed(number, "indices must be unsigned whole numbers"));
+        }
+        let listed = sparse.indices.layout(kind, 1, sparse.count);
+        let elements = self.located(number, accessor, &listed)?;
+        let index = |i: usize| real(elements.at(i), kind, false, 0) as usize;
+        let indices: Vec<usize> = (0..sparse.count).map(index).collect();
+        if let Some(beyond) = indices.iter().find(|index| **index >= count) {
+            let problem = format!("it lists element {beyond}, but has only {count}");
+            return Err(self.failed(number, problem));
+        }
+        let components = accessor.kind.components();
+        let listed = &sparse.values;
+        let listed = listed.layout(accessor.component_type, components, sparse.count);
+        let elements = self.located(number, accessor, &listed)?;
+        for (i, index) in indices.into_iter().enumerate() {
+            filled[index] = elements.triple(i);
+        }
+        Ok(filled)
     }
 
     /// Four numbers each, as rotations are; `what` they are.
@@ -228,8 +344,7 @@ impl Accessors<'_> {
         &mut self,
         number: usize,
     ) -> Result<impl Iterator<Item = u32>, MeshFileError> {
-        let fits =
-            |a: &Accessor| a.kind == Kind::Scalar && [5121, 5123, 5125].contains(&a.component_type);
+        let fits = |a: &Accessor| a.kind == Kind::Scalar && INDEX_KINDS.contains(&a.component_type);
         if self.accessors.get(number).is_some_and(|a| !fits(a)) {
             return Err(self.failed(number, "indices must be unsigned whole numbers"));
         }
@@ -238,6 +353,9 @@ impl Accessors<'_> {
         Ok((0..elements.accessor.count).map(move |i| real(elements.at(i), kind, false, 0) as u32))
     }
 }
+
+/// Component types of whole numbers that are not negative.
+const INDEX_KINDS: [u32; 3] = [5121, 5123, 5125];
 
 /// Bytes of a component.
 fn size(component_type: u32) -> Option<usize> {

@@ -10,6 +10,7 @@ mod looks;
 mod materials;
 mod nodes;
 mod pictures;
+mod targets;
 
 pub(super) use buffers::files_beside;
 pub(super) use looks::parse_model;
@@ -18,11 +19,12 @@ use super::{Mesh, MeshFileError};
 use accessor::Accessors;
 use buffers::Buffers;
 use capture::without_byte_order_mark;
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use nodes::{Node, Scene, world_from_nodes};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
+use targets::Target;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -54,6 +56,8 @@ struct Asset {
 struct MeshEntry {
     #[serde(default)]
     primitives: Vec<Primitive>,
+    /// Of each primitive's targets, where a node says nothing else.
+    weights: Option<Box<[f64]>>,
 }
 
 #[derive(Deserialize)]
@@ -62,6 +66,7 @@ struct Primitive {
     indices: Option<usize>,
     /// Triangles, if absent.
     mode: Option<u32>,
+    targets: Option<Box<[Target]>>,
 }
 
 #[derive(Deserialize)]
@@ -210,6 +215,8 @@ fn read(
             record: format!("node {number}"),
             problem: format!("there is no mesh {mesh}"),
         })?;
+        let weights = node.weights.as_deref().or(entry.weights.as_deref());
+        let weights = weights.unwrap_or_default();
         let world_from_copies = reader.world_from_copies(node, number, world_from_node)?;
         for (i, primitive) in entry.primitives.iter().enumerate() {
             if visitor.leaves_out(number, mesh, i) {
@@ -223,7 +230,7 @@ fn read(
             let name = format!("mesh {mesh}, primitive {i}");
             for world_from_copy in &world_from_copies {
                 let (corner, triangle) = (reader.mesh.positions.len(), reader.mesh.triangles.len());
-                reader.primitive(primitive, &name, world_from_copy)?;
+                reader.primitive(primitive, weights, &name, world_from_copy)?;
                 let place = Place {
                     node: number,
                     mesh,
@@ -351,10 +358,11 @@ impl Reader<'_> {
         })
     }
 
-    /// Takes in a primitive if it is made of triangles.
+    /// Takes in a primitive if it is made of triangles, moved by targets of these weights.
     fn primitive(
         &mut self,
         primitive: &Primitive,
+        weights: &[f64],
         name: &str,
         world_from_node: &DMat4,
     ) -> Result<(), MeshFileError> {
@@ -384,8 +392,11 @@ impl Reader<'_> {
         self.check_size(bytes, ANY_MESH, name)?;
         // 2. Corners.
         let first = self.mesh.positions.len();
+        let targets = primitive.targets.as_deref().unwrap_or_default();
+        let moves = targets::moves(&mut self.accessors, targets, weights, corners)?;
         let positions = self.accessors.triples(positions, "positions")?;
         for (i, position) in positions.enumerate() {
+            let position = position + moves.get(i).copied().unwrap_or(DVec3::ZERO);
             let position = world_from_node.transform_point3(position);
             if !position.is_finite() {
                 return Err(failed(format!("the position of corner {i} is not finite")));

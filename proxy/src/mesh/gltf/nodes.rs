@@ -17,6 +17,8 @@ pub(super) struct Scene {
 pub(super) struct Node {
     children: Option<Box<[usize]>>,
     pub(super) mesh: Option<u32>,
+    /// Of its mesh's targets, in place of the mesh's own.
+    pub(super) weights: Option<Box<[f64]>>,
     matrix: Option<Box<[f64; 16]>>,
     translation: Option<Box<[f64; 3]>>,
     rotation: Option<Box<[f64; 4]>>,
