@@ -13,7 +13,7 @@ use super::{Photo, Scene, SceneError, Warning};
 use calibrate::Reconstruction;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
-use capture::{CaptureError, PhotoSet, find_photos_within, photo_size};
+use capture::{CaptureError, PhotoFile, PhotoSet, find_photos_within, photo_size};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -119,15 +119,27 @@ impl Scene {
         let names = scene.photos.iter().map(|photo| photo.name.as_str());
         let files = meant.photos.values().map(|file| file.name.as_str());
         let names: BTreeSet<&str> = names.chain(files).collect();
-        let unused = |photo: &&capture::PhotoFile| !names.contains(photo.name.as_str());
-        if let Some(example) = found.photos.iter().find(unused) {
+        let named = Named::of(&source, &called)?;
+        let photos = found.photos.iter();
+        let mut unused: Vec<&PhotoFile> = photos
+            .filter(|photo| !names.contains(photo.name.as_str()))
+            .collect();
+        let mut total = found.photos.len();
+        if let (Some(named), false) = (&named, unused.is_empty()) {
+            // Masks and depth maps may lie where photos are looked for.
+            total -= unused.len();
+            let beside = named.real_files();
+            let real = |photo: &PhotoFile| photo.path.canonicalize().ok();
+            unused.retain(|photo| real(photo).is_none_or(|file| !beside.contains(&file)));
+            total += unused.len();
+        }
+        if let Some(example) = unused.first() {
             warnings.push(Warning::Uncalibrated {
-                count: found.photos.iter().filter(unused).count(),
-                total: found.photos.len(),
+                count: unused.len(),
+                total,
                 example: example.name.clone(),
             });
         }
-        let named = Named::of(&source, &called)?;
         let clues = Clues {
             capture,
             found: &found,

@@ -4,7 +4,7 @@ use super::calibration::Source;
 use super::{DEPTH_UNITS_PER_STEP, ImportOptions, Scene, SceneError, Warning};
 use calibrate::formats::{self, FilesBeside, Format};
 use capture::{Beside, CaptureError, check_beside};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What a `transforms.json` says beside cameras and poses, by the photos' names.
@@ -28,6 +28,15 @@ impl Named {
         beside.times = by_photo(beside.times, called);
         let file = file.clone();
         Ok(Some(Self { file, beside }))
+    }
+
+    /// The masks and depth maps that are there, by paths without links.
+    pub(super) fn real_files(&self) -> BTreeSet<PathBuf> {
+        let FilesBeside {
+            masks, depth_maps, ..
+        } = &self.beside;
+        let files = masks.values().chain(depth_maps.values());
+        files.filter_map(|file| file.canonicalize().ok()).collect()
     }
 
     /// Forgets depth maps that are passed over for these photos: what is wrong with them is said.

@@ -77,6 +77,38 @@ fn what_a_transforms_file_names_beside_the_photos_is_used() {
 }
 
 #[test]
+fn masks_and_depth_maps_among_the_photos_are_not_counted_as_such() {
+    let folder = with_wall();
+    let here = folder.path();
+    let at = |path: &str| here.join(path);
+    let run = |line: &str| lumigraph(here, line).ok();
+    save_masks(&at("wall/masks"), 9, 16);
+    run("import wall -o scene");
+    run("export scene --format transforms -o wall/transforms.json");
+    fs::remove_dir_all(at("wall/sparse")).unwrap();
+    let mut text = fs::read_to_string(at("wall/transforms.json")).unwrap();
+    for (from, to) in [("images", "rgb"), ("masks", "msk"), ("depth", "dpt")] {
+        fs::rename(at("wall").join(from), at("wall").join(to)).unwrap();
+        text = text.replace(&format!("\"{from}/"), &format!("\"{to}/"));
+    }
+    fs::write(at("wall/transforms.json"), text).unwrap();
+    let ran = run("import wall -o back");
+    let counts = ", 9 ignore masks, 9 depth maps\n";
+    assert!(ran.stdout.ends_with(counts), "{}", ran.stdout);
+    assert!(
+        !ran.stderr.contains("not in the calibration"),
+        "{}",
+        ran.stderr
+    );
+
+    fs::copy(at("wall/rgb/0003.png"), at("wall/rgb/more.png")).unwrap();
+    let ran = run("import wall --no-masks -o more");
+    let note =
+        "note: 1 of 10 photos are not in the calibration and stay unused (rgb/more.png, for one)\n";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+}
+
+#[test]
 fn depth_maps_of_instant_ngp_are_read_in_its_scale() {
     let folder = with_wall();
     let here = folder.path();
