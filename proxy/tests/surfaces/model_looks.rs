@@ -352,34 +352,91 @@ fn what_is_not_opaque_is_told_once() {
 }
 
 #[test]
-fn a_texture_is_told_to_be_moved_only_where_it_would_be() {
+fn textures_are_stretched_turned_and_moved() {
     let bytes = mesh::model_to_glb(&small()).unwrap();
-    let warnings_of = |name: &str, extension: Value| {
-        let moved = with_materials(&bytes, |materials| {
+    let of = |name: &str, extension: Value| {
+        let changed = with_materials(&bytes, |materials| {
             let texture = &mut materials[0]["pbrMetallicRoughness"]["baseColorTexture"];
             texture["extensions"] = json!({name: extension});
         });
-        read(&moved).unwrap().1
+        read(&changed).unwrap()
     };
     let name = "KHR_texture_transform";
-    for nothing in [
-        json!({}),
-        json!({"offset": [0, 0], "rotation": 0, "scale": [1, 1], "texCoord": 0}),
-    ] {
-        assert_eq!(warnings_of(name, nothing), [""; 0]);
+    let uvs = |model: &mesh::Model, triangle: usize| {
+        let corners = model.mesh.triangles[triangle];
+        corners.map(|corner| model.uvs[corner as usize])
+    };
+    let (plain, _) = read(&bytes).unwrap();
+    let quarter = std::f64::consts::FRAC_PI_2;
+    type Moved = fn([f32; 2]) -> [f32; 2];
+    let cases: [(Value, Moved); 6] = [
+        (json!({}), |uv| uv),
+        (
+            json!({"offset": [0, 0], "rotation": 0, "scale": [1, 1], "texCoord": 0}),
+            |uv| uv,
+        ),
+        (json!({"offset": [0.25, -2]}), |[u, v]| [u + 0.25, v - 2.0]),
+        (json!({"scale": [3, -1]}), |[u, v]| [3.0 * u, -v]),
+        (json!({"rotation": quarter}), |[u, v]| [v, -u]),
+        // The lower left quarter of the picture, as the extension's own example says.
+        (
+            json!({"offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5]}),
+            |[u, v]| [0.5 * v, 1.0 - 0.5 * u],
+        ),
+    ];
+    for (extension, moved) in cases {
+        let (model, warnings) = of(name, extension.clone());
+        assert_eq!(warnings, [""; 0]);
+        let pairs = uvs(&model, 0).into_iter().zip(uvs(&plain, 0).map(moved));
+        for (found, expected) in pairs {
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-6, "{extension}");
+            }
+        }
+        assert_eq!(uvs(&model, 1), uvs(&plain, 1));
     }
-    for something in [
-        json!({"offset": [0, 0.5]}),
-        json!({"rotation": 1}),
-        json!({"scale": [1, -1]}),
-        json!({"texCoord": 1}),
-    ] {
-        let said = "texture 0: KHR_texture_transform is not applied";
-        assert_eq!(warnings_of(name, something), [said]);
-    }
+    let (_, warnings) = of(name, json!({"texCoord": 1}));
+    let said = " has a texture but no texture coordinates";
+    assert!(
+        warnings.len() == 1 && warnings[0].ends_with(said),
+        "{warnings:?}"
+    );
     // Nobody knows what another does.
     let said = "texture 0: EXT_other is not applied";
-    assert_eq!(warnings_of("EXT_other", json!({})), [said]);
+    assert_eq!(of("EXT_other", json!({})).1, [said]);
+}
+
+#[test]
+fn pictures_of_other_kinds_are_told_once_a_kind() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let warnings_of = |name: &str, source: &str| {
+        let changed = changed(&bytes, |text| {
+            let extensions = format!("\"extensions\":{{\"{name}\":{{\"source\":0}}}}{source}");
+            let texture = text.replace("\"source\":0", &extensions);
+            let mut json: Value = serde_json::from_str(&texture).unwrap();
+            // A second one, that the other material has.
+            let second = json["textures"][0].clone();
+            json["textures"].as_array_mut().unwrap().push(second);
+            let material = &mut json["materials"][1]["pbrMetallicRoughness"];
+            material["baseColorTexture"] = json!({"index": 1});
+            json.to_string()
+        });
+        read(&changed).unwrap().1
+    };
+    for (name, kind) in [
+        ("EXT_texture_webp", "WebP"),
+        ("KHR_texture_basisu", "KTX2"),
+        ("EXT_other", "another kind"),
+    ] {
+        let said = format!(
+            "2 textures: number 0, number 1: a plain colour instead of a picture that is {kind} alone ({name}), \
+             which is not read; export the model again with PNG or JPEG textures"
+        );
+        assert_eq!(warnings_of(name, ""), [said]);
+        // With another picture for those that do not know it.
+        let known = warnings_of(name, ",\"source\":0");
+        assert!(known.iter().all(|said| !said.contains(name)), "{known:?}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ use super::pictures::{Decoded, Picture, decode};
 use super::{PassedOver, Place, Visitor};
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::{Material, MeshFileError, Model, ModelNode, PORTAL_NODE, Part, Wrap};
+use glam::{DAffine2, DVec2};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::{BTreeMap, BTreeSet};
@@ -52,6 +53,9 @@ struct Primitive {
 struct TextureEntry {
     source: Option<usize>,
     sampler: Option<usize>,
+    /// By name, whatever they hold: other kinds of picture.
+    #[serde(default)]
+    extensions: BTreeMap<String, IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -69,6 +73,14 @@ struct Sampler {
     #[serde(default)]
     wrap_t: u32,
 }
+
+/// What textures' pictures are by the extensions that name them.
+const KINDS: [(&str, &str); 4] = [
+    ("EXT_texture_avif", "AVIF"),
+    ("EXT_texture_webp", "WebP"),
+    ("KHR_texture_basisu", "KTX2"),
+    ("MSFT_texture_dds", "DDS"),
+];
 
 /// Reads a .glb or .gltf file that has triangles with its looks. What could not be had of them is told beside the
 /// model, and has a plain colour instead; so is what is drawn opaque or left out.
@@ -104,6 +116,7 @@ pub(in crate::mesh) fn parse_model(
     let mut not_shown = looks.not_shown(&decoded);
     not_shown.extend(looks.told_passed_over());
     not_shown.extend(looks.told_unposed());
+    not_shown.extend(looks.told_unread());
     let Looks {
         mut model,
         mut warnings,
@@ -138,6 +151,8 @@ struct Looks {
     passed_over: BTreeMap<PassedOver, BTreeSet<(usize, usize)>>,
     /// Nodes whose meshes bones would pose.
     unposed: BTreeSet<usize>,
+    /// Textures that an extension alone has a picture for, by that.
+    unread: BTreeMap<String, BTreeSet<usize>>,
     /// How many triangles are left out as nobody could see them, by the file's materials.
     hidden: BTreeMap<usize, usize>,
     /// The least alpha of corners that are drawn, by the file's materials.
@@ -199,7 +214,10 @@ impl Visitor for Looks {
         let number = entry.and_then(|entry| entry.material);
         let attribute = |name: &str| entry.and_then(|entry| entry.attributes.get(name).copied());
         let used = self.texture_use(number);
-        let uvs = attribute(&format!("TEXCOORD_{}", used.map_or(0, |u| u.tex_coord)));
+        let coordinates = used.map_or(0, TextureUse::coordinates);
+        let uvs = attribute(&format!("TEXCOORD_{coordinates}"));
+        let placed = used.map(TextureUse::picture_from_coordinates);
+        let placed = placed.unwrap_or(DAffine2::IDENTITY);
         let colors = attribute("COLOR_0");
         let here = format!("mesh {}, primitive {}", place.mesh, place.primitive);
         let failed = |problem: String| MeshFileError::Record {
@@ -224,7 +242,10 @@ impl Visitor for Looks {
         let mut least_alpha = 1.0_f64;
         if let Some(accessor) = uvs {
             let finite = |x: f64| if x.is_finite() { x as f32 } else { 0.0 };
-            let uv = |[u, v, ..]: [f64; 4]| [finite(u), finite(v)];
+            let uv = |[u, v, ..]: [f64; 4]| {
+                let place = placed.transform_point2(DVec2::new(u, v));
+                place.to_array().map(finite)
+            };
             self.model.uvs.extend(accessors.vectors(accessor)?.map(uv));
         } else {
             self.model.uvs.resize(corners, [0.0; 2]);
@@ -330,6 +351,22 @@ impl Looks {
         })
     }
 
+    /// What textures' pictures are that are not read, once a kind.
+    fn told_unread(&self) -> Vec<String> {
+        let told = self.unread.iter().map(|(extension, numbers)| {
+            let numbers: Vec<usize> = numbers.iter().copied().collect();
+            let of = super::listed("texture", &numbers, |_| None);
+            let kind = KINDS.iter().find(|(name, _)| name == extension);
+            let kind = kind.map_or("another kind", |(_, kind)| *kind);
+            format!(
+                "{of}: a plain colour instead of a picture that is {kind} alone ({}), which is not read; export the \
+                 model again with PNG or JPEG textures",
+                crate::mesh::obj::shown(extension)
+            )
+        });
+        told.collect()
+    }
+
     /// What of the primitives is no triangle, once a kind.
     fn told_passed_over(&self) -> Vec<String> {
         let told = self.passed_over.iter().filter_map(|(what, primitives)| {
@@ -411,9 +448,16 @@ impl Looks {
         let wraps = sampler.map_or([Wrap::Repeat; 2], |s| [wrap(s.wrap_s), wrap(s.wrap_t)]);
         let image = entry.and_then(|t| t.source);
         let Some((image, source)) = image.and_then(|i| Some((i, root.images.get(i)?))) else {
-            self.warnings.push(format!(
-                "texture {number} has no picture that can be read: a plain colour instead"
-            ));
+            let other = entry.and_then(|t| t.extensions.keys().next());
+            match other.filter(|_| image.is_none()) {
+                Some(extension) => {
+                    let of_kind = self.unread.entry(extension.clone()).or_default();
+                    of_kind.insert(number);
+                }
+                None => self.warnings.push(format!(
+                    "texture {number} has no picture that can be read: a plain colour instead"
+                )),
+            }
             return Ok((None, wraps));
         };
         if let Some(idx) = self.picture_idxs.get(&image) {

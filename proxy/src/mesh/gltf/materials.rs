@@ -2,6 +2,7 @@
 
 use crate::mesh::model::srgb_from_linear;
 use crate::mesh::obj::shown;
+use glam::{DAffine2, DVec2};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
@@ -75,7 +76,7 @@ struct Strength {
 pub(super) struct TextureUse {
     pub(super) index: usize,
     #[serde(default)]
-    pub(super) tex_coord: u32,
+    tex_coord: u32,
     /// By name, whatever they hold.
     #[serde(default)]
     extensions: BTreeMap<String, Value>,
@@ -91,29 +92,47 @@ struct Transform {
     tex_coord: Option<u32>,
 }
 
-/// The extension that moves, turns and stretches a texture, which some programs write where it does nothing.
+/// The extension that moves, turns and stretches a texture.
 const TRANSFORM: &str = "KHR_texture_transform";
 
 impl TextureUse {
-    /// The extensions that are not applied, but for one that changes nothing.
+    /// What [`TRANSFORM`] says, if it is there and can be read.
+    fn transform(&self) -> Option<Transform> {
+        Transform::deserialize(self.extensions.get(TRANSFORM)?).ok()
+    }
+
+    /// Which of a primitive's texture coordinates it has.
+    pub(super) fn coordinates(&self) -> u32 {
+        let other = self.transform().and_then(|transform| transform.tex_coord);
+        other.unwrap_or(self.tex_coord)
+    }
+
+    /// Places in the picture from these coordinates.
+    pub(super) fn picture_from_coordinates(&self) -> DAffine2 {
+        let transform = self.transform();
+        transform.map_or(DAffine2::IDENTITY, |transform| transform.affine())
+    }
+
+    /// The extensions that are not applied.
     pub(super) fn not_applied(&self) -> impl Iterator<Item = &str> {
-        let tex_coord = self.tex_coord;
-        self.extensions.iter().filter_map(move |(name, extension)| {
-            let transform = Transform::deserialize(extension);
-            let is_still = transform.is_ok_and(|transform| !transform.moves(tex_coord));
-            let is_lost = name != TRANSFORM || !is_still;
-            is_lost.then_some(name.as_str())
-        })
+        let is_read = self.transform().is_some();
+        let names = self.extensions.keys().map(String::as_str);
+        names.filter(move |name| *name != TRANSFORM || !is_read)
     }
 }
 
 impl Transform {
-    /// Whether it changes anything of a texture that has these coordinates without it.
-    fn moves(&self, tex_coord: u32) -> bool {
-        self.offset.unwrap_or([0.0; 2]) != [0.0; 2]
-            || self.rotation.unwrap_or(0.0) != 0.0
-            || self.scale.unwrap_or([1.0; 2]) != [1.0; 2]
-            || self.tex_coord.unwrap_or(tex_coord) != tex_coord
+    /// Stretches, then turns, then moves. As v counts downwards, a turn that is counter-clockwise where it is drawn
+    /// is the inverse of the matrix that the extension's text has, and what its example and viewers show.
+    fn affine(&self) -> DAffine2 {
+        let [sx, sy] = self.scale.unwrap_or([1.0; 2]);
+        let (sin, cos) = self.rotation.unwrap_or(0.0).sin_cos();
+        let offset = DVec2::from(self.offset.unwrap_or_default());
+        DAffine2::from_cols(
+            sx * DVec2::new(cos, -sin),
+            sy * DVec2::new(sin, cos),
+            offset,
+        )
     }
 }
 
