@@ -203,7 +203,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             imported
         }
     };
-    let (mut scene, warnings) = imported?;
+    let (mut scene, mut warnings) = imported?;
+    warnings.extend(scene.leave_out_unwritable(args.strict)?);
     scene.video = match is_video {
         true => Some(args.photos.clone()),
         false => video_of_frames(&args.photos),

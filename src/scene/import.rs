@@ -10,9 +10,9 @@ use super::named::Named;
 use super::times::{Clues, TimeSource, set_times, taken};
 use super::turned::{self, Pixels};
 use super::{Photo, Scene, SceneError, Warning};
-use calibrate::Reconstruction;
 use calibrate::formats::Format;
 use calibrate::opencv::Keys;
+use calibrate::{Reconstruction, colmap};
 use capture::{CaptureError, PhotoFile, PhotoSet, find_photos_within, photo_size};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -270,6 +270,20 @@ impl Scene {
             }
         }
         self.leave_out(unusable, strict)
+    }
+
+    /// Leaves out the photos whose names the model in a scene's folder cannot hold.
+    ///
+    /// # Errors
+    /// As where photos are missing.
+    pub fn leave_out_unwritable(&mut self, strict: bool) -> Result<Vec<Warning>, SceneError> {
+        const REASON: &str = "a scene cannot hold its name, which begins or ends with white space or has a line break \
+                              or a `\\`; rename the photo, in the calibration, too";
+        let names = self.photos.iter().map(|photo| photo.name.as_str());
+        let unwritable = names.filter(|name| !colmap::fits_text(name));
+        let unwritable: Vec<(String, &str)> =
+            unwritable.map(|name| (name.to_owned(), REASON)).collect();
+        self.leave_out(unwritable, strict)
     }
 
     /// Fails of the first photo that cannot be decoded, of which headers tell nothing.

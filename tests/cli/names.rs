@@ -80,7 +80,7 @@ fn another_photo_does_not_stand_in_for_one_that_is_missing() {
     for stray in ["0004.png", "0004.jpg"] {
         let stray = at(&folder, "wall/images").join(stray);
         image::RgbImage::new(96, 72).save(&stray).unwrap();
-        let error = lumigraph(folder.path(), "import wall --strict -o scene").error(1);
+        let error = lumigraph(folder.path(), "import wall --strict -o strict").error(1);
         assert!(error.contains("photo cam0/0004.png: "), "{error}");
         let ran = lumigraph(folder.path(), "import wall --force -o scene").ok();
         assert!(ran.stdout.contains("8 photos"), "{}", ran.stdout);
@@ -225,6 +225,29 @@ fn names_may_lead_past_other_folders() {
     );
     // As the split calls them.
     assert_eq!(ran.json()["photos"][0]["name"], "0000.png");
+}
+
+#[test]
+fn a_photo_whose_name_a_scene_cannot_hold_is_left_out() {
+    let folder = with_wall();
+    let model = at(&folder, "wall/sparse/0");
+    let mut whole = colmap::read_model(&model).unwrap();
+    let mut images = whole.images.values_mut();
+    let image = images.find(|image| image.name == "0004.png").unwrap();
+    image.name = " 0004.png".to_owned();
+    fs::remove_dir_all(&model).unwrap();
+    colmap::write_binary(&whole, &model).unwrap();
+    fs::rename(photo(&folder, 4), at(&folder, "wall/images/ 0004.png")).unwrap();
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    let warning = "photo  0004.png is left out: a scene cannot hold its name, which begins";
+    assert!(ran.stderr.contains(warning), "{}", ran.stderr);
+    assert!(ran.stdout.contains("8 photos"), "{}", ran.stdout);
+    let error = lumigraph(folder.path(), "import wall --strict -o strict").error(1);
+    assert!(error.contains("photo  0004.png: "), "{error}");
+    // Where nothing is written it serves.
+    let line = "render wall --proxy plane --path sweep --frames 2 --size 32x24 -o frames";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(!ran.stderr.contains("is left out"), "{}", ran.stderr);
 }
 
 #[test]

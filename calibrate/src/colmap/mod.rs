@@ -27,7 +27,7 @@ mod write;
 
 pub use error::{ColmapError, Incomplete, Place};
 pub use find::{SubModel, find_model, side_by_side};
-pub use write::{write_binary, write_text};
+pub use write::{fits_text, write_binary, write_text};
 
 use crate::{Camera, CameraId, Reconstruction};
 use std::borrow::Cow;

@@ -24,14 +24,18 @@ pub fn write_text(reconstruction: &Reconstruction, folder: &Path) -> Result<(), 
             folder: folder.to_owned(),
         });
     }
-    let fits = |name: &str| !name.contains(['\n', '\r', '\\']) && name.trim() == name;
     write(
         reconstruction,
         folder,
         Format::Text,
-        fits,
+        fits_text,
         [text::write_cameras, text::write_images, text::write_points],
     )
+}
+
+/// Whether a text model can hold a photo's name: one without line breaks, `\` and white space at its ends.
+pub fn fits_text(name: &str) -> bool {
+    !name.contains(['\n', '\r', '\\']) && name.trim() == name
 }
 
 /// Writes `cameras.bin`, `images.bin` and `points3D.bin` into `folder`, which is made
