@@ -15,6 +15,8 @@
 //!   fisheye's. nerfstudio's r⁸ term of a lens that is no fisheye (`k4`) must be zero, and so
 //!   must `k5` and `k6` of all but FULL_OPENCV. `distortion_params`, a list of nerfstudio's in
 //!   the order k1 k2 k3 k4 p1 p2, goes before the single coefficients beside it.
+//! - With EQUIRECTANGULAR a photo goes all round, azimuth across and elevation down, its middle ahead; what
+//!   nerfstudio has for focal lengths is then half the width, and the height.
 
 use super::build::{self, Builder, SizeOf};
 use super::error::{FormatError, Problem};
@@ -25,6 +27,10 @@ use std::path::Path;
 
 /// Lenses of instant-ngp that no model here can represent.
 const FOREIGN_LENSES: [&str; 4] = ["ftheta_p0", "latlong", "equirectangular", "rolling_shutter"];
+/// nerfstudio's name for photos that go all round.
+const PANORAMA: &str = "EQUIRECTANGULAR";
+/// So many pixels may a panorama's numbers lie beside those of one that goes all round.
+const MOST_BESIDE: f64 = 1.0;
 const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
 /// A principal point of so few pixels in both coordinates is in the photo's corner, or no pixels at all.
@@ -138,6 +144,9 @@ impl<'a> Intrinsics<'a> {
             (Some(w), Some(h)) => (w.whole()?, h.whole()?),
             _ => size().map_err(|problem| self.frame.error(problem))?,
         };
+        if self.model()? == Some(PANORAMA) {
+            return self.panorama(width, height);
+        }
         let (fx, fy) = self.focals(width, height)?;
         let cx = self.number_or("cx", f64::from(width) / 2.0)?;
         let cy = self.number_or("cy", f64::from(height) / 2.0)?;
@@ -150,6 +159,49 @@ impl<'a> Intrinsics<'a> {
             width,
             height,
             params,
+        })
+    }
+
+    /// What the file calls the lens.
+    fn model(&self) -> Result<Option<&'a str>, FormatError> {
+        let named = self.get("camera_model");
+        named.map(|json| json.text()).transpose()
+    }
+
+    /// The camera of a panorama, which goes all round.
+    fn panorama(&self, width: u32, height: u32) -> Result<Camera, FormatError> {
+        let (w, h) = (f64::from(width), f64::from(height));
+        for (key, expected) in [
+            ("fl_x", 0.5 * w),
+            ("fl_y", h),
+            ("cx", 0.5 * w),
+            ("cy", 0.5 * h),
+        ] {
+            let Some(json) = self.get(key) else {
+                continue;
+            };
+            let found = json.number()?;
+            if (found - expected).abs() > MOST_BESIDE {
+                let problem = format!(
+                    "found {found}, expected {expected}: a panorama of {width} × {height} pixels that goes all round"
+                );
+                let remedy =
+                    "remove the key if it does, or cut it into views and export these as PINHOLE";
+                return Err(json.error(Problem::new(problem, remedy)));
+            }
+        }
+        let mut coefficients = COEFFICIENTS.iter().zip(self.coefficients()?);
+        if let Some((key, value)) = coefficients.find(|(_, value)| *value != 0.0) {
+            let problem = format!("found {PANORAMA} with {key} = {value}, which a panorama lacks");
+            return Err(self
+                .frame
+                .error(Problem::new(problem, "remove the coefficients")));
+        }
+        Ok(Camera {
+            model: ModelKind::Equirectangular,
+            width,
+            height,
+            params: vec![w, h],
         })
     }
 
@@ -250,8 +302,8 @@ impl<'a> Intrinsics<'a> {
             Some(other) => {
                 return refuse(
                     format!(
-                        "found the camera model {other:?}, expected PINHOLE, OPENCV or \
-                         OPENCV_FISHEYE"
+                        "found the camera model {other:?}, expected PINHOLE, OPENCV, \
+                         OPENCV_FISHEYE or {PANORAMA}"
                     ),
                     undistort,
                 );

@@ -2,9 +2,10 @@ use crate::broken::damage;
 use crate::captures::{angle_between, capture};
 use calibrate::colmap::{find_model, read_model};
 use calibrate::formats::{FormatError, parse_files_beside, read_transforms};
-use calibrate::{Camera, ModelKind, Reconstruction};
+use calibrate::{Camera, ModelKind, Pixel, Reconstruction};
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 fn no_photo(_: &str) -> Option<(u32, u32)> {
@@ -266,6 +267,38 @@ fn intrinsics_that_are_no_pixels_are_refused() {
 }
 
 #[test]
+fn panoramas_are_nerfstudios() {
+    let size = r#""w": 400, "h": 200, "camera_model": "EQUIRECTANGULAR""#;
+    let camera = camera(size);
+    assert_eq!(camera.model, ModelKind::Equirectangular);
+    assert_eq!(camera.params, [400.0, 200.0]);
+    let lens = camera.lens().unwrap();
+    for (x, y) in [(200.0, 100.0), (10.5, 20.5), (301.0, 44.0), (399.0, 199.0)] {
+        // As its `Camera` has rays: in OpenGL's axes, from shares of the focal lengths (fx = w/2, fy = h).
+        let (theta, phi) = (-PI * (x - 200.0) / 200.0, PI * (0.5 + (y - 100.0) / 200.0));
+        let ray = DVec3::new(
+            -theta.sin() * phi.sin(),
+            phi.cos(),
+            -theta.cos() * phi.sin(),
+        );
+        let found = lens.unproject(Pixel::new(x, y)).unwrap();
+        let expected = DVec3::new(ray.x, -ray.y, -ray.z);
+        assert!((found - expected).length() < 1e-12, "{x} {y}: {found}");
+    }
+    let whole = r#""fl_x": 200, "fl_y": 200, "cx": 200, "cy": 100, "k1": 0"#;
+    assert_eq!(self::camera(&format!("{size}, {whole}")), camera);
+    assert_eq!(
+        error(&format!("{size}, \"fl_x\": 120"), FRAME),
+        "fl_x: found 120, expected 200: a panorama of 400 × 200 pixels that goes all round; remove the key if it \
+         does, or cut it into views and export these as PINHOLE"
+    );
+    assert_eq!(
+        error(&format!("{size}, \"k1\": 0.5"), FRAME),
+        "frames[0] (a/b c.jpg): found EQUIRECTANGULAR with k1 = 0.5, which a panorama lacks; remove the coefficients"
+    );
+}
+
+#[test]
 fn errors_name_the_frame_and_a_remedy() {
     let shared = r#""w": 100, "h": 80, "fl_x": 90"#;
     let again = "copy the file again, or export it again from the program it is from";
@@ -309,11 +342,11 @@ fn errors_name_the_frame_and_a_remedy() {
     );
     assert_eq!(
         error(
-            &format!("{shared}, \"camera_model\": \"EQUIRECTANGULAR\""),
+            &format!("{shared}, \"camera_model\": \"ORTHOGRAPHIC\""),
             FRAME
         ),
-        "camera_model: found the camera model \"EQUIRECTANGULAR\", expected PINHOLE, OPENCV or \
-         OPENCV_FISHEYE; undistort the photos and export them as PINHOLE"
+        "camera_model: found the camera model \"ORTHOGRAPHIC\", expected PINHOLE, OPENCV, \
+         OPENCV_FISHEYE or EQUIRECTANGULAR; undistort the photos and export them as PINHOLE"
     );
     assert_eq!(
         error(
