@@ -61,18 +61,20 @@ pub(super) fn read_other(
     let mut whole = formats::read(format, path, &size_of, &names, &mut notes)?;
     warnings.extend(notes.into_iter().map(Warning::Note));
     let called = listed.names(whole.images.values().map(|image| image.name.as_str()));
-    let mut named = BTreeSet::new();
+    let mut paths: BTreeMap<String, String> = BTreeMap::new();
     for image in whole.images.values_mut() {
-        image.name.clone_from(&called[&image.name]);
-        if !named.insert(image.name.clone()) {
+        let name = &called[&image.name];
+        let own = std::mem::replace(&mut image.name, name.clone());
+        if let Some(other) = paths.get(name) {
             return Err(SceneError::Poses {
                 path: path.to_owned(),
                 problem: format!(
-                    "two poses whose paths both end in that of the photo {}",
-                    image.name
+                    "two poses whose paths both end in that of the photo {name}, {other} and {own}; remove one of \
+                     them, or give the folder of photos in which both are found by longer ends of their paths"
                 ),
             });
         }
+        paths.insert(name.clone(), own);
     }
     Ok((whole, called))
 }

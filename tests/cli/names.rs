@@ -91,6 +91,16 @@ fn another_photo_does_not_stand_in_for_one_that_is_missing() {
 }
 
 #[test]
+fn two_poses_of_one_photo_are_named() {
+    let folder = listed_rig();
+    rewrite(&folder, "images/cam1/0003.png", "images/cam0/0002");
+    let error = lumigraph(folder.path(), "import wall -o scene").error(1);
+    let said = "wall/transforms.json: the file holds two poses whose paths both end in that of the photo cam0/0002.png, \
+                images/cam0/0002.png and images/cam0/0002; remove one of them, or give";
+    assert!(error.starts_with(said), "{error}");
+}
+
+#[test]
 fn missing_photos_are_called_as_the_others_are() {
     let folder = listed_rig();
     // Two that are called alike but for their folders.
