@@ -282,12 +282,16 @@ fn is_nothing_there(error: &ColmapError) -> bool {
     matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
 }
 
+/// Where Bundler itself leaves its work, beside the list of photos.
+const BUNDLER: &str = "bundle/bundle.out";
+
 /// The other programs' calibrations in a folder, by name, but parts of a data set that are not to
-/// be trained on last; and what is wrong with files that are called like one.
+/// be trained on last, and what Bundler left within; and what is wrong with files that are called like one.
 fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
     files.sort_by_cached_key(|file| (is_test_split(file), file.clone()));
+    files.extend(Some(folder.join(BUNDLER)).filter(|file| file.is_file()));
     let (mut found, mut damaged) = (Vec::new(), Vec::new());
     for file in files {
         if let Some(format) = formats::detect(&file) {

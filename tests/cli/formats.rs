@@ -389,6 +389,28 @@ fn photos_that_are_missing_or_corrupt_are_left_out_whatever_the_format() {
 }
 
 #[test]
+fn bundlers_own_folder_is_looked_into() {
+    let folder = with_wall();
+    let at = |path: &str| folder.path().join(path);
+    let model = colmap::read_model(&at("wall/sparse/0")).unwrap();
+    let list: Vec<String> = model
+        .images
+        .values()
+        .map(|i| format!("./{}", i.name))
+        .collect();
+    fs::write(at("wall/list.txt"), list.join("\n")).unwrap();
+    fs::create_dir(at("wall/bundle")).unwrap();
+    fs::write(at("wall/bundle/bundle.out"), bundle(&model)).unwrap();
+    // Others go first.
+    let ran = lumigraph(folder.path(), "info wall").ok();
+    let note = "`lumigraph import wall --calibration wall/bundle/bundle.out -o SCENE` takes that";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    fs::remove_dir_all(at("wall/sparse")).unwrap();
+    let ran = lumigraph(folder.path(), "import wall -o scene").ok();
+    assert!(ran.stdout.starts_with("scene: 9 photos"), "{}", ran.stdout);
+}
+
+#[test]
 fn a_calibration_in_place_of_photos_is_told_to_be_one() {
     let folder = with_wall();
     let here = folder.path();
