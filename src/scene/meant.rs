@@ -26,7 +26,7 @@ impl Meant {
     ///
     /// A photo is meant where its name and the calibration's are the only ones that differ in letters'
     /// case or in how their marks are written alone, or else in what they end in, too, and it is as large
-    /// as was calibrated.
+    /// as was calibrated. A `\` in its name is the `/` that calibrations' readers make of one.
     ///
     /// Of names that lead to photos from a folder within alone a message says how to import those: `home` is
     /// the folder that they are looked for in, and `calibration` where that is.
@@ -67,7 +67,7 @@ impl Meant {
             let open = by_key(open, |name| key(name));
             let files = free.iter().copied();
             let files = files.filter(|photo| !taken.contains(photo.name.as_str()));
-            let files = by_key(files, |photo| key(&photo.name));
+            let files = by_key(files, |photo| key(&photo.name.replace('\\', "/")));
             for (key, names) in open {
                 let Some(files) = files.get(&key) else {
                     continue;
@@ -140,9 +140,14 @@ impl Meant {
     /// What to say of photos that are used under another name, if there are any.
     pub(super) fn note(&self, total: usize) -> Option<Warning> {
         let (name, photo) = self.photos.first_key_value()?;
+        let has_other_slash = |photo: &PhotoFile| photo.name.contains('\\');
+        let slashes = match self.photos.values().any(has_other_slash) {
+            true => " in `\\` for `/`,",
+            false => "",
+        };
         Some(Warning::Note(format!(
             "{} of {total} photos are used though their files' names differ from the calibration's in \
-             letters' case, in how marks are written, or in what they end in ({} for {name}, for one)",
+             letters' case,{slashes} in how marks are written, or in what they end in ({} for {name}, for one)",
             self.photos.len(),
             photo.name
         )))

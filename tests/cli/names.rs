@@ -224,6 +224,26 @@ fn names_may_differ_in_case_in_marks_and_in_what_they_end_in() {
     );
 }
 
+#[cfg(unix)]
+#[test]
+fn names_may_have_backslashes() {
+    let folder = called(|name| name.replace("0004", "on/4"));
+    fs::rename(photo(&folder, 4), at(&folder, "wall/images/on\\4.png")).unwrap();
+    let ran = lumigraph(folder.path(), "import wall --strict -o scene").ok();
+    assert!(ran.stdout.contains("9 photos"), "{}", ran.stdout);
+    let note = "note: 1 of 9 photos are used though their files' names differ from the calibration's in letters' \
+                case, in `\\` for `/`, in how marks are written, or in what they end in (on\\4.png for on/4.png, for \
+                one)\n";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    assert!(
+        !ran.stderr.contains("not in the calibration"),
+        "{}",
+        ran.stderr
+    );
+    let ran = lumigraph(folder.path(), "info scene --strict").ok();
+    assert!(!ran.stderr.contains("left out"), "{}", ran.stderr);
+}
+
 #[test]
 fn names_may_lead_past_other_folders() {
     let folder = called(|name| format!("../images/{name}"));
