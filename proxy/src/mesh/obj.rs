@@ -7,8 +7,12 @@ use capture::{byte_lines, without_byte_order_mark};
 use glam::DVec3;
 use std::path::Path;
 
-/// Reads `v` and `f`; all else is for looks and left alone.
+/// Reads `v` and `f`, which some write as capitals; all else is for looks and left alone.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        let problem = "its text is UTF-16, which is not read; save it as UTF-8";
+        return Err(MeshFileError::File(path.to_owned(), problem.to_owned()));
+    }
     let bytes = without_byte_order_mark(bytes);
     let mut mesh = Mesh::default();
     // The greatest index so far and the line that has it: corners may follow their faces.
@@ -23,7 +27,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
         };
         // Comments and names may be in any encoding.
         let line = line.split(|b| *b == b'#').next().unwrap_or_default();
-        let is_ours = |line: &[u8]| matches!(line, [b'v' | b'f', b' ' | b'\t', ..]);
+        let is_ours = |line: &[u8]| matches!(line, [b'v' | b'V' | b'f' | b'F', b' ' | b'\t', ..]);
         let line = line.trim_ascii();
         if !is_ours(line) {
             continue;
@@ -39,7 +43,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh, MeshFileError> {
         }
         let mut words = text.split_ascii_whitespace();
         match words.next() {
-            Some("v") => {
+            Some("v" | "V") => {
                 let mut coordinate = || {
                     let word = words
                         .next()

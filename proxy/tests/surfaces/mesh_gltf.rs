@@ -318,11 +318,43 @@ fn gltf_targets_move_corners_by_their_weights() {
     assert_eq!(read.positions, [corner(0), corner(1), corner(2), moved]);
     // Without weight it is not read.
     parse("a.gltf", sparse("5126")).unwrap();
-    let said = message("a.gltf", &of_node(&sparse("5126"), "[2]"));
+    let said = message("a.gltf", of_node(&sparse("5126"), "[2]"));
     let expected = "a.gltf, accessor 0: indices must be unsigned whole numbers";
     assert_eq!(said, expected);
     let short = of_node(&sparse("5123"), "[2]").replacen(r#""count": 4"#, r#""count": 3"#, 1);
     let said = message("a.gltf", &short);
     let expected = "a.gltf, accessor 0: 3 moves of a target for 4 corners";
     assert_eq!(said, expected);
+}
+
+#[test]
+fn gltf_numbers_that_are_compressed_are_told() {
+    let plain = gltf(5, None, &SQUARE, ONE_NODE);
+    let used = |name: &str| format!(r#"{{"extensionsUsed": ["KHR_lights_punctual", "{name}"], "#);
+    let compressed = |text: &str, name: &str| text.replacen('{', &used(name), 1);
+    let no_view = plain.replacen(r#""bufferView": 0, "#, "", 1);
+    let at = plain.find(r#", "uri": "data:"#).unwrap();
+    let no_bytes = format!("{}}}]}}", &plain[..at]);
+    for (text, what) in [
+        (
+            no_view,
+            "accessor 0: it has no numbers in the file (no buffer view)",
+        ),
+        (
+            no_bytes,
+            "buffer 0: it has no bytes: neither a uri nor a binary chunk",
+        ),
+    ] {
+        let expected = format!("a.gltf, {what}; export the mesh again");
+        assert_eq!(message("a.gltf", &text), expected);
+        for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
+            let expected = format!(
+                "a.gltf, {what}; the file is compressed ({name}), which is not read: export the mesh again without \
+                 compression"
+            );
+            assert_eq!(message("a.gltf", compressed(&text, name)), expected);
+        }
+    }
+    // Where the numbers are there as well, they are read.
+    parse("a.gltf", compressed(&plain, "KHR_draco_mesh_compression")).unwrap();
 }

@@ -26,6 +26,21 @@ fn obj_faces_take_every_form() {
 }
 
 #[test]
+fn obj_capitals_are_read_and_utf_16_is_told() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1 2 3\n";
+    let expected = parse("a.obj", text).unwrap();
+    assert_eq!(parse("a.obj", text.to_uppercase()).unwrap(), expected);
+    for to_bytes in [u16::to_le_bytes, u16::to_be_bytes] {
+        let codes = std::iter::once(0xfeff).chain(text.encode_utf16());
+        let bytes: Vec<u8> = codes.flat_map(to_bytes).collect();
+        assert_eq!(
+            message("a.obj", bytes),
+            "a.obj: its text is UTF-16, which is not read; save it as UTF-8"
+        );
+    }
+}
+
+#[test]
 fn obj_lines_may_end_as_on_any_computer() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let expected = parse("a.obj", text).unwrap();

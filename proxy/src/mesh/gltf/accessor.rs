@@ -171,7 +171,9 @@ impl Accessors<'_> {
     ) -> Result<Elements<'b>, MeshFileError> {
         let view = layout.view.and_then(|i| self.views.get(i));
         let Some(view) = view else {
-            return Err(self.failed(number, "it has no numbers in the file (no buffer view)"));
+            let remedy = self.buffers.remedy();
+            let problem = format!("it has no numbers in the file (no buffer view){remedy}");
+            return Err(self.failed(number, problem));
         };
         let Some(size) = size(layout.component_type).map(|size| layout.components * size) else {
             let problem = format!("unknown component type {}", layout.component_type);

@@ -1,6 +1,7 @@
 //! The bytes behind a glTF file: in it, in its text, or beside it.
 
 use crate::mesh::MeshFileError;
+use crate::mesh::obj::shown;
 use base64::Engine;
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -15,6 +16,9 @@ pub(super) struct Buffer {
     uri: Option<String>,
 }
 
+/// What extensions' names have that compress numbers (`KHR_draco_mesh_compression`, `EXT_meshopt_compression`).
+const COMPRESSION: &str = "_compression";
+
 /// Buffers, each read when it is first needed.
 pub(super) struct Buffers<'a> {
     path: &'a Path,
@@ -22,16 +26,37 @@ pub(super) struct Buffers<'a> {
     blob: Option<&'a [u8]>,
     read: Vec<Option<Cow<'a, [u8]>>>,
     external_size: usize,
+    /// The extension that the file's numbers are compressed by, if it names one.
+    compression: Option<&'a str>,
 }
 
 impl<'a> Buffers<'a> {
-    pub(super) fn new(path: &'a Path, buffers: &'a [Buffer], blob: Option<&'a [u8]>) -> Self {
+    /// The buffers of a file that uses these extensions.
+    pub(super) fn new(
+        path: &'a Path,
+        buffers: &'a [Buffer],
+        blob: Option<&'a [u8]>,
+        extensions: &'a [String],
+    ) -> Self {
+        let mut compressions = extensions.iter().filter(|name| name.contains(COMPRESSION));
         Self {
             path,
             buffers,
             blob,
             read: vec![None; buffers.len()],
             external_size: 0,
+            compression: compressions.next().map(String::as_str),
+        }
+    }
+
+    /// What to do where numbers are not there, beginning with what keeps them apart from what is missing.
+    pub(super) fn remedy(&self) -> String {
+        match self.compression {
+            Some(name) => format!(
+                "; the file is compressed ({}), which is not read: export the mesh again without compression",
+                shown(name)
+            ),
+            None => "; export the mesh again".to_owned(),
         }
     }
 
@@ -64,7 +89,7 @@ impl<'a> Buffers<'a> {
             (None, Some(blob)) if number == 0 => return Ok(Cow::Borrowed(blob)),
             (None, _) => {
                 let problem = "it has no bytes: neither a uri nor a binary chunk";
-                return Err(self.failed(number, problem.to_owned()));
+                return Err(self.failed(number, format!("{problem}{}", self.remedy())));
             }
         };
         let (bytes, is_external) = fetch(self.path, uri, |e| self.failed(number, e))?;
@@ -92,7 +117,7 @@ pub(super) fn fetch<E>(
         return Err(failed(format!(
             "its bytes are at `{}`; put them into a file beside this one, or export the mesh \
              as .glb",
-            super::super::obj::shown(uri)
+            shown(uri)
         )));
     };
     let path = path.parent().unwrap_or(Path::new("")).join(beside);

@@ -44,6 +44,8 @@ struct Root {
     #[serde(default)]
     buffers: Vec<buffers::Buffer>,
     #[serde(default)]
+    extensions_used: Vec<String>,
+    #[serde(default)]
     extensions_required: Vec<String>,
 }
 
@@ -197,7 +199,7 @@ fn read(
             path,
             accessors: &root.accessors,
             views: &root.buffer_views,
-            buffers: Buffers::new(path, &root.buffers, blob),
+            buffers: Buffers::new(path, &root.buffers, blob, &root.extensions_used),
         },
         mesh: Mesh::default(),
         copies: 0,
