@@ -3,7 +3,7 @@
 use super::exposure::ExposureArgs;
 use super::film::write_picture;
 use super::inputs::files_behind_scene;
-use super::options::{DrawArgs, EdgeArgs, FieldArgs, SceneArgs, compared};
+use super::options::{DrawArgs, FieldArgs, FinishArgs, SceneArgs, compared};
 use super::output::say;
 use super::output::{print, print_json};
 use super::report::Report;
@@ -54,7 +54,7 @@ pub(super) struct Args {
     #[command(flatten)]
     field: FieldArgs,
     #[command(flatten)]
-    edges: EdgeArgs,
+    finish: FinishArgs,
     #[command(flatten)]
     draw: DrawArgs,
     #[command(flatten)]
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         &args.time,
         None,
     )?;
-    session.edge_samples = args.edges.across;
+    session.finish_as(&args.finish);
     let size = args.draw.size;
     let lines = score_photos(&mut session, &held_out, size, output, &kept)?;
     let report = Report::new(&session, &start);

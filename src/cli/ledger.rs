@@ -19,18 +19,21 @@ pub(super) enum Stage {
     Load,
     /// Drawing. On the CPU photos that were not decoded ahead are decoded meanwhile.
     Draw,
+    /// Drawing what no photo shows softly.
+    Guesses,
     /// Drawing pixels anew at which the proxy jumps.
     Edges,
     /// Writing the picture.
     Write,
 }
 
-const STAGES: [(Stage, &str); 7] = [
+const STAGES: [(Stage, &str); 8] = [
     (Stage::Surface, "surface"),
     (Stage::Field, "field"),
     (Stage::Ahead, "ahead"),
     (Stage::Load, "load"),
     (Stage::Draw, "draw"),
+    (Stage::Guesses, "guesses"),
     (Stage::Edges, "edges"),
     (Stage::Write, "write"),
 ];

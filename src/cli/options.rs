@@ -262,14 +262,18 @@ impl FieldArgs {
     }
 }
 
-/// How outlines are drawn.
+/// What is done to a picture once it is drawn.
 #[derive(Args)]
-pub(super) struct EdgeArgs {
+pub(super) struct FinishArgs {
     /// Samples of a pixel, across and down, where a mesh jumps between it and one beside it that looks otherwise:
     /// outlines without stairs; 1 draws them as all else
     #[arg(long = "edges", value_name = "N", default_value_t = EDGE_SAMPLES,
         value_parser = clap::value_parser!(u32).range(1..=8))]
-    pub(super) across: u32,
+    pub(super) edge_samples: u32,
+    /// Draw what no photo shows, which is guessed from what is beside it, as sharply as that; else the farther from
+    /// what is seen the softer
+    #[arg(long)]
+    pub(super) sharp_guesses: bool,
 }
 
 /// Where and how large.

@@ -4,7 +4,7 @@ use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
 use super::frames::{Asked, FRAMES, NamedView, ViewArgs, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
-use super::options::{DrawArgs, EdgeArgs, FieldArgs, HoldOutArgs, SceneArgs, max_error};
+use super::options::{DrawArgs, FieldArgs, FinishArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
 use super::output::{print, print_json};
 use super::path::NerfstudioArgs;
@@ -55,7 +55,7 @@ pub(super) struct Args {
         conflicts_with_all = ["renderer", "grid"])]
     max_error: Option<f64>,
     #[command(flatten)]
-    edges: EdgeArgs,
+    finish: FinishArgs,
     #[command(flatten)]
     draw: DrawArgs,
     #[command(flatten)]
@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         args.at.time,
     )?;
     session.max_error = args.max_error;
-    session.edge_samples = args.edges.across;
+    session.finish_as(&args.finish);
     session.why_empty = why_empty;
     let points = || session.points();
     let count = chosen.count(FRAMES);

@@ -155,6 +155,8 @@ struct FrameCost {
     scorings: Option<u64>,
     scorings_omitted: u64,
     by_cpu: bool,
+    /// Drawn softly.
+    guessed_pixels: usize,
     /// Drawn of several samples.
     edge_pixels: usize,
     /// No pixel is covered, not even in part.
@@ -209,11 +211,19 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
+            guessed_pixels: 0,
             edge_pixels: 0,
             is_empty,
             is_unshown: is_empty && frame.sees_proxy(),
         };
         self.frames.insert(frame_idx, cost);
+    }
+
+    /// Notes how many pixels of that frame no photo shows, which were drawn softly.
+    pub(super) fn note_guesses(&mut self, frame_idx: usize, guessed_pixels: usize) {
+        if let Some(cost) = self.frames.get_mut(&frame_idx) {
+            cost.guessed_pixels = guessed_pixels;
+        }
     }
 
     /// Notes how many pixels of that frame were drawn anew, of several samples.
@@ -279,6 +289,7 @@ impl Costs {
             "photos_used": cost.photos_used,
             "parts": cost.parts,
             "drawn_by_cpu": cost.by_cpu,
+            "guessed_pixels": cost.guessed_pixels,
             "edge_pixels": cost.edge_pixels,
             "grid": cost.grid,
             "error_at_most": cost.error,

@@ -6,7 +6,7 @@ use super::budget;
 use super::damaged::{leave_out, left_out_text};
 use super::exposure::{ExposureArgs, ExposureUsed};
 use super::ledger::Ledger;
-use super::options::{DrawArgs, FieldArgs};
+use super::options::{DrawArgs, FieldArgs, FinishArgs};
 use super::output::say;
 use super::report::Costs;
 use super::surface::{ChosenProxy, ProxyArgs};
@@ -20,7 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoError,
-    Prepared, RenderError, Residency, Skips,
+    Prepared, RenderError, Residency, Skips, soften_guesses,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -38,7 +38,8 @@ pub(super) struct Session {
     /// Steps of 255: in [`Self::draw_all`] it chooses each frame's method.
     pub(super) max_error: Option<f64>,
     /// Across a pixel at which the proxy jumps.
-    pub(super) edge_samples: u32,
+    edge_samples: u32,
+    soft_guesses: bool,
     /// Where time plays a part.
     pub(super) clock: Option<Clock>,
     pub(super) in_window: InWindow,
@@ -126,6 +127,7 @@ impl Session {
             method: field.method(),
             max_error: None,
             edge_samples: 1,
+            soft_guesses: false,
             without,
             left_out,
             uploaded: BTreeSet::new(),
@@ -231,6 +233,12 @@ impl Session {
         clock.map(|clock| clock.moment(name, own)).transpose()
     }
 
+    /// What is done to pictures once they are drawn; nothing where that is not said.
+    pub(super) fn finish_as(&mut self, finish: &FinishArgs) {
+        self.edge_samples = finish.edge_samples;
+        self.soft_guesses = !finish.sharp_guesses;
+    }
+
     /// Draws a view. A photo that turns out corrupt is reported and left out from then on
     /// and the view drawn again, unless `--strict`.
     pub(super) fn draw(
@@ -246,6 +254,9 @@ impl Session {
             };
             let drawn = Prepared::new(&frame, self.method).and_then(|prepared| {
                 let mut picture = engine.draw(&frame, &prepared)?;
+                if self.soft_guesses {
+                    soften_guesses(&frame, &mut picture);
+                }
                 engine.smooth(&frame, &prepared, self.edge_samples, &mut picture)?;
                 Ok(picture)
             });

@@ -13,15 +13,15 @@ use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
     EDGE_SAMPLES, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared,
-    RenderError, Skips, TriangulatedField, picture,
+    RenderError, Skips, TriangulatedField, picture, soften_guesses,
 };
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The stage in which outlines are drawn anew, where nothing moves.
-pub(crate) const EDGES: &str = "edges";
+/// The stage in which guesses are drawn softly and outlines anew, where nothing moves.
+pub(crate) const FINISH: &str = "finish";
 /// More triangles than this are thinned out before their edges are shown.
 const MOST_EDGED: usize = 6000;
 /// More points than this are.
@@ -203,8 +203,11 @@ impl<'a> SceneDrawer<'a> {
                     let draw = || engine.draw(frame, prepared);
                     let mut picture = timed(&mut stages, "draw", draw)?;
                     if !request.is_moving {
-                        let draw = || engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture);
-                        timed(&mut stages, EDGES, draw)?;
+                        let finish = || {
+                            soften_guesses(frame, &mut picture);
+                            engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture)
+                        };
+                        timed(&mut stages, FINISH, finish)?;
                         let coarse =
                             Memories::now(&self.lumigraph.photos, engine).told_since(memories);
                         smooth.get_or_init(|| (picture.clone(), coarse));

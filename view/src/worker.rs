@@ -3,7 +3,7 @@
 
 use crate::content::{Content, House, Space};
 use crate::draw_house::draw_house;
-use crate::draw_scene::{Drawn, EDGES, SceneDrawer};
+use crate::draw_scene::{Drawn, FINISH, SceneDrawer};
 use crate::picture::{Request, Shown};
 use crate::shot::{self, Shot, Subject};
 use image::RgbaImage;
@@ -333,10 +333,10 @@ impl<'s> Desk<'s> {
                     match draw(self.tell, &request, reduction) {
                         Ok((picture, mut shown)) => {
                             shown.revision = self.revision;
-                            let edges = shown.stages.iter().find(|(stage, _)| *stage == EDGES);
-                            let edges_ms = edges.map_or(0.0, |(_, ms)| *ms);
+                            let finish = shown.stages.iter().find(|(stage, _)| *stage == FINISH);
+                            let finish_ms = finish.map_or(0.0, |(_, ms)| *ms);
                             (self.tell)(News::Shown(Box::new(shown)));
-                            self.adapt(&request, 1e3 * start.elapsed().as_secs_f64() - edges_ms);
+                            self.adapt(&request, 1e3 * start.elapsed().as_secs_f64() - finish_ms);
                             if reduction == 1 && !request.is_moving {
                                 kept = Some((*request, picture));
                             }

@@ -15,6 +15,7 @@ mod engines_photos;
 mod engines_triangulated;
 mod exposure;
 mod goals;
+mod guesses;
 mod hard_places;
 mod house;
 mod interior_captured;

@@ -34,7 +34,7 @@ fn points(shot: &Shot) -> Vec<SparsePoint> {
     points.collect()
 }
 
-fn lumigraph(shot: &Shot) -> Lumigraph {
+pub(crate) fn lumigraph(shot: &Shot) -> Lumigraph {
     Lumigraph {
         proxy: Proxy::Points { within: None },
         points: points(shot),

@@ -1,0 +1,379 @@
+//! Guesses drawn as guesses: what no photo shows has no detail.
+//!
+//! What no photo has, or shows, of the proxy is looked at elsewhere along its ray, where one does (`sight.rs`). Of such
+//! pixels neighbours may look at things far apart: streaks, teeth and patterns, as sharp as photos are. What is right beside
+//! what photos show is likely to go on as they do; farther in nobody knows more than a colour. So each guess becomes the
+//! mean of what is around it, over as much as it is far from what is seen, by a pyramid whose levels are mixed
+//! from coarse to fine (Burt and Adelson 1983).
+
+use crate::frame::Frame;
+use crate::surface::{FacetMap, Surface};
+use glam::Vec4;
+use image::RgbaImage;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Of the logarithm of one more than so many times a pixel's distance from what is seen it has the pyramid's level: half of a
+/// mean's weight lies within a quarter of that distance, about. By photos that were held out twice as much is no better of an
+/// object before the dark, whose guesses are right, and 0.05 dB better elsewhere.
+const LEVEL_BY_DISTANCE: f32 = 0.35;
+
+/// A pixel of the coarsest level that is mixed in has in it what is within so many times its side: to make all levels takes two
+/// pixels of each finer one around it, and to go back as much.
+const REACH: usize = 4;
+
+/// What a level of the pyramid is made of and made finer by: a pixel and two on either side.
+const TAPS: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
+
+/// Draws the pixels of a frame's picture that no photo shows, but for a guess, as softly as they are far from what one shows.
+/// Their alpha stays. How many they are.
+///
+/// Not so of a proxy that is a plane, of which nothing is guessed: what no photo has is not covered.
+pub fn soften_guesses(frame: &Frame<'_>, picture: &mut RgbaImage) -> usize {
+    match &frame.surface {
+        Surface::Facets(map) if map.any_is_moved() => soften(map, picture),
+        _ => 0,
+    }
+}
+
+fn soften(map: &FacetMap, picture: &mut RgbaImage) -> usize {
+    let width = picture.width() as usize;
+    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * width + x]);
+    let size = [width, picture.height() as usize];
+    let Some(guesses) = Part::around(size, is_guess) else {
+        return 0;
+    };
+    // 1. How coarse each is to be.
+    let far = guesses.and(1, 1, size);
+    let level_of = |distance: f32| match distance {
+        0.0 => 0.0,
+        _ => (LEVEL_BY_DISTANCE * distance + 1.0).log2(),
+    };
+    let distances = distances(&far, is_guess);
+    let levels: Vec<f32> = distances.into_par_iter().map(level_of).collect();
+    let level_at = |x: usize, y: usize| far.index(x, y).map_or(0.0, |i| levels[i]);
+    let coarsest = levels.iter().copied().fold(0.0, f32::max).ceil() as usize;
+    // 2. Ever coarser pictures of what is around, whose pixels lie on the same ones of the picture wherever guesses are.
+    let around = guesses.and(REACH << coarsest, 1 << coarsest, size);
+    let mut pyramid = vec![Level::of(picture, &around)];
+    for l in 0..coarsest {
+        let coarser = pyramid[l].reduced();
+        pyramid.push(coarser);
+    }
+    // 3. From coarse to fine, each as far as no coarser one is wanted.
+    let mut mixed = pyramid.pop().expect("the picture at least");
+    for (l, mut own) in pyramid.into_iter().enumerate().rev() {
+        let first = [around.columns.start, around.rows.start];
+        let share = |x: usize, y: usize| {
+            // The pixel of the picture on which that of the level lies.
+            let level = level_at(first[0] + (x << l), first[1] + (y << l));
+            (level - l as f32).clamp(0.0, 1.0)
+        };
+        own.mix_with(&mixed, share);
+        mixed = own;
+    }
+    // 4. Into the picture.
+    let mut count = 0;
+    for y in guesses.rows.clone() {
+        for x in guesses.columns.clone().filter(|x| is_guess(*x, y)) {
+            let Some(at) = around.index(x, y) else {
+                continue;
+            };
+            count += 1;
+            let sum = mixed.sums[at];
+            let pixel = &mut picture.get_pixel_mut(x as u32, y as u32).0;
+            if pixel[3] > 0 && sum.w > 0.0 {
+                let straight = (sum * (255.0 / sum.w) + 0.5).min(Vec4::splat(255.0));
+                let [r, g, b] = straight.truncate().to_array().map(|c| c as u8);
+                *pixel = [r, g, b, pixel[3]];
+            }
+        }
+    }
+    count
+}
+
+/// A part of a picture.
+struct Part {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl Part {
+    /// The smallest one with all pixels of a kind; `None` without any.
+    fn around(
+        [width, height]: [usize; 2],
+        is_in: impl Fn(usize, usize) -> bool + Sync,
+    ) -> Option<Self> {
+        let of_row = |y: usize| {
+            let first = (0..width).find(|x| is_in(*x, y))?;
+            let last = (0..width).rfind(|x| is_in(*x, y))?;
+            Some((first..last + 1, y))
+        };
+        let rows = (0..height).into_par_iter().with_min_len(32);
+        let all: Vec<(Range<usize>, usize)> = rows.filter_map(of_row).collect();
+        Some(Self {
+            columns: all.iter().map(|(columns, _)| columns.start).min()?
+                ..all.iter().map(|(columns, _)| columns.end).max()?,
+            rows: all.first()?.1..all.last()?.1 + 1,
+        })
+    }
+
+    /// So much more on all sides, as far as there is a picture, from a whole number of steps on.
+    fn and(&self, more: usize, step: usize, [width, height]: [usize; 2]) -> Self {
+        let grown = |range: &Range<usize>, side: usize| {
+            range.start.saturating_sub(more) / step * step..(range.end + more).min(side)
+        };
+        Self {
+            columns: grown(&self.columns, width),
+            rows: grown(&self.rows, height),
+        }
+    }
+
+    /// Where a pixel of the picture is in it, row by row, if it is.
+    fn index(&self, x: usize, y: usize) -> Option<usize> {
+        let is_in = self.columns.contains(&x) && self.rows.contains(&y);
+        is_in.then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
+    }
+}
+
+/// How far each pixel of a part is from those that are no guesses, in pixels; as far as the part is wide and high where there
+/// are none. Exact (Meijster et al. 2000: down columns, then the lowest of parabolas along rows).
+fn distances(part: &Part, is_guess: impl Fn(usize, usize) -> bool + Sync) -> Vec<f32> {
+    let (width, height) = (part.columns.len(), part.rows.len());
+    let none = width + height;
+    // 1. To the nearest above or below.
+    let mut down = vec![0; width * height];
+    let mut last = vec![none; width];
+    for (y, row) in part.rows.clone().zip(down.chunks_exact_mut(width)) {
+        for ((x, own), last) in part.columns.clone().zip(row).zip(&mut last) {
+            *last = if is_guess(x, y) { *last + 1 } else { 0 };
+            *own = (*last).min(none);
+        }
+    }
+    for row in down.chunks_exact_mut(width).rev() {
+        for (own, last) in row.iter_mut().zip(&mut last) {
+            *last = (*last + 1).min(*own);
+            *own = *last;
+        }
+    }
+    // 2. Of all columns: of each run of guesses those and the seen ones at its ends, as what is beyond is farther.
+    let rows = down.par_chunks_exact(width).flat_map_iter(|row| {
+        let mut distances = vec![0.0; width];
+        let mut lowest = Vec::new();
+        let mut start = 0;
+        for run in row.chunk_by(|a, b| (*a == 0) == (*b == 0)) {
+            let end = start + run.len();
+            if run[0] > 0 {
+                let first = start.saturating_sub(1);
+                let columns = &row[first..(end + 1).min(width)];
+                lowest_parabolas(columns, &mut lowest);
+                let mut k = 0;
+                for (x, distance) in (start - first..).zip(&mut distances[start..end]) {
+                    while lowest.get(k + 1).is_some_and(|(_, from)| *from < x as f64) {
+                        k += 1;
+                    }
+                    let nearest: usize = lowest[k].0;
+                    let squared = x.abs_diff(nearest).pow(2) + columns[nearest].pow(2);
+                    *distance = (squared as f64).sqrt() as f32;
+                }
+            }
+            start = end;
+        }
+        distances
+    });
+    rows.collect()
+}
+
+/// Of parabolas over columns, each as far above as that column's value squared, those that are lowest somewhere, from left
+/// to right, and from where on.
+fn lowest_parabolas(columns: &[usize], lowest: &mut Vec<(usize, f64)>) {
+    // Where that of one column is as high as that of one at its left.
+    let meet = |left: usize, right: usize| {
+        let square = |x: usize| (columns[x].pow(2) + x.pow(2)) as f64;
+        (square(right) - square(left)) / (2 * (right - left)) as f64
+    };
+    lowest.clear();
+    for x in 0..columns.len() {
+        let from = loop {
+            let Some(&(left, since)) = lowest.last() else {
+                break f64::NEG_INFINITY;
+            };
+            let from = meet(left, x);
+            if from > since {
+                break from;
+            }
+            lowest.pop();
+        };
+        lowest.push((x, from));
+    }
+}
+
+/// A level of the pyramid: premultiplied colours of 0…255 and alpha, row by row.
+struct Level {
+    width: usize,
+    sums: Vec<Vec4>,
+}
+
+impl Level {
+    /// The finest, of a part of a picture.
+    fn of(picture: &RgbaImage, part: &Part) -> Self {
+        let pixels = picture.as_raw().as_chunks::<4>().0;
+        let premultiplied = |[r, g, b, alpha]: &[u8; 4]| {
+            let straight = Vec4::new(f32::from(*r), f32::from(*g), f32::from(*b), 255.0);
+            straight * (f32::from(*alpha) / 255.0)
+        };
+        let of_row = |y: usize| {
+            let row = &pixels[y * picture.width() as usize..][part.columns.clone()];
+            row.iter().map(premultiplied)
+        };
+        Self {
+            width: part.columns.len(),
+            sums: part
+                .rows
+                .clone()
+                .into_par_iter()
+                .flat_map_iter(of_row)
+                .collect(),
+        }
+    }
+
+    /// Half as wide and high: a pixel lies on every other one. What is beyond the border repeats it.
+    fn reduced(&self) -> Self {
+        let (width, height) = (self.width, self.sums.len() / self.width);
+        let near = |at: usize, k: usize, side: usize| (2 * at + k).saturating_sub(2).min(side - 1);
+        let half = width.div_ceil(2);
+        let of_row = |y: usize| {
+            let mut column = vec![Vec4::ZERO; width];
+            for (k, tap) in TAPS.into_iter().enumerate() {
+                let row = &self.sums[near(y, k, height) * width..][..width];
+                column
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(sum, own)| *sum += *own * tap);
+            }
+            let mean = move |x: usize| {
+                let taps = TAPS.into_iter().enumerate();
+                taps.map(|(k, tap)| column[near(x, k, width)] * tap)
+                    .sum::<Vec4>()
+            };
+            (0..half).map(mean)
+        };
+        let rows = (0..height.div_ceil(2)).into_par_iter();
+        Self {
+            width: half,
+            sums: rows.flat_map_iter(of_row).collect(),
+        }
+    }
+
+    /// Takes of the coarser level as large a share as is wanted of it at each pixel, 0…1.
+    fn mix_with(&mut self, coarser: &Self, share: impl Fn(usize, usize) -> f32 + Sync) {
+        let rows_of_coarser = coarser.sums.len() / coarser.width;
+        let mix = |(y, row): (usize, &mut [Vec4])| {
+            for (x, sum) in row.iter_mut().enumerate() {
+                let share = share(x, y);
+                if share > 0.0 {
+                    let mut wide = Vec4::ZERO;
+                    for (row, down) in finer_taps(y, rows_of_coarser) {
+                        for (column, along) in finer_taps(x, coarser.width) {
+                            wide += coarser.sums[row * coarser.width + column] * (down * along);
+                        }
+                    }
+                    *sum += (wide - *sum) * share;
+                }
+            }
+        };
+        self.sums
+            .par_chunks_exact_mut(self.width)
+            .enumerate()
+            .for_each(mix);
+    }
+}
+
+/// The pixels of a coarser level, so many wide or high, that one of the finer level is made of, and by what shares: of [`TAPS`]
+/// those that fall on pixels, twice.
+fn finer_taps(at: usize, side: usize) -> [(usize, f32); 3] {
+    let on = at / 2;
+    let next = (on + 1).min(side - 1);
+    if at.is_multiple_of(2) {
+        let [outer, _, middle, ..] = TAPS.map(|tap| 2.0 * tap);
+        [(on.saturating_sub(1), outer), (on, middle), (next, outer)]
+    } else {
+        let half = 2.0 * TAPS[1];
+        [(on, half), (next, half), (on, 0.0)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Level, Part, distances, finer_taps};
+    use image::{Rgba, RgbaImage};
+
+    #[test]
+    fn distances_are_those_to_the_nearest_pixel_that_is_seen() {
+        let (width, height) = (37_usize, 23_usize);
+        for (seen_of_64, salt) in [(1, 1), (5, 2), (40, 3)] {
+            // Any pattern.
+            let is_guess =
+                |x: usize, y: usize| (31 * x + 17 * y + 7 * x * y + salt) % 64 >= seen_of_64;
+            let part = Part {
+                columns: 2..width,
+                rows: 3..height,
+            };
+            let places = || {
+                part.rows
+                    .clone()
+                    .flat_map(|y| (2..width).map(move |x| (x, y)))
+            };
+            let found = distances(&part, is_guess);
+            for ((x, y), found) in places().zip(found) {
+                let seen = places().filter(|(x, y)| !is_guess(*x, *y));
+                let to = seen.map(|(a, b)| a.abs_diff(x).pow(2) + b.abs_diff(y).pow(2));
+                let expected = (to.min().unwrap() as f32).sqrt();
+                assert_eq!(found, expected, "{x}, {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_seen_distances_are_finite() {
+        let part = Part {
+            columns: 0..5,
+            rows: 0..4,
+        };
+        for distance in distances(&part, |_, _| true) {
+            assert!((9.0..=14.0).contains(&distance), "{distance}");
+        }
+    }
+
+    #[test]
+    fn levels_of_one_colour_have_that_colour() {
+        let color = Rgba([200, 100, 50, 255]);
+        for (width, height) in [(1, 1), (2, 3), (13, 8)] {
+            let picture = RgbaImage::from_pixel(width, height, color);
+            let part = Part {
+                columns: 0..width as usize,
+                rows: 0..height as usize,
+            };
+            let mut fine = Level::of(&picture, &part);
+            let coarse = fine.reduced().reduced();
+            let mut middle = fine.reduced();
+            middle.mix_with(&coarse, |_, _| 1.0);
+            fine.mix_with(&middle, |_, _| 0.5);
+            for sum in fine.sums.iter().chain(&coarse.sums) {
+                let off = *sum - glam::Vec4::new(200.0, 100.0, 50.0, 255.0);
+                assert!(off.abs().max_element() < 1e-3, "{sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_taken_of_a_coarser_level_is_all_of_it() {
+        for side in 1..4 {
+            for at in 0..2 * side {
+                let taps = finer_taps(at, side);
+                assert_eq!(taps.iter().map(|(_, tap)| tap).sum::<f32>(), 1.0);
+                assert!(taps.iter().all(|(i, _)| *i < side), "{at} of {side}");
+            }
+        }
+    }
+}

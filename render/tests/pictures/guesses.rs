@@ -1,0 +1,110 @@
+//! What no photo shows, drawn softly.
+
+use crate::{common, points};
+
+use calibrate::{Rigid3, View};
+use common::Shot;
+use glam::{DQuat, DVec3};
+use image::RgbaImage;
+use points::lumigraph;
+use render::{FieldOptions, Frame, Lumigraph, Method, Surface, cpu, soften_guesses};
+
+/// From farther back than all photos, and aside.
+fn desired_views(shot: &Shot, lumigraph: &Lumigraph) -> Vec<View> {
+    let middle = shot.views[0].between(&shot.views[3], 0.45);
+    let distance = lumigraph.points[0].position.distance(middle.center());
+    let view = |step: i32| {
+        let angle = 0.4 * f64::from(step);
+        let place = DVec3::new(0.1 * angle.cos(), 0.1 * angle.sin(), 0.4) * distance;
+        let turned = DQuat::from_rotation_z(0.03 * f64::from(step));
+        View {
+            camera_from_world: Rigid3::new(turned, place) * middle.camera_from_world,
+            ..middle.clone()
+        }
+    };
+    (0..12).step_by(3).map(view).collect()
+}
+
+fn frame<'a>(lumigraph: &'a Lumigraph, desired: &View) -> Frame<'a> {
+    Frame::new(lumigraph, desired.clone(), FieldOptions::default())
+}
+
+fn moved(frame: &Frame<'_>) -> Vec<bool> {
+    match &frame.surface {
+        Surface::Facets(map) => map.moved().collect(),
+        _ => panic!("points are facets"),
+    }
+}
+
+/// The picture as it is drawn, and with soft guesses; how many there are.
+fn drawn(frame: &Frame<'_>) -> (RgbaImage, RgbaImage, usize) {
+    let sharp = cpu::render(frame, Method::Exact).unwrap();
+    let mut soft = sharp.clone();
+    let count = soften_guesses(frame, &mut soft);
+    (sharp, soft, count)
+}
+
+#[test]
+fn soft_guesses_are_nearer_to_the_truth_and_all_else_stays() {
+    let shot = Shot::of("shelf", 4, None);
+    let lumigraph = lumigraph(&shot);
+    let scene = shot.dataset.scene_of(&shot.dataset.photos[0]);
+    for (i, desired) in desired_views(&shot, &lumigraph).into_iter().enumerate() {
+        let frame = frame(&lumigraph, &desired);
+        let moved = moved(&frame);
+        let (sharp, soft, count) = drawn(&frame);
+        assert_eq!(count, moved.iter().filter(|is_moved| **is_moved).count());
+        assert!(count > 300, "{i}: {count}");
+        let truth = datasets::render_view(&scene, &desired, 2);
+        let mut off = [0.0; 2];
+        for (k, is_moved) in moved.into_iter().enumerate() {
+            let (x, y) = (k as u32 % sharp.width(), k as u32 / sharp.width());
+            let [sharp, soft, truth] = [&sharp, &soft, &truth].map(|p| p.get_pixel(x, y).0);
+            assert_eq!(sharp[3], soft[3], "{i}: {x}, {y}");
+            assert!(is_moved || sharp == soft, "{i}: {x}, {y}");
+            if is_moved {
+                for (off, drawn) in off.iter_mut().zip([sharp, soft]) {
+                    let step = |c: usize| f64::from(drawn[c]) - f64::from(truth[c]);
+                    *off += (0..3).map(|c| step(c).powi(2)).sum::<f64>();
+                }
+            }
+        }
+        println!("{i}: {count} guesses, {:.3}", off[1] / off[0]);
+        assert!(off[1] < 0.95 * off[0], "{i}: {off:?}");
+    }
+}
+
+/// How soft a guess is follows what is to be seen, not the pixels.
+#[test]
+fn guesses_are_as_soft_in_larger_pictures() {
+    let shot = Shot::of("shelf", 4, None);
+    let lumigraph = lumigraph(&shot);
+    let desired = &desired_views(&shot, &lumigraph)[1];
+    let (_, small, _) = drawn(&frame(&lumigraph, desired));
+    let (width, height) = (desired.width, desired.height);
+    let large = frame(&lumigraph, &desired.resized(3 * width, 3 * height));
+    let (sharp, soft, _) = drawn(&large);
+    let reduced = |picture: &RgbaImage| {
+        RgbaImage::from_fn(width, height, |x, y| {
+            let mut sum = [0_u32; 4];
+            for k in 0..9 {
+                let pixel = picture.get_pixel(3 * x + k % 3, 3 * y + k / 3).0;
+                (0..4).for_each(|c| sum[c] += u32::from(pixel[c]));
+            }
+            image::Rgba(sum.map(|sum| ((sum + 4) / 9) as u8))
+        })
+    };
+    let [sharp, soft] = [&sharp, &soft].map(|large| common::psnr(&reduced(large), &small));
+    println!("{sharp:.1}, {soft:.1} dB");
+    assert!(soft > sharp, "{sharp} {soft}");
+}
+
+#[test]
+fn a_view_at_a_photos_own_pose_has_no_guesses() {
+    let shot = Shot::of("shelf", 4, None);
+    let lumigraph = lumigraph(&shot);
+    for view in &shot.views {
+        let (sharp, soft, count) = drawn(&frame(&lumigraph, view));
+        assert_eq!((count, soft), (0, sharp));
+    }
+}
