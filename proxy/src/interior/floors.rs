@@ -34,15 +34,21 @@ impl Contents {
     ///
     /// It is the higher of the floors of the portal's two cells, if that is at most a step below its
     /// sill: a cell of several storeys has its own floor on the lowest. Else, as before a window, it
-    /// is the lowest point of the viewer's cell, or where the place of that is unknown, of the portal.
+    /// is the lowest point of the viewer's cell, and outside of the cell within. Where that is not known it is the
+    /// lowest point of the portal, and so it is outside of one that lies flat, a hatch in a roof.
     pub fn floor_within(&self, interior: &Interior, from: Option<CellId>, portal: &Portal) -> f64 {
         let [sill, head] = extent(portal.polygon.corners(), interior.up);
         // On a floor that is over the opening nobody looks through it.
         let threshold = self.threshold(interior, portal);
         let threshold = threshold.filter(|floor| *floor < head);
-        threshold
-            .or_else(|| self.floor_of(interior, from?))
-            .unwrap_or(sill)
+        let own = || match from {
+            Some(id) => self.floor_of(interior, id),
+            None if portal.lies_flat(interior.up) => None,
+            None => self
+                .higher_floor(interior, portal)
+                .filter(|floor| *floor < sill),
+        };
+        threshold.or_else(own).unwrap_or(sill)
     }
 
     /// Whether one can walk through a portal, and it is no window: a floor of its cells is at most a
@@ -56,10 +62,15 @@ impl Contents {
     /// The higher floor of a portal's cells, if it is at most a step below the sill.
     fn threshold(&self, interior: &Interior, portal: &Portal) -> Option<f64> {
         let [sill, _] = extent(portal.polygon.corners(), interior.up);
+        let higher = self.higher_floor(interior, portal)?;
+        (sill - higher <= STEP * interior.eye_height).then_some(higher)
+    }
+
+    /// The higher floor of a portal's cells, of those that are known.
+    fn higher_floor(&self, interior: &Interior, portal: &Portal) -> Option<f64> {
         let cells = portal.cells.into_iter().flatten();
         let floors = cells.filter_map(|id| self.floor_of(interior, id));
-        let higher = floors.reduce(f64::max)?;
-        (sill - higher <= STEP * interior.eye_height).then_some(higher)
+        floors.reduce(f64::max)
     }
 
     /// Whether a portal is a step or more over the floor of one of its cells, and at the other's: only triangles tell
@@ -180,8 +191,8 @@ mod tests {
             (0, true, [(stairwell, 0.0), (lower, 0.0)]),
             (1, true, [(stairwell, 2.8), (upper, 2.8)]),
             (2, true, [(lower, 0.3), (landing, 0.3)]),
-            // Each side's own; outside, the sill.
-            (3, false, [(lower, 0.0), (None, 1.0)]),
+            // Each side's own; outside, that of the room within.
+            (3, false, [(lower, 0.0), (None, 0.0)]),
             (4, true, [(lower, 0.0), (upper, 2.8)]),
         ] {
             let portal = &interior.portals[i];
@@ -199,8 +210,8 @@ mod tests {
         // There cameras are at eye height.
         for view in semicircles(&interior, &contents, &SemicircleOptions::default()) {
             let height = view.camera_from_world.center().y;
-            if view.portal.0 < 2 {
-                let floor = [0.0, 2.8][view.portal.0 as usize];
+            if [0, 1, 3].contains(&view.portal.0) {
+                let floor = [0.0, 2.8, 0.3, 0.0][view.portal.0 as usize];
                 assert!((height - floor - 1.6).abs() < 1e-9, "{view:?}");
             }
         }
@@ -233,6 +244,25 @@ mod tests {
             is_inside.push(view.is_inside);
         }
         assert!(is_inside.len() == 13 && !is_inside[6], "{is_inside:?}");
+    }
+
+    #[test]
+    fn outside_a_window_eyes_are_as_high_as_within_and_over_a_hatch_in_the_roof_above_it() {
+        let (interior, _) = parse_rooms(Path::new("r.json"), STAIRS.as_bytes(), "m.glb").unwrap();
+        let (mut contents, _) = Contents::new(&interior, &Model::default()).unwrap();
+        let window = &interior.portals[3];
+        let views = semicircles(&interior, &contents, &SemicircleOptions::default());
+        let outside: Vec<_> = views.iter().filter(|view| view.from.is_none()).collect();
+        assert_eq!(outside.len(), 13);
+        for view in outside {
+            assert!((view.camera_from_world.center().y - 1.6).abs() < 1e-9);
+        }
+        let mut hatch = interior.portals[4].clone();
+        hatch.cells[1] = None;
+        assert_eq!(contents.floor_height(&interior, None, &hatch), 2.8);
+        // Of a room whose place is unknown the sill is what there is.
+        contents.bounds[1] = None;
+        assert_eq!(contents.floor_height(&interior, None, window), 1.0);
     }
 
     /// A hall of 5 m, and behind an opening half way up a gallery.
