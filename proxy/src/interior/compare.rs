@@ -1,9 +1,10 @@
 //! How a found interior compares with a known one.
 
-use super::floors::extent;
+mod floor;
+
 use super::{Cell, CellId, Interior};
 use crate::shown_name;
-use glam::DVec3;
+use floor::Shared;
 use std::fmt;
 
 /// A cell of the known interior, and the found one that is the same.
@@ -13,7 +14,7 @@ pub struct ComparedCell {
     pub name: String,
     /// The found one's; each is matched once.
     pub found: Option<String>,
-    /// Floor area that both have, over floor area that either has.
+    /// Floor area that both have, over floor area that either has, up to rounding.
     pub iou: f64,
     /// Where none is: the one that shares most with it all the same, and floor that both have over floor that either has.
     pub nearest: Option<(String, f64)>,
@@ -53,31 +54,18 @@ pub struct Comparison {
     pub meter: f64,
 }
 
-/// The side of squares of floor that are compared, in tolerances; and how many there are at most along
-/// a side of the storey.
-const STEP: f64 = 0.25;
-const MOST: f64 = 2000.0;
-/// So much of the lower box's height two boxes have in common that are of one storey.
-const LEVEL: f64 = 0.5;
-
 /// Compares cells with boxes by the floor that they share, and portals by where their middles are and what they join: a
 /// cell is the same where half of the smaller one's floor is shared, or where one has no box. Boxes share floor only where
 /// they share half of the lower one's height, too: rooms of two storeys have none in common.
 /// `tolerance` is in world units, of which a metre has so many; of interiors without any box there is nothing to
 /// compare but portals.
 pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -> Comparison {
-    let shared = shared_floor(known, found, tolerance);
+    let shared = Shared::new(known, found);
     let (n, m) = (known.cells.len(), found.cells.len());
-    let iou = |t: usize, f: usize| {
-        let both = shared.both[t * m + f];
-        both as f64 / (shared.known[t] + shared.found[f] - both).max(1) as f64
-    };
-    // A sliver is shared by neighbours, too.
-    let share_half =
-        |t: usize, f: usize| 2 * shared.both[t * m + f] >= shared.known[t].min(shared.found[f]);
+    let iou = |t: usize, f: usize| shared.iou(t, f);
     // 1. Cells, those that share most first.
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|t| (0..m).map(move |f| (t, f))).collect();
-    pairs.retain(|(t, f)| iou(*t, *f) > 0.0 && share_half(*t, *f));
+    pairs.retain(|(t, f)| iou(*t, *f) > 0.0 && shared.is_half(*t, *f));
     pairs.sort_by(|a, b| iou(b.0, b.1).total_cmp(&iou(a.0, a.1)));
     let (mut of_known, mut is_matched) = (vec![None; n], vec![false; m]);
     for (t, f) in pairs {
@@ -118,7 +106,7 @@ pub fn compare(known: &Interior, found: &Interior, tolerance: f64, meter: f64) -
     let is_same = |t: Option<CellId>, f: Option<CellId>| match (t, f) {
         (Some(t), Some(f)) => {
             let have_boxes = has_box(known.cell(t)) && has_box(found.cell(f));
-            !have_boxes || share_half(t.0 as usize, f.0 as usize)
+            !have_boxes || shared.is_half(t.0 as usize, f.0 as usize)
         }
         (t, f) => t.is_none() && f.is_none(),
     };
@@ -189,91 +177,6 @@ fn apart(a: &Cell, b: &Cell) -> Option<f64> {
     let (a, b) = (a.content.room()?, b.content.room()?);
     let sides = (a.min - b.min).abs().max((a.max - b.max).abs());
     Some(sides.max_element())
-}
-
-/// Squares of floor, by cell.
-struct Shared {
-    known: Vec<usize>,
-    found: Vec<usize>,
-    /// By known cell, then by found cell.
-    both: Vec<usize>,
-}
-
-fn shared_floor(known: &Interior, found: &Interior, tolerance: f64) -> Shared {
-    let m = found.cells.len();
-    let mut shared = Shared {
-        known: vec![0; known.cells.len()],
-        found: vec![0; m],
-        both: vec![0; known.cells.len() * m],
-    };
-    let up = known.up;
-    let along = up.any_orthonormal_vector();
-    let axes = [along, up.cross(along)];
-    // 1. What all boxes span.
-    let boxes = known.cells.iter().chain(&found.cells);
-    let boxes = boxes.filter_map(|c| c.content.room());
-    let corners = boxes.flat_map(|room| room.corners());
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for p in corners {
-        for k in 0..2 {
-            low[k] = low[k].min(p.dot(axes[k]));
-            high[k] = high[k].max(p.dot(axes[k]));
-        }
-    }
-    let longest = (high[0] - low[0]).max(high[1] - low[1]);
-    if !(longest.is_finite() && longest > 0.0) {
-        return shared;
-    }
-    // 2. Which cells are of one storey.
-    let heights = |interior: &Interior| -> Vec<Option<[f64; 2]>> {
-        let cells = interior.cells.iter();
-        let rooms = cells.map(|cell| cell.content.room());
-        rooms
-            .map(|room| Some(extent(&room?.corners(), up)))
-            .collect()
-    };
-    let [known_heights, found_heights] = [known, found].map(heights);
-    let is_beside = |t: usize, f: usize| match (known_heights[t], found_heights[f]) {
-        (Some([a, b]), Some([c, d])) => b.min(d) - a.max(c) >= LEVEL * (b - a).min(d - c),
-        _ => false,
-    };
-    // 3. Which squares are whose.
-    let step = (STEP * tolerance).max(longest / MOST);
-    let counts = [0, 1].map(|k| ((high[k] - low[k]) / step) as usize + 1);
-    for i in 0..counts[0] * counts[1] {
-        let place = [i % counts[0], i / counts[0]];
-        let at = [0, 1].map(|k| low[k] + (place[k] as f64 + 0.5) * step);
-        let p = at[0] * axes[0] + at[1] * axes[1];
-        let over = |interior: &Interior| -> Vec<usize> {
-            let ids = 0..interior.cells.len();
-            ids.filter(|i| is_over(interior, CellId(*i as u32), p, up))
-                .collect()
-        };
-        let (a, b) = (over(known), over(found));
-        a.iter().for_each(|t| shared.known[*t] += 1);
-        b.iter().for_each(|f| shared.found[*f] += 1);
-        for t in &a {
-            let beside = b.iter().filter(|f| is_beside(*t, **f));
-            beside.for_each(|f| shared.both[t * m + f] += 1);
-        }
-    }
-    shared
-}
-
-/// Whether a cell's box and outline have the vertical through a point.
-fn is_over(interior: &Interior, id: CellId, p: DVec3, up: DVec3) -> bool {
-    let cell = interior.cell(id);
-    let Some(room) = cell.content.room() else {
-        return false;
-    };
-    let middle = room.min.midpoint(room.max);
-    let in_box = p + up * (middle.dot(up) - p.dot(up));
-    let on_floor = |floor: &super::Polygon| {
-        let along = up.dot(floor.normal());
-        let foot = p - up * (floor.height(p) / along);
-        along.abs() > 1e-6 && floor.covers(foot, 0.0)
-    };
-    room.contains(in_box) && cell.floor.as_ref().is_none_or(on_floor)
 }
 
 impl fmt::Display for Comparison {
@@ -349,6 +252,7 @@ impl fmt::Display for Comparison {
 mod tests {
     use super::*;
     use crate::interior::{Content, Polygon, RoomBox, parse_rooms};
+    use glam::DVec3;
     use std::path::Path;
 
     /// Two rooms, and a doorway in the wall between them; those that are asked for are nodes.
