@@ -36,6 +36,12 @@ impl FieldOptions {
         self.k as f64 / 3.0
     }
 
+    /// Whether of so many source views one alone paints each ray, so that colours jump where another does: Buehler's
+    /// t is that of the second view at most, which leaves it no weight.
+    pub(crate) fn is_of_one(&self, views: usize) -> bool {
+        self.blend == Blend::Paper && views > 1 && self.k.min(views) <= 2
+    }
+
     /// Whether every number makes sense.
     ///
     /// # Errors

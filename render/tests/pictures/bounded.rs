@@ -6,7 +6,7 @@ use common::Shot;
 use image::RgbaImage;
 use render::score::score;
 use render::{
-    Bounded, DeviceChoice, Engine, FieldOptions, Frame, GRIDS, Method, Prepared, Samples,
+    Blend, Bounded, DeviceChoice, Engine, FieldOptions, Frame, GRIDS, Method, Prepared, Samples,
     TriangulatedField, cpu, prepare_within,
 };
 
@@ -102,6 +102,38 @@ fn samples_tell_the_whole_pictures_error() {
             );
         }
     });
+}
+
+#[test]
+fn where_one_photo_paints_each_pixel_a_missed_one_is_off_by_far() {
+    let wall = |views: usize| Shot::of("wall", views, None);
+    let (many, two) = (wall(9), wall(2));
+    for (shot, blend, k, is_far) in [
+        (&many, Blend::Paper, 1, true),
+        (&many, Blend::Paper, 2, true),
+        (&many, Blend::Paper, 3, false),
+        (&many, Blend::Consistent, 1, false),
+        (&many, Blend::Consistent, 2, false),
+        (&two, Blend::Paper, 5, true),
+    ] {
+        let lumigraph = shot.lumigraph();
+        let desired = shot.views[0].between(&shot.views[1], 0.5);
+        let options = FieldOptions {
+            k,
+            blend,
+            ..FieldOptions::default()
+        };
+        let frame = Frame::new(&lumigraph, desired.resized(240, 180), options);
+        let field = TriangulatedField::new(&frame, 32).unwrap();
+        let samples = Samples::new(&frame).unwrap();
+        let missed = samples.error_of(&field).unwrap().missed.sqrt();
+        let expected = if is_far { 0.7..0.85 } else { 0.07..0.085 };
+        assert!(expected.contains(&missed), "{blend:?} {k}: {missed}");
+        if is_far {
+            let chosen = prepare_within(&frame, 0.6).unwrap();
+            assert_eq!((chosen.cells_across, chosen.error), (None, Some(0.0)));
+        }
+    }
 }
 
 #[test]
