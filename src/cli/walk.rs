@@ -323,8 +323,8 @@ fn report(
     let (interior, model) = (&opened.interior, &opened.model);
     let device = walk.painter().description();
     let references = walk.library().residency();
-    let photos = walk.painter().captured();
-    let decoded = photos.map(|captured| captured.lumigraph().photos.residency());
+    let captured = walk.painter().captured();
+    let photos = captured.map(|captured| &captured.lumigraph().photos);
     // Where all frames are from before, so is their plot.
     if let (Some(first), Some(last)) = (frames.first(), frames.last())
         && let Some(svg) = times_svg(walks, &(first.index..=last.index))
@@ -342,8 +342,8 @@ fn report(
             "references_made": references.loads,
             "references_let_go": references.evictions,
             "references_peak_bytes": references.peak,
-            "photos_peak_bytes": decoded.map(|d| d.peak),
-            "photos_decoded": decoded.map(|d| d.loads),
+            "photos_peak_bytes": photos.map(|photos| photos.residency().peak),
+            "photos_decoded": photos.map(|photos| photos.decoded()),
             "video": args.film.video(),
             "walks": walks,
             "report": whole,

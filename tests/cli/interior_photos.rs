@@ -150,6 +150,15 @@ fn a_captures_rooms_are_drawn_from_its_photos() {
         let read = |folder: &str| std::fs::read(here.join(folder).join(file)).unwrap();
         assert!(read("a") == read("b"), "{file}");
     }
+    // Each photo counts once, however often it was decoded.
+    let walk =
+        "walk two --tour --frames 8 --size 48x36 --reference-size 32x32 --portals ldi --device cpu";
+    let line = format!("{walk} --cpu-memory 60kB --json -o few");
+    let report = lumigraph(here, &line).ok().json();
+    let whole = &report["report"];
+    let loads = whole["cpu_memory"]["loads"].as_u64();
+    assert!(loads > whole["photos_decoded"].as_u64(), "{whole}");
+    assert_eq!(report["photos_decoded"], whole["photos_decoded"]);
     // Held-out photos that the scene does not have are told by name, with the file to correct.
     let path = here.join("two/interior.json");
     let held_out = file["held_out"].as_array().unwrap();
