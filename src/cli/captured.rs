@@ -26,6 +26,8 @@ pub(super) struct Opened {
     pub(super) file: PathBuf,
     pub(super) interior: Interior,
     pub(super) model: Model,
+    /// How many triangles its file has: [`Self::painter`] may add others.
+    pub(super) triangles: usize,
     /// What of the model each cell has.
     pub(super) contents: Contents,
     /// None where no cell is a scene.
@@ -53,6 +55,7 @@ impl Opened {
         Ok(Self {
             file,
             interior,
+            triangles: model.mesh.triangles.len(),
             model,
             contents,
             photos,

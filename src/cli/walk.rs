@@ -320,7 +320,7 @@ fn report(
     frames: &[Named],
     whole: &Report,
 ) -> anyhow::Result<()> {
-    let (interior, model) = (&opened.interior, &opened.model);
+    let interior = &opened.interior;
     let device = walk.painter().description();
     let references = walk.library().residency();
     let captured = walk.painter().captured();
@@ -334,7 +334,7 @@ fn report(
     if args.json {
         let walks: Vec<Value> = walks.iter().map(|w| w.json(interior)).collect();
         return print_json(&json!({
-            "triangles": model.mesh.triangles.len(),
+            "triangles": opened.triangles,
             "cells": interior.cells.len(),
             "portals": interior.portals.len(),
             "device": device,

@@ -159,6 +159,11 @@ fn a_captures_rooms_are_drawn_from_its_photos() {
     let loads = whole["cpu_memory"]["loads"].as_u64();
     assert!(loads > whole["photos_decoded"].as_u64(), "{whole}");
     assert_eq!(report["photos_decoded"], whole["photos_decoded"]);
+    // Triangles are the model's, without the shell that is drawn behind them.
+    let (model, _) = read_model(&here.join("two/model.glb")).unwrap();
+    assert_eq!(report["triangles"], model.mesh.triangles.len());
+    let drawn = report["walks"][0]["frames"][0]["triangles_in_cells"].as_u64();
+    assert!(drawn > report["triangles"].as_u64(), "{report}");
     // Held-out photos that the scene does not have are told by name, with the file to correct.
     let path = here.join("two/interior.json");
     let held_out = file["held_out"].as_array().unwrap();

@@ -89,7 +89,7 @@ pub struct FrameCost {
     /// Portals filled with images, even if mixed with geometry: those among them, and those seen through one
     /// that is near.
     pub filled: usize,
-    /// Triangles of the cells that are drawn as geometry.
+    /// Triangles of the cells that are drawn as geometry, and of what is in none; of a capture all.
     pub triangles_in_cells: usize,
     /// Those of them in runs that are in sight.
     pub triangles_tried: usize,
