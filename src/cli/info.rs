@@ -13,6 +13,7 @@ use super::surface::{proxy_json, proxy_text};
 use calibrate::{TRUSTED_TIE, WeakGroup, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
+use lumigraph::bench::median;
 use lumigraph::scene::{Photo, Scene, SceneError, other_models};
 use proxy::shown_number;
 use serde_json::{Value, json};
@@ -200,7 +201,7 @@ fn reprojection(errors_px: Vec<f64>) -> Value {
     let mean = finite.iter().sum::<f64>() / finite.len() as f64;
     json!({
         "mean": (!finite.is_empty()).then_some(mean),
-        "median": finite.get(finite.len() / 2),
+        "median": median(&finite),
         "p95": finite.get(finite.len() * 95 / 100),
         "observations": finite.len(),
         "behind": behind,
@@ -258,4 +259,20 @@ fn text(scene: &Scene, info: &Value) -> String {
         megabytes(bytes)
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_two_errors_is_between_them() {
+        let told = reprojection(vec![3.0, f64::INFINITY, 1.0]);
+        assert_eq!(told["median"], 2.0);
+        assert_eq!(
+            (&told["observations"], &told["behind"]),
+            (&json!(2), &json!(1))
+        );
+        assert!(reprojection(Vec::new())["median"].is_null());
+    }
 }

@@ -3,6 +3,7 @@
 use super::super::plot::{Line, Panel, plot};
 use super::super::stamp::in_unicode;
 use super::super::took::{Memory, Start, Took};
+use lumigraph::bench::median;
 use lumigraph::scene::TruthScore;
 use proxy::interior::Interior;
 use render::interior::{FrameCost, PortalFill, Walk};
@@ -233,7 +234,7 @@ impl Walked {
             let i = (share * times.len() as f64).ceil() as usize;
             times.get(i.saturating_sub(1)).copied()
         };
-        Some([at(0.5)?, at(0.95)?, at(1.0)?])
+        Some([median(&times)?, at(0.95)?, at(1.0)?])
     }
 
     fn sum(&self, of: impl Fn(&FrameCost) -> usize) -> usize {
@@ -394,6 +395,22 @@ mod tests {
             assert!(is(&frame["references_ms"], *making), "{report}");
             assert!(is(&frame["with_making_ms"], ms + making), "{report}");
         }
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_of_frames_is_between_the_two_in_the_middle() {
+        let spread = |times: &[(u64, u64)]| walked(PortalFill::Geometry, times).spread();
+        let is = |found: Option<[f64; 3]>, expected: [f64; 3]| {
+            let found = found.unwrap();
+            (0..3).all(|i| (found[i] - expected[i]).abs() < 1e-9)
+        };
+        assert!(is(spread(&[(3, 0), (1, 0)]), [2.0, 3.0, 3.0]));
+        assert!(is(spread(&[(9, 0), (1, 0), (2, 0)]), [2.0, 9.0, 9.0]));
+        assert!(is(
+            spread(&[(4, 0), (1, 0), (9, 0), (2, 0)]),
+            [3.0, 9.0, 9.0]
+        ));
+        assert_eq!(spread(&[]), None);
     }
 
     #[test]
