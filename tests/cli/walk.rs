@@ -355,3 +355,47 @@ fn layered_images_of_the_nearest_views_are_the_same_in_parts() {
     let ran = lumigraph(here, &format!("{walk} --ldi-views 0 -o x"));
     assert_eq!(ran.code, 2, "{}", ran.stderr);
 }
+
+#[test]
+fn whoever_stands_in_a_doorway_sees_what_is_beyond_the_rooms_other_portals() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate house --rooms 4 --triangles 1 -o house").ok();
+    // In two doorways' planes but for rounding, by which they seem to lie behind the eye.
+    let matrices = [
+        "0.5000000000000001, 0, -0.8660254037844386, -0.21065791128141106,
+         0.04324724487786694, -0.9987523388778446, 0.02496880847194615, 1.2177352708120381,
+         -0.8649448975573378, -0.04993761694389229, -0.49937616943892243, 7.685269614960485,
+         0, 0, 0, 1",
+        "0, 0, 1, -3.25,
+         -0.049937616943892274, -0.9987523388778446, 0, 1.748440813248027,
+         0.9987523388778446, -0.049937616943892274, 0, -2.9288412337592797,
+         0, 0, 0, 1",
+        "0.25881904510252074, 0, 0.9659258262890683, -3.918951308810816,
+         -0.04823603390943612, -0.9987523388778445, 0.012924806332113658, 1.7013091737773585,
+         0.9647206781887215, -0.049937616943892274, -0.25849612664227295, -1.9862084443459092,
+         0, 0, 0, 1",
+    ];
+    let frames = matrices.map(|matrix| {
+        format!(
+            r#"{{"camera_from_world": [{matrix}], "width": 64, "height": 48, "model": "PINHOLE",
+                "params": [40, 40, 32, 24]}}"#
+        )
+    });
+    let path = format!(
+        r#"{{"version": 1, "fps": 30, "frames": [{}]}}"#,
+        frames.join(",")
+    );
+    std::fs::write(here.join("path.json"), path).unwrap();
+    let line = "walk house --path path.json --portals texture,ldi --reference-size 64x64 -o out";
+    lumigraph(here, line).ok();
+    for kind in ["texture", "ldi"] {
+        for i in 0..matrices.len() {
+            let file = here.join(format!("out/{kind}/frame_{i:04}.png"));
+            let picture = image::open(file).unwrap().into_rgba8();
+            let open = picture.pixels().filter(|p| p.0[3] < u8::MAX).count();
+            // One eighth of the pixels and more where the doorway hides the others.
+            assert!(open <= 3, "{kind} {i}: {open}");
+        }
+    }
+}

@@ -218,6 +218,13 @@ impl Portal {
         }
     }
 
+    /// Whether an eye is in it: inside its outline, and on its plane but for rounding. What it sees may be on either
+    /// side.
+    pub fn is_around(&self, eye: DVec3) -> bool {
+        let margin = locate::tolerance(self);
+        self.polygon.height(eye).abs() <= margin && self.polygon.covers(eye, margin)
+    }
+
     /// The normal on the side of `cell`, into it.
     pub fn normal_into(&self, cell: Option<CellId>) -> DVec3 {
         match self.cells[0] == cell {

@@ -359,13 +359,12 @@ impl<'a> Search<'a> {
         region: &Region,
         entrance: Option<(&Portal, DVec3)>,
     ) -> Vec<Region> {
-        let margin = tolerance(portal);
-        let is_front = portal.cells[0] == Some(cell);
-        let height = (self.eye - portal.polygon.center()).dot(portal.normal_into(Some(cell)));
-        // In the doorway: all that one sees may be on either side.
-        if height.abs() <= margin && portal.polygon.covers(self.eye, margin) {
+        // In the doorway.
+        if portal.is_around(self.eye) {
             return vec![region.clone()];
         }
+        let is_front = portal.cells[0] == Some(cell);
+        let height = (self.eye - portal.polygon.center()).dot(portal.normal_into(Some(cell)));
         // From behind it one does not look out of this cell.
         if !(height > 0.0) {
             return Vec::new();

@@ -31,9 +31,14 @@ const ROOM: f64 = 1.0;
 /// The most that an image spans to each side of its axis, as x / z.
 const WIDEST: f64 = 5.0;
 
-/// The plane of a portal as a camera sees it, and what is beyond on the side of `into`.
+/// The plane of a portal as a camera sees it, and what is beyond on the side of `into`. It goes through the eye of
+/// one that is in the portal: rounding must not say which side of it the eye is on.
 pub(super) fn plane_of(camera: &Pinhole, portal: &Portal, into: Option<CellId>) -> Beyond {
-    Beyond::new(camera, portal.polygon.center(), portal.normal_into(into))
+    let point = match portal.is_around(camera.center) {
+        true => camera.center,
+        false => portal.polygon.center(),
+    };
+    Beyond::new(camera, point, portal.normal_into(into))
 }
 
 impl Reference {

@@ -154,6 +154,9 @@ impl Walk<'_> {
 
     /// Of an image in what is drawn of a portal, 0 to 1, by the eye's distance from it.
     pub(super) fn share_of_image(&self, portal: &Portal, eye: DVec3, near: f64) -> f64 {
+        if portal.is_around(eye) {
+            return 0.0;
+        }
         let far = near * portal.semicircle_radius(self.interior.up);
         let near = ALONE * far;
         let distance = portal.polygon.distance(eye);
