@@ -93,7 +93,8 @@ fn main() {
     );
     if let (Some(file), Some(outlines)) = (&args.house, &args.outlines) {
         let (model, _) = read_model(file).expect("a model");
-        let (interior, _) = read_rooms(outlines, "house.glb", 1.0).expect("its rooms");
+        let given = read_rooms(outlines, "house.glb", 1.0).expect("its rooms");
+        let interior = given.interior;
         let all: Vec<u32> = (0..model.mesh.triangles.len() as u32).collect();
         let all = CellGeometry::of(&model, &all);
         let truth = |view: &View| {

@@ -49,8 +49,9 @@ pub(super) struct Args {
     /// The model, textured: .glb; or a scene or capture with depth maps
     #[arg(value_name = "MODEL|SCENE")]
     model: PathBuf,
-    /// Rooms and openings: {"version": 1, "rooms": [{"name", "min", "max"}], "openings":
-    /// [{"name", "between": ["A", "B"], "polygon": [[x, y, z], …]}]}
+    /// Rooms and openings: {"version": 1, "up": [0, 1, 0], "rooms": [{"name", "min", "max"}], "openings":
+    /// [{"name", "between": ["A", "B"], "polygon": [[x, y, z], …]}]}; without "up" a model's is y, and a capture's the
+    /// axis next to what was up for its cameras
     #[arg(long, value_name = "FILE")]
     rooms: Option<PathBuf>,
     #[command(flatten)]
@@ -114,9 +115,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 /// Says where an option was given for nothing.
 fn say_unused(args: &Args, told: &Told) {
-    if let (Some(file), Some((rooms, _))) = (&args.rooms, &told.rooms)
+    if let (Some(file), Some(rooms)) = (&args.rooms, &told.rooms)
         && args.meter != 1.0
-        && rooms.eye_height != EYE_HEIGHT * args.meter
+        && rooms.interior.eye_height != EYE_HEIGHT * args.meter
     {
         let file = file.display();
         say!("note: --meter changes nothing: {file} says how high eyes are (\"eye_height\")");
@@ -175,7 +176,12 @@ fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     // 2. Its rooms.
     let start = Instant::now();
     let mut rooms = match told.rooms {
-        Some((interior, warnings)) => Rooms::given(interior, warnings),
+        Some(mut given) => {
+            if let Some(up) = surface.up() {
+                given.ask_cameras(up).with_context(named)?;
+            }
+            Rooms::given(given.interior, given.warnings)
+        }
         None => {
             let busy = spinner("finding rooms");
             let found = surface.rooms(MODEL, options);
@@ -250,7 +256,7 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
         false => model_to_glb(&model).with_context(named)?,
     };
     let given = match told.rooms {
-        rooms @ Some(_) => rooms,
+        Some(given) => Some((given.interior, given.warnings)),
         None if args.find => None,
         None => match (interior_from_nodes(&model, &file, args.meter), args.up) {
             (Err(InteriorError::NoCellNodes), _) => None,

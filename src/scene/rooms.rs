@@ -4,11 +4,13 @@ use super::fit::{fuse_depth, unfit};
 use super::import::ENOUGH;
 use super::{Photo, Scene, SceneError, SceneProxy};
 use calibrate::{DepthAlong, Pixel, View};
-use capture::DepthMap;
+use capture::{DepthMap, quarters_of};
 use glam::DVec3;
 use proxy::depth::Fusion;
 use proxy::interior::Contents;
-use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior, sights};
+use proxy::interior::find::{
+    Evidence, FindOptions, FoundInterior, find_interior, sights, up_of_cameras,
+};
 use proxy::mesh::{Material, Mesh, Model, ModelNode, Painting, Part};
 use proxy::{Proxy, Solid};
 use rayon::prelude::*;
@@ -104,7 +106,11 @@ impl Scene {
             return Err(SceneError::Damaged(left_out));
         }
         let colors = painting.colors();
-        let cameras = sources.iter().map(|(_, v)| (v.center(), v.up())).collect();
+        let camera = |(photo, view): &(&Photo, View)| {
+            let quarters = photo.orientation.map_or(0, quarters_of);
+            (view.center(), up_as_shown(view, quarters))
+        };
+        let cameras = sources.iter().map(camera).collect();
         Ok(SceneSurface {
             model: model_of(mesh, colors),
             maps: maps - maps_left_out.len(),
@@ -169,6 +175,22 @@ impl SceneSurface {
         };
         find_interior(&evidence, file, options).map_err(unfit)
     }
+
+    /// Which way was up for its cameras; `None` where they do not agree.
+    pub fn up(&self) -> Option<DVec3> {
+        up_of_cameras(&self.cameras)
+    }
+}
+
+/// Which way is up for who looks at a photo that is turned by so many quarters, clockwise, to be shown.
+fn up_as_shown(view: &View, quarters: u8) -> DVec3 {
+    let as_stored = match quarters {
+        1 => DVec3::NEG_X,
+        2 => DVec3::Y,
+        3 => DVec3::X,
+        _ => return view.up(),
+    };
+    view.camera_from_world.rotation.conjugate() * as_stored
 }
 
 /// The surface of those depth maps that can be decoded. What is wrong with the others is added to `left_out`, by
@@ -261,9 +283,10 @@ fn depths_by_rays(solid: &Solid, view: &View, along: DepthAlong) -> Vec<f32> {
 mod tests {
     use super::*;
     use calibrate::{Distortion, Lens, Rigid3};
-    use glam::DVec2;
+    use glam::{DQuat, DVec2};
     use image::{Rgba, RgbaImage};
     use proxy::MeshKind;
+    use std::f64::consts::FRAC_PI_2;
 
     /// A room of 4 × 3 × 5 around the origin, its walls in squares, wound as seen from within.
     fn room() -> Mesh {
@@ -351,6 +374,20 @@ mod tests {
             let painted = colors.iter().filter(|c| **c == COLOR).count();
             let share = painted as f64 / colors.len() as f64;
             assert!(share >= least, "{share}");
+        }
+    }
+
+    #[test]
+    fn up_is_what_is_up_where_photos_are_shown() {
+        let pinhole = Lens::pinhole(DVec2::splat(40.0), DVec2::new(48.0, 36.0));
+        let upright = seen_by(pinhole, (96, 72));
+        for quarters in 0..4 {
+            // Stored as it is before it is turned.
+            let mut stored = upright.clone();
+            let back = DQuat::from_rotation_z(-FRAC_PI_2 * f64::from(quarters));
+            stored.camera_from_world.rotation = back * upright.camera_from_world.rotation;
+            let off = up_as_shown(&stored, quarters).distance(upright.up());
+            assert!(off < 1e-12, "{quarters}: {off}");
         }
     }
 

@@ -4,10 +4,12 @@ use crate::interior::{HALVES, apart, corners, names, with_house};
 use crate::run::lumigraph;
 use crate::uncalibrated::is_installed;
 use calibrate::{ModelKind, colmap};
+use glam::DQuat;
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
-use proxy::interior::{surface_of, write_interior};
+use proxy::interior::{read_interior, surface_of, write_interior};
 use proxy::mesh::read_model;
 use serde_json::Value;
+use std::f64::consts::PI;
 use std::path::Path;
 
 /// Makes an interior of a model, and one of photos with depth taken all around in its rooms, and
@@ -225,4 +227,42 @@ fn a_capture_without_depth_needs_a_mesh() {
     let line = "interior scene --hold-out hall/split.json -o other";
     let error = lumigraph(here, line).error(1);
     assert!(error.contains("which is held out"), "{error}");
+}
+
+#[test]
+fn rooms_of_photos_that_do_not_say_what_is_up_have_what_cameras_had() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 48x36 -o hall").ok();
+    // In a world where y points down: turned half round about x.
+    let model = here.join("hall/sparse/0");
+    let mut whole = colmap::read_model(&model).unwrap();
+    let half = DQuat::from_rotation_x(PI);
+    for image in whole.images.values_mut() {
+        image.camera_from_world.rotation *= half;
+    }
+    for point in whole.points.values_mut() {
+        point.position = half * point.position;
+    }
+    colmap::write_binary(&whole, &model).unwrap();
+    let rooms = r#"{"version": 1, UP "rooms": [
+        {"name": "front", "min": [-9, -9, 2], "max": [9, 9, 99]},
+        {"name": "back", "min": [-9, -9, -99], "max": [9, 9, 2]}],
+        "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,
+            "polygon": [[-1, 0, 2], [1, 0, 2], [1, -2.4, 2], [-1, -2.4, 2]]}]}"#;
+    for (given, up, is_told) in [
+        ("", [0.0, -1.0, 0.0], false),
+        (r#""up": [0, -1, 0],"#, [0.0, -1.0, 0.0], false),
+        (r#""up": [0, 1, 0],"#, [0.0, 1.0, 0.0], true),
+    ] {
+        std::fs::write(here.join("rooms.json"), rooms.replace("UP", given)).unwrap();
+        let line = "interior hall --rooms rooms.json -o two --force";
+        let said = lumigraph(here, line).ok().stderr;
+        let (interior, _) = read_interior(&here.join("two/interior.json")).unwrap();
+        assert_eq!(interior.up.to_array(), up, "{given}");
+        let warning =
+            "warning: `up` is [0, 1, 0], but the photos were held with about [0, -1, 0] up";
+        assert_eq!(said.contains(warning), is_told, "{said}");
+        assert_eq!(said.contains("`up` is"), is_told, "{said}");
+    }
 }

@@ -235,6 +235,17 @@ pub enum InteriorWarning {
         "far more hangs below the ceiling than stands on the floor: if the house is upside down, say --up with {0:.2}"
     )]
     UpsideDown(DVec3),
+    /// Another direction than what was up for the photos' cameras.
+    #[error(
+        "`up` is {given}, but the photos were held with about {next} up: what is drawn would lie on its side or upside \
+         down; correct it"
+    )]
+    UpOfCameras {
+        /// Unit length.
+        given: DVec3,
+        /// The axis of the world next to the cameras'.
+        next: DVec3,
+    },
     /// There is no ceiling as far up as is looked, and walls go on: units may be no metres.
     #[error(
         "walls are {0} m high or more, and no ceiling is lower: is the scale right? --meter says how many world units \

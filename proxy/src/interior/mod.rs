@@ -29,7 +29,9 @@ pub use error::{InteriorError, InteriorFileError, InteriorWarning};
 pub use file::{parse_interior, read_interior, write_interior};
 pub use overlap::triangle_touches_box;
 pub use polygon::{Polygon, PolygonError};
-pub use rooms::{EYE_HEIGHT, interior_from_nodes, interior_from_rooms, parse_rooms, read_rooms};
+pub use rooms::{
+    EYE_HEIGHT, GivenRooms, interior_from_nodes, interior_from_rooms, parse_rooms, read_rooms,
+};
 pub use semicircle::{SemicircleOptions, SemicircleView, angle_before, semicircles};
 pub use strays::{Stray, Strays, fit_to_sight, strays};
 pub use visibility::{Pass, Region, Visibility, VisibleCell, clip, visible, visible_through};

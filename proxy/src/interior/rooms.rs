@@ -17,9 +17,9 @@
 //! }
 //! ```
 //!
-//! `up` is y and `eye_height` 1.6 metres where they are not given; `floor` and `radius` need not be. An
-//! outline may go either way round; where boxes do not tell its sides (both are all around it), it
-//! is counter-clockwise as the first of its rooms sees it. Boxes should meet in the plane of the
+//! `up` is y, of a capture's rooms as its cameras had it, and `eye_height` 1.6 metres where they are not given;
+//! `floor` and `radius` need not be. An outline may go either way round; where boxes do not tell its sides (both
+//! are all around it), it is counter-clockwise as the first of its rooms sees it. Boxes should meet in the plane of the
 //! opening between them: triangles between boxes are in no cell, and drawn always.
 //!
 //! In a model, the node `cell:NAME` and all below it are a cell, and the node `portal:A|B`, a
@@ -37,17 +37,66 @@ use super::{
 };
 use crate::mesh::{Model, PORTAL_NODE, Place, place};
 use glam::DVec3;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Where eyes are over the floor where nothing else is said, in metres.
 pub const EYE_HEIGHT: f64 = 1.6;
 
+/// What a file says is up is far off what was up for cameras from this angle on: its cosine.
+const FAR_OFF: f64 = 0.5;
+
+/// Rooms that a file gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenRooms {
+    /// They, and the openings between them.
+    pub interior: Interior,
+    /// What is odd about them.
+    pub warnings: Vec<InteriorWarning>,
+    /// Whether the file says which way is up; else it is y.
+    pub says_up: bool,
+}
+
+impl GivenRooms {
+    /// Compares with which way was up for a capture's cameras. Where the file does not say it, that axis of the world
+    /// is taken which is next to theirs, as boxes stand along axes; where it says something far off, a warning does.
+    ///
+    /// # Errors
+    /// As for [`Interior::check`].
+    pub fn ask_cameras(&mut self, up: DVec3) -> Result<(), InteriorError> {
+        let next = next_axis(up);
+        if !self.says_up {
+            let mut interior = self.interior.clone();
+            interior.up = next;
+            (self.interior, self.warnings) = interior_from_rooms(interior)?;
+        } else if self.interior.up.dot(up) < FAR_OFF * up.length() {
+            let given = self.interior.up;
+            let warning = InteriorWarning::UpOfCameras { given, next };
+            self.warnings.insert(0, warning);
+        }
+        Ok(())
+    }
+}
+
+/// The axis of the world, either way, that is next to a direction.
+fn next_axis(direction: DVec3) -> DVec3 {
+    // What is as near to two of them has the first.
+    let mut next = DVec3::Y;
+    for axis in DVec3::AXES {
+        for axis in [axis, DVec3::ZERO - axis] {
+            if axis.dot(direction) > next.dot(direction) {
+                next = axis;
+            }
+        }
+    }
+    next
+}
+
 #[derive(Deserialize)]
 struct Rooms {
-    #[serde(default = "y", deserialize_with = "exactly")]
-    up: [f64; 3],
+    #[serde(default, deserialize_with = "exactly_some")]
+    up: Option<[f64; 3]>,
     eye_height: Option<f64>,
     rooms: Vec<Room>,
     #[serde(default)]
@@ -75,8 +124,9 @@ struct Opening {
     radius: Option<f64>,
 }
 
-fn y() -> [f64; 3] {
-    DVec3::Y.to_array()
+/// What is there is all there, and no null.
+fn exactly_some<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    exactly(from).map(Some)
 }
 
 /// Reads rooms and openings; `model` is the model's file, beside the `interior.json` to be, and `meter` a
@@ -84,16 +134,12 @@ fn y() -> [f64; 3] {
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub fn read_rooms(
-    path: &Path,
-    model: &str,
-    meter: f64,
-) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+pub fn read_rooms(path: &Path, model: &str, meter: f64) -> Result<GivenRooms, InteriorFileError> {
     let bytes = std::fs::read(path).map_err(|e| InteriorFileError::Io(path.to_owned(), e))?;
     rooms_of(path, &bytes, model, meter)
 }
 
-/// Reads the content of a file as [`read_rooms`] does, of a world in metres.
+/// Reads the content of a file as [`read_rooms`] does, of a world in metres; y is up where it does not say.
 ///
 /// # Errors
 /// As for [`read_rooms`].
@@ -102,7 +148,8 @@ pub fn parse_rooms(
     bytes: &[u8],
     model: &str,
 ) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
-    rooms_of(path, bytes, model, 1.0)
+    let given = rooms_of(path, bytes, model, 1.0)?;
+    Ok((given.interior, given.warnings))
 }
 
 fn rooms_of(
@@ -110,11 +157,17 @@ fn rooms_of(
     bytes: &[u8],
     model: &str,
     meter: f64,
-) -> Result<(Interior, Vec<InteriorWarning>), InteriorFileError> {
+) -> Result<GivenRooms, InteriorFileError> {
     let rooms: Rooms = parse_version_1(path, "a list of rooms", bytes)?;
+    let says_up = rooms.up.is_some();
     let failed = |e| InteriorFileError::Interior(path.to_owned(), e);
     let interior = rooms.stored(model, meter).interior().map_err(failed)?;
-    interior_from_rooms(interior).map_err(failed)
+    let (interior, warnings) = interior_from_rooms(interior).map_err(failed)?;
+    Ok(GivenRooms {
+        interior,
+        warnings,
+        says_up,
+    })
 }
 
 impl Rooms {
@@ -141,7 +194,7 @@ impl Rooms {
         Stored {
             version: 1,
             model: Some(model.to_owned()),
-            up: self.up,
+            up: self.up.unwrap_or(DVec3::Y.to_array()),
             eye_height: self.eye_height.unwrap_or(EYE_HEIGHT * meter),
             cells: self.rooms.into_iter().map(cell).collect(),
             portals: self.openings.into_iter().map(portal).collect(),
@@ -331,4 +384,45 @@ fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
         }
     }
     Ok(corners)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn given(up: &str) -> GivenRooms {
+        let text = format!(
+            r#"{{"version": 1, {up} "eye_height": 1.6,
+                "rooms": [{{"name": "a", "min": [0, 0, 0], "max": [4, 3, 4]}}]}}"#
+        );
+        rooms_of(Path::new("rooms.json"), text.as_bytes(), "m.glb", 1.0).unwrap()
+    }
+
+    #[test]
+    fn cameras_say_which_way_is_up_where_a_file_does_not() {
+        // Held a little down.
+        let up = DVec3::new(0.1, -0.9, 0.3).normalize();
+        let mut rooms = given("");
+        assert_eq!((rooms.interior.up, rooms.says_up), (DVec3::Y, false));
+        rooms.ask_cameras(up).unwrap();
+        assert_eq!(rooms.interior.up, DVec3::NEG_Y);
+        assert!(rooms.warnings.is_empty(), "{:?}", rooms.warnings);
+        // It is believed, and told where it is far off.
+        for (text, is_far) in [
+            ("0, -2, 0", false),
+            ("0, -1, 1", false),
+            ("0, 1, 0", true),
+            ("1, 0, 0", true),
+        ] {
+            let mut rooms = given(&format!(r#""up": [{text}],"#));
+            let said = rooms.interior.up;
+            rooms.ask_cameras(up).unwrap();
+            let warning = InteriorWarning::UpOfCameras {
+                given: said,
+                next: DVec3::NEG_Y,
+            };
+            assert_eq!(rooms.interior.up, said);
+            assert_eq!(rooms.warnings.contains(&warning), is_far, "{text}");
+        }
+    }
 }

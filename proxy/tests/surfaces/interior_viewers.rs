@@ -6,7 +6,7 @@ use crate::interior_nodes::{level, nodes_of_quads, wall};
 
 use glam::DVec3;
 use proxy::interior::{
-    CellId, Contents, SemicircleOptions, interior_from_nodes, read_rooms, semicircles,
+    CellId, Contents, GivenRooms, SemicircleOptions, interior_from_nodes, read_rooms, semicircles,
 };
 use proxy::mesh::{self, Model};
 use std::path::Path;
@@ -161,7 +161,9 @@ fn the_captured_house_has_three_cells() {
         return;
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/interior-house-rooms.json");
-    let (interior, warnings) = read_rooms(&path, "house.glb", 1.0).unwrap();
+    let GivenRooms {
+        interior, warnings, ..
+    } = read_rooms(&path, "house.glb", 1.0).unwrap();
     assert_eq!(warnings, []);
     let (model, _) = mesh::read_model(&folder.join("house.glb")).unwrap();
     let (contents, warnings) = Contents::new(&interior, &model).unwrap();

@@ -93,7 +93,8 @@ fn in_the_captured_house_whatever_is_met_first_is_drawn() {
     };
     let (model, _) = proxy::mesh::read_model(&folder.join("house.glb")).unwrap();
     let rooms = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/interior-house-rooms.json");
-    let (interior, _) = proxy::interior::read_rooms(&rooms, "house.glb", 1.0).unwrap();
+    let given = proxy::interior::read_rooms(&rooms, "house.glb", 1.0).unwrap();
+    let interior = given.interior;
     let (contents, _) = Contents::new(&interior, &model).unwrap();
     let solid = Solid::new(MeshKind::Mesh, model.mesh.clone());
     let missed = |seed: u64| {

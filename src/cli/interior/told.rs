@@ -3,15 +3,14 @@
 use super::super::Usage;
 use super::{Args, MODEL, open};
 use anyhow::Context;
-use proxy::interior::{Interior, InteriorFileError, InteriorWarning, read_rooms};
+use proxy::interior::{GivenRooms, Interior, InteriorFileError, read_rooms};
 use std::io::ErrorKind;
 use std::path::Path;
 
 /// What there is to read before any work.
 pub(super) struct Told {
-    /// The rooms that are asked for (`--rooms`), and what is odd about them; without them they are
-    /// found, or named by nodes.
-    pub(super) rooms: Option<(Interior, Vec<InteriorWarning>)>,
+    /// The rooms that are asked for (`--rooms`); without them they are found, or named by nodes.
+    pub(super) rooms: Option<GivenRooms>,
     /// Those to compare with (`--compare`).
     pub(super) known: Option<Interior>,
 }
@@ -32,7 +31,7 @@ impl Told {
             true => anyhow::Ok(open(given).context("--compare")?.1),
             false => {
                 let expected = "expected such a file as --rooms has, or an interior's folder";
-                Ok(rooms_of("--compare", given, &model, args.meter, expected)?.0)
+                Ok(rooms_of("--compare", given, &model, args.meter, expected)?.interior)
             }
         });
         Ok(Self {
@@ -58,7 +57,7 @@ fn rooms_of(
     model: &str,
     meter: f64,
     expected: &str,
-) -> anyhow::Result<(Interior, Vec<InteriorWarning>)> {
+) -> anyhow::Result<GivenRooms> {
     read_rooms(file, model, meter).map_err(|error| match error {
         InteriorFileError::Io(file, error) => {
             let found = match error.kind() {

@@ -53,6 +53,8 @@ const NEAR: f64 = 8.0;
 /// A direction that a file format or cameras say is right if this much lies across it,
 /// compared with the best.
 const TRUST: f64 = 0.4;
+/// Cameras agree on what is up if their mean is longer.
+const AGREED: f64 = 0.3;
 /// Where the best has so many times as much, it is told, if rooms would not be as high as most; if they would
 /// be either way, from so much on. Corridors and narrow houses have more wall than floor, too.
 const DOUBT: f64 = 1.3;
@@ -217,6 +219,13 @@ fn is_likely(
     other.most >= LEAST_CEILING && (!own.is_usual || is_far_better)
 }
 
+/// Which way was up for cameras ([`Evidence::cameras`]), unit length; `None` where they do not agree.
+pub fn up_of_cameras(cameras: &[(DVec3, DVec3)]) -> Option<DVec3> {
+    let sum: DVec3 = cameras.iter().map(|(_, up)| *up).sum();
+    let agreed = sum.length() > AGREED * cameras.len() as f64;
+    sum.try_normalize().filter(|_| agreed)
+}
+
 /// Up: given, as cameras had it, or the direction that most floor lies across; y, if that is
 /// about as good, and then the best one, if that is far better.
 fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, Option<Better>) {
@@ -246,12 +255,8 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, O
         }
     }
     // 2. What cameras, or the habit of files, say.
-    let cameras: DVec3 = evidence.cameras.iter().map(|(_, up)| *up).sum();
-    let agreed = cameras.length() > 0.3 * evidence.cameras.len() as f64;
-    let hint = match cameras.try_normalize().filter(|_| agreed) {
-        Some(up) => up,
-        None => DVec3::Y,
-    };
+    let cameras = up_of_cameras(evidence.cameras);
+    let hint = cameras.unwrap_or(DVec3::Y);
     let near = refined(facets, hint);
     let area = level_area(facets, near, bin);
     if near.dot(hint) > 0.9 && area >= TRUST * best.1 {
@@ -262,7 +267,7 @@ fn up(facets: &[Facet], evidence: &Evidence, options: &FindOptions) -> (DVec3, O
         });
         return (near, better);
     }
-    if agreed && !evidence.cameras.is_empty() {
+    if cameras.is_some() {
         let up = match best.0.dot(hint) {
             cos if cos.abs() > 0.7 => best.0 * cos.signum(),
             _ => hint,

@@ -25,7 +25,7 @@ mod stubs;
 mod thick;
 mod upside;
 
-pub use level::Level;
+pub use level::{Level, up_of_cameras};
 pub use sights::sights;
 
 use super::check::away;
