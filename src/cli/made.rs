@@ -33,7 +33,7 @@ pub(super) struct Made {
 
 /// What an interior's folder has of LDIs.
 enum Found {
-    /// Nothing that was begun.
+    /// No LDIs.
     None,
     /// Those that would be made now, or some of them.
     Same,
@@ -89,7 +89,7 @@ impl Made {
         let file = folder.join(FILE);
         let bytes = match std::fs::read(&file) {
             Ok(bytes) => bytes,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::None),
+            Err(error) if error.kind() == ErrorKind::NotFound => return unnamed(folder),
             Err(error) => {
                 return Err(error).with_context(|| format!("{}: cannot read", file.display()));
             }
@@ -138,14 +138,14 @@ impl Made {
     pub(super) fn begin(&self, folder: &Path, say: impl FnOnce(String)) -> anyhow::Result<()> {
         let why = match self.find(folder)? {
             Found::Same => return Ok(()),
-            Found::Other(how) => how,
-            Found::None => format!("has LDIs and no {FILE}"),
+            Found::Other(how) => Some(how),
+            Found::None => None,
         };
         let old: Vec<PathBuf> = match folder.is_dir() {
             true => entries(folder)?.into_iter().filter(|f| is_ldi(f)).collect(),
             false => Vec::new(),
         };
-        if !old.is_empty() {
+        if let Some(why) = why.filter(|_| !old.is_empty()) {
             say(format!("{} {why}; it is made anew", folder.display()));
         }
         for file in old {
@@ -169,10 +169,11 @@ pub(super) fn usable(
 ) -> anyhow::Result<Option<PathBuf>> {
     let folder = folder_of(file).join(FOLDER);
     let there = std::fs::metadata(folder.join(FILE));
-    if there.is_err_and(|error| error.kind() == ErrorKind::NotFound) {
-        return Ok(None);
-    }
-    Ok(match made()?.find(&folder)? {
+    let found = match there.is_err_and(|error| error.kind() == ErrorKind::NotFound) {
+        true => unnamed(&folder)?,
+        false => made()?.find(&folder)?,
+    };
+    Ok(match found {
         Found::None => None,
         Found::Same => Some(folder),
         Found::Other(how) => {
@@ -182,6 +183,15 @@ pub(super) fn usable(
             ));
             None
         }
+    })
+}
+
+/// What a folder has where nothing says what it was made of.
+fn unnamed(folder: &Path) -> anyhow::Result<Found> {
+    let has_ldis = folder.is_dir() && entries(folder)?.iter().any(|file| is_ldi(file));
+    Ok(match has_ldis {
+        true => Found::Other(format!("has LDIs and no {FILE}")),
+        false => Found::None,
     })
 }
 

@@ -195,12 +195,19 @@ fn layered_images_of_other_files_or_options_are_not_used() {
     assert!(left.contains(&"mine.txt".to_owned()) && left.len() == ldis(&own).len() + 2);
     assert!(walked(here, "").1[0] == 0);
     std::fs::remove_file(own.join("made.json")).unwrap();
+    unused(
+        "",
+        "note: house/ldi has LDIs and no made.json; make it again with `lumigraph ldis`",
+    );
     // Nothing is said of what was never begun.
+    let aside = here.join("aside");
+    std::fs::rename(&own, &aside).unwrap();
     let (_, [made, read], notes) = walked(here, "");
     assert!(
         made > 0 && read == 0 && !notes.contains("note: "),
         "{notes}"
     );
+    std::fs::rename(&aside, &own).unwrap();
     let ran = lumigraph(here, MAKE).ok();
     assert!(
         ran.stderr.contains("has LDIs and no made.json"),
