@@ -19,6 +19,8 @@ pub(super) const FOLDER: &str = "ldi";
 const FILE: &str = "made.json";
 /// Of that file, and of how LDIs are made: raised when either changes, as those of before are not those of now.
 const VERSION: u32 = 7;
+/// The option that is a number of what calibrations say.
+const CALIBRATION: &str = "calibration";
 
 /// What decides the samples of all LDIs of an interior.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -70,7 +72,7 @@ impl Made {
             put("ldi_from", json!(of));
             put("device", json!(painter.description()));
             put("exposure", photos.exposure.json()["how"].take());
-            put("calibration", json!(photos.fingerprint()));
+            put(CALIBRATION, json!(photos.fingerprint()));
             // Photos that have no room are drawn coarser.
             put("cpu_memory", json!(options.budget));
         }
@@ -99,20 +101,25 @@ impl Made {
             return Ok(Found::Other(text));
         };
         let others = before.others(self);
-        if !others.is_empty() {
+        let changes = changes(&before.inputs, &self.inputs);
+        // What is known of photos changes with their files, which say more than a number does.
+        let is_told_by_files =
+            !changes.is_empty() && others.iter().all(|(name, _)| name == CALIBRATION);
+        if !others.is_empty() && !is_told_by_files {
+            let texts: Vec<String> = others.into_iter().map(|(_, text)| text).collect();
+            let others = texts.join(", ");
             return Ok(Found::Other(format!(
                 "was made with other options: {others}"
             )));
         }
-        let changes = changes(&before.inputs, &self.inputs);
         Ok(match changes.is_empty() {
             true => Found::Same,
             false => Found::Other(format!("was made of other files: {changes}")),
         })
     }
 
-    /// Options that are not those of before, for people.
-    fn others(&self, now: &Self) -> String {
+    /// Options that are not those of before: the name of each, and how it differs, for people.
+    fn others(&self, now: &Self) -> Vec<(String, String)> {
         let named = |made: &Self| {
             let mut all = made.options.clone();
             all.insert("program".to_owned(), json!(made.program));
@@ -130,8 +137,11 @@ impl Made {
         let names = is.keys().chain(gone).map(String::as_str);
         let pairs = names.map(|name| (name, of(&was, name), of(&is, name)));
         let others = pairs.filter(|(_, was, is)| was != is);
-        let others = others.map(|(name, was, is)| format!("{name} was {was}, is {is}"));
-        others.collect::<Vec<String>>().join(", ")
+        let told = |(name, was, is): (&str, String, String)| {
+            let text = format!("{name} was {was}, is {is}");
+            (name.to_owned(), text)
+        };
+        others.map(told).collect()
     }
 
     /// Begins a folder, or goes on with it: what is there of other LDIs is removed, and `say` told so.

@@ -247,12 +247,22 @@ fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
         let (_, [made, read], notes) = walked(here, more);
         assert!(made > 0 && read == 0 && notes.contains(said), "{notes}");
     }
+    // A depth map that is away for a while: of photos without one less is known.
+    let map = names(&here.join("hall/depth")).remove(0);
+    let [there, aside] = [here.join("hall/depth").join(&map), here.join("aside.png")];
+    std::fs::rename(&there, &aside).unwrap();
+    let notes = walked(here, "").2;
+    let said = format!("was made of other files: ../hall/depth/{map} is gone; make it again");
+    assert!(notes.contains(&said), "{notes}");
+    std::fs::rename(&aside, &there).unwrap();
+    assert_eq!(walked(here, "").1[0], 0);
     // A photo, and a camera of the calibration by its last bit.
     let photo = names(&here.join("hall/images")).remove(0);
     let photo = here.join("hall/images").join(photo);
     std::fs::write(&photo, std::fs::read(&photo).unwrap()).unwrap();
     let notes = walked(here, "").2;
     assert!(notes.contains("of other files: ../hall/images/"), "{notes}");
+    lumigraph(here, MAKE).ok();
     let cameras = here.join("hall/sparse/0/cameras.bin");
     let mut bytes = std::fs::read(&cameras).unwrap();
     let last_number = bytes.len() - 8;
