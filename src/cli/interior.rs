@@ -193,15 +193,22 @@ fn run_scene(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     // 3. The photos that show them.
     rooms.interior.show_photos(&photos);
     rooms.interior.held_out = without.into_iter().collect();
-    let model = &surface.model;
-    let bytes = model_to_glb(model).with_context(named)?;
-    finish(args, MODEL, &bytes, model, rooms, told.known)?;
+    let (bytes, model) = stored(&surface.model, MODEL).with_context(named)?;
+    finish(args, MODEL, &bytes, &model, rooms, told.known)?;
     let surface = match surface.maps {
         0 => "the scene's own mesh, coloured".to_owned(),
         maps => format!("{maps} depth maps fused and coloured"),
     };
     say!("{surface} in {fused_s:.1} s, rooms in {rooms_s:.1} s");
     Ok(())
+}
+
+/// A model's file, and the model as whoever opens it has it: with coordinates that are rounded to f32, which says
+/// whether what lies in the plane of a box's side is in it.
+fn stored(model: &Model, file: &str) -> anyhow::Result<(Vec<u8>, Model)> {
+    let bytes = model_to_glb(model)?;
+    let (model, _) = parse_model(Path::new(file), &bytes)?;
+    Ok((bytes, model))
 }
 
 /// Says so where pictures of the interior cannot be compared with photos that are held out.
@@ -250,10 +257,10 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     }
     let file = model_name(args);
     let named = || args.model.display().to_string();
-    let bytes = match files_beside(&args.model)?.is_empty() {
-        true => bytes,
+    let (bytes, model) = match files_beside(&args.model)?.is_empty() {
+        true => (bytes, model),
         // What lies beside it is not there beside a copy.
-        false => model_to_glb(&model).with_context(named)?,
+        false => stored(&model, &file).with_context(named)?,
     };
     let given = match told.rooms {
         Some(given) => Some((given.interior, given.warnings)),

@@ -9,6 +9,7 @@ use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{read_interior, surface_of, write_interior};
 use proxy::mesh::read_model;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -264,5 +265,46 @@ fn rooms_of_photos_that_do_not_say_what_is_up_have_what_cameras_had() {
             "warning: `up` is [0, 1, 0], but the photos were held with about [0, -1, 0] up";
         assert_eq!(said.contains(warning), is_told, "{said}");
         assert_eq!(said.contains("`up` is"), is_told, "{said}");
+    }
+}
+
+#[test]
+fn triangles_in_no_cell_are_counted_alike_where_rooms_are_made_and_walked_through() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
+    let rooms = |high: f64| {
+        let text = format!(
+            r#"{{"version": 1, "rooms": [{{"name": "low", "min": [-9, -9, -9], "max": [8, {high}, 8]}}]}}"#
+        );
+        std::fs::write(here.join("rooms.json"), text).unwrap();
+        let line = "interior hall --rooms rooms.json -o one --force";
+        lumigraph(here, line).ok().stderr
+    };
+    rooms(2.0);
+    // Planes that most triangles are on and above of, as f32 has them.
+    let (model, _) = read_model(&here.join("one/model.glb")).unwrap();
+    let mut planes: BTreeMap<u64, usize> = BTreeMap::new();
+    for i in 0..model.mesh.triangles.len() {
+        let low = model.mesh.corners(i).map(|corner| corner.y);
+        let low = low.into_iter().fold(f64::INFINITY, f64::min);
+        *planes.entry(low.to_bits()).or_default() += 1;
+    }
+    let mut planes: Vec<(usize, f64)> = planes
+        .into_iter()
+        .map(|(bits, count)| (count, f64::from_bits(bits)))
+        .collect();
+    planes.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    let told = |said: &str| {
+        let is_told = |line: &&str| line.contains("triangles are in no cell");
+        said.lines().find(is_told).map(str::to_owned)
+    };
+    for (_, plane) in &planes[..3] {
+        // A box has what is this much beyond it, too: by rounding these triangles, or not.
+        let made = told(&rooms(plane - 9.0 * f64::from(f32::EPSILON)));
+        let line = "walk one --frames 1 --size 16x12 -o frames";
+        let walked = told(&lumigraph(here, line).ok().stderr);
+        assert!(made.is_some());
+        assert_eq!(made, walked, "{plane}");
     }
 }
