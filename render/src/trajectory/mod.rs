@@ -15,9 +15,9 @@ use crate::lumigraph::SourceView;
 use crate::path::{CameraPath, Curve, Interpolation, PathError, PathFrame, default_name};
 use calibrate::{Camera, ModelKind, Rigid3, View};
 use capture::{Capture, Ring};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use proxy::Proxy;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use stray::without_strays;
 
 /// The kinds of path.
@@ -65,7 +65,8 @@ const ORBIT_POINTS: usize = 720;
 /// pinhole with the median focal length of the source views, their most common image
 /// size, and the principal point in its centre. The path of a capture of one place, or of one photo, stands
 /// still. Photos stand as their cameras say ([`SourceView::quarters`]), and those taken with the camera turned
-/// count as if they stood as most do; see [`upright()`].
+/// count as if they stood as most do; see [`upright()`]. Where most lie ([`Standing::lying`]) the path is that of photos that
+/// stand, and its frames lie as those do.
 /// What a photo looks at is in its middle, wherever its principal point is.
 /// Photos whose cameras are misplaced by far do not count.
 ///
@@ -89,8 +90,16 @@ pub fn derive(
 
     let sources = without_strays(sources, points_in_world, proxy);
     let views: Vec<&View> = sources.iter().map(|s| &s.view).collect();
-    let shown = sources.iter().map(|s| (&s.view, s.quarters));
-    let mut standing = upright(&shown.collect::<Vec<_>>());
+    let stand = |turn: u8| {
+        let shown = sources.iter().map(|s| (&s.view, (s.quarters + turn) % 4));
+        upright(&shown.collect::<Vec<_>>())
+    };
+    let mut standing = stand(0);
+    // Where all lie on their side the path goes around as if they stood, and then its frames lie as they do.
+    let lying = standing.lying;
+    if lying != 0 {
+        standing = stand(lying);
+    }
     for (photo, view) in standing.photos.iter_mut().zip(&views) {
         photo.rotation = gaze::centered(view, photo.rotation);
     }
@@ -101,11 +110,16 @@ pub fn derive(
         Trajectory::Sweep => sweep(&capture, frames),
     };
 
-    let camera = typical_camera(&sources, &standing.photos);
+    let camera = typical_camera(&sources, &standing.photos, lying);
+    let laid = DQuat::from_rotation_z(-FRAC_PI_2 * f64::from(lying));
     let frame = |(index, pose): (usize, &Rigid3)| {
         // The capture's poses are relative to its reference camera's centre.
         let center = pose.center() + capture.origin_in_world;
-        let camera_from_world = Rigid3::new(pose.rotation, -(pose.rotation * center));
+        let rotation = match lying {
+            0 => pose.rotation,
+            _ => laid * pose.rotation,
+        };
+        let camera_from_world = Rigid3::new(rotation, -(rotation * center));
         let time_s = Some(index as f64 / fps);
         PathFrame::new(
             default_name(index),
@@ -316,12 +330,12 @@ fn orbit_around(ring: &Ring, frames: usize) -> Vec<Rigid3> {
 }
 
 /// A pinhole with the median focal length (relative to the longer side) and the most
-/// common image size, of photos as they stand upright; of equally common ones the first.
-fn typical_camera(sources: &[SourceView], upright: &[Upright]) -> Camera {
+/// common image size, of photos as they stand upright, turned back by so many quarters; of equally common ones the first.
+fn typical_camera(sources: &[SourceView], upright: &[Upright], lying: u8) -> Camera {
     let mut counts: Vec<((u32, u32), usize)> = Vec::new();
     for (source, upright) in sources.iter().zip(upright) {
         let (width, height) = (source.view.width, source.view.height);
-        let size = match upright.sides_exchanged {
+        let size = match upright.sides_exchanged == lying.is_multiple_of(2) {
             true => (height, width),
             false => (width, height),
         };

@@ -28,6 +28,9 @@ pub struct Standing {
     /// Up in the world, of unit length: the vertical that most photos share, across what is level in them, or
     /// where they share none the mean of their ups; `None` where those all but cancel.
     pub up: Option<DVec3>,
+    /// Where nearly all share a vertical that most of them do not stand along, by how many quarters, clockwise, most would
+    /// have to be turned to stand: those of a camera on its side that goes around something, for one. 0 else.
+    pub lying: u8,
 }
 
 /// The tangent of 30°: a photo that leans by more from all four ways of turning it is not turned.
@@ -51,6 +54,8 @@ const AGREED: f64 = 0.3;
 const SAME_GUESS: f64 = 0.94;
 /// So many guesses are followed.
 const MOST_GUESSES: usize = 64;
+/// So many of all photos share a vertical that they are said to lie along.
+const NEARLY_ALL: f64 = 0.9;
 /// Two directions that photos' mean gaze differs from by so much less, as cosines, are told apart by it.
 const DOWNWARD: f64 = 0.05;
 
@@ -89,7 +94,9 @@ pub fn upright(photos: &[(&View, u8)]) -> Standing {
         center: view.center(),
     };
     let shown: Vec<Shown> = photos.iter().map(show).collect();
-    let vertical = shared_vertical(&shown);
+    let best = best_vote(&shown);
+    let vertical = best.as_ref().filter(|vote| vote.is_shared(shown.len()));
+    let vertical = vertical.map(|vote| vote.up);
     let stand = |(shown, (_, own)): (&Shown, &(&View, u8))| {
         let turn = vertical.and_then(|up| quarters(shown.rotation, up));
         let turn = turn.unwrap_or(0);
@@ -106,7 +113,9 @@ pub fn upright(photos: &[(&View, u8)]) -> Standing {
     let up = vertical
         .or_else(|| Some(mean()).filter(|mean| mean.length() > AGREED))
         .and_then(DVec3::try_normalize);
-    Standing { photos, up }
+    let lying = best.as_ref().and_then(|vote| vote.lying(shown.len()));
+    let lying = lying.unwrap_or(0);
+    Standing { photos, up, lying }
 }
 
 /// By how many quarters a camera is turned about its optical axis to stand upright; `None` where that
@@ -208,6 +217,26 @@ impl Vote {
         self.by_quarters[0] == self.most()
     }
 
+    /// Whether half of so many photos or more have this vertical, upwards as half of them or more are.
+    fn is_shared(&self, photos: usize) -> bool {
+        self.is_upright()
+            && 2 * self.by_quarters[0] >= self.clear()
+            && 2 * self.explained() >= photos
+    }
+
+    /// By how many quarters most of so many photos would have to be turned to stand, if they lie; see [`Standing::lying`].
+    fn lying(&self, photos: usize) -> Option<u8> {
+        let is_clear = self.clear() as f64 >= NEARLY_ALL * photos as f64;
+        let is_most = |turn: &u8| {
+            let alike = self.by_quarters[usize::from(*turn)];
+            alike == self.most() && 2 * alike >= self.clear()
+        };
+        if !is_clear || self.is_upright() {
+            return None;
+        }
+        (1..4).find(is_most)
+    }
+
     /// Whether it says more of the photos than another; of two that say as much photos look down, not
     /// up, in the better.
     fn is_better(&self, other: &Self, ahead: DVec3) -> bool {
@@ -217,9 +246,8 @@ impl Vote {
     }
 }
 
-/// The vertical that most photos have, upwards as half of them or more are; `None` where there is no such
-/// direction.
-fn shared_vertical(photos: &[Shown]) -> Option<DVec3> {
+/// How photos stand along the direction that says most of them; `None` without any direction.
+fn best_vote(photos: &[Shown]) -> Option<Vote> {
     let rotations: Vec<DQuat> = photos.iter().map(|photo| photo.rotation).collect();
     let ahead = photos.iter().map(Shown::forward).sum::<DVec3>();
     let ahead = ahead / photos.len().max(1) as f64;
@@ -245,12 +273,7 @@ fn shared_vertical(photos: &[Shown]) -> Option<DVec3> {
             break;
         }
     }
-    let is_shared = |vote: &Vote| {
-        vote.is_upright()
-            && 2 * vote.by_quarters[0] >= vote.clear()
-            && 2 * vote.explained() >= photos.len()
-    };
-    best.filter(is_shared).map(|vote| vote.up)
+    best
 }
 
 /// Directions that may be the vertical: first that of the mean of all ups; then, from the photos in the middle

@@ -123,6 +123,40 @@ fn photos_that_are_all_rolled_have_paths_that_are() {
     }
 }
 
+/// They go around what photos go around, not over it, and lie as the photos do.
+#[test]
+fn paths_around_something_lie_where_all_photos_do() {
+    for straight in [ring(140), ring(360)] {
+        for quarters in [1, 3] {
+            let lying = Scene {
+                // A few the other way, as of a camera that an arm carries over the top.
+                sources: (0..)
+                    .zip(&straight.sources)
+                    .map(|(i, source)| match i % 3 {
+                        1 => rolled(source, 4 - quarters),
+                        _ => rolled(source, quarters),
+                    })
+                    .collect(),
+                points: straight.points.clone(),
+                proxy: straight.proxy.clone(),
+            };
+            let turn = DQuat::from_rotation_z(PI / 2.0 * f64::from(quarters));
+            for kind in ALL {
+                let what = format!("{kind:?}, {quarters}");
+                let (mut expected, found) = (path(kind, &straight), path(kind, &lying));
+                for frame in &mut expected.frames {
+                    let pose = &mut frame.view.camera_from_world;
+                    *pose = Rigid3::new(turn, DVec3::ZERO) * *pose;
+                }
+                assert_same_poses(&found, &expected, &what);
+                for frame in &found.frames {
+                    assert_eq!((frame.camera.width, frame.camera.height), (480, 640));
+                }
+            }
+        }
+    }
+}
+
 /// Moves a camera that stays turned as it is.
 fn moved(source: &SourceView, by: DVec3) -> SourceView {
     let mut moved = source.clone();
