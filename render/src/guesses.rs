@@ -13,9 +13,9 @@ use image::RgbaImage;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Of the logarithm of one more than so many times a pixel's distance from what is seen it has the pyramid's level: half of a
-/// mean's weight lies within a quarter of that distance, about. By photos that were held out twice as much is no better of an
-/// object before the dark, whose guesses are right, and 0.05 dB better elsewhere.
+/// A guess has the level of the pyramid that is the binary logarithm of one more than so many times its distance from what is
+/// seen. With twice as much held-out photos of temple-ring lose 0.09 dB, whose guesses, of the dark behind the object, are
+/// right; those of four other captures gain 0.05.
 const LEVEL_BY_DISTANCE: f32 = 0.35;
 
 /// A pixel of the coarsest level that is mixed in has in it what is within so many times its side: to make all levels takes two

@@ -3,7 +3,7 @@
 use crate::interior::{HALVES, apart, corners, names, with_house};
 use crate::run::lumigraph;
 use crate::uncalibrated::is_installed;
-use calibrate::{ModelKind, colmap};
+use calibrate::{ModelKind, Reconstruction, colmap};
 use glam::DQuat;
 use proxy::interior::find::{Evidence, FindOptions, find_interior};
 use proxy::interior::{read_interior, surface_of, write_interior};
@@ -69,19 +69,26 @@ fn photos_of_another_house_do_so_too() {
     same_from_model_and_photos(folder.path(), &model, survey);
 }
 
+/// Photos of the hallway, whose model is changed, in `hall`.
+fn hallway(here: &Path, change: impl FnOnce(&mut Reconstruction)) {
+    lumigraph(here, "generate hallway --size 48x36 -o hall").ok();
+    let model = here.join("hall/sparse/0");
+    let mut whole = colmap::read_model(&model).unwrap();
+    change(&mut whole);
+    colmap::write_binary(&whole, &model).unwrap();
+}
+
 #[test]
 fn held_out_photos_of_lenses_that_bend_are_told_with_what_helps() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 48x36 -o hall").ok();
-    let model = here.join("hall/sparse/0");
-    let mut whole = colmap::read_model(&model).unwrap();
-    for camera in whole.cameras.values_mut() {
-        assert_eq!(camera.model, ModelKind::SimplePinhole);
-        camera.model = ModelKind::SimpleRadial;
-        camera.params.push(0.01);
-    }
-    colmap::write_binary(&whole, &model).unwrap();
+    hallway(here, |whole| {
+        for camera in whole.cameras.values_mut() {
+            assert_eq!(camera.model, ModelKind::SimplePinhole);
+            camera.model = ModelKind::SimpleRadial;
+            camera.params.push(0.01);
+        }
+    });
     std::fs::write(here.join("halves.json"), HALVES).unwrap();
     let made = "--rooms halves.json --hold-out hall/split.json";
     let remedy = "import the photos with --undistort, and make the interior of that scene";
@@ -234,18 +241,16 @@ fn a_capture_without_depth_needs_a_mesh() {
 fn rooms_of_photos_that_do_not_say_what_is_up_have_what_cameras_had() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 48x36 -o hall").ok();
     // In a world where y points down: turned half round about x.
-    let model = here.join("hall/sparse/0");
-    let mut whole = colmap::read_model(&model).unwrap();
-    let half = DQuat::from_rotation_x(PI);
-    for image in whole.images.values_mut() {
-        image.camera_from_world.rotation *= half;
-    }
-    for point in whole.points.values_mut() {
-        point.position = half * point.position;
-    }
-    colmap::write_binary(&whole, &model).unwrap();
+    hallway(here, |whole| {
+        let half = DQuat::from_rotation_x(PI);
+        for image in whole.images.values_mut() {
+            image.camera_from_world.rotation *= half;
+        }
+        for point in whole.points.values_mut() {
+            point.position = half * point.position;
+        }
+    });
     let rooms = r#"{"version": 1, UP "rooms": [
         {"name": "front", "min": [-9, -9, 2], "max": [9, 9, 99]},
         {"name": "back", "min": [-9, -9, -99], "max": [9, 9, 2]}],

@@ -24,22 +24,30 @@ fn scene_json(folder: &TempDir, scene: &str) -> Value {
     serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
 }
 
-#[test]
-fn what_a_transforms_file_names_beside_the_photos_is_used() {
-    // 1. Out with all of them.
+/// A folder with the wall, masks and depth maps beside it, calibrated by a `transforms.json`, whose text is given, too.
+fn wall_as_transforms() -> (TempDir, String) {
     let folder = with_wall();
-    let here = folder.path();
-    let at = |path: &str| here.join(path);
-    let run = |line: &str| lumigraph(here, line).ok();
-    save_masks(&at("wall/masks"), 9, 16);
+    let run = |line: &str| lumigraph(folder.path(), line).ok();
+    let wall = folder.path().join("wall");
+    save_masks(&wall.join("masks"), 9, 16);
     run("import wall -o scene");
     let ran = run("export scene --format transforms -o wall/transforms.json");
     assert!(!ran.stderr.contains("note: "), "{}", ran.stderr);
-    let text = fs::read_to_string(at("wall/transforms.json")).unwrap();
+    fs::remove_dir_all(wall.join("sparse")).unwrap();
+    let text = fs::read_to_string(wall.join("transforms.json")).unwrap();
+    (folder, text)
+}
+
+#[test]
+fn what_a_transforms_file_names_beside_the_photos_is_used() {
+    // 1. Out with all of them.
+    let (folder, text) = wall_as_transforms();
+    let here = folder.path();
+    let at = |path: &str| here.join(path);
+    let run = |line: &str| lumigraph(here, line).ok();
     let write = |text: &str| fs::write(at("wall/transforms.json"), text).unwrap();
 
     // 2. In from folders that are not looked into.
-    fs::remove_dir_all(at("wall/sparse")).unwrap();
     fs::rename(at("wall/masks"), at("wall/msk")).unwrap();
     fs::rename(at("wall/depth"), at("wall/dpt")).unwrap();
     let text = text.replace("\"masks/", "\"msk/");
@@ -78,15 +86,10 @@ fn what_a_transforms_file_names_beside_the_photos_is_used() {
 
 #[test]
 fn masks_and_depth_maps_among_the_photos_are_not_counted_as_such() {
-    let folder = with_wall();
+    let (folder, mut text) = wall_as_transforms();
     let here = folder.path();
     let at = |path: &str| here.join(path);
     let run = |line: &str| lumigraph(here, line).ok();
-    save_masks(&at("wall/masks"), 9, 16);
-    run("import wall -o scene");
-    run("export scene --format transforms -o wall/transforms.json");
-    fs::remove_dir_all(at("wall/sparse")).unwrap();
-    let mut text = fs::read_to_string(at("wall/transforms.json")).unwrap();
     for (from, to) in [("images", "rgb"), ("masks", "msk"), ("depth", "dpt")] {
         fs::rename(at("wall").join(from), at("wall").join(to)).unwrap();
         text = text.replace(&format!("\"{from}/"), &format!("\"{to}/"));

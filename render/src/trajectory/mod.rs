@@ -15,10 +15,11 @@ use crate::lumigraph::SourceView;
 use crate::path::{CameraPath, Curve, Interpolation, PathError, PathFrame, default_name};
 use calibrate::{Camera, ModelKind, Rigid3, View};
 use capture::{Capture, Ring};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use proxy::Proxy;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 use stray::without_strays;
+use upright::turned;
 
 /// The kinds of path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +96,7 @@ pub fn derive(
         upright(&shown.collect::<Vec<_>>())
     };
     let mut standing = stand(0);
-    // Where all lie on their side the path goes around as if they stood, and then its frames lie as they do.
+    // Where most lie the path is as if they stood, and then its frames lie as they do.
     let lying = standing.lying;
     if lying != 0 {
         standing = stand(lying);
@@ -111,14 +112,10 @@ pub fn derive(
     };
 
     let camera = typical_camera(&sources, &standing.photos, lying);
-    let laid = DQuat::from_rotation_z(-FRAC_PI_2 * f64::from(lying));
     let frame = |(index, pose): (usize, &Rigid3)| {
         // The capture's poses are relative to its reference camera's centre.
         let center = pose.center() + capture.origin_in_world;
-        let rotation = match lying {
-            0 => pose.rotation,
-            _ => laid * pose.rotation,
-        };
+        let rotation = turned(pose.rotation, (4 - lying) % 4);
         let camera_from_world = Rigid3::new(rotation, -(rotation * center));
         let time_s = Some(index as f64 / fps);
         PathFrame::new(

@@ -150,7 +150,7 @@ fn squares(rights: impl Iterator<Item = DVec3>) -> DMat3 {
 }
 
 /// A camera turned about its optical axis, from x towards y.
-fn turned(rotation: DQuat, quarters: u8) -> DQuat {
+pub(super) fn turned(rotation: DQuat, quarters: u8) -> DQuat {
     match quarters {
         0 => rotation,
         _ => DQuat::from_rotation_z(f64::from(quarters) * FRAC_PI_2) * rotation,
