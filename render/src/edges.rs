@@ -77,7 +77,7 @@ impl<'f> Edges<'f> {
 
     /// What photos are sampled by.
     pub(crate) fn frame_of_samples(&self) -> Frame<'f> {
-        self.frame.of_samples(self.across)
+        self.frame.of_samples(self.across as f64)
     }
 
     /// How many pixels they are.

@@ -8,6 +8,7 @@ use crate::gpu::{self, Gpu};
 use crate::options::Method;
 use crate::photos::PhotoStore;
 use crate::sight::Views;
+use crate::soft::{Softened, soften};
 use crate::{RenderError, reference};
 use image::RgbaImage;
 
@@ -245,6 +246,25 @@ impl Engine {
             }
             drawn => drawn,
         }
+    }
+
+    /// Draws those parts of a frame's picture softly that no photo shows, but for a guess, and those of which photos
+    /// contradict each other. The CPU looks at these whatever has drawn the picture, with the photos that were prepared for it.
+    ///
+    /// # Errors
+    /// A photo that is needed cannot be decoded.
+    pub fn soften(
+        &mut self,
+        frame: &Frame<'_>,
+        prepared: &Prepared,
+        picture: &mut RgbaImage,
+    ) -> Result<Softened, RenderError> {
+        let field = prepared.field();
+        let contradictions = match self.by {
+            By::Reference => reference::contradictions(frame, field)?,
+            By::Cpu { .. } | By::Gpu(_) => self.spare.contradictions(frame, field)?,
+        };
+        Ok(soften(frame, contradictions.as_ref(), picture))
     }
 
     /// Draws the pixels of a picture at which its frame's surface jumps anew, as means of so many samples across

@@ -289,15 +289,15 @@ impl<'a> Frame<'a> {
     }
 
     /// For so many samples of a pixel, across and down: photos weigh as they do in this frame, and are sampled from finer
-    /// mip levels. What samples look at they bring with them.
-    pub(crate) fn of_samples(&self, across: usize) -> Self {
+    /// mip levels, or coarser ones where it is less than one. What samples look at they bring with them.
+    pub(crate) fn of_samples(&self, across: f64) -> Self {
         Self {
             lumigraph: self.lumigraph,
             desired: self.desired.clone(),
             options: self.options,
             sources: self.sources.clone(),
             surface: Surface::Nothing,
-            across: across as f64,
+            across,
             skips: self.skips,
             view_tree: self.view_tree.clone(),
             tally: Tally::new(self.sources.len()),

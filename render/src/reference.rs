@@ -3,6 +3,7 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
+use crate::contradictions::{Contradictions, frame_of_cells};
 use crate::edges::Edges;
 use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint, exposed, trust};
@@ -63,6 +64,48 @@ pub(crate) fn smooth(
     frame.check_masks()
 }
 
+/// Where the photos of a frame contradict each other, of those that its field lists, if it has one.
+///
+/// # Errors
+/// A photo or mask that is needed cannot be decoded.
+pub(crate) fn contradictions(
+    frame: &Frame<'_>,
+    field: Option<&TriangulatedField>,
+) -> Result<Option<Contradictions>, PhotoError> {
+    let among = field.map_or_else(|| frame.taking_part().collect(), TriangulatedField::listed);
+    let photos = Held::again(frame, &among);
+    let frame_of_cells = frame_of_cells(frame);
+    let variance = |point: &ProxyPoint| {
+        let contributors = blend_among(&frame_of_cells, point, among.iter().copied());
+        variance_at(&frame_of_cells, &photos, point, &contributors)
+    };
+    let variances = |(): &mut (), points: &[ProxyPoint]| points.iter().map(variance).collect();
+    let found = Contradictions::of(frame, || (), variances)?;
+    frame.check_masks()?;
+    Ok(found)
+}
+
+/// The variance of the contributors' colours at a proxy point, 0…1, by what they weigh, in the mean over channels; `None`
+/// where there is none.
+fn variance_at(
+    frame: &Frame<'_>,
+    photos: &Held<'_>,
+    point: &ProxyPoint,
+    contributors: &[Contributor],
+) -> Result<Option<f32>, PhotoError> {
+    let mean = color_at(frame, photos, point, contributors)?;
+    let (mut squares, mut sum) = (0.0, 0.0);
+    for &contributor in contributors {
+        let Some((weight, color)) = painted(frame, photos, point, contributor)? else {
+            continue;
+        };
+        let squared = |c: usize| (color[c] - mean[c]).powi(2);
+        squares += weight * (0..3).map(squared).sum::<f64>();
+        sum += weight;
+    }
+    Ok((sum > 0.0).then(|| (squares / (3.0 * sum)) as f32))
+}
+
 /// A source view as a candidate for a proxy point that falls on a pixel of its image; `None`
 /// outside the image and where its mask ignores it.
 pub(crate) fn candidate(
@@ -117,14 +160,10 @@ pub fn color_at(
     contributors: &[Contributor],
 ) -> Result<[f64; 4], PhotoError> {
     let (mut color, mut sum) = ([0.0; 4], 0.0);
-    for &Contributor { source_idx, weight } in contributors {
-        let Some(pixel) = frame.project(source_idx, point) else {
+    for &contributor in contributors {
+        let Some((weight, sample)) = painted(frame, photos, point, contributor)? else {
             continue;
         };
-        let photo = photos.get(source_idx)?;
-        let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
-        let sample = exposed(sample, frame.sources[source_idx].exposure);
-        let weight = weight * trust(sample[3]);
         for c in 0..4 {
             color[c] += weight * sample[c];
         }
@@ -135,6 +174,22 @@ pub fn color_at(
     } else {
         color
     })
+}
+
+/// What a contributor paints a proxy point with, and what that counts.
+fn painted(
+    frame: &Frame<'_>,
+    photos: &Held<'_>,
+    point: &ProxyPoint,
+    Contributor { source_idx, weight }: Contributor,
+) -> Result<Option<(f64, [f64; 4])>, PhotoError> {
+    let Some(pixel) = frame.project(source_idx, point) else {
+        return Ok(None);
+    };
+    let photo = photos.get(source_idx)?;
+    let sample = sample(photo, pixel, frame.level_of_detail(source_idx, point));
+    let sample = exposed(sample, frame.sources[source_idx].exposure);
+    Ok(Some((weight * trust(sample[3]), sample)))
 }
 
 /// The exact picture: straight alpha, alpha = coverage.

@@ -19,10 +19,10 @@ pub(super) enum Stage {
     Load,
     /// Drawing. On the CPU photos that were not decoded ahead are decoded meanwhile.
     Draw,
-    /// Drawing what no photo shows softly.
-    Guesses,
     /// Drawing pixels anew at which the proxy jumps.
     Edges,
+    /// Drawing what no photo shows softly, and what they contradict each other of.
+    Soften,
     /// Writing the picture.
     Write,
 }
@@ -33,8 +33,8 @@ const STAGES: [(Stage, &str); 8] = [
     (Stage::Ahead, "ahead"),
     (Stage::Load, "load"),
     (Stage::Draw, "draw"),
-    (Stage::Guesses, "guesses"),
     (Stage::Edges, "edges"),
+    (Stage::Soften, "soften"),
     (Stage::Write, "write"),
 ];
 

@@ -270,10 +270,10 @@ pub(super) struct FinishArgs {
     #[arg(long = "edges", value_name = "N", default_value_t = EDGE_SAMPLES,
         value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(super) edge_samples: u32,
-    /// Draw what no photo shows, which is guessed from what is beside it, as sharply as that; else the farther from
-    /// what is seen the softer
+    /// Draw as sharply as it comes what no photo shows, which is guessed from what is beside it, and what photos contradict
+    /// each other of; else the one is the softer the farther it is from what is seen, the other the less they agree
     #[arg(long)]
-    pub(super) sharp_guesses: bool,
+    pub(super) sharp: bool,
 }
 
 /// Where and how large.

@@ -7,7 +7,7 @@ use super::took::{Memory, Start, Took};
 use calibrate::Distortion;
 use image::RgbaImage;
 use render::gpu::Gpu;
-use render::{Bounded, Engine, Frame, Ready, SourceView, photo_bytes};
+use render::{Bounded, Engine, Frame, Ready, Softened, SourceView, photo_bytes};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -155,8 +155,7 @@ struct FrameCost {
     scorings: Option<u64>,
     scorings_omitted: u64,
     by_cpu: bool,
-    /// Drawn softly.
-    guessed_pixels: usize,
+    softened: Softened,
     /// Drawn of several samples.
     edge_pixels: usize,
     /// No pixel is covered, not even in part.
@@ -211,7 +210,7 @@ impl Costs {
             },
             // The reference is no engine that stands in, but runs there, too.
             by_cpu: gpu.is_none(),
-            guessed_pixels: 0,
+            softened: Softened::default(),
             edge_pixels: 0,
             is_empty,
             is_unshown: is_empty && frame.sees_proxy(),
@@ -219,10 +218,10 @@ impl Costs {
         self.frames.insert(frame_idx, cost);
     }
 
-    /// Notes how many pixels of that frame no photo shows, which were drawn softly.
-    pub(super) fn note_guesses(&mut self, frame_idx: usize, guessed_pixels: usize) {
+    /// Notes how many pixels of that frame were drawn softly.
+    pub(super) fn note_softened(&mut self, frame_idx: usize, softened: Softened) {
         if let Some(cost) = self.frames.get_mut(&frame_idx) {
-            cost.guessed_pixels = guessed_pixels;
+            cost.softened = softened;
         }
     }
 
@@ -289,7 +288,8 @@ impl Costs {
             "photos_used": cost.photos_used,
             "parts": cost.parts,
             "drawn_by_cpu": cost.by_cpu,
-            "guessed_pixels": cost.guessed_pixels,
+            "guessed_pixels": cost.softened.guessed,
+            "contradicted_pixels": cost.softened.contradicted,
             "edge_pixels": cost.edge_pixels,
             "grid": cost.grid,
             "error_at_most": cost.error,

@@ -20,7 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lumigraph::scene::{Scene, SceneError, Truth};
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, PhotoError,
-    Prepared, RenderError, Residency, Skips, soften_guesses,
+    Prepared, RenderError, Residency, Skips,
 };
 use serde_json::Value;
 use std::borrow::Cow;
@@ -39,7 +39,7 @@ pub(super) struct Session {
     pub(super) max_error: Option<f64>,
     /// Across a pixel at which the proxy jumps.
     edge_samples: u32,
-    soft_guesses: bool,
+    sharp: bool,
     /// Where time plays a part.
     pub(super) clock: Option<Clock>,
     pub(super) in_window: InWindow,
@@ -127,7 +127,7 @@ impl Session {
             method: field.method(),
             max_error: None,
             edge_samples: 1,
-            soft_guesses: false,
+            sharp: true,
             without,
             left_out,
             uploaded: BTreeSet::new(),
@@ -236,7 +236,7 @@ impl Session {
     /// What is done to pictures once they are drawn; nothing where that is not said.
     pub(super) fn finish_as(&mut self, finish: &FinishArgs) {
         self.edge_samples = finish.edge_samples;
-        self.soft_guesses = !finish.sharp_guesses;
+        self.sharp = finish.sharp;
     }
 
     /// Draws a view. A photo that turns out corrupt is reported and left out from then on
@@ -254,10 +254,10 @@ impl Session {
             };
             let drawn = Prepared::new(&frame, self.method).and_then(|prepared| {
                 let mut picture = engine.draw(&frame, &prepared)?;
-                if self.soft_guesses {
-                    soften_guesses(&frame, &mut picture);
-                }
                 engine.smooth(&frame, &prepared, self.edge_samples, &mut picture)?;
+                if !self.sharp {
+                    engine.soften(&frame, &prepared, &mut picture)?;
+                }
                 Ok(picture)
             });
             say_notes(engine, &mut self.notes_said);

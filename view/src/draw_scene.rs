@@ -13,14 +13,14 @@ use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
     EDGE_SAMPLES, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared,
-    RenderError, Skips, TriangulatedField, picture, soften_guesses,
+    RenderError, Skips, TriangulatedField, picture,
 };
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The stage in which guesses are drawn softly and outlines anew, where nothing moves.
+/// The stage in which outlines are drawn anew, and what nobody knows softly, where nothing moves.
 pub(crate) const FINISH: &str = "finish";
 /// More triangles than this are thinned out before their edges are shown.
 const MOST_EDGED: usize = 6000;
@@ -204,8 +204,8 @@ impl<'a> SceneDrawer<'a> {
                     let mut picture = timed(&mut stages, "draw", draw)?;
                     if !request.is_moving {
                         let finish = || {
-                            soften_guesses(frame, &mut picture);
-                            engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture)
+                            engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture)?;
+                            engine.soften(frame, prepared, &mut picture)
                         };
                         timed(&mut stages, FINISH, finish)?;
                         let coarse =

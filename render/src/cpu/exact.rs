@@ -71,13 +71,14 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// The exact picture of some proxy points that are near one another, straight RGBA; `None` where no photo has one.
-    pub(super) fn draw_points(
+    /// The exact field of proxy points that are near one another, in tiles of as many as there are lanes: for each in which
+    /// there is something, its number, the source views that see it, and what they weigh.
+    pub(super) fn weigh_points(
         &self,
-        photos: &Held<'_>,
-        (asked, seen): &mut (Asked, Seen),
         points: &[ProxyPoint],
-    ) -> Result<Vec<Option<[u8; 4]>>, PhotoError> {
+        (asked, seen): &mut (Asked, Seen),
+        then: impl FnMut(usize, &Seen) -> Result<(), PhotoError>,
+    ) -> Result<(), PhotoError> {
         let tile = |points: &[ProxyPoint]| {
             let mut tile = Tile::nothing();
             for (k, point) in points.iter().enumerate() {
@@ -86,9 +87,19 @@ impl Engine<'_> {
             tile
         };
         let tiles: Vec<Tile> = points.chunks(LANES).map(tile).collect();
-        let mut colors = vec![None; tiles.len() * LANES];
         asked.forget(self.frame);
-        self.weigh_block(&tiles, asked, seen, |i, seen| {
+        self.weigh_block(&tiles, asked, seen, then)
+    }
+
+    /// The exact picture of some proxy points that are near one another, straight RGBA; `None` where no photo has one.
+    pub(super) fn draw_points(
+        &self,
+        photos: &Held<'_>,
+        scratch: &mut (Asked, Seen),
+        points: &[ProxyPoint],
+    ) -> Result<Vec<Option<[u8; 4]>>, PhotoError> {
+        let mut colors = vec![None; points.len().next_multiple_of(LANES)];
+        self.weigh_points(points, scratch, |i, seen| {
             let mut weight = [0.0_f32; LANES];
             for (_, _, term) in seen.iter() {
                 weight = each(|k| weight[k] + term.weight[k]);

@@ -4,6 +4,7 @@
 //! same bytes.
 
 mod asked;
+mod contradictions;
 mod exact;
 pub(crate) mod lanes;
 mod mark;
@@ -15,6 +16,7 @@ mod triangulated;
 mod weights;
 
 use crate::RenderError;
+use crate::contradictions::{Contradictions, frame_of_cells};
 use crate::edges::Edges;
 use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint};
@@ -96,25 +98,56 @@ impl Cpu {
         edges: &Edges<'_>,
         picture: &mut RgbaImage,
     ) -> Result<(), PhotoError> {
+        self.ask(frame, field, &edges.frame_of_samples(), |engine, photos| {
+            let draw = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
+                engine.draw_points(photos, scratch, points)
+            };
+            edges.put(Default::default, draw, picture)
+        })
+    }
+
+    /// Where the photos of a frame contradict each other, of those that its field lists, if it has one.
+    ///
+    /// # Errors
+    /// A photo or mask that is needed cannot be decoded.
+    pub(crate) fn contradictions(
+        &mut self,
+        frame: &Frame<'_>,
+        field: Option<&TriangulatedField>,
+    ) -> Result<Option<Contradictions>, PhotoError> {
+        self.ask(frame, field, &frame_of_cells(frame), |engine, photos| {
+            let variances = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
+                engine.variances(photos, scratch, points)
+            };
+            Contradictions::of(frame, Default::default, variances)
+        })
+    }
+
+    /// Asks about proxy points of a frame of `samples` of one that was drawn, of the photos that its field lists, if it has
+    /// one.
+    fn ask<R>(
+        &mut self,
+        frame: &Frame<'_>,
+        field: Option<&TriangulatedField>,
+        samples: &Frame<'_>,
+        then: impl FnOnce(&Engine<'_>, &Held<'_>) -> Result<R, PhotoError>,
+    ) -> Result<R, PhotoError> {
         frame.view_tree();
         let rays = self.rays.of(&frame.desired);
         let wanted = match field {
             Some(field) => field.listed(),
             None => mark::wanted(&Engine::new(frame, rays), frame.taking_part().collect()),
         };
-        let samples = edges.frame_of_samples();
-        let mut engine = Engine::new(&samples, rays);
+        let mut engine = Engine::new(samples, rays);
         let photos = Held::again(frame, &wanted);
         if field.is_some() {
             let mut among = vec![false; frame.sources.len()];
             wanted.iter().for_each(|i| among[*i] = true);
             engine.among = Some(among);
         }
-        let draw = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
-            engine.draw_points(&photos, scratch, points)
-        };
-        edges.put(Default::default, draw, picture)?;
-        frame.check_masks()
+        let result = then(&engine, &photos)?;
+        frame.check_masks()?;
+        Ok(result)
     }
 }
 

@@ -15,7 +15,7 @@ mod engines_photos;
 mod engines_triangulated;
 mod exposure;
 mod goals;
-mod guesses;
+
 mod hard_places;
 mod house;
 mod interior_captured;
@@ -41,4 +41,5 @@ mod mesh;
 mod near;
 mod points;
 mod residency;
+mod soft;
 mod time;

@@ -341,24 +341,28 @@ fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
     }
 }
 
-#[test]
-fn a_flat_mesh_is_a_plane() {
-    let shot = Shot::of("wall", 6, None);
-    let plane = shot.plane;
-    let across = plane.normal().any_orthonormal_vector();
-    let along = plane.normal().cross(across);
-    let corner = |x: f64, y: f64| plane.point() + 50.0 * (x * across + y * along);
+/// A shot with a large square through a point for its proxy, parallel to its plane.
+pub(crate) fn meshed(shot: &Shot, through: DVec3) -> Lumigraph {
+    let across = shot.plane.normal().any_orthonormal_vector();
+    let along = shot.plane.normal().cross(across);
+    let corner = |x: f64, y: f64| through + 50.0 * (x * across + y * along);
     let mesh = quad([
         corner(-1.0, -1.0),
         corner(1.0, -1.0),
         corner(1.0, 1.0),
         corner(-1.0, 1.0),
     ]);
-    let flat = shot.lumigraph();
-    let meshed = Lumigraph {
+    Lumigraph {
         proxy: Proxy::Mesh(Arc::new(Solid::new(MeshKind::Mesh, mesh))),
         ..shot.lumigraph()
-    };
+    }
+}
+
+#[test]
+fn a_flat_mesh_is_a_plane() {
+    let shot = Shot::of("wall", 6, None);
+    let flat = shot.lumigraph();
+    let meshed = meshed(&shot, shot.plane.point());
     let desired = shot.views[0].between(&shot.views[3], 0.4);
     let of = |lumigraph: &Lumigraph, method| {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());

@@ -5,7 +5,7 @@ use super::{Session, frame, say_notes};
 use anyhow::bail;
 use calibrate::View;
 use image::RgbaImage;
-use render::{Bounded, Method, Moment, decode_ahead, prepare_within, soften_guesses};
+use render::{Bounded, Method, Moment, decode_ahead, prepare_within};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
 
@@ -88,14 +88,14 @@ impl Session {
             }
             self.costs
                 .note(current, &frame, &chosen, engine, &was_ready, &picture);
-            if self.soft_guesses {
-                let soften = || soften_guesses(&frame, &mut picture);
-                let guessed_pixels = ledger.time(current, Stage::Guesses, soften);
-                self.costs.note_guesses(current, guessed_pixels);
-            }
             let smooth = || engine.smooth(&frame, prepared, self.edge_samples, &mut picture);
             let edge_pixels = ledger.time(current, Stage::Edges, smooth)?;
             self.costs.note_edges(current, edge_pixels);
+            if !self.sharp {
+                let soften = || engine.soften(&frame, prepared, &mut picture);
+                let softened = ledger.time(current, Stage::Soften, soften)?;
+                self.costs.note_softened(current, softened);
+            }
             ledger.time(current, Stage::Write, || take(current, picture))?;
             *done += 1;
             next = match coming.transpose() {

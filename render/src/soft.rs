@@ -1,11 +1,13 @@
-//! Guesses drawn as guesses: what no photo shows has no detail.
+//! What nobody knows is drawn softly: guesses, and what photos contradict each other of.
 //!
 //! What no photo has, or shows, of the proxy is looked at elsewhere along its ray, where one does (`sight.rs`). Of such
 //! pixels neighbours may look at things far apart: streaks, teeth and patterns, as sharp as photos are. What is right beside
 //! what photos show is likely to go on as they do; farther in nobody knows more than a colour. So each guess becomes the
-//! mean of what is around it, over as much as it is far from what is seen, by a pyramid whose levels are mixed
-//! from coarse to fine (Burt and Adelson 1983).
+//! mean of what is around it, over as much as it is far from what is seen. And where photos contradict each other
+//! (`contradictions.rs`) at most one of them shows what is there: the less they agree, the wider the mean. Both by one
+//! pyramid, whose levels are mixed from coarse to fine (Burt and Adelson 1983).
 
+use crate::contradictions::Contradictions;
 use crate::frame::Frame;
 use crate::surface::{FacetMap, Surface};
 use glam::Vec4;
@@ -18,6 +20,13 @@ use std::ops::Range;
 /// right; those of four other captures gain 0.05.
 const LEVEL_BY_DISTANCE: f32 = 0.35;
 
+/// What photos contradict each other of has the level that is the binary logarithm of one more than so many times the
+/// picture's longer side by how far they are from their mean, 0…1, beyond [`AGREE`].
+const LEVEL_BY_CONTRADICTION: f32 = 0.04;
+
+/// No farther from their mean, 0…1, photos agree.
+const AGREE: f32 = 0.05;
+
 /// A pixel of the coarsest level that is mixed in has in it what is within so many times its side: to make all levels takes two
 /// pixels of each finer one around it, and to go back as much.
 const REACH: usize = 4;
@@ -25,36 +34,70 @@ const REACH: usize = 4;
 /// What a level of the pyramid is made of and made finer by: a pixel and two on either side.
 const TAPS: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
-/// Draws the pixels of a frame's picture that no photo shows, but for a guess, as softly as they are far from what one shows.
-/// Their alpha stays. How many they are.
+/// How many pixels of a picture were drawn softly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Softened {
+    /// That no photo shows.
+    pub guessed: usize,
+    /// All others: photos contradict each other.
+    pub contradicted: usize,
+}
+
+/// Draws those parts of a frame's picture softly that no photo shows, but for a guess, and those of which photos contradict
+/// each other, as far as contradictions are given. Their alpha stays.
 ///
 /// Not so of a proxy that is a plane, of which nothing is guessed: what no photo has is not covered.
-pub fn soften_guesses(frame: &Frame<'_>, picture: &mut RgbaImage) -> usize {
+pub fn soften(
+    frame: &Frame<'_>,
+    contradictions: Option<&Contradictions>,
+    picture: &mut RgbaImage,
+) -> Softened {
     match &frame.surface {
-        Surface::Facets(map) if map.any_is_moved() => soften(map, picture),
-        _ => 0,
+        Surface::Facets(map) => soften_where(map, contradictions, picture),
+        _ => Softened::default(),
     }
 }
 
-fn soften(map: &FacetMap, picture: &mut RgbaImage) -> usize {
-    let width = picture.width() as usize;
-    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * width + x]);
-    let size = [width, picture.height() as usize];
-    let Some(guesses) = Part::around(size, is_guess) else {
-        return 0;
+fn soften_where(
+    map: &FacetMap,
+    contradictions: Option<&Contradictions>,
+    picture: &mut RgbaImage,
+) -> Softened {
+    let size = [picture.width() as usize, picture.height() as usize];
+    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * size[0] + x]);
+    let longer = size[0].max(size[1]) as f32;
+    let excess_at = |x: usize, y: usize| {
+        let off = contradictions.map_or(0.0, |all| all.at(x, y));
+        (off - AGREE).max(0.0)
+    };
+    let is_soft = |x: usize, y: usize| excess_at(x, y) > 0.0 || is_guess(x, y);
+    let Some(soft) = Part::around(size, is_soft) else {
+        return Softened::default();
     };
     // 1. How coarse each is to be.
-    let far = guesses.and(1, 1, size);
-    let level_of = |distance: f32| match distance {
-        0.0 => 0.0,
-        _ => (LEVEL_BY_DISTANCE * distance + 1.0).log2(),
-    };
+    let far = soft.and(1, 1, size);
     let distances = distances(&far, is_guess);
-    let levels: Vec<f32> = distances.into_par_iter().map(level_of).collect();
+    let of_row = |y: usize| {
+        let row = far
+            .columns
+            .clone()
+            .zip(&distances[(y - far.rows.start) * far.columns.len()..]);
+        row.map(move |(x, distance)| {
+            let contradicted = LEVEL_BY_CONTRADICTION * longer * excess_at(x, y);
+            let more = contradicted.max(LEVEL_BY_DISTANCE * distance);
+            if more > 0.0 { (more + 1.0).log2() } else { 0.0 }
+        })
+    };
+    let levels: Vec<f32> = far
+        .rows
+        .clone()
+        .into_par_iter()
+        .flat_map_iter(of_row)
+        .collect();
     let level_at = |x: usize, y: usize| far.index(x, y).map_or(0.0, |i| levels[i]);
     let coarsest = levels.iter().copied().fold(0.0, f32::max).ceil() as usize;
-    // 2. Ever coarser pictures of what is around, whose pixels lie on the same ones of the picture wherever guesses are.
-    let around = guesses.and(REACH << coarsest, 1 << coarsest, size);
+    // 2. Ever coarser pictures of what is around, whose pixels lie on the same ones of the picture wherever that is.
+    let around = soft.and(REACH << coarsest, 1 << coarsest, size);
     let mut pyramid = vec![Level::of(picture, &around)];
     for l in 0..coarsest {
         let coarser = pyramid[l].reduced();
@@ -73,13 +116,16 @@ fn soften(map: &FacetMap, picture: &mut RgbaImage) -> usize {
         mixed = own;
     }
     // 4. Into the picture.
-    let mut count = 0;
-    for y in guesses.rows.clone() {
-        for x in guesses.columns.clone().filter(|x| is_guess(*x, y)) {
+    let mut count = Softened::default();
+    for y in soft.rows.clone() {
+        for x in soft.columns.clone().filter(|x| level_at(*x, y) > 0.0) {
             let Some(at) = around.index(x, y) else {
                 continue;
             };
-            count += 1;
+            match is_guess(x, y) {
+                true => count.guessed += 1,
+                false => count.contradicted += 1,
+            }
             let sum = mixed.sums[at];
             let pixel = &mut picture.get_pixel_mut(x as u32, y as u32).0;
             if pixel[3] > 0 && sum.w > 0.0 {

@@ -1,13 +1,17 @@
-//! What no photo shows, drawn softly.
+//! What nobody knows, drawn softly.
 
-use crate::{common, points};
+use crate::{common, mesh, points};
 
 use calibrate::{Rigid3, View};
-use common::Shot;
+use common::{Shot, assert_close, by_reference, psnr, unmoved};
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
+use mesh::meshed;
 use points::lumigraph;
-use render::{FieldOptions, Frame, Lumigraph, Method, Surface, cpu, soften_guesses};
+use render::{
+    DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, Softened, Surface, cpu,
+    soften,
+};
 
 /// From farther back than all photos, and aside.
 fn desired_views(shot: &Shot, lumigraph: &Lumigraph) -> Vec<View> {
@@ -40,8 +44,9 @@ fn moved(frame: &Frame<'_>) -> Vec<bool> {
 fn drawn(frame: &Frame<'_>) -> (RgbaImage, RgbaImage, usize) {
     let sharp = cpu::render(frame, Method::Exact).unwrap();
     let mut soft = sharp.clone();
-    let count = soften_guesses(frame, &mut soft);
-    (sharp, soft, count)
+    let count = soften(frame, None, &mut soft);
+    assert_eq!(count.contradicted, 0);
+    (sharp, soft, count.guessed)
 }
 
 #[test]
@@ -94,7 +99,7 @@ fn guesses_are_as_soft_in_larger_pictures() {
             image::Rgba(sum.map(|sum| ((sum + 4) / 9) as u8))
         })
     };
-    let [sharp, soft] = [&sharp, &soft].map(|large| common::psnr(&reduced(large), &small));
+    let [sharp, soft] = [&sharp, &soft].map(|large| psnr(&reduced(large), &small));
     println!("{sharp:.1}, {soft:.1} dB");
     assert!(soft > sharp, "{sharp} {soft}");
 }
@@ -106,5 +111,65 @@ fn a_view_at_a_photos_own_pose_has_no_guesses() {
     for view in &shot.views {
         let (sharp, soft, count) = drawn(&frame(&lumigraph, view));
         assert_eq!((count, soft), (0, sharp));
+    }
+}
+
+/// What an engine makes of a picture.
+fn softened(by: DeviceChoice, frame: &Frame<'_>, mut picture: RgbaImage) -> (RgbaImage, Softened) {
+    let prepared = Prepared::new(frame, Method::TRIANGULATED).unwrap();
+    let mut engine = Engine::open(by).unwrap();
+    let count = engine.soften(frame, &prepared, &mut picture).unwrap();
+    (picture, count)
+}
+
+/// A wall whose proxy is so much nearer to the photos as it is far.
+fn wall(shot: &Shot, nearer: f64) -> Lumigraph {
+    let (point, center) = (shot.plane.point(), shot.views[0].center());
+    let off = shot.plane.normal() * (center - point).dot(shot.plane.normal());
+    meshed(shot, point + nearer * off)
+}
+
+#[test]
+fn what_photos_contradict_each_other_of_is_drawn_softly() {
+    let shot = Shot::of("wall", 6, None);
+    let scene = shot.dataset.scene_of(&shot.dataset.photos[0]);
+    let desired = shot.views[0].between(&shot.views[3], 0.4);
+    let truth = datasets::render_view(&scene, &desired, 2);
+    // Where they agree, all stays.
+    let right = wall(&shot, 0.0);
+    let right = frame(&right, &desired);
+    let sharp = cpu::render(&right, Method::TRIANGULATED).unwrap();
+    let (soft, count) = softened(DeviceChoice::Cpu, &right, sharp.clone());
+    assert_eq!(count.contradicted, 0);
+    assert!(unmoved(&right, &soft) == unmoved(&right, &sharp));
+    // Of another place they show different things.
+    let wrong = wall(&shot, 0.4);
+    let wrong = frame(&wrong, &desired);
+    let sharp = cpu::render(&wrong, Method::TRIANGULATED).unwrap();
+    let (soft, count) = softened(DeviceChoice::Cpu, &wrong, sharp.clone());
+    let of = psnr(&sharp, &truth);
+    let with = psnr(&soft, &truth);
+    println!("{count:?}: {of:.2}, {with:.2} dB");
+    assert!(count.contradicted > 1000, "{count:?}");
+    assert!(with > of + 0.05, "{of} {with}");
+    let alpha = |picture: &RgbaImage| picture.pixels().map(|p| p.0[3]).collect::<Vec<u8>>();
+    assert_eq!(alpha(&sharp), alpha(&soft));
+    // The specification finds the same.
+    let sharp = by_reference(&wrong, Method::TRIANGULATED).unwrap();
+    let (by_reference, _) = softened(DeviceChoice::Reference, &wrong, sharp);
+    assert_close(&soft, &by_reference, "reference");
+}
+
+/// There the photo is all that counts, whatever the others show.
+#[test]
+fn a_view_at_a_photos_own_pose_has_no_contradictions() {
+    let shot = Shot::of("wall", 4, None);
+    let wrong = wall(&shot, 0.4);
+    for view in &shot.views {
+        let frame = frame(&wrong, view);
+        let sharp = cpu::render(&frame, Method::TRIANGULATED).unwrap();
+        let (soft, count) = softened(DeviceChoice::Cpu, &frame, sharp.clone());
+        assert_eq!(count, Softened::default());
+        assert!(soft == sharp);
     }
 }
