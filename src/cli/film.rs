@@ -9,6 +9,7 @@ use super::stamp::in_unicode;
 use super::targets::{check_file, check_film, check_inputs};
 use anyhow::Context;
 use calibrate::View;
+use capture::video::{FILMS, is_film};
 use image::{Rgba, RgbaImage};
 use render::score::on_black;
 use std::collections::BTreeMap;
@@ -127,14 +128,6 @@ pub(super) struct FilmArgs {
     /// line, the photos and all other files that frames are made of must be those of before
     #[arg(long)]
     resume: bool,
-}
-
-/// What the names of films usually end in; ffmpeg may know others.
-const FILMS: [&str; 5] = ["mp4", "webm", "mkv", "mov", "avi"];
-
-fn is_film(video: &Path) -> bool {
-    let end = video.extension().unwrap_or_default();
-    FILMS.iter().any(|film| end.eq_ignore_ascii_case(film))
 }
 
 /// What is behind the picture.

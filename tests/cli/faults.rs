@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use crate::run::{Ran, files, lumigraph, with_wall};
+use crate::uncalibrated::is_installed;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -54,7 +55,12 @@ fn all_whole(folder: &Path) -> usize {
 
 /// Runs the program where no file may grow beyond a kilobyte: a full disk, but for its error.
 fn on_a_full_disk(folder: &Path, line: &str) -> Ran {
-    let script = format!("trap '' XFSZ; ulimit -f 1; exec {PROGRAM} {line}");
+    with_room_for(1, folder, line)
+}
+
+/// Runs the program where no file may grow beyond so many kilobytes.
+fn with_room_for(kilobytes: u32, folder: &Path, line: &str) -> Ran {
+    let script = format!("trap '' XFSZ; ulimit -f {kilobytes}; exec {PROGRAM} {line}");
     let output = Command::new("bash")
         .args(["-c", &script])
         .current_dir(folder)
@@ -100,6 +106,30 @@ fn a_full_disk_is_told_and_leaves_nothing_half_written() {
     assert_eq!(output.status.code(), Some(1), "{text}");
     let said = "error: standard output: cannot write: No space left";
     assert!(text.contains(said), "{text}");
+}
+
+/// Short films are written as they end, of which ffmpeg's exit status says nothing unless it is asked to.
+#[test]
+fn a_film_that_finds_no_room_leaves_the_one_before() {
+    if !is_installed(&capture::video::ffmpeg()) {
+        return;
+    }
+    let folder = with_wall();
+    let here = folder.path();
+    let render = "render wall --proxy plane --path sweep --frames 12 --size 96x72 --device cpu --resume -o out";
+    for film in ["film.mp4", "film.mkv"] {
+        let line = format!("{render} --video {film}");
+        lumigraph(here, &line).ok();
+        let before = files(here);
+        // There is room for the film of two small frames that is tried first.
+        assert!(before[Path::new(film)].len() > 3 * 1024, "{film}");
+        let error = with_room_for(3, here, &line).error(1);
+        assert!(
+            error.starts_with(&format!("{film}: `ffmpeg` failed")),
+            "{error}"
+        );
+        assert!(files(here) == before, "{film}");
+    }
 }
 
 /// Of what is written the proxy finds room, and `scene.json`, which says what it rests on, finds none.

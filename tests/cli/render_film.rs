@@ -1,5 +1,7 @@
 //! Frames made a film, and films that are refused.
 
+#[cfg(unix)]
+use crate::run::with_script;
 use crate::run::{files, lumigraph, run, with_wall};
 use calibrate::{Camera, ModelKind, Rigid3};
 use render::path::{CameraPath, PathFrame};
@@ -107,6 +109,55 @@ fn without_ffmpeg_a_film_fails_before_anything_is_drawn() {
     let error = run(folder.path(), &words, &[("PATH", "/nowhere")]).error(1);
     assert!(error.contains("apt-get install ffmpeg"), "{error}");
     assert!(!folder.path().join("frames").exists());
+}
+
+/// An ffmpeg that always reports success, though it left nothing, or what it cannot read.
+#[cfg(unix)]
+#[test]
+fn a_film_that_ffmpeg_leaves_empty_or_unreadable_is_none() {
+    // The film that is tried first, of 16 × 16 pixels with a whole path, is well.
+    let script = |left: &str| {
+        format!(
+            r#"#!/bin/sh
+case "$*" in
+-version | *"-i file:/"*) exit ;;
+*"-i file:"*) echo 'no film at all' >&2; exit 1 ;;
+esac
+cat >/dev/null
+case "$*" in *16x16*) film='a film' ;; *) film='{left}' ;; esac
+for last; do :; done
+printf '%s' "$film" >"${{last#file:}}"
+"#
+        )
+    };
+    let folder = with_wall();
+    let here = folder.path();
+    std::fs::write(here.join("film.mp4"), "the film before").unwrap();
+    let line =
+        "render wall --proxy plane --path sweep --frames 2 --size 48x36 -o out --video film.mp4";
+    let words: Vec<&str> = line.split(' ').collect();
+    for (left, said) in [
+        (
+            "",
+            "film.mp4: ffmpeg left no film, or an empty file; check that the disk",
+        ),
+        (
+            "half a film",
+            "film.mp4: ffmpeg cannot read the film that it made; check",
+        ),
+    ] {
+        let path = with_script(here, "ffmpeg", &script(left));
+        let error = run(here, &words, &[("PATH", &path)]).error(1);
+        assert!(error.starts_with(said), "{error}");
+        let film = std::fs::read(here.join("film.mp4")).unwrap();
+        assert_eq!(film, b"the film before");
+        let left = files(here).into_keys();
+        assert!(
+            !left
+                .map(|name| name.display().to_string())
+                .any(|name| name.contains("partial"))
+        );
+    }
 }
 
 #[test]

@@ -72,6 +72,24 @@ pub(crate) fn run(folder: &Path, words: &[&str], variables: &[(&str, &str)]) -> 
     }
 }
 
+/// Puts a script in a program's place, in a folder `bin` within this one: the `PATH` on which it comes first.
+#[cfg(unix)]
+pub(crate) fn with_script(folder: &Path, program: &str, script: &str) -> String {
+    let bin = folder.join("bin");
+    std::fs::create_dir_all(&bin).unwrap();
+    std::fs::write(bin.join("script"), script).unwrap();
+    // What this process has open to write, for an instant in others that it starts too, cannot be run.
+    let copy = format!("cp script {program} && chmod +x {program}");
+    let copied = Command::new("sh")
+        .args(["-c", &copy])
+        .current_dir(&bin)
+        .status();
+    assert!(copied.unwrap().success());
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let paths = std::iter::once(bin).chain(std::env::split_paths(&paths));
+    std::env::join_paths(paths).unwrap().into_string().unwrap()
+}
+
 /// A folder with `wall`, a capture of nine 96 × 72 photos of which 0000.png and 0008.png
 /// are to be held out.
 pub(crate) fn with_wall() -> TempDir {

@@ -1,4 +1,4 @@
-//! Photos out of a video: of each stretch of time the sharpest frame, through `ffmpeg`.
+//! Photos out of a video: of each stretch of time the sharpest frame, through `ffmpeg`; and films out of frames.
 //!
 //! The video is decoded twice: once small and grey, to score how sharp every frame is, and
 //! once at full size for the chosen ones alone. Times are those of presentation, so a
@@ -19,6 +19,7 @@
 mod choose;
 mod damage;
 mod error;
+mod film;
 mod list;
 mod scan;
 mod shape;
@@ -26,16 +27,16 @@ mod shape;
 pub use choose::{FrameCount, ScoredFrame, choose};
 pub use damage::Damage;
 pub use error::VideoError;
+pub use film::{FILMS, FilmError, encode, is_film};
 pub use list::VideoFrame;
 pub use scan::{scan, sharpness};
 pub use shape::FrameShape;
 
+use crate::Tool;
 use crate::folder::{beside, place_of, take_place};
-use crate::{Tool, ToolError};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A step of an extraction, for progress.
@@ -80,97 +81,6 @@ pub fn ffmpeg() -> Tool {
 
 /// How colours are converted: else ffmpeg rounds them down, by a level and more where the matrix changes.
 const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp";
-
-/// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
-/// what else ffmpeg takes the file's name to mean. Films have even sizes: an odd width or
-/// height gains one more of its last column or row. The video appears complete or not at all.
-///
-/// # Errors
-/// `ffmpeg` is missing or fails; a frame cannot be had or has another size.
-pub fn encode(
-    video: &Path,
-    (width, height): (u32, u32),
-    frames_per_second: f64,
-    frames: impl Iterator<Item = std::io::Result<Vec<u8>>> + Send,
-) -> Result<(), ToolError> {
-    let name = video.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = video.with_file_name(format!(".partial-{name}"));
-    let mut arguments: Vec<OsString> = Vec::new();
-    let own = [width as usize, height as usize];
-    let [even_width, even_height] = own.map(|side| side.next_multiple_of(2));
-    let size = format!("{even_width}x{even_height}");
-    let rate = frames_per_second.to_string();
-    let given = [
-        "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size,
-    ];
-    arguments.extend(given.map(OsString::from));
-    // The frames are sRGB with full range.
-    let (matrix, mark) = matrix_of(video);
-    let filter = format!("scale=out_color_matrix={matrix}:out_range=tv:{EXACT}");
-    let made = [
-        "-r", &rate, "-i", "-", "-vf", &filter, "-pix_fmt", "yuv420p",
-    ];
-    arguments.extend(made.map(OsString::from));
-    let marked = [
-        "-colorspace",
-        mark,
-        "-color_primaries",
-        "bt709",
-        "-color_trc",
-        "bt709",
-    ];
-    arguments.extend(marked.map(OsString::from));
-    arguments.push(scan::file(&temporary));
-    let made = ffmpeg().feed(&arguments, move |mut stdin| {
-        for frame in frames {
-            let frame = frame?;
-            if frame.len() != 3 * own[0] * own[1] {
-                return Err(std::io::Error::other("a frame has another size"));
-            }
-            stdin.write_all(&made_even(frame, own))?;
-        }
-        Ok(())
-    });
-    let renamed = made.and_then(|()| {
-        std::fs::rename(&temporary, video).map_err(|source| ToolError::Log {
-            path: video.to_owned(),
-            source,
-        })
-    });
-    if renamed.is_err() {
-        // There is nothing to do about it where this fails, too.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    renamed
-}
-
-/// A frame's RGB bytes with one more of its last column and row where these are odd in number.
-fn made_even(mut frame: Vec<u8>, [width, height]: [usize; 2]) -> Vec<u8> {
-    if width % 2 == 1 {
-        let rows = frame.chunks_exact(3 * width);
-        frame = rows
-            .flat_map(|row| [row, &row[3 * (width - 1)..]])
-            .flatten()
-            .copied()
-            .collect();
-    }
-    if height % 2 == 1 {
-        let last_row = 3 * width.next_multiple_of(2) * (height - 1);
-        frame.extend_from_within(last_row..);
-    }
-    frame
-}
-
-/// What a film's colours are written in, and what ffmpeg marks it by: BT.709, which players expect, in files that can
-/// say so. Of all that do not (.avi, .wmv), players take BT.601 for granted.
-fn matrix_of(video: &Path) -> (&'static str, &'static str) {
-    const TOLD: [&str; 5] = ["mp4", "m4v", "mov", "mkv", "webm"];
-    let end = video.extension().unwrap_or_default();
-    match TOLD.iter().any(|told| end.eq_ignore_ascii_case(told)) {
-        true => ("bt709", "bt709"),
-        false => ("bt601", "smpte170m"),
-    }
-}
 
 /// Writes a video's sharpest frames into `folder`, as JPEG files of high quality that are
 /// named by their time in seconds, and a list of them. A folder that holds anything else is
@@ -360,25 +270,6 @@ fn literal(folder: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn odd_frames_gain_one_more_of_their_last_column_and_row() {
-        let frame = |pixels: &[u8]| -> Vec<u8> { pixels.iter().flat_map(|p| [*p; 3]).collect() };
-        let cases: [([usize; 2], &[u8], &[u8]); 5] = [
-            ([1, 2], &[1, 2], &[1, 1, 2, 2]),
-            ([2, 1], &[1, 2], &[1, 2, 1, 2]),
-            ([1, 1], &[1], &[1; 4]),
-            ([2, 2], &[1, 2, 3, 4], &[1, 2, 3, 4]),
-            (
-                [3, 3],
-                &[1, 2, 3, 4, 5, 6, 7, 8, 9],
-                &[1, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 7, 8, 9, 9],
-            ),
-        ];
-        for (size, pixels, even) in cases {
-            assert_eq!(made_even(frame(pixels), size), frame(even), "{size:?}");
-        }
-    }
 
     #[test]
     fn frames_a_fraction_of_a_millisecond_apart_have_names_of_their_own() {
