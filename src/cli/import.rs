@@ -3,6 +3,7 @@
 use super::Usage;
 use super::damaged::left_out_text;
 use super::exposure::ExposureArgs;
+use super::hold::hold;
 use super::inputs::video_of;
 use super::interior::check_no_interior;
 use super::options::{KeyArgs, beside_text, positive, print_warnings};
@@ -156,6 +157,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let message = "--turntable takes a folder of photos in even steps, and PHOTOS is a file";
         return Err(Usage(message.to_owned()).into());
     }
+    // Before another import's frames, or what its COLMAP does, are taken for one's own or replaced.
+    let held = is_video.then(|| hold(&args.output)).transpose()?;
     let (capture, frames) = if is_video {
         let folder = Scene::frames_folder(&args.output);
         let shape = frame_shape(args);
@@ -188,6 +191,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let imported = match first {
         Err(SceneError::Uncalibrated { .. }) => {
+            let _held = match &held {
+                Some(_) => None,
+                None => Some(hold(&args.output)?),
+            };
             let work = Scene::colmap_folder(&args.output);
             let uncalibrated = &args.uncalibrated;
             options.calibration = Some(uncalibrated.calibrate(&capture, is_video, &work)?);

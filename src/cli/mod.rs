@@ -13,6 +13,7 @@ mod field;
 mod film;
 mod frames;
 mod generate;
+mod hold;
 mod import;
 mod info;
 mod info_of_file;

@@ -1,7 +1,7 @@
 //! What goes wrong around the program while it works.
 #![cfg(unix)]
 
-use crate::run::{Ran, files, lumigraph, with_wall};
+use crate::run::{Ran, files, lumigraph, run, with_script, with_wall};
 use crate::uncalibrated::is_installed;
 use std::fs;
 use std::io::Read;
@@ -130,6 +130,91 @@ fn a_film_that_finds_no_room_leaves_the_one_before() {
         );
         assert!(files(here) == before, "{film}");
     }
+}
+
+/// What a script in the place of COLMAP or ffmpeg does as it comes to its work: it waits for a file `go`, or for `at-work`
+/// to be taken away.
+const AT_WORK: &str = "mkdir -p at-work; touch at-work/it
+    while [ -e at-work ] && [ ! -e go ]; do sleep 0.02; done";
+
+#[test]
+fn two_imports_do_not_share_the_work_of_colmap() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::rename(here.join("wall/sparse/0"), here.join("model")).unwrap();
+    let script = format!(
+        r#"#!/bin/sh
+if [ "$1" = help ]; then echo 'COLMAP 3.8 -- a script'; exit; fi
+if [ "$2" = -h ]; then exit; fi
+case "$1" in
+feature_extractor) {AT_WORK} ;;
+mapper)
+    while [ "$1" != --output_path ]; do shift; done
+    cp -r model "$2/0" ;;
+esac
+"#
+    );
+    let path = with_script(here, "colmap", &script);
+    let words = ["import", "wall", "-o", "scene"];
+    let begin = || {
+        let mut command = Command::new(PROGRAM);
+        command.current_dir(here).args(words).env("PATH", &path);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    };
+    let at_work = here.join("at-work");
+
+    // One that is killed holds nothing, though its COLMAP is at work.
+    let mut killed = begin();
+    wait_for(&mut killed, &at_work);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    fs::remove_dir_all(&at_work).unwrap();
+
+    let mut first = begin();
+    wait_for(&mut first, &at_work);
+    let error = run(here, &words, &[("PATH", &path)]).error(1);
+    assert_eq!(
+        error,
+        "scene: another import is at work here; wait until it has ended, or choose another -o"
+    );
+    fs::write(here.join("go"), "").unwrap();
+    let (code, said) = stderr_of(first);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("COLMAP placed 9 of 9 photos"), "{said}");
+    lumigraph(here, "info scene").ok();
+}
+
+#[test]
+fn two_imports_do_not_take_frames_into_one_folder() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    fs::write(here.join("sweep.mp4"), "a video").unwrap();
+    let script = format!(
+        r#"#!/bin/sh
+case "$*" in *showinfo*)
+    {AT_WORK}
+    echo 'no video' >&2; exit 1 ;;
+esac
+"#
+    );
+    let path = with_script(here, "ffmpeg", &script);
+    let words = ["import", "sweep.mp4", "-o", "new/scene"];
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(here).args(words).env("PATH", &path);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut first = command.spawn().unwrap();
+    wait_for(&mut first, &here.join("at-work"));
+    let error = run(here, &words, &[("PATH", &path)]).error(1);
+    assert_eq!(
+        error,
+        "new/scene: another import is at work here; wait until it has ended, or choose another -o"
+    );
+    fs::write(here.join("go"), "").unwrap();
+    let (code, said) = stderr_of(first);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("cannot decode this as a video"), "{said}");
+    assert!(!here.join("new").exists());
 }
 
 /// Of what is written the proxy finds room, and `scene.json`, which says what it rests on, finds none.

@@ -3,9 +3,10 @@
 use super::super::output::{make_parent, write_file};
 use super::super::stamp::{Stamp, changes, in_unicode, stamps};
 use anyhow::{Context, anyhow, bail};
+use capture::folder::{Hold, try_hold};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -45,12 +46,11 @@ const BETWEEN: Duration = Duration::from_millis(10);
 /// `None` where that cannot be: systems and disks that lock no folders; another run that was stopped meanwhile. Then a
 /// change that another run makes at the same moment may be lost.
 fn hold(folder: &Path) -> Option<File> {
-    let folder = File::open(folder).ok()?;
     for _ in 0..TRIES {
-        match folder.try_lock() {
-            Ok(()) => return Some(folder),
-            Err(TryLockError::WouldBlock) => std::thread::sleep(BETWEEN),
-            Err(TryLockError::Error(_)) => return None,
+        match try_hold(folder) {
+            Hold::Held(held) => return Some(held),
+            Hold::Taken => std::thread::sleep(BETWEEN),
+            Hold::Unknown => return None,
         }
     }
     None
