@@ -104,9 +104,9 @@ fn search(
     let mut found = usable.into_iter();
 
     // 2. The first of it.
-    let source = match (found.next(), model) {
-        (Some(source), _) => source,
-        (None, Ok(model)) => Source::Colmap(model),
+    let (source, closed) = match (found.next(), model) {
+        (Some(source), model) => (source, model.err().filter(is_closed)),
+        (None, Ok(model)) => (Source::Colmap(model), None),
         (None, Err(error)) => {
             let is_nothing = is_nothing_there(&error);
             return Err(match unusable.into_iter().next() {
@@ -133,7 +133,8 @@ fn search(
     let is_part = |error: &SceneError| {
         matches!(source, Source::OpenCv(_)) && matches!(error, SceneError::OpenCv(_))
     };
-    for reason in unusable.into_iter().filter(|error| !is_part(error)) {
+    let unusable = unusable.into_iter().filter(|error| !is_part(error));
+    for reason in unusable.chain(closed.map(SceneError::from)) {
         warnings.push(Warning::Note(format!(
             "the calibration is {}; not used: {reason}",
             source.text()
@@ -282,6 +283,11 @@ fn is_nothing_there(error: &ColmapError) -> bool {
     matches!(error, ColmapError::NoModel { incomplete, .. } if incomplete.is_empty())
 }
 
+/// Whether a model may be there and cannot be looked into.
+fn is_closed(error: &ColmapError) -> bool {
+    matches!(error, ColmapError::Closed { .. })
+}
+
 /// Where Bundler itself leaves its work, beside the list of photos.
 const BUNDLER: &str = "bundle/bundle.out";
 
@@ -289,9 +295,11 @@ const BUNDLER: &str = "bundle/bundle.out";
 /// be trained on last, and what Bundler left within; and what is wrong with files that are called like one.
 fn others(folder: &Path) -> (Vec<Source>, Vec<FormatError>) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
+    // Of a link that leads nowhere it is told that it cannot be read.
+    let is_file = |path: &PathBuf| path.is_file() || (path.is_symlink() && !path.exists());
+    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(is_file).collect();
     files.sort_by_cached_key(|file| (is_test_split(file), file.clone()));
-    files.extend(Some(folder.join(BUNDLER)).filter(|file| file.is_file()));
+    files.extend(Some(folder.join(BUNDLER)).filter(is_file));
     let (mut found, mut damaged) = (Vec::new(), Vec::new());
     for file in files {
         if let Some(format) = formats::detect(&file) {

@@ -207,3 +207,40 @@ fn of_models_that_colmap_could_not_join_the_largest_is_used_aloud() {
     assert!(ran.stdout.starts_with("scene: 3 photos"), "{}", ran.stdout);
     assert!(!ran.stderr.contains("takes another"), "{}", ran.stderr);
 }
+
+/// The disk that it is on may not be mounted: COLMAP would make another world of the photos.
+#[cfg(unix)]
+#[test]
+fn a_calibration_whose_link_leads_nowhere_is_an_error() {
+    use std::os::unix::fs::symlink;
+    let folder = with_wall();
+    let here = folder.path();
+    let model = here.join("wall/sparse/0");
+    fs::rename(&model, here.join("model")).unwrap();
+    symlink("/nonexistent/model", &model).unwrap();
+    let said = "wall/sparse/0: a COLMAP model may be here, but it cannot be looked into: \
+                it is a link to /nonexistent/model, which is not there; see that";
+    for line in [
+        "import wall -o scene",
+        "info wall",
+        "render wall --path orbit -o out",
+    ] {
+        let error = lumigraph(here, line).error(1);
+        assert!(error.starts_with(said), "{line}: {error}");
+    }
+    // Beside another it is noted.
+    lumigraph(here, "import wall --calibration model -o whole").ok();
+    lumigraph(here, "export whole --format opencv -o wall/cal.yml").ok();
+    let ran = lumigraph(here, "import wall -o scene").ok();
+    let note = format!("the calibration is wall/cal.yml; not used: {said}");
+    assert!(ran.stderr.contains(&note), "{}", ran.stderr);
+
+    // The same of a file.
+    fs::remove_file(here.join("wall/cal.yml")).unwrap();
+    fs::remove_dir_all(here.join("wall/sparse")).unwrap();
+    symlink("/nonexistent", here.join("wall/transforms.json")).unwrap();
+    let error = lumigraph(here, "import wall -o other").error(1);
+    let said = "wall/transforms.json: cannot read the file: No such file";
+    assert!(error.starts_with(said), "{error}");
+    assert!(!here.join("other").exists());
+}

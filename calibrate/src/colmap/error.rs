@@ -27,6 +27,18 @@ pub enum ColmapError {
         /// The places that hold part of a model.
         incomplete: Vec<Incomplete>,
     },
+    /// A place where a model usually lies cannot be looked into.
+    #[error(
+        "{}: a COLMAP model may be here, but it cannot be looked into: {source}; see that it can be \
+         read and that its disk is mounted, or move it away",
+        path.display()
+    )]
+    Closed {
+        /// The file, folder or link.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// A file could not be read.
     #[error("{}: cannot read the file: {source}", path.display())]
     Read {

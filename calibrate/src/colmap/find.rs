@@ -1,6 +1,6 @@
 use super::{ColmapError, Format, Incomplete, binary, run, text};
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// One of several models side by side: COLMAP makes them of photos that it cannot join.
@@ -22,36 +22,71 @@ pub struct SubModel {
 /// taken, of equals the first; see [`side_by_side`].
 ///
 /// # Errors
-/// No such folder, or no model in any of those places.
+/// No such folder, or no model in any of those places; one of them, before any model or beside it, cannot be
+/// looked into.
 pub fn find_model(folder: &Path) -> Result<PathBuf, ColmapError> {
-    if !folder.is_dir() {
+    if !is_there(folder, Metadata::is_dir)? {
         return Err(ColmapError::NoFolder {
             folder: folder.to_owned(),
         });
     }
-    let places = places(folder);
-    let found = places.iter().find_map(|together| largest(together));
-    found.ok_or_else(|| no_model(folder, &places.concat()))
+    let mut looked_in = Vec::new();
+    for Together { places, are_all } in places(folder) {
+        if let Some(model) = largest(&places)? {
+            return Ok(model);
+        }
+        are_all?;
+        looked_in.extend(places);
+    }
+    Err(no_model(folder, &looked_in))
 }
 
-/// Where a capture's model may be, in order; of several places together the largest is taken.
-fn places(folder: &Path) -> Vec<Vec<PathBuf>> {
+/// Places of which that with the largest model is taken.
+struct Together {
+    places: Vec<PathBuf>,
+    /// Why there may be others, if it cannot be known.
+    are_all: Result<(), ColmapError>,
+}
+
+impl Together {
+    fn one(place: PathBuf) -> Self {
+        Self {
+            places: vec![place],
+            are_all: Ok(()),
+        }
+    }
+
+    /// Those that were found, or where there are none the usual one.
+    fn or_usual(found: Result<Vec<PathBuf>, ColmapError>, usual: PathBuf) -> Self {
+        match found {
+            Ok(places) if !places.is_empty() => Self {
+                places,
+                are_all: Ok(()),
+            },
+            found => Self {
+                places: vec![usual],
+                are_all: found.map(|_| ()),
+            },
+        }
+    }
+}
+
+/// Where a capture's model may be, in order.
+fn places(folder: &Path) -> Vec<Together> {
     let dense = folder.join("dense");
     let colmap = folder.join("colmap");
-    let or_first = |models: Vec<PathBuf>, first: PathBuf| match models {
-        models if models.is_empty() => vec![first],
-        models => models,
+    let models = |within: &Path| Together::or_usual(numbered(within), within.join("0"));
+    let undistorted_models = |within: &Path| {
+        let usual = within.join("0").join("sparse");
+        Together::or_usual(undistorted(within), usual)
     };
-    let models = |within: &Path| or_first(numbered(within), within.join("0"));
-    let undistorted_models =
-        |within: &Path| or_first(undistorted(within), within.join("0").join("sparse"));
     let mut places = vec![
         models(&folder.join("sparse")),
-        vec![folder.join("sparse")],
-        vec![dense.join("sparse")],
+        Together::one(folder.join("sparse")),
+        Together::one(dense.join("sparse")),
         undistorted_models(&dense),
-        vec![folder.join("model")],
-        vec![folder.to_owned()],
+        Together::one(folder.join("model")),
+        Together::one(folder.to_owned()),
         models(folder),
     ];
     // In any other folder numbered ones may be captures that have nothing to do with each other.
@@ -60,7 +95,7 @@ fn places(folder: &Path) -> Vec<Vec<PathBuf>> {
     }
     if !run::is_work(&colmap) {
         let sparse = colmap.join("sparse");
-        places.extend([models(&sparse), vec![sparse]]);
+        places.extend([models(&sparse), Together::one(sparse)]);
     }
     places
 }
@@ -73,8 +108,10 @@ pub fn side_by_side(model: &Path) -> Vec<SubModel> {
         above.map(numbered),
         above.and_then(Path::parent).map(undistorted),
     ];
-    let complete = |mut models: Vec<PathBuf>| {
-        models.retain(|place| format_in(place).is_some());
+    // Those that cannot be looked into are told where one is chosen.
+    let complete = |models: Result<Vec<PathBuf>, ColmapError>| {
+        let mut models = models.unwrap_or_default();
+        models.retain(|place| matches!(format_in(place), Ok(Some(_))));
         models
     };
     let mut families = families.into_iter().flatten().map(complete);
@@ -88,52 +125,66 @@ pub fn side_by_side(model: &Path) -> Vec<SubModel> {
 
 /// How many images the largest has of the models in the numbered folders within one, as far as their files tell.
 pub(super) fn most_images(folder: &Path) -> usize {
-    let counts = numbered(folder).into_iter();
+    let counts = numbered(folder).unwrap_or_default().into_iter();
     let counts = counts.filter_map(|model| count_images(&model));
     counts.max().unwrap_or(0) as usize
 }
 
-/// The folders within one that are called by numbers, in the order of these.
-fn numbered(folder: &Path) -> Vec<PathBuf> {
-    let number = |path: PathBuf| {
+/// The folders within one that are called by numbers, in the order of these, and what else of such a name may be one.
+fn numbered(folder: &Path) -> Result<Vec<PathBuf>, ColmapError> {
+    let number = |path: &Path| -> Option<u32> {
         let name = path.file_name()?.to_str()?;
         // Signs are part of numbers, too.
         let is_plain = name.bytes().all(|byte| byte.is_ascii_digit());
-        let number: u32 = name.parse().ok().filter(|_| is_plain)?;
-        path.is_dir().then_some((number, path))
+        name.parse().ok().filter(|_| is_plain)
     };
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut found: Vec<_> = entries.filter_map(|e| number(e.path())).collect();
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) => return nothing_at(folder, error).map(|()| Vec::new()),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|source| closed(folder, source))?.path();
+        if let Some(number) = number(&path)
+            && fs::metadata(&path).map_or(true, |entry| entry.is_dir())
+        {
+            found.push((number, path));
+        }
+    }
     found.sort();
-    found.into_iter().map(|(_, path)| path).collect()
+    Ok(found.into_iter().map(|(_, path)| path).collect())
 }
 
 /// Where COLMAP's reconstructor leaves the models of photos that it undistorted, of each model's
 /// in a numbered folder.
-fn undistorted(folder: &Path) -> Vec<PathBuf> {
-    let numbered = numbered(folder).into_iter();
-    numbered.map(|folder| folder.join("sparse")).collect()
+fn undistorted(folder: &Path) -> Result<Vec<PathBuf>, ColmapError> {
+    let numbered = numbered(folder)?.into_iter();
+    Ok(numbered.map(|folder| folder.join("sparse")).collect())
 }
 
 /// Of these places that with the model of the most images, of equals the first.
-fn largest(together: &[PathBuf]) -> Option<PathBuf> {
-    let is_model = |place: &&PathBuf| format_in(place).is_some();
-    let found: Vec<&PathBuf> = together.iter().filter(is_model).collect();
+fn largest(together: &[PathBuf]) -> Result<Option<PathBuf>, ColmapError> {
+    let mut found = Vec::new();
+    for place in together {
+        if format_in(place)?.is_some() {
+            found.push(place);
+        }
+    }
     // One alone need not be read.
     if let [only] = found[..] {
-        return Some(only.clone());
+        return Ok(Some(only.clone()));
     }
     // The last of equals is taken.
     let largest = found
         .into_iter()
         .rev()
         .max_by_key(|model| count_images(model));
-    largest.cloned()
+    Ok(largest.cloned())
 }
 
 /// How many images the model in a folder has, from as little of it as tells.
 fn count_images(folder: &Path) -> Option<u64> {
-    let format = format_in(folder)?;
+    let format = format_in(folder).ok()??;
     let [_, images, _] = format.files(folder);
     if format == Format::Text {
         return text::count_images(&images, &fs::read(&images).ok()?);
@@ -147,10 +198,63 @@ fn count_images(folder: &Path) -> Option<u64> {
 }
 
 /// The format of the complete model in a folder; binary where both are.
-pub(super) fn format_in(folder: &Path) -> Option<Format> {
-    [Format::Binary, Format::Text]
-        .into_iter()
-        .find(|format| format.files(folder).iter().all(|file| file.is_file()))
+///
+/// # Errors
+/// Whether one is there cannot be known.
+pub(super) fn format_in(folder: &Path) -> Result<Option<Format>, ColmapError> {
+    if !is_there(folder, Metadata::is_dir)? {
+        return Ok(None);
+    }
+    for format in [Format::Binary, Format::Text] {
+        let mut are_there = true;
+        for file in format.files(folder) {
+            are_there &= is_there(&file, Metadata::is_file)?;
+        }
+        if are_there {
+            return Ok(Some(format));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether there is a file or a folder, as `is_kind` asks for.
+///
+/// # Errors
+/// It cannot be known, or a link there leads nowhere.
+fn is_there(path: &Path, is_kind: fn(&Metadata) -> bool) -> Result<bool, ColmapError> {
+    match fs::metadata(path) {
+        Ok(found) => Ok(is_kind(&found)),
+        Err(error) => nothing_at(path, error).map(|()| false),
+    }
+}
+
+/// What it means that a path cannot be examined.
+///
+/// # Errors
+/// It does not mean that nothing is there: a disk may not be mounted that a link leads to, or a folder may not be
+/// searched by whoever asks.
+fn nothing_at(path: &Path, error: io::Error) -> Result<(), ColmapError> {
+    let leads_nowhere = |path: &&Path| path.is_symlink() && !path.exists();
+    match error.kind() {
+        ErrorKind::NotADirectory => Ok(()),
+        // The folder that it would lie in may be such a link, too.
+        ErrorKind::NotFound => match path.ancestors().take(2).find(leads_nowhere) {
+            None => Ok(()),
+            Some(link) => {
+                let to = fs::read_link(link).unwrap_or_default();
+                let text = format!("it is a link to {}, which is not there", to.display());
+                Err(closed(link, io::Error::new(ErrorKind::NotFound, text)))
+            }
+        },
+        _ => Err(closed(path, error)),
+    }
+}
+
+fn closed(path: &Path, source: io::Error) -> ColmapError {
+    ColmapError::Closed {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 /// The error that no model is in any of `places`, saying which come close.

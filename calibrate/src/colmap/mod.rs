@@ -71,7 +71,7 @@ impl Format {
 /// A missing or unreadable file, a file that is not what COLMAP writes, a camera model
 /// this version does not read, or records that contradict each other.
 pub fn read_model(folder: &Path) -> Result<Reconstruction, ColmapError> {
-    let format = find::format_in(folder).ok_or_else(|| find::no_model(folder, &[folder]))?;
+    let format = find::format_in(folder)?.ok_or_else(|| find::no_model(folder, &[folder]))?;
     parse(format, folder, |path| read_file(path).map(Cow::Owned))
 }
 

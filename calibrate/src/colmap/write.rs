@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// folder with a binary model, which would be read instead, or with `rigs.txt` or
 /// `frames.txt`. Files that cannot be written.
 pub fn write_text(reconstruction: &Reconstruction, folder: &Path) -> Result<(), ColmapError> {
-    if find::format_in(folder) == Some(Format::Binary) {
+    if find::format_in(folder)? == Some(Format::Binary) {
         return Err(ColmapError::Hidden {
             folder: folder.to_owned(),
         });

@@ -1,4 +1,6 @@
 use crate::synthetic::small;
+#[cfg(unix)]
+use calibrate::colmap::{ColmapError, read_model};
 use calibrate::colmap::{find_model, side_by_side, write_binary, write_text};
 use std::collections::BTreeSet;
 use std::fs;
@@ -73,6 +75,70 @@ fn what_a_run_of_ours_works_on_is_no_model_yet() {
     assert_eq!(find_model(root).unwrap(), root.join("colmap/sparse/0"));
     fs::write(root.join("colmap/run.json"), "{}").unwrap();
     assert!(find_model(root).is_err());
+}
+
+/// Photos would be calibrated anew, in another world, for want of a disk or of leave to look.
+#[cfg(unix)]
+#[test]
+fn a_place_that_cannot_be_looked_into_is_not_taken_for_one_without_a_model() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let is_closed = |error: &ColmapError, place: &PathBuf| {
+        let ColmapError::Closed { path, .. } = error else {
+            return false;
+        };
+        path == place
+    };
+    for link in [
+        "sparse", "sparse/0", "sparse/3", "dense", "dense/0", "model", "0", "colmap",
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        let place = root.join(link);
+        fs::create_dir_all(place.parent().unwrap()).unwrap();
+        symlink("/nonexistent/model", &place).unwrap();
+        let error = find_model(root).unwrap_err();
+        assert!(is_closed(&error, &place), "{link}: {error}");
+        let said = "it is a link to /nonexistent/model, which is not there; see that";
+        assert!(error.to_string().contains(said), "{link}: {error}");
+    }
+
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let [first, second] = ["sparse/0", "sparse/1"].map(|model| root.join(model));
+    write_binary(&small(), &first).unwrap();
+    // A link that leads to a model, and one that is never come to, do no harm.
+    symlink("/nonexistent/model", root.join("model")).unwrap();
+    fs::rename(&first, root.join("elsewhere")).unwrap();
+    symlink("../elsewhere", &first).unwrap();
+    assert_eq!(find_model(root).unwrap(), first);
+    // It might be larger.
+    symlink("/nonexistent/model", &second).unwrap();
+    assert!(is_closed(&find_model(root).unwrap_err(), &second));
+    fs::remove_file(&second).unwrap();
+    // One file alone.
+    let images = root.join("elsewhere/images.bin");
+    fs::remove_file(&images).unwrap();
+    symlink("/nonexistent/images.bin", &images).unwrap();
+    let at_first = first.join("images.bin");
+    assert!(is_closed(&find_model(root).unwrap_err(), &at_first));
+    assert!(is_closed(&read_model(&first).unwrap_err(), &at_first));
+
+    // Of a folder that may not be searched; whoever may do everything can.
+    write_binary(&small(), &second).unwrap();
+    fs::remove_file(&first).unwrap();
+    assert_eq!(find_model(root).unwrap(), second);
+    let set_mode = |mode| fs::set_permissions(&second, fs::Permissions::from_mode(mode)).unwrap();
+    set_mode(0o600);
+    let found = find_model(root);
+    let is_open = fs::metadata(second.join("images.bin")).is_ok();
+    set_mode(0o700);
+    if is_open {
+        eprintln!("SKIPPED: permissions bind nobody here");
+        return;
+    }
+    let error = found.unwrap_err();
+    assert!(is_closed(&error, &second.join("cameras.bin")), "{error}");
+    assert!(error.to_string().contains("Permission denied"), "{error}");
 }
 
 #[test]
