@@ -6,6 +6,7 @@ use capture::{Tool, ToolError};
 use image::{Rgb, RgbImage, imageops};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Barrier;
 
 /// ffmpeg; `None`, said aloud, where it is missing, unless the environment has
 /// `LUMIGRAPH_REQUIRE_TOOLS=1`.
@@ -258,6 +259,42 @@ fn films_show_the_colours_of_their_frames_whatever_they_are_called() {
         let off = (0..3).map(|c| middle[c].abs_diff(color[c])).max();
         assert!(off <= Some(4), "{name}: {middle:?}");
     }
+}
+
+/// Each writes a file of its own, and what is there in the end is one of them, whole.
+#[test]
+fn films_of_one_name_may_be_made_at_once() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let film = here.path().join("film.mp4");
+    // Both are at work when either gives its last frame: the first do not fit into a pipe.
+    let meet = Barrier::new(2);
+    let make = |count: usize| {
+        let frames = (0..count).map(|i| {
+            if i == 0 || i == count - 1 {
+                meet.wait();
+            }
+            Ok(frame(i as u32).into_raw())
+        });
+        video::encode(&film, (320, 240), 8.0, frames)
+    };
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| make(4));
+        make(9).unwrap();
+        other.join().unwrap().unwrap();
+    });
+    let frames = video::scan(&ffmpeg, &film, &mut |_| {}).unwrap().len();
+    assert!([4, 9].contains(&frames), "{frames}");
+    assert_eq!(fs::read_dir(here.path()).unwrap().count(), 1);
+
+    // Where it cannot take its place, it is no log that cannot be written.
+    let taken = here.path().join("taken.mp4");
+    fs::create_dir(&taken).unwrap();
+    let frames = [(); 2].map(|()| Ok(vec![0; 3 * 16 * 16])).into_iter();
+    let error = video::encode(&taken, (16, 16), 8.0, frames).unwrap_err();
+    let said = "the film is made, but cannot be given its name: ";
+    assert!(error.to_string().starts_with(said), "{error}");
+    assert_eq!(fs::read_dir(here.path()).unwrap().count(), 2);
 }
 
 #[test]

@@ -5,7 +5,8 @@ use crate::ToolError;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What the names of films usually end in; ffmpeg may know others.
 pub const FILMS: [&str; 5] = ["mp4", "webm", "mkv", "mov", "avi"];
@@ -31,12 +32,18 @@ pub enum FilmError {
         /// What it says.
         source: ToolError,
     },
+    /// It is made, and cannot be given its name.
+    #[error("the film is made, but cannot be given its name: {source}")]
+    Rename {
+        /// Why.
+        source: io::Error,
+    },
 }
 
 /// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
 /// what else ffmpeg takes the file's name to mean. Films have even sizes: an odd width or
 /// height gains one more of its last column or row. The video appears complete or not at all: one that was there
-/// stays until then.
+/// stays until then. Of several that are made of one name at once the last to be complete stays.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails, or leaves no film that can be read; a frame cannot be had or has another size.
@@ -46,8 +53,7 @@ pub fn encode(
     frames_per_second: f64,
     frames: impl Iterator<Item = io::Result<Vec<u8>>> + Send,
 ) -> Result<(), FilmError> {
-    let name = video.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = video.with_file_name(format!(".partial-{name}"));
+    let temporary = beside(video);
     let mut arguments: Vec<OsString> = Vec::new();
     let own = [width as usize, height as usize];
     let [even_width, even_height] = own.map(|side| side.next_multiple_of(2));
@@ -87,16 +93,26 @@ pub fn encode(
     });
     let made = made.map_err(FilmError::from);
     let placed = made.and_then(|()| check(&temporary)).and_then(|()| {
-        fs::rename(&temporary, video).map_err(|source| {
-            let path = video.to_owned();
-            ToolError::Log { path, source }.into()
-        })
+        fs::rename(&temporary, video).map_err(|source| FilmError::Rename { source })
     });
     if placed.is_err() {
         // There is nothing to do about it where this fails, too.
         let _ = fs::remove_file(&temporary);
     }
     placed
+}
+
+/// Where a film lies until it is complete: hidden beside its place, with its ending, by which ffmpeg goes, and with a
+/// name that no other film in the making has, of this process or another.
+fn beside(video: &Path) -> PathBuf {
+    static FILMS_BEGUN: AtomicUsize = AtomicUsize::new(0);
+    let number = FILMS_BEGUN.fetch_add(1, Ordering::Relaxed);
+    let mut name = OsString::from(format!(".partial-{}-{number}", std::process::id()));
+    if let Some(end) = video.extension() {
+        name.push(".");
+        name.push(end);
+    }
+    video.with_file_name(name)
 }
 
 /// Fails of a film that is not there, is empty, or cannot be read, whatever ffmpeg said as it made it.
