@@ -4,7 +4,7 @@ mod kept;
 
 use super::Usage;
 use super::options::positive;
-use super::output::say;
+use super::output::{say, temporary_folder};
 use super::stamp::in_unicode;
 use super::targets::{check_file, check_film, check_inputs};
 use anyhow::Context;
@@ -181,7 +181,7 @@ impl FilmArgs {
         }
         check_file(video, "--video")?;
         capture::video::ffmpeg().text(&["-version"])?;
-        let folder = tempfile::tempdir()?;
+        let folder = temporary_folder().with_context(|| named.clone())?;
         let trial = folder.path().join(video.file_name().unwrap_or_default());
         let (size, fps) = ((16, 16), self.fps.unwrap_or(30.0));
         // Of one frame alone ffmpeg makes a picture, too (.png).

@@ -1,9 +1,10 @@
 //! What a command leaves behind: stdout, pictures, other files.
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
+use tempfile::TempDir;
 
 /// Prints a line to stderr, whether or not anybody still reads it.
 macro_rules! say {
@@ -38,6 +39,17 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     make_parent(path)?;
     let written = capture::write_whole(path, |temporary| std::fs::write(temporary, bytes));
     written.with_context(|| format!("{}: cannot write", path.display()))
+}
+
+/// A folder for what is needed for a while, which goes with what comes back.
+pub(super) fn temporary_folder() -> anyhow::Result<TempDir> {
+    tempfile::tempdir().map_err(|error| {
+        anyhow!(
+            "{}: cannot make a folder for what is needed for a while: {error}; have the variable TMPDIR name \
+             a folder that can be written to",
+            std::env::temp_dir().display()
+        )
+    })
 }
 
 /// Makes the folder that a file is to lie in.

@@ -217,6 +217,23 @@ esac
     assert!(!here.join("new").exists());
 }
 
+#[test]
+fn without_a_folder_for_a_while_it_is_said_where_one_is_expected() {
+    let folder = with_wall();
+    let here = folder.path();
+    let path = with_script(here, "ffmpeg", "#!/bin/sh\n");
+    let film = "render wall --path sweep --frames 2 --size 48x36 -o out --video film.mp4";
+    for (line, whose) in [(film, "--video film.mp4"), ("bench -o out", "shelf")] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let variables = [("PATH", path.as_str()), ("TMPDIR", "/nonexistent/tmp")];
+        let error = run(here, &words, &variables).error(1);
+        let said = format!("{whose}: /nonexistent/tmp: cannot make a folder for what is needed");
+        assert!(error.starts_with(&said), "{line}: {error}");
+        assert!(error.contains("; have the variable TMPDIR name"), "{error}");
+        assert!(!here.join("out").exists(), "{line}");
+    }
+}
+
 /// Of what is written the proxy finds room, and `scene.json`, which says what it rests on, finds none.
 #[test]
 fn a_scene_keeps_its_proxy_where_there_is_no_room_for_another() {

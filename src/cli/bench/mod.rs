@@ -18,7 +18,7 @@ use super::captured::Opened;
 use super::exposure::ExposureArgs;
 use super::inputs::{files_of, files_of_mesh, files_of_places, scenes_of};
 use super::options::DeviceName;
-use super::output::{print, print_json, say, write_file};
+use super::output::{print, print_json, say, temporary_folder, write_file};
 use super::session::progress;
 use super::stamp::{Stamp, changes, in_unicode, stamps};
 use super::targets::check_folder;
@@ -311,7 +311,7 @@ fn measure_one(
             interior::measure(interior, &contents, model, painter, name, effort, bar)
         }
         Given::Synthetic(dataset) => {
-            let folder = tempfile::tempdir()?;
+            let folder = temporary_folder()?;
             let options = datasets::Options {
                 size: (!effort.thorough).then_some((480, 360)),
                 ..datasets::Options::default()
