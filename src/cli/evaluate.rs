@@ -9,7 +9,7 @@ use super::output::{print, print_json};
 use super::report::Report;
 use super::session::{Session, progress};
 use super::surface::ProxyArgs;
-use super::targets::{check_folder, check_inputs, check_no_photos, others};
+use super::targets::{check_folder, check_in_no_part, check_inputs, check_no_photos, others};
 use super::time::TimeArgs;
 use super::took::Start;
 use anyhow::bail;
@@ -87,6 +87,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let scene = args.scene.open()?;
     if let Some(folder) = output {
         check_no_photos(folder, &scene)?;
+        check_in_no_part(folder, "-o")?;
     }
     let held_out = held_out(args, &scene)?;
     // What cannot be compared is said at once: fitting a proxy may take long.

@@ -11,7 +11,7 @@ use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
 use super::output::{make_parent, print, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
-use super::targets::{check_file, check_inputs};
+use super::targets::{check_file, check_file_in_no_part, check_inputs};
 use super::time::{AtArgs, Clock, TimeArgs};
 use anyhow::anyhow;
 use calibrate::{Pixel, View};
@@ -86,16 +86,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         (args.weights.as_ref(), "--weights"),
         (args.triangulation.as_ref(), "--triangulation"),
     ];
-    let mut files: Vec<&Path> = Vec::new();
+    let mut files: Vec<(&Path, &str)> = Vec::new();
     for (file, option) in outputs {
         let Some(file) = file else {
             continue;
         };
         check_file(file, option)?;
-        files.push(file);
+        files.push((file.as_path(), option));
     }
     let mut scene = args.scene.open()?;
-    check_inputs(files, &files_behind_scene(&args.scene.scene, &scene))?;
+    let inputs = files_behind_scene(&args.scene.scene, &scene);
+    check_inputs(files.iter().map(|(file, _)| *file), &inputs)?;
+    for (file, option) in files {
+        check_file_in_no_part(file, option)?;
+    }
     let mut without = args.hold_out.names(&scene)?;
     let photo = scene.name_here(&args.view);
     if args.without_view {

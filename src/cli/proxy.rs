@@ -7,7 +7,7 @@ use super::inputs::files_behind_scene;
 use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
-use super::targets::{check_apart, check_file, check_scene_folder};
+use super::targets::{check_apart, check_file, check_file_in_no_part, check_scene_folder};
 use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::{Context, bail};
 use calibrate::{Pixel, View};
@@ -141,6 +141,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let named = [&args.mesh, &args.hold_out.hold_out].into_iter();
         inputs.extend(named.flatten().cloned());
         check_apart("the proxy is", "-o", [file.as_path()], &inputs)?;
+        check_file_in_no_part(file, "-o")?;
     } else if let Some(folder) = &scene.folder {
         check_scene_folder(folder)?;
     }

@@ -13,7 +13,9 @@ use super::session::{Session, progress};
 use super::shot::say_other_look;
 use super::stamp::in_unicode;
 use super::surface::ProxyArgs;
-use super::targets::{check_film, check_folder, check_inputs, check_no_photos, others};
+use super::targets::{
+    check_film, check_folder, check_in_no_part, check_inputs, check_no_photos, others,
+};
 use super::time::{AtArgs, TimeArgs};
 use super::took::Start;
 use calibrate::View;
@@ -97,6 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let kept = files_behind_scene(&args.scene.scene, &scene);
     check_film(args.film.file(), &kept)?;
     check_no_photos(&args.output, &scene)?;
+    check_in_no_part(&args.output, "-o")?;
     let without = args.hold_out.names(&scene)?;
     let asked = asked.in_scene(&scene);
     // What need not be derived is checked first: fitting a proxy may take long.

@@ -87,9 +87,13 @@ pub(super) fn check_inputs<'a>(
     check_apart("pictures are", "-o", files, inputs)
 }
 
-/// The same of the film that frames become.
+/// The same of the film that frames become, which is to be no part of a scene either.
 pub(super) fn check_film(file: Option<&Path>, inputs: &[PathBuf]) -> anyhow::Result<()> {
-    check_apart("the film is", "--video", file, inputs)
+    check_apart("the film is", "--video", file, inputs)?;
+    match file {
+        None => Ok(()),
+        Some(file) => check_file_in_no_part(file, "--video"),
+    }
 }
 
 /// The same of whatever else is made: `what` begins the sentence, as in `the path is`, and `option` names the file.
@@ -111,6 +115,39 @@ pub(super) fn check_apart<'a>(
         Some(file) => bail!(
             "{}: {what} made of this very file; nothing was written: choose another {option}",
             file.display()
+        ),
+    }
+}
+
+/// Fails where files are to be written into a folder that is a part of a scene, or lies in one: that scene could not be
+/// imported again, as they would go with it. The option names it.
+pub(super) fn check_in_no_part(folder: &Path, option: &str) -> anyhow::Result<()> {
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| PathBuf::from("."));
+    check_no_part_around(&whole, folder, option)
+}
+
+/// The same of the folder that a file is to lie in.
+pub(super) fn check_file_in_no_part(file: &Path, option: &str) -> anyhow::Result<()> {
+    let whole = std::path::absolute(file)?;
+    check_no_part_around(whole.parent().unwrap_or(&whole), file, option)
+}
+
+/// The same of an absolute path to a folder; `named` is what is to be written, as it was given.
+fn check_no_part_around(whole: &Path, named: &Path, option: &str) -> anyhow::Result<()> {
+    // With what is to be made in what is there.
+    let there = whole.ancestors().find(|path| path.exists());
+    let real = there.and_then(|there| {
+        let missing = whole.strip_prefix(there).ok()?;
+        Some(there.canonicalize().ok()?.join(missing))
+    });
+    let real = real.unwrap_or_else(|| whole.to_owned());
+    match real.ancestors().find(|path| Scene::is_part(path)) {
+        None => Ok(()),
+        Some(part) => bail!(
+            "{}: {} is part of a scene, and what else lies there keeps that from being imported again; choose another \
+             {option}",
+            named.display(),
+            part.display()
         ),
     }
 }

@@ -18,7 +18,7 @@ use super::references::{ReferenceArgs, before_ldis};
 use super::report::is_empty;
 use super::session::progress;
 use super::shot::say_other_look;
-use super::targets::{check_film, check_folder, others};
+use super::targets::{check_film, check_folder, check_in_no_part, others};
 use super::took::Start;
 use anyhow::{Context, bail};
 use calibrate::View;
@@ -165,6 +165,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     check_holds_none(&args.output)?;
     check_folder(&args.output)?;
+    check_in_no_part(&args.output, "-o")?;
     args.film.check(&args.output)?;
     // 2. What there is.
     let warn = |text| say!("warning: {text}");

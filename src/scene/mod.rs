@@ -28,6 +28,7 @@ mod named;
 mod names;
 mod observed;
 mod own;
+mod parts;
 mod relative;
 mod rooms;
 mod silhouettes;

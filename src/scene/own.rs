@@ -1,7 +1,8 @@
 //! The surface that was made for a scene, and that its folder holds.
 
 use super::file::{Extra, ProxyEntry};
-use super::store::{PROXY_FILE, PROXY_MESH, SCENE_FILE, io, make_within, write_json};
+use super::parts::{PROXY_FILE, PROXY_MESH, SCENE_FILE};
+use super::store::{io, make_within, write_json};
 use super::{Scene, SceneError};
 use capture::{as_argument, without_byte_order_mark};
 use proxy::Proxy;

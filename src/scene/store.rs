@@ -1,48 +1,15 @@
 //! A scene's folder.
 
-use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::file::{PhotoEntry, SceneFile};
 use super::own::proxy_file;
+use super::parts::{COLMAP_FOLDER, FRAMES_FOLDER, MODEL_FOLDER, PARTS, SCENE_FILE, WORK_PREFIX};
 use super::relative::relative;
-use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
 use super::{Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
-use capture::without_byte_order_mark;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-
-/// The file that makes a folder a scene.
-pub(super) const SCENE_FILE: &str = "scene.json";
-const MODEL_FOLDER: &str = "model";
-pub(super) const PROXY_FILE: &str = "proxy.json";
-/// The same of one that is a mesh.
-pub(super) const PROXY_MESH: &str = "proxy.ply";
-/// In the order in which they take their places: a folder without the last is no scene.
-const PARTS: [&str; 9] = [
-    IMAGES_FOLDER,
-    MASKS_FOLDER,
-    MATTES_FOLDER,
-    SILHOUETTES_FOLDER,
-    DEPTH_FOLDER,
-    MODEL_FOLDER,
-    PROXY_FILE,
-    PROXY_MESH,
-    SCENE_FILE,
-];
-/// COLMAP's work, for photos without a calibration. Like the frames it stays when the scene
-/// is written again: both took long to make.
-const COLMAP_FOLDER: &str = "colmap";
-/// The photos that were taken out of a video.
-const FRAMES_FOLDER: &str = "photos";
-/// What [`capture::video::extract`] leaves of the latter if it is killed.
-const PARTIAL_FRAMES: &str = ".photos.partial";
-/// What the name begins with of earlier frames, if it is killed while it replaces them.
-const REPLACED_FRAMES: &str = ".photos.replaced-";
-/// What the name begins with of the folder that a scene is made in, within its own: only that
-/// is surely on the same disk.
-const WORK_PREFIX: &str = ".lumigraph-";
 
 impl Scene {
     /// Opens a scene's folder, or imports a capture's in memory with the defaults.
@@ -172,55 +139,6 @@ impl Scene {
     /// The folder of a scene for photos that are taken out of a video.
     pub fn frames_folder(folder: &Path) -> PathBuf {
         folder.join(FRAMES_FOLDER)
-    }
-
-    /// Whether a scene may be written to a folder.
-    ///
-    /// # Errors
-    /// The folder holds something: an earlier scene, unless `replace`; anything that is no
-    /// part of a scene, always.
-    pub fn check_free(folder: &Path, replace: bool) -> Result<(), SceneError> {
-        if !folder.exists() {
-            return Ok(());
-        }
-        let occupied = |problem: String| SceneError::Occupied {
-            path: folder.to_owned(),
-            problem,
-        };
-        let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
-        let is_scene = Self::is_scene(folder);
-        let mut parts = vec![COLMAP_FOLDER, FRAMES_FOLDER, PARTIAL_FRAMES];
-        // Without its file, only what is left of an import that was killed as its parts took
-        // their places: all else is somebody's own.
-        if is_scene || is_own_model(&folder.join(MODEL_FOLDER)) {
-            parts.extend([MODEL_FOLDER, PROXY_FILE, PROXY_MESH]);
-        }
-        if is_scene {
-            parts.extend([SCENE_FILE, SILHOUETTES_FOLDER]);
-        }
-        // Other photos are part of a scene only where it says that they are its own.
-        if is_scene && holds_photos(folder) {
-            parts.extend([IMAGES_FOLDER, MASKS_FOLDER, MATTES_FOLDER, DEPTH_FOLDER]);
-        }
-        for entry in entries {
-            let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let is_left = [REPLACED_FRAMES, WORK_PREFIX]
-                .iter()
-                .any(|prefix| name.starts_with(prefix));
-            if !is_left && !parts.contains(&name.as_str()) {
-                return Err(occupied(format!(
-                    "holds {name}, which is no part of a scene; choose another folder"
-                )));
-            }
-        }
-        if is_scene && !replace {
-            return Err(occupied(
-                "holds a scene already; replace it with --force, or choose another folder"
-                    .to_owned(),
-            ));
-        }
-        Ok(())
     }
 
     /// Writes the scene's files, complete or not at all. COLMAP's work and the frames of a
@@ -397,21 +315,6 @@ pub(super) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(
         source,
     })?;
     std::fs::write(path, text + "\n").map_err(|e| io(path, "write", e))
-}
-
-/// Whether a folder holds a model as scenes have it, and nothing else.
-fn is_own_model(folder: &Path) -> bool {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
-    names.sort();
-    names == ["cameras.txt", "images.txt", "points3D.txt"]
-}
-
-/// Whether the scene in a folder was undistorted into it.
-fn holds_photos(folder: &Path) -> bool {
-    let bytes = std::fs::read(folder.join(SCENE_FILE)).unwrap_or_default();
-    let text = without_byte_order_mark(&bytes);
-    serde_json::from_slice::<SceneFile>(text).is_ok_and(|file| file.settings.undistorted)
 }
 
 pub(super) fn io(path: &Path, doing: &'static str, source: std::io::Error) -> SceneError {

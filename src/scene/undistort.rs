@@ -79,7 +79,8 @@ impl Scene {
 
             // 2. The scene names them, where they will be.
             let mut unusable = Vec::new();
-            for (photo, written) in scene.photos.iter_mut().zip(written) {
+            let photos = scene.photos.iter_mut().zip(&new_names);
+            for ((photo, new_name), written) in photos.zip(written) {
                 match written {
                     Ok(Photo {
                         name,
@@ -103,7 +104,10 @@ impl Scene {
                         photo.name = name;
                     }
                     Err(error @ CaptureError::Write { .. }) => return Err(error.into()),
-                    Err(error) => unusable.push((photo.name.clone(), error)),
+                    Err(error) => {
+                        remove_photo(new_name, new);
+                        unusable.push((photo.name.clone(), error));
+                    }
                 }
             }
             let renamed: BTreeMap<&str, String> = self
@@ -150,18 +154,13 @@ fn write_photo(
     }
 
     // 2. What lies beside it, named after it.
-    let beside = |folder_name: &str| {
-        let mut name = new_name.as_os_str().to_owned();
-        name.push(".png");
-        Path::new(folder_name).join(name)
-    };
     let warped = |mask: GrayImage| {
         let mask = DynamicImage::from(mask).into_rgba8();
         DynamicImage::from(warp(&mask, size, KERNEL, footprint_of)).into_luma8()
     };
     let written = |folder_name: &str, mask: Option<GrayImage>| {
         let Some(mask) = mask else { return Ok(None) };
-        let file = beside(folder_name);
+        let file = beside(folder_name, new_name);
         write_mask(&folder.join(&file), &mask)?;
         Ok(Some(file))
     };
@@ -187,7 +186,7 @@ fn write_photo(
         Some(path) => {
             let steps = decode_depth_steps(path, &photo.name, photo_size)?;
             let steps = along_axis(steps, undistortion.lens());
-            let file = beside(DEPTH_FOLDER);
+            let file = beside(DEPTH_FOLDER, new_name);
             let steps = warp_depth_steps(&steps, size, footprint_of);
             write_depth_steps(&folder.join(&file), &steps)?;
             Some(file)
@@ -203,6 +202,31 @@ fn write_photo(
         depth_map,
         ..photo.clone()
     })
+}
+
+/// The file of what lies beside a photo, by its path from the scene's folder.
+fn beside(folder_name: &str, new_name: &Path) -> PathBuf {
+    let mut name = new_name.as_os_str().to_owned();
+    name.push(".png");
+    Path::new(folder_name).join(name)
+}
+
+/// Removes what [`write_photo`] wrote into the scene's folder before it failed: no part of the scene.
+fn remove_photo(new_name: &Path, folder: &Path) {
+    let folders = [
+        MASKS_FOLDER,
+        MATTES_FOLDER,
+        SILHOUETTES_FOLDER,
+        DEPTH_FOLDER,
+    ];
+    let files = folders.map(|folder_name| beside(folder_name, new_name));
+    for file in files
+        .into_iter()
+        .chain([Path::new(IMAGES_FOLDER).join(new_name)])
+    {
+        // Most of them are not there.
+        let _ = std::fs::remove_file(folder.join(file));
+    }
 }
 
 /// A depth map's steps along the axis, 0 for what lies aside or behind.

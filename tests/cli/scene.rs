@@ -147,6 +147,74 @@ fn a_model_or_a_proxy_of_somebodys_own_stays() {
 }
 
 #[test]
+fn what_is_somebodys_own_within_a_scenes_parts_stays() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    lumigraph(here, "import wall -o thin").ok();
+    for file in [
+        "flat/masks/0000.png.png",
+        "flat/images/mine.png",
+        "flat/images/deep/er/notes.txt",
+        "flat/depth/mine.txt",
+        "flat/mattes",
+        "flat/model/mine.txt",
+        "thin/model/fr/frame_0000.png",
+        "thin/silhouettes/0000.png",
+        "thin/proxy.json/mine.txt",
+    ] {
+        let path = here.join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "mine").unwrap();
+        let before = files(here);
+        let (scene, name) = file.split_once('/').unwrap();
+        for more in ["", " --force", " --undistort --force"] {
+            let error = lumigraph(here, &format!("import wall{more} -o {scene}")).error(1);
+            let said = format!("{scene}: holds {name}, which the scene does not name and would");
+            assert!(error.starts_with(&said), "{more}: {error}");
+            assert!(files(here) == before, "{file}");
+        }
+        fs::remove_file(path).unwrap();
+    }
+    // Empty folders are no matter.
+    lumigraph(here, "import wall --undistort --force -o flat").ok();
+    lumigraph(here, "import wall --force -o thin").ok();
+    assert!(!here.join("flat/images/deep").exists());
+
+    // Nor is anything written there that would be in the way.
+    let before = files(here);
+    let size = "--proxy plane --size 48x36";
+    let film = format!("render wall --path sweep --frames 2 {size}");
+    for line in [
+        format!("{film} -o thin/model/fr"),
+        format!("{film} -o thin/silhouettes"),
+        format!("{film} -o thin/proxy.json/new"),
+        format!("{film} -o flat/images/new"),
+        format!("evaluate wall --every 3 {size} -o flat/masks"),
+        format!("field wall --view 0000.png {size} -o thin/model/field.png"),
+        format!("field wall --view 0000.png {size} -o f.png --weights flat/depth/f.npz"),
+        "proxy wall plane -o thin/model/p.json".to_owned(),
+    ] {
+        let error = lumigraph(here, &line).error(1);
+        assert!(error.contains(" is part of a scene, and"), "{error}");
+        assert!(files(here) == before, "{line}");
+    }
+}
+
+#[test]
+fn what_is_left_of_a_photo_that_is_left_out_is_no_part_of_the_scene() {
+    let folder = with_wall();
+    let here = folder.path();
+    // Found when the photo itself is written already.
+    let depth = here.join("wall/depth/0003.png");
+    let bytes = fs::read(&depth).unwrap();
+    fs::write(&depth, &bytes[..bytes.len() / 2]).unwrap();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    assert!(!here.join("flat/images/0003.png").exists());
+    lumigraph(here, "import wall --undistort --force -o flat").ok();
+}
+
+#[test]
 fn a_scene_whose_photos_went_or_that_lies_says_so() {
     let folder = with_wall();
     lumigraph(folder.path(), "import wall -o scene").ok();
