@@ -1,7 +1,7 @@
-//! Folders that are made beside their place, and take it once they are complete; and that one process at a time holds.
+//! Folders that are made beside their place, and take it once they are complete.
 
 use std::ffi::OsString;
-use std::fs::{self, File, TryLockError};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -35,29 +35,6 @@ pub fn place_of(folder: &Path) -> io::Result<PathBuf> {
 pub fn beside(place: &Path, what: &str) -> PathBuf {
     let name = place.file_name().unwrap_or_default().to_string_lossy();
     place.with_file_name(format!(".{name}.{what}"))
-}
-
-/// What comes of trying to hold a folder.
-#[derive(Debug)]
-pub enum Hold {
-    /// It is held until this is dropped or the process ends, however that ends. Programs that it starts hold nothing.
-    Held(File),
-    /// Another process holds it, or this one does already.
-    Taken,
-    /// It cannot be held: it is not there, or the system or the disk locks no folders.
-    Unknown,
-}
-
-/// Tries to hold a folder against all that try the same. Nothing else is kept from it.
-pub fn try_hold(folder: &Path) -> Hold {
-    let Ok(folder) = File::open(folder) else {
-        return Hold::Unknown;
-    };
-    match folder.try_lock() {
-        Ok(()) => Hold::Held(folder),
-        Err(TryLockError::WouldBlock) => Hold::Taken,
-        Err(TryLockError::Error(_)) => Hold::Unknown,
-    }
 }
 
 /// Gives a new folder the place of another, which goes, if there is one. `place` is as

@@ -13,6 +13,7 @@ mod decode;
 mod error;
 mod exif;
 pub mod folder;
+pub mod hold;
 mod jpeg;
 mod photo_set;
 mod resize;

@@ -1,7 +1,7 @@
 //! A scene's folder in which one import at a time has COLMAP work, or takes frames out of a video.
 
 use anyhow::{Context, bail};
-use capture::folder::{Hold, try_hold};
+use capture::hold::{Taken, hold_now};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
@@ -35,9 +35,9 @@ pub(super) fn hold(scene: &Path) -> anyhow::Result<Held> {
     let mut made = Made(missing.map(Path::to_owned).collect());
     fs::create_dir_all(scene)
         .with_context(|| format!("{}: cannot make the folder", scene.display()))?;
-    let lock = match try_hold(scene) {
-        Hold::Held(lock) => Some(lock),
-        Hold::Taken => {
+    let lock = match hold_now(scene) {
+        Ok(lock) => lock,
+        Err(Taken) => {
             // It may be empty yet, and is the other's.
             made.0.clear();
             bail!(
@@ -45,7 +45,6 @@ pub(super) fn hold(scene: &Path) -> anyhow::Result<Held> {
                 scene.display()
             );
         }
-        Hold::Unknown => None,
     };
     Ok(Held {
         _made: made,

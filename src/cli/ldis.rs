@@ -20,7 +20,7 @@ use std::time::Instant;
 /// They lie in the interior's folder, in ldi/: one for each side of each portal, several with
 /// --ldi-views. `walk` and `view` read those that were made with the same options, of files as
 /// they are now, and make the rest; the pictures are the same. Run again, it makes what is
-/// missing; after a change, all of them.
+/// missing; after a change, all of them. One run at a time may be at work on an interior.
 ///
 ///     lumigraph ldis house
 ///     lumigraph ldis house --ldi-views 3
@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let photos = opened.photos.as_ref();
     let made = Made::new(&opened.file, &files, &options.library, &painter, photos)?;
     let folder = folder_of(&opened.file).join(FOLDER);
-    made.begin(&folder, |text| say!("note: {text}"))?;
+    let _held = made.begin(&folder, |text| say!("note: {text}"))?;
     // 3. What is missing.
     let mut notes = Notes::default();
     let note = before_ldis(&options.library, &mut painter);

@@ -1,15 +1,16 @@
 //! What the LDIs in an interior's folder were made of, and whether that is what there is now.
 
 use super::captured::Photos;
-use super::output::write_file;
+use super::output::{make_parent, write_file};
 use super::stamp::{Stamp, changes, stamps};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
+use capture::hold::{Taken, hold_now};
 use lumigraph::scene::relative_lossy;
 use render::interior::{LdiSource, LibraryOptions, Painter};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
-use std::fs::read_dir;
+use std::fs::{File, read_dir};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -144,10 +145,25 @@ impl Made {
         others.map(told).collect()
     }
 
-    /// Begins a folder, or goes on with it: what is there of other LDIs is removed, and `say` told so.
-    pub(super) fn begin(&self, folder: &Path, say: impl FnOnce(String)) -> anyhow::Result<()> {
+    /// Begins a folder, or goes on with it: what is there of other LDIs is removed, and `say` told so. What comes back
+    /// is to be kept until the last of them is written: of another run's no file says what it was made with.
+    ///
+    /// # Errors
+    /// Another run has begun and not ended; files that cannot be read, removed or written.
+    pub(super) fn begin(
+        &self,
+        folder: &Path,
+        say: impl FnOnce(String),
+    ) -> anyhow::Result<Option<File>> {
+        make_parent(&folder.join(FILE))?;
+        let held = hold_now(folder).map_err(|Taken| {
+            anyhow!(
+                "{}: another `lumigraph ldis` is at work here; wait until it has ended, and try again",
+                folder.display()
+            )
+        })?;
         let why = match self.find(folder)? {
-            Found::Same => return Ok(()),
+            Found::Same => return Ok(held),
             Found::Other(how) => Some(how),
             Found::None => None,
         };
@@ -166,7 +182,8 @@ impl Made {
         write_file(
             &folder.join(FILE),
             &serde_json::to_vec_pretty(self).context(FILE)?,
-        )
+        )?;
+        Ok(held)
     }
 }
 
@@ -231,4 +248,36 @@ fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 fn is_ldi(file: &Path) -> bool {
     let name = file.file_name().and_then(OsStr::to_str).unwrap_or_default();
     name.ends_with(".ldi") || name.ends_with(".ldi.part")
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_one_runs_until_it_ends() {
+        let of = |size: u32| Made {
+            version: VERSION,
+            program: "1".to_owned(),
+            options: Map::from_iter([("size".to_owned(), json!([size, size]))]),
+            inputs: Vec::new(),
+        };
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("house/ldi");
+        let begin = |size: u32| of(size).begin(&folder, |_| ());
+        let held = begin(64).unwrap();
+        if held.is_none() {
+            eprintln!("SKIPPED: no folder can be held here");
+            return;
+        }
+        for size in [64, 128] {
+            let error = begin(size).unwrap_err().to_string();
+            let said = format!("{}: another `lumigraph ldis` is at work", folder.display());
+            assert!(error.starts_with(&said), "{error}");
+            assert!(matches!(of(64).find(&folder), Ok(Found::Same)));
+        }
+        drop(held);
+        begin(128).unwrap();
+        assert!(matches!(of(128).find(&folder), Ok(Found::Same)));
+    }
 }

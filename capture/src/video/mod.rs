@@ -91,7 +91,7 @@ const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
 /// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
 /// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
 /// whole frames ([`choose()`]). Two extractions at once into one folder take each other's frames away: whoever starts
-/// them keeps them apart ([`try_hold`](crate::folder::try_hold)). Frames whose pixels are not square are drawn out as `shape` says.
+/// them keeps them apart ([`hold_now`](crate::hold::hold_now)). Frames whose pixels are not square are drawn out as `shape` says.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame; a folder that

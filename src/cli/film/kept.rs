@@ -3,13 +3,12 @@
 use super::super::output::{make_parent, write_file};
 use super::super::stamp::{Stamp, changes, in_unicode, stamps};
 use anyhow::{Context, anyhow, bail};
-use capture::folder::{Hold, try_hold};
+use capture::hold::hold;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// What the frames of a folder were made with.
 #[derive(Serialize, Deserialize)]
@@ -35,25 +34,6 @@ fn file_in(folder: &Path) -> PathBuf {
 /// A picture as a plan in a folder names it.
 fn name_in(folder: &Path, picture: &Path) -> PathBuf {
     in_unicode(picture.strip_prefix(folder).unwrap_or(picture))
-}
-
-/// How often, and how far apart, a run tries to hold a folder: ten seconds together. Others hold it for as long as
-/// writing the plan and removing a film's frames takes.
-const TRIES: u32 = 1000;
-const BETWEEN: Duration = Duration::from_millis(10);
-
-/// Holds a folder, until what comes back is dropped or the process ends, against other runs that change its plan.
-/// `None` where that cannot be: systems and disks that lock no folders; another run that was stopped meanwhile. Then a
-/// change that another run makes at the same moment may be lost.
-fn hold(folder: &Path) -> Option<File> {
-    for _ in 0..TRIES {
-        match try_hold(folder) {
-            Hold::Held(held) => return Some(held),
-            Hold::Taken => std::thread::sleep(BETWEEN),
-            Hold::Unknown => return None,
-        }
-    }
-    None
 }
 
 impl Plan {

@@ -96,7 +96,7 @@ pub fn colmap() -> Tool {
 
 /// Calibrates photos in the folder `work`, which is made where it is missing. What an
 /// earlier run with the same photos and options finished there is not done again. Two runs at once would take each
-/// other's work away: whoever starts them keeps them apart ([`capture::folder::try_hold`]).
+/// other's work away: whoever starts them keeps them apart ([`capture::hold::hold_now`]).
 ///
 /// # Errors
 /// Less than two photos; COLMAP is missing, fails or finds no model; files that cannot be
