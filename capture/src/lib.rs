@@ -47,4 +47,4 @@ pub use times::{
 };
 pub use tool::{Tool, ToolError, fingerprint};
 pub use warp::{Footprint, Kernel, warp, warp_depth_steps};
-pub use write::{copy_photo, write_depth_steps, write_mask, write_png, write_whole};
+pub use write::{copy_photo, is_left_of, write_depth_steps, write_mask, write_png, write_whole};

@@ -70,6 +70,16 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> i
     written
 }
 
+/// Whether a file of this name is what [`write_whole`] leaves beside that called `whole` if it is killed.
+pub fn is_left_of(name: &str, whole: &str) -> bool {
+    let number = name.strip_prefix('.').and_then(|rest| {
+        rest.strip_prefix(whole)?
+            .strip_prefix('.')?
+            .strip_suffix(".tmp")
+    });
+    number.is_some_and(|number| number.parse::<u32>().is_ok())
+}
+
 /// [`write_whole`] in folders that are made where they are missing.
 fn write(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), CaptureError> {
     let written = write_whole(path, |temporary| {

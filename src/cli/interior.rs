@@ -590,8 +590,9 @@ fn beside_interior(folder: &Path) -> anyhow::Result<Option<String>> {
     for name in &names {
         let (path, shown) = (folder.join(name), name.to_string_lossy());
         if name == made::FOLDER {
-            if !made::is_ours(&path) {
-                return Ok(Some(format!("what is no LDI in {shown}")));
+            if let Some(other) = made::beside_ldis(&path) {
+                let other = other.strip_prefix(folder).unwrap_or(&other);
+                return Ok(Some(other.display().to_string()));
             }
         } else if path.extension().is_some_and(|e| e == "glb") {
             models.push(shown);

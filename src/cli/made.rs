@@ -5,6 +5,7 @@ use super::output::{make_parent, write_file};
 use super::stamp::{Stamp, changes, stamps};
 use anyhow::{Context, anyhow};
 use capture::hold::{Taken, hold_now};
+use capture::is_left_of;
 use lumigraph::scene::relative_lossy;
 use render::interior::{LdiSource, LibraryOptions, Painter};
 use serde::{Deserialize, Serialize};
@@ -162,22 +163,19 @@ impl Made {
                 folder.display()
             )
         })?;
+        let there = entries(folder)?;
+        // Of a run that was killed as it wrote what it makes them of.
+        remove(there.iter().filter(|file| is_unfinished(file)))?;
         let why = match self.find(folder)? {
             Found::Same => return Ok(held),
             Found::Other(how) => Some(how),
             Found::None => None,
         };
-        let old: Vec<PathBuf> = match folder.is_dir() {
-            true => entries(folder)?.into_iter().filter(|f| is_ldi(f)).collect(),
-            false => Vec::new(),
-        };
+        let old: Vec<&PathBuf> = there.iter().filter(|file| is_ldi(file)).collect();
         if let Some(why) = why.filter(|_| !old.is_empty()) {
             say(format!("{} {why}; it is made anew", folder.display()));
         }
-        for file in old {
-            let failed = || format!("{}: cannot be removed", file.display());
-            std::fs::remove_file(&file).with_context(failed)?;
-        }
+        remove(old)?;
         // Before any LDI: what lies there without it is of something else.
         write_file(
             &folder.join(FILE),
@@ -230,18 +228,35 @@ pub(super) fn folder_of(file: &Path) -> &Path {
     }
 }
 
-/// Whether a folder holds LDIs, and nothing else.
-pub(super) fn is_ours(folder: &Path) -> bool {
-    let is_own = |file: &PathBuf| {
-        let name = file.file_name().and_then(OsStr::to_str);
-        is_ldi(file) || name.is_some_and(|name| name.strip_suffix(".tmp").unwrap_or(name) == FILE)
+/// What a folder holds besides LDIs and what says of what they were made: the first by name, or the folder where that
+/// cannot be listed.
+pub(super) fn beside_ldis(folder: &Path) -> Option<PathBuf> {
+    let Ok(files) = entries(folder) else {
+        return Some(folder.to_owned());
     };
-    entries(folder).is_ok_and(|files| files.iter().all(is_own))
+    let is_own = |file: &Path| is_ldi(file) || is_unfinished(file) || file.ends_with(FILE);
+    files.into_iter().filter(|file| !is_own(file)).min()
+}
+
+/// Removes files.
+fn remove<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> anyhow::Result<()> {
+    for file in files {
+        let failed = || format!("{}: cannot be removed", file.display());
+        std::fs::remove_file(file).with_context(failed)?;
+    }
+    Ok(())
 }
 
 fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let all = read_dir(folder).and_then(|all| all.map(|e| e.map(|e| e.path())).collect());
     all.with_context(|| format!("{}: cannot read", folder.display()))
+}
+
+/// What was written in place of the file that says of what LDIs were made, and not to its end: by this version, or an
+/// earlier one.
+fn is_unfinished(file: &Path) -> bool {
+    let name = file.file_name().and_then(OsStr::to_str).unwrap_or_default();
+    is_left_of(name, FILE) || name.strip_suffix(".tmp") == Some(FILE)
 }
 
 /// An LDI's file, or one that was not written to its end.
