@@ -29,7 +29,7 @@ pub fn hold_now(folder: &Path) -> Result<Option<File>, Taken> {
     }
 }
 
-/// The same, once others no longer hold it; `None` also where another run was stopped meanwhile. Then a change that
+/// [`hold_now`], once others no longer hold the folder; `None` also where another run was stopped meanwhile. Then a change that
 /// another run makes at the same moment may be lost.
 pub fn hold(folder: &Path) -> Option<File> {
     for _ in 0..TRIES {

@@ -126,6 +126,12 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // Before what may take hours.
     check_folder(&args.output)?;
+    if Scene::put_back(&args.output)? {
+        say!(
+            "note: {}: an import was stopped as its scene took the place of another here; that one is back",
+            args.output.display()
+        );
+    }
     Scene::check_free(&args.output, args.force)?;
     let given = [&args.calibration, &args.masks, &args.mattes, &args.depth];
     let inputs = given.into_iter().flatten().chain([&args.photos]).cloned();

@@ -29,6 +29,7 @@ mod names;
 mod observed;
 mod own;
 mod parts;
+mod put_back;
 mod relative;
 mod rooms;
 mod silhouettes;

@@ -176,7 +176,7 @@ fn named_files(folder: &Path) -> BTreeSet<PathBuf> {
 }
 
 /// What makes a folder a scene, if that can be read.
-fn scene_file(folder: &Path) -> Option<SceneFile> {
+pub(super) fn scene_file(folder: &Path) -> Option<SceneFile> {
     let bytes = std::fs::read(folder.join(SCENE_FILE)).ok()?;
     serde_json::from_slice(without_byte_order_mark(&bytes)).ok()
 }

@@ -3,10 +3,12 @@
 use super::file::{PhotoEntry, SceneFile};
 use super::own::proxy_file;
 use super::parts::{COLMAP_FOLDER, FRAMES_FOLDER, MODEL_FOLDER, PARTS, SCENE_FILE, WORK_PREFIX};
+use super::put_back::{NEW_FOLDER, OLD_FOLDER};
 use super::relative::relative;
 use super::{Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
+use capture::hold::hold_now;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -230,6 +232,8 @@ impl Scene {
         // 1. Everything into a folder within it, which goes away on errors.
         std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
         let (made, new) = make_within(folder)?;
+        // So that no other import takes it for what is left of one that was killed.
+        let _held = hold_now(made.path());
         fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
@@ -239,7 +243,7 @@ impl Scene {
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
         // 2. They take their places.
-        let old = made.path().join("old");
+        let old = made.path().join(OLD_FOLDER);
         std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
         let exchanged = exchange(&PARTS, &new, folder, &old);
         if exchanged.is_err() && std::fs::remove_dir(&old).is_err() {
@@ -302,7 +306,7 @@ pub(super) fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneErro
         .prefix(WORK_PREFIX)
         .tempdir_in(folder)
         .map_err(|e| io(folder, "make a folder within", e))?;
-    let new = made.path().join("scene");
+    let new = made.path().join(NEW_FOLDER);
     std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
     Ok((made, new))
 }

@@ -4,8 +4,9 @@ use crate::run::{files, lumigraph, with_wall};
 use calibrate::colmap;
 use serde_json::{Value, json};
 use std::fs;
+use std::path::{Path, PathBuf};
 
-fn read(path: &std::path::Path) -> Value {
+fn read(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
@@ -212,6 +213,71 @@ fn what_is_left_of_a_photo_that_is_left_out_is_no_part_of_the_scene() {
     lumigraph(here, "import wall --undistort -o flat").ok();
     assert!(!here.join("flat/images/0003.png").exists());
     lumigraph(here, "import wall --undistort --force -o flat").ok();
+}
+
+#[test]
+fn a_scene_that_was_to_be_replaced_is_put_back_where_that_was_killed() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall --undistort -o flat").ok();
+    lumigraph(here, "proxy flat plane").ok();
+    lumigraph(here, "import wall -o thin").ok();
+    let copy = |from: &str, to: &Path| {
+        for (name, bytes) in files(&here.join(from)) {
+            let path = to.join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, bytes).unwrap();
+        }
+    };
+    // In the order in which they take their places.
+    let parts = |scene: &str| -> Vec<&'static str> {
+        let all = ["images", "depth", "model", "proxy.json", "scene.json"].into_iter();
+        all.filter(|part| here.join(scene).join(part).exists())
+            .collect()
+    };
+    let scene = here.join("scene");
+    let work = scene.join(".lumigraph-abc");
+    let [new, old] = ["scene", "old"].map(|name| work.join(name));
+    // What an import leaves that is killed after so many renames.
+    let kill = |before: Option<&str>, after: &str, renames: usize| {
+        copy(after, &new);
+        fs::create_dir(&old).unwrap();
+        if let Some(before) = before {
+            copy(before, &scene);
+        }
+        let leaving = before.map_or(Vec::new(), parts).into_iter().rev();
+        let leaving = leaving.map(|part| (scene.join(part), old.join(part)));
+        let coming = parts(after).into_iter();
+        let coming = coming.map(|part| (new.join(part), scene.join(part)));
+        let all: Vec<(PathBuf, PathBuf)> = leaving.chain(coming).collect();
+        for (from, to) in &all[..renames] {
+            fs::rename(from, to).unwrap();
+        }
+        all.len()
+    };
+    for (before, after) in [("flat", "thin"), ("thin", "flat"), ("flat", "flat")] {
+        let all = parts(before).len() + parts(after).len();
+        for renames in 1..all {
+            assert_eq!(kill(Some(before), after, renames), all);
+            let ran = lumigraph(here, "import wall -o scene");
+            let said = "note: scene: an import was stopped as its scene took the place of another here; that one is back";
+            assert!(ran.stderr.contains(said), "{}", ran.stderr);
+            let error = ran.error(1);
+            assert!(error.contains("holds a scene already"), "{error}");
+            fs::remove_dir_all(&work).unwrap();
+            let is_back = files(&scene) == files(&here.join(before));
+            assert!(is_back, "{before}, {after}, {renames}");
+            fs::remove_dir_all(&scene).unwrap();
+        }
+    }
+    // A first import has nothing to go back to.
+    for renames in [1, 4] {
+        kill(None, "flat", renames);
+        let ran = lumigraph(here, "import wall -o scene").ok();
+        assert!(!ran.stderr.contains("an import was"), "{}", ran.stderr);
+        assert!(!scene.join("images").exists());
+        fs::remove_dir_all(&scene).unwrap();
+    }
 }
 
 #[test]

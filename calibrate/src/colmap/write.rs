@@ -116,7 +116,13 @@ fn write(
         write_one(&path, |out| write_file(reconstruction, out)).map_err(failed(&path))?;
     }
 
-    // 3. All three are complete: give them their names.
+    // 3. All three are complete: give them their names. One of an earlier model's goes first, so that a process which is
+    // killed between them leaves no model, rather than one of both.
+    let [.., points] = &files;
+    match fs::remove_file(points) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(points)(error)),
+        _ => {}
+    }
     for (path, file) in temporary.0.iter().zip(&files) {
         fs::rename(path, file).map_err(failed(file))?;
     }

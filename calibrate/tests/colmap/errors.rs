@@ -428,6 +428,19 @@ fn a_text_model_is_not_hidden_behind_a_binary_one() {
     );
 }
 
+#[test]
+fn a_model_that_is_replaced_in_part_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_binary(&small(), folder.path()).unwrap();
+    // Of three renames the second fails.
+    fs::remove_file(at("images.bin")).unwrap();
+    fs::create_dir(at("images.bin")).unwrap();
+    let error = write_binary(&small(), folder.path()).unwrap_err();
+    assert!(error.to_string().contains("images.bin"), "{error}");
+    assert!(at("cameras.bin").exists() && !at("points3D.bin").exists());
+}
+
 /// COLMAP 4 cannot open three files of one model and rigs and frames of another.
 #[test]
 fn a_model_is_not_written_beside_the_rigs_of_another() {
