@@ -9,7 +9,7 @@ use anyhow::bail;
 use calibrate::export::{
     FrameFiles, check_colmap, check_colmap_text, has_board, opencv_yaml, transforms_json,
 };
-use calibrate::{Image, colmap};
+use calibrate::{Image, Reconstruction, colmap};
 use clap::ValueEnum;
 use lumigraph::scene::{DEPTH_UNITS_PER_STEP, Photo, Scene, SceneError, relative};
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 
 /// Write a scene's cameras, poses and points for other programs
 ///
-/// A COLMAP model is a folder; transforms.json (nerfstudio) and OpenCV's calibration are a
+/// A COLMAP model is a folder, and one that is there and says something else is replaced with
+/// --force alone; transforms.json (nerfstudio) and OpenCV's calibration are a
 /// file, which names the photos by their paths from where it lies, transforms.json their ignore
 /// masks, depth maps and times, too. Photos are not copied.
 /// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
@@ -33,6 +34,9 @@ pub(super) struct Args {
     /// Whose format
     #[arg(long, value_enum)]
     format: Format,
+    /// Replace another COLMAP model that PATH holds
+    #[arg(long)]
+    force: bool,
     /// The model's folder, or the file
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
@@ -81,6 +85,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         false => check_model_folder(&scene, output)?,
     }
     let whole = &scene.reconstruction;
+    if !is_file && !args.force {
+        check_no_other_model(whole, args.format, output)?;
+    }
     match args.format {
         Format::Colmap => {
             check_colmap(whole)?;
@@ -160,6 +167,31 @@ fn check_model_folder<'a>(scene: &'a Scene, output: &Path) -> anyhow::Result<()>
         );
     }
     Ok(())
+}
+
+/// Fails where a COLMAP model would be replaced, or hidden behind one in binary, that says anything else: it may be the
+/// only calibration that somebody's photos have. One that says the same, as an earlier export does, is no loss.
+fn check_no_other_model(
+    whole: &Reconstruction,
+    format: Format,
+    output: &Path,
+) -> anyhow::Result<()> {
+    // Of one in binary where text is to be written the writer tells.
+    let is_lost = |file: &PathBuf| {
+        let is_text = file.extension().is_some_and(|end| end == "txt");
+        (is_text || matches!(format, Format::Colmap)) && file.exists()
+    };
+    let Some(file) = model_files(output).into_iter().find(is_lost) else {
+        return Ok(());
+    };
+    if colmap::read_model(output).is_ok_and(|there| there == *whole) {
+        return Ok(());
+    }
+    bail!(
+        "{}: holds {}, of another COLMAP model; nothing was written: replace it with --force, or choose another -o",
+        output.display(),
+        file.file_name().unwrap_or_default().display()
+    )
 }
 
 /// The files of a scene's photos by the photos' names, as seen from a file's folder, and their times.

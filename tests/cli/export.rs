@@ -258,6 +258,41 @@ fn nothing_that_belongs_to_a_scene_is_written_over() {
     }
 }
 
+#[test]
+fn another_model_is_replaced_only_by_force() {
+    let folder = with_wall();
+    let here = folder.path();
+    for format in ["colmap", "colmap-text"] {
+        // The same as often as one likes.
+        let line = format!("export wall --format {format} -o {format}");
+        for _ in 0..2 {
+            lumigraph(here, &line).ok();
+        }
+        // One camera differs, by its last bit.
+        let own = model(&folder, format);
+        let mut other = own.clone();
+        let camera = other.cameras.values_mut().next().unwrap();
+        camera.params[0] = f64::from_bits(camera.params[0].to_bits() + 1);
+        match format {
+            "colmap" => colmap::write_binary(&other, &here.join(format)).unwrap(),
+            _ => colmap::write_text(&other, &here.join(format)).unwrap(),
+        }
+        let before = files(here);
+        let error = lumigraph(here, &line).error(1);
+        let said = format!("{format}: holds cameras.");
+        assert!(error.starts_with(&said), "{error}");
+        assert!(error.contains("replace it with --force"), "{error}");
+        assert!(files(here) == before);
+        lumigraph(here, &format!("{line} --force")).ok();
+        assert_eq!(model(&folder, format), own);
+    }
+    // Of one in part nobody knows what it says.
+    fs::create_dir(here.join("part")).unwrap();
+    fs::copy(here.join("colmap/images.bin"), here.join("part/images.bin")).unwrap();
+    let error = lumigraph(here, "export wall --format colmap -o part").error(1);
+    assert!(error.starts_with("part: holds images.bin, of"), "{error}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn files_name_no_path_that_is_not_utf_8() {
