@@ -1,7 +1,9 @@
 //! Folders that are made beside their place, and take it once they are complete.
 
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -31,10 +33,28 @@ pub fn place_of(folder: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// A hidden path beside a place, which is as [`place_of`] gives it.
+/// A hidden path beside a place, which is as [`place_of`] gives it. Whatever the length of the place's name, that of
+/// this one is one that disks take, up to a `what` of some fifty bytes.
 pub fn beside(place: &Path, what: &str) -> PathBuf {
     let name = place.file_name().unwrap_or_default().to_string_lossy();
-    place.with_file_name(format!(".{name}.{what}"))
+    place.with_file_name(format!(".{}.{what}", shortened(&name)))
+}
+
+/// How long the part of another name may be that a hidden one has, in bytes: disks take 255 for the whole.
+const LONGEST: usize = 200;
+
+/// A name, or the beginning of one that is longer than [`LONGEST`], and a hash of all of it.
+fn shortened(name: &str) -> Cow<'_, str> {
+    if name.len() <= LONGEST {
+        return Cow::Borrowed(name);
+    }
+    let mut hasher = DefaultHasher::new();
+    name.hash(&mut hasher);
+    let hash = format!("~{:016x}", hasher.finish());
+    let end = (0..=LONGEST - hash.len())
+        .rev()
+        .find(|end| name.is_char_boundary(*end));
+    Cow::Owned(name[..end.unwrap_or(0)].to_owned() + &hash)
 }
 
 /// Gives a new folder the place of another, which goes, if there is one. `place` is as

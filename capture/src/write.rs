@@ -1,4 +1,5 @@
 use crate::CaptureError;
+use crate::folder::beside;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{
     EncodableLayout, GrayImage, ImageBuffer, Luma, PixelWithColorType, Primitive, RgbaImage,
@@ -51,17 +52,13 @@ pub fn copy_photo(from: &Path, to: &Path) -> Result<(), CaptureError> {
 /// A path that does not end in a file's name; what `fill` fails with; a file that cannot be
 /// renamed.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    let name = path.file_name().ok_or_else(|| {
-        io::Error::new(
+    if path.file_name().is_none() {
+        return Err(io::Error::new(
             io::ErrorKind::InvalidInput,
             "the path does not end in a file's name",
-        )
-    })?;
-    let temporary = path.with_file_name(format!(
-        ".{}.{}.tmp",
-        name.to_string_lossy(),
-        std::process::id()
-    ));
+        ));
+    }
+    let temporary = beside(path, &format!("{}.tmp", std::process::id()));
     let written = fill(&temporary).and_then(|()| fs::rename(&temporary, path));
     if written.is_err() {
         // The error at hand is the one to report.

@@ -1,6 +1,7 @@
 //! Folders that take the place of others.
 
 use capture::folder::{beside, exchange, place_of, take_place};
+use capture::write_whole;
 use std::fs;
 use std::path::Path;
 
@@ -17,6 +18,34 @@ fn names(folder: &Path) -> Vec<String> {
 fn with_file(folder: &Path, file: &str) {
     fs::create_dir(folder).unwrap();
     fs::write(folder.join(file), file).unwrap();
+}
+
+#[test]
+fn names_as_long_as_disks_take_have_room_beside_them() {
+    let here = tempfile::tempdir().unwrap();
+    for name in ["n".repeat(255), "é".repeat(127), "ab".repeat(100)] {
+        let path = here.path().join(&name);
+        write_whole(&path, |temporary| {
+            assert_eq!(temporary.parent(), path.parent());
+            fs::write(temporary, "half")?;
+            fs::write(temporary, "whole")
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        fs::remove_file(&path).unwrap();
+        with_file(&path, "old");
+        let new = beside(&path, "partial-4194304");
+        with_file(&new, "new");
+        take_place(&new, &path).unwrap();
+        assert_eq!(names(&path), ["new"]);
+        assert_eq!(names(here.path()), [name.as_str()]);
+        fs::remove_dir_all(&path).unwrap();
+        // Of another name that begins so it is another.
+        let mut other = name;
+        other.pop();
+        let other = path.with_file_name(other + "x");
+        assert_ne!(beside(&path, "tmp"), beside(&other, "tmp"));
+    }
 }
 
 #[test]

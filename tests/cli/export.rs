@@ -259,6 +259,24 @@ fn nothing_that_belongs_to_a_scene_is_written_over() {
 }
 
 #[test]
+fn files_may_have_names_as_long_as_disks_take() {
+    let folder = with_wall();
+    let here = folder.path();
+    let name = format!("{}.json", "n".repeat(250));
+    lumigraph(here, &format!("export wall --format transforms -o {name}")).ok();
+    assert!(here.join(name).is_file());
+    let house = "h".repeat(255);
+    let line = format!("generate house --rooms 2 --triangles 1 -o {house}");
+    lumigraph(here, &line).ok();
+    lumigraph(
+        here,
+        &format!("interior {house}/house.glb --force -o {house}"),
+    )
+    .ok();
+    assert!(here.join(house).join("interior.json").is_file());
+}
+
+#[test]
 fn another_model_is_replaced_only_by_force() {
     let folder = with_wall();
     let here = folder.path();
