@@ -44,6 +44,12 @@ const ONE_PLACE: f64 = 1e-6;
 /// The mean rotation of cameras about a place near the end of a row is that of a place farther in, which may differ by
 /// more than they see. Wider ones show much the same, and the mean is smoother than a fit.
 const LONG: f64 = 2.5;
+/// Directions to within 10° of straight above or below something tell no azimuth.
+const POLE: f64 = PI / 18.0;
+/// The cameras leave gaps of azimuths below this where they go around something.
+const WIDEST_GAP: f64 = PI / 2.0;
+/// So many azimuths are an arc around something, where only one gap is wider.
+const LEAST_ARC: f64 = 2.0 * PI / 3.0;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
 
@@ -179,7 +185,8 @@ impl Capture {
     }
 
     /// The ring of cameras around an object, if that is what they are: most look at one
-    /// place, from directions more than 120° apart.
+    /// place, from directions more than 120° apart; those of cameras that look down on it may be
+    /// nearer to one another, if they are so far apart in plan with others in between.
     pub(super) fn ring(&self) -> Option<Ring> {
         let forwards: Vec<DVec3> = self
             .rotations
@@ -211,9 +218,7 @@ impl Capture {
             .filter_map(|c| (*c - focus).try_normalize())
             .collect();
         let apart = |(i, u): (usize, &DVec3)| from_focus[..i].iter().any(|v| u.dot(*v) < -0.5);
-        if !from_focus.iter().enumerate().any(apart) {
-            return None;
-        }
+        let is_opposed = from_focus.iter().enumerate().any(apart);
 
         // 2. Its axis: up as the cameras have it, or else across the ring.
         let across = || self.axes[2] * self.axes[2].dot(self.reference_up()).signum();
@@ -229,13 +234,14 @@ impl Capture {
             let (x, y, z) = (v.dot(zero), v.dot(quarter), v.dot(up));
             [y.atan2(x), z.atan2(x.hypot(y)), v.length()]
         };
-        Some(Ring {
+        let ring = Ring {
             focus,
             up,
             zero,
             quarter,
             cameras: self.centers.iter().map(spherical).collect(),
-        })
+        };
+        (is_opposed || ring.surrounds()).then_some(ring)
     }
 }
 
@@ -250,23 +256,27 @@ pub(super) struct Ring {
 }
 
 impl Ring {
+    /// Whether the cameras go around, or along an arc, in plan.
+    fn surrounds(&self) -> bool {
+        let aside = self.cameras.iter().filter(|c| c[1].abs() < PI / 2.0 - POLE);
+        let azimuths: Vec<f64> = aside.map(|c| c[0]).collect();
+        let are_most = 2 * azimuths.len() > self.cameras.len();
+        let mut widths: Vec<f64> = gaps(azimuths).iter().map(|gap| gap.0).collect();
+        widths.sort_by(|a, b| b.total_cmp(a));
+        let limits = [2.0 * PI - LEAST_ARC, WIDEST_GAP];
+        are_most && widths.iter().zip(limits).all(|(gap, limit)| *gap < limit)
+    }
+
     /// Azimuths from where to where, and whether that is all around: it is where no gap
     /// reaches 90°. Otherwise the gap is left out, and a tenth of the rest at both ends.
     pub(super) fn arc(&self) -> (f64, f64, bool) {
-        let mut azimuths: Vec<f64> = self.cameras.iter().map(|c| c[0]).collect();
-        azimuths.sort_by(f64::total_cmp);
-        let mut widest = (0.0, 0.0);
-        for (i, &a) in azimuths.iter().enumerate() {
-            let next = azimuths
-                .get(i + 1)
-                .copied()
-                .unwrap_or(azimuths[0] + 2.0 * PI);
-            if next - a > widest.0 {
-                widest = (next - a, next);
-            }
-        }
-        let (gap, start) = widest;
-        if gap < PI / 2.0 {
+        let gaps = gaps(self.cameras.iter().map(|c| c[0]).collect());
+        let wider = |widest: (f64, f64), gap: (f64, f64)| match gap.0 > widest.0 {
+            true => gap,
+            false => widest,
+        };
+        let (gap, start) = gaps.into_iter().fold((0.0, 0.0), wider);
+        if gap < WIDEST_GAP {
             return (0.0, 2.0 * PI, true);
         }
         let span = 2.0 * PI - gap;
@@ -292,6 +302,15 @@ impl Ring {
         let direction = level * elevation.cos() + self.up * elevation.sin();
         self.focus + direction * (distance / sum)
     }
+}
+
+/// The gaps between azimuths that follow one another, once around: how wide each is, and where it ends.
+fn gaps(mut azimuths: Vec<f64>) -> Vec<(f64, f64)> {
+    azimuths.sort_by(f64::total_cmp);
+    let again = azimuths.first().map(|first| first + 2.0 * PI);
+    let ends = azimuths.iter().copied().skip(1).chain(again);
+    let both = azimuths.iter().zip(ends);
+    both.map(|(start, end)| (end - start, end)).collect()
 }
 
 /// How far the scene is ahead of a camera that looks along a direction: the median depth of the points in its

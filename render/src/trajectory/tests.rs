@@ -59,6 +59,24 @@ fn ring(degrees: i32) -> Scene {
     scene(poses.collect(), vec![DVec3::ZERO; 9], DVec3::ZERO)
 }
 
+/// Cameras around the origin, 4 units off, so many degrees above its level, evenly over a part of a turn.
+fn ring_above(count: u32, elevation: f64, degrees: f64) -> Scene {
+    let elevation = elevation.to_radians();
+    let poses = (0..count).map(|i| {
+        let azimuth = (degrees * f64::from(i) / f64::from(count)).to_radians();
+        let level = DVec3::new(azimuth.cos(), 0.0, azimuth.sin());
+        let center = 4.0 * (level * elevation.cos() + DVec3::NEG_Y * elevation.sin());
+        Rigid3::looking_at(center, DVec3::ZERO, DVec3::NEG_Y)
+    });
+    scene(poses.collect(), vec![DVec3::ZERO; 9], DVec3::ZERO)
+}
+
+/// How far two photos that follow one another are apart.
+fn step(s: &Scene) -> f64 {
+    let [first, second] = [0, 1].map(|i| s.sources[i].view.center());
+    first.distance(second)
+}
+
 /// Forwards along a gentle curve.
 fn walk() -> Scene {
     let place = |i: i32| DVec3::new((0.1 * f64::from(i)).sin(), 0.0, 0.5 * f64::from(i));
@@ -200,6 +218,41 @@ fn an_orbit_looks_at_the_focus_and_goes_all_around() {
         .map(|c| (c.x - 3.0).abs())
         .fold(0.0, f64::max);
     assert!(widest > 1.0 && widest < 1.9, "{widest}");
+}
+
+/// Photos that look down on it steeply are less than 120° apart, seen from it.
+#[test]
+fn an_orbit_goes_around_what_photos_look_down_on() {
+    // The widest gap between azimuths.
+    let widest = |path: &CameraPath| {
+        let mut azimuths: Vec<f64> = centers(path).iter().map(|c| c.z.atan2(c.x)).collect();
+        azimuths.sort_by(f64::total_cmp);
+        let around = azimuths[0] + TAU - azimuths[119];
+        let between = azimuths.windows(2).map(|pair| pair[1] - pair[0]);
+        between.fold(around, f64::max)
+    };
+    for elevation in [0.0, 29.0, 31.0, 45.0, 60.0, 72.0] {
+        for count in [8, 16, 36] {
+            let s = ring_above(count, elevation, 360.0);
+            let around = path(Trajectory::Orbit, &s);
+            let gap = widest(&around);
+            assert!(gap < 0.06, "{elevation} {count}: {gap}");
+            let far = farthest_from_sources(&around, &s) / step(&s);
+            assert!(far < 0.53, "{elevation} {count}: {far}");
+        }
+        // Of an arc it keeps to what was taken.
+        let s = ring_above(20, elevation, 200.0);
+        let arc = path(Trajectory::Orbit, &s);
+        let taken = TAU - widest(&arc);
+        assert!(taken > 2.4 && taken < 2.9, "{elevation}: {taken}");
+        let far = farthest_from_sources(&arc, &s) / step(&s);
+        assert!(far < 0.7, "{elevation}: {far}");
+    }
+    // Less of it is looked at from one side.
+    for elevation in [0.0, 45.0, 60.0] {
+        let small = path(Trajectory::Orbit, &ring_above(12, elevation, 110.0));
+        assert!(TAU - widest(&small) < 1.0, "{elevation}");
+    }
 }
 
 #[test]
