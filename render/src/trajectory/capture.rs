@@ -50,6 +50,9 @@ const POLE: f64 = PI / 18.0;
 const WIDEST_GAP: f64 = PI / 2.0;
 /// So many azimuths are an arc around something, where only one gap is wider.
 const LEAST_ARC: f64 = 2.0 * PI / 3.0;
+/// Cameras around something are few where their spacing is so much of the radius in plan, or more: of 24 evenly all around.
+/// A mean of those about a place lies well within the ring, where no photo was taken.
+const FEW_AROUND: f64 = 0.5;
 /// More than this many are thinned out where all pairs are looked at.
 const MANY: usize = 512;
 
@@ -249,6 +252,7 @@ impl Capture {
 pub(super) struct Ring {
     pub(super) focus: DVec3,
     pub(super) up: DVec3,
+    /// Towards the reference camera; azimuths grow to its right.
     zero: DVec3,
     quarter: DVec3,
     /// Azimuth, elevation and distance.
@@ -265,6 +269,13 @@ impl Ring {
         widths.sort_by(|a, b| b.total_cmp(a));
         let limits = [2.0 * PI - LEAST_ARC, WIDEST_GAP];
         are_most && widths.iter().zip(limits).all(|(gap, limit)| *gap < limit)
+    }
+
+    /// Whether it is of few cameras, so far apart; see [`FEW_AROUND`].
+    pub(super) fn is_sparse(&self, spacing: f64) -> bool {
+        let in_plan = |c: &[f64; 3]| c[2] * c[1].cos();
+        let radius = median(self.cameras.iter().map(in_plan).collect());
+        radius.is_some_and(|radius| spacing >= FEW_AROUND * radius)
     }
 
     /// Azimuths from where to where, and whether that is all around: it is where no gap

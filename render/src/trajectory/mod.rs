@@ -30,7 +30,8 @@ pub enum Trajectory {
     /// From the middle of the capture towards the scene, back and beyond, and to the middle again;
     /// where the cameras were walked forwards, along the walk.
     Dolly,
-    /// Along the longest direction of the camera positions and back.
+    /// Along the longest direction of the camera positions and back; where few cameras surround an object, around half of
+    /// it, or along their arc.
     Sweep,
 }
 
@@ -155,6 +156,16 @@ fn there_and_back(frames: usize) -> Vec<f64> {
 }
 
 fn sweep(capture: &Capture, frames: usize) -> Vec<Rigid3> {
+    // The mean of few cameras around something would be in the midst of it.
+    let ring = capture.ring();
+    if let Some(ring) = ring.filter(|ring| ring.is_sparse(capture.spacing)) {
+        let (from, to) = match ring.arc() {
+            // The half that the reference camera is in the middle of.
+            (_, _, true) => (-0.5 * PI, 0.5 * PI),
+            (from, to, false) => (from, to),
+        };
+        return along_the_ring(&ring, from, to, there_and_back(frames));
+    }
     let Some((curve, length, _)) = along_the_cameras(capture) else {
         return vec![capture.reference_pose(); frames];
     };
@@ -295,6 +306,15 @@ fn small_orbit(capture: &Capture, frames: usize) -> Vec<Rigid3> {
 /// to and fro where they leave a gap.
 fn orbit_around(ring: &Ring, frames: usize) -> Vec<Rigid3> {
     let (from, to, closed) = ring.arc();
+    let shares: Vec<f64> = match closed {
+        true => all_around(frames).collect(),
+        false => there_and_back(frames),
+    };
+    along_the_ring(ring, from, to, shares)
+}
+
+/// At shares of the way between two azimuths, looking at the object.
+fn along_the_ring(ring: &Ring, from: f64, to: f64, shares: Vec<f64>) -> Vec<Rigid3> {
     let azimuth = |i: usize| from + (to - from) * i as f64 / ORBIT_POINTS as f64;
     let centers: Vec<DVec3> = (0..=ORBIT_POINTS).map(|i| ring.at(azimuth(i))).collect();
     let mut lengths = vec![0.0];
@@ -302,10 +322,6 @@ fn orbit_around(ring: &Ring, frames: usize) -> Vec<Rigid3> {
         lengths.push(lengths[lengths.len() - 1] + pair[0].distance(pair[1]));
     }
     let length = lengths[ORBIT_POINTS];
-    let shares: Vec<f64> = match closed {
-        true => all_around(frames).collect(),
-        false => there_and_back(frames),
-    };
     shares
         .into_iter()
         .map(|share| {

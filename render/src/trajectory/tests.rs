@@ -269,6 +269,39 @@ fn a_sweep_covers_the_longest_direction() {
     assert!((walked[60].distance(walked[0]) - 0.8 * 19.5).abs() < 1.0);
 }
 
+/// The means of few photos around something lie within it.
+#[test]
+fn a_sweep_of_few_photos_around_something_stays_among_them() {
+    for elevation in [0.0, 25.0, 45.0, 60.0] {
+        for (count, degrees) in [
+            (8, 360.0),
+            (12, 360.0),
+            (16, 360.0),
+            (24, 360.0),
+            (36, 360.0),
+            (6, 200.0),
+            (12, 200.0),
+        ] {
+            let s = ring_above(count, elevation, degrees);
+            let along = path(Trajectory::Sweep, &s);
+            let what = format!("{elevation} {count} {degrees}");
+            let far = farthest_from_sources(&along, &s) / step(&s);
+            assert!(far < 0.75, "{what}: {far}");
+            // Half the view's width is 0.57.
+            let off = along.frames.iter().map(|f| angle_off(f, DVec3::ZERO));
+            let off = off.fold(0.0, f64::max);
+            assert!(off < 0.15, "{what}: {off}");
+            // It goes far along them, to their right.
+            let places = centers(&along);
+            let [from, to] = [places[0], places[60]];
+            let wide = from.distance(to) / (4.0 * elevation.to_radians().cos());
+            assert!(wide > 1.5, "{what}: {wide}");
+            let right = along.frames[30].view.camera_from_world.rotation.conjugate() * DVec3::X;
+            assert!(right.dot(to - from) > 0.0, "{what}");
+        }
+    }
+}
+
 /// 4.6° wide: neighbours are turned by more.
 #[test]
 fn a_sweep_of_long_lenses_looks_where_its_photos_do() {
