@@ -12,7 +12,7 @@ use gltf::json::{self, validation::Checked::Valid, validation::USize64};
 /// The first node holds the mesh and `extras` (JSON text). Positions are f32 and relative to
 /// that node, which stands amid the mesh: in UTM metres, too, they keep millimetres. The cameras are its children: the vertical field of view and aspect of each
 /// lens without its distortion, looking along −z with y up as glTF has it. Coordinates are
-/// the world's, whatever way up it is.
+/// the world's, whatever way up it is. Triangles are seen from both sides.
 ///
 /// # Errors
 /// An empty mesh, numbers that are not finite, 4 GiB and more, extras that are no JSON.
@@ -110,6 +110,11 @@ pub fn to_glb(
     let none = [None, None];
     let indices = accessor(indices_view, count, ComponentType::U32, Type::Scalar, none);
     let indices = root.push(indices);
+    // Viewers leave out backs otherwise, and which side of a plane is its front means nothing.
+    let material = root.push(json::Material {
+        double_sided: true,
+        ..Default::default()
+    });
     let shape = root.push(json::Mesh {
         extensions: None,
         extras: None,
@@ -119,7 +124,7 @@ pub fn to_glb(
             extensions: None,
             extras: None,
             indices: Some(indices),
-            material: None,
+            material: Some(material),
             mode: Valid(json::mesh::Mode::Triangles),
             targets: None,
         }],

@@ -158,6 +158,27 @@ fn cameras_of_a_glb_look_where_the_photos_did() {
     assert!((aspect * tan - 320.0 / 500.0).abs() < 1e-6);
 }
 
+/// Which side a plane's normal is on is chance, and cameras may be on either.
+#[test]
+fn a_glb_is_seen_from_both_sides() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plane.glb");
+    let of_plane = |normal: DVec3| {
+        let plane = proxy::Plane::new(DVec3::ZERO, normal).unwrap();
+        proxy::write(&path, &proxy::Proxy::Plane(plane), &[], &[]).unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    for bytes in [
+        of_plane(DVec3::Z),
+        of_plane(DVec3::NEG_Z),
+        mesh::to_glb(&far_mesh(), &[], None).unwrap(),
+    ] {
+        let document = checked(&bytes);
+        let mut primitives = document.meshes().flat_map(|mesh| mesh.primitives());
+        assert!(primitives.all(|part| part.material().double_sided()));
+    }
+}
+
 #[test]
 fn what_a_glb_cannot_hold_is_refused() {
     let error = |mesh: &Mesh, cameras: &[(String, View)], extras: Option<&str>| {
