@@ -340,5 +340,16 @@ fn matrix(text: &str) -> Result<DMat4, String> {
     if !matrix.is_finite() || matrix.determinant() == 0.0 {
         return Err("it flattens space; expected an invertible matrix".to_owned());
     }
+    let (column, last) = ([rows[3], rows[7], rows[11]], &rows[12..]);
+    if last != [0.0, 0.0, 0.0, 1.0] {
+        let is_transposed = column == [0.0; 3] && last[3] == 1.0;
+        let remedy = match is_transposed {
+            true => "it seems to be column by column: transpose it",
+            false => "expected 16 numbers, row by row, that move, turn, scale or shear",
+        };
+        return Err(format!(
+            "its last row is {last:?}, not 0, 0, 0, 1; {remedy}"
+        ));
+    }
     Ok(matrix)
 }

@@ -58,6 +58,18 @@ fn usage_errors_exit_with_2() {
             "proxy wall mesh a.obj --transform 1,2 -o m.ply",
             "expected 16",
         ),
+        (
+            "proxy wall mesh a.obj --transform 1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1 -o m.ply",
+            "its last row is [1.0, 2.0, 3.0, 1.0], not 0, 0, 0, 1; it seems to be column by column: transpose it",
+        ),
+        (
+            "proxy wall mesh a.obj --transform 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,2 -o m.ply",
+            "its last row is [0.0, 0.0, 0.0, 2.0], not 0, 0, 0, 1; expected 16 numbers, row by row",
+        ),
+        (
+            "proxy wall mesh a.obj --transform 1,0,0,5,0,1,0,0,0,0,1,0,0,0,0.5,1 -o m.ply",
+            "its last row is [0.0, 0.0, 0.5, 1.0], not 0, 0, 0, 1; expected 16 numbers, row by row",
+        ),
         ("generate moon -o moon", "shelf, wall, helicopter"),
     ] {
         let ran = lumigraph(folder.path(), line);
