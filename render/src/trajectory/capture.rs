@@ -1,5 +1,6 @@
 //! What a path needs to know of a capture's geometry.
 
+use super::upright::fitted;
 use super::{PI, Standing, gaze};
 use crate::lumigraph::SourceView;
 use crate::path::{fitted_rotation, mean_rotation};
@@ -44,6 +45,9 @@ const ONE_PLACE: f64 = 1e-6;
 /// The mean rotation of cameras about a place near the end of a row is that of a place farther in, which may differ by
 /// more than they see. Wider ones show much the same, and the mean is smoother than a fit.
 const LONG: f64 = 2.5;
+/// The sine of 25°: a camera that looks straight up or down but for that, and one beside it that looks at the same
+/// place, by up to 14° another way, need not be level to stand as the photos do.
+const STEEP: f64 = 0.42;
 /// Directions to within 10° of straight above or below something tell no azimuth.
 const POLE: f64 = PI / 18.0;
 /// The cameras leave gaps of azimuths below this where they go around something.
@@ -136,6 +140,15 @@ impl Capture {
 
     pub(super) fn reference_up(&self) -> DVec3 {
         self.rotations[self.reference_idx].conjugate() * DVec3::NEG_Y
+    }
+
+    /// Up for cameras about the reference camera that look much as it does: across what is level in photos, or
+    /// where it looks steeply up or down as it has it.
+    pub(super) fn up_at_reference(&self) -> DVec3 {
+        let forward = self.rotations[self.reference_idx].conjugate() * DVec3::Z;
+        let up = self.up.and_then(|up| fitted(&self.rotations, up));
+        up.filter(|up| forward.cross(*up).length() > STEEP)
+            .unwrap_or_else(|| self.reference_up())
     }
 
     pub(super) fn distance_to_nearest(&self, at: DVec3) -> f64 {

@@ -296,7 +296,7 @@ fn small_orbit(capture: &Capture, frames: usize) -> Vec<Rigid3> {
         }
         radii = radii.map(|r| 0.8 * r);
     }
-    let up = capture.reference_up();
+    let up = capture.up_at_reference();
     all_around(frames)
         .map(|t| Rigid3::looking_at(at(radii, t), capture.focus, up))
         .collect()

@@ -255,6 +255,36 @@ fn an_orbit_goes_around_what_photos_look_down_on() {
     }
 }
 
+/// The photo in the middle leans towards what it looks down on, and those beside it would lean to a side.
+#[test]
+fn a_small_orbit_is_as_level_as_its_photos() {
+    let leans_by = |s: &Scene| {
+        let lean = |frame: &PathFrame| {
+            let right = frame.view.camera_from_world.rotation.conjugate() * DVec3::X;
+            right.y.abs().asin().to_degrees()
+        };
+        let frames = path(Trajectory::Orbit, s).frames;
+        frames.iter().map(lean).fold(0.0, f64::max)
+    };
+    for down in [0.0_f64, 15.0, 45.0, 63.0] {
+        // From a circle outwards.
+        let (below, ahead) = down.to_radians().sin_cos();
+        let looks = (0..24).map(|i| {
+            let (sin, cos) = (TAU * f64::from(i) / 24.0).sin_cos();
+            let center = DVec3::new(cos, 0.0, sin);
+            (center, center + 4.0 * (center * ahead + DVec3::Y * below))
+        });
+        let pose = |(center, target)| Rigid3::looking_at(center, target, DVec3::NEG_Y);
+        let targets = looks.clone().map(|(_, target)| target).collect();
+        let outwards = scene(looks.map(pose).collect(), targets, DVec3::Z * 12.0);
+        let lean = leans_by(&outwards);
+        assert!(lean < 0.1, "{down}: {lean}");
+        // Of photos that look much the same way what is level in them tells less. It was up to 10°.
+        let lean = leans_by(&ring_above(11, down, 110.0));
+        assert!(lean < 1.5, "{down}: {lean}");
+    }
+}
+
 #[test]
 fn a_sweep_covers_the_longest_direction() {
     let xs: Vec<f64> = centers(&path(Trajectory::Sweep, &grid()))

@@ -319,7 +319,7 @@ fn settled(rotations: &[DQuat], guess: DVec3) -> DVec3 {
 /// The direction u that is most nearly upright in photos which are turned by what a guess of it says: it
 /// minimises Σ (rᵢ·u)² + λ|u|² − 2λ Σ uᵢ·u, with their right axes rᵢ and ups uᵢ. Those of a ring from high
 /// above lean towards its middle by as much, so that the mean of ups would be no vertical of a part of it.
-fn fitted(rotations: &[DQuat], guess: DVec3) -> Option<DVec3> {
+pub(super) fn fitted(rotations: &[DQuat], guess: DVec3) -> Option<DVec3> {
     let (mut rights, mut ups) = (Vec::with_capacity(rotations.len()), DVec3::ZERO);
     for &rotation in rotations {
         let Some(turn) = quarters(rotation, guess) else {
