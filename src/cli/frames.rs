@@ -1,6 +1,7 @@
 //! Which views to render.
 
 use super::Usage;
+use super::output::say;
 use super::report::UNSHOWN;
 use anyhow::bail;
 use calibrate::formats::{self, Format};
@@ -255,9 +256,24 @@ fn of_images(
     Ok(views)
 }
 
+/// Reads a path's file, and says so where no frame shows its last keyframe.
+pub(super) fn read_path(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<CameraPath> {
+    let (path, keyframes) = path::read_with_keyframes(file, frame)?;
+    let cut_short = keyframes.and_then(|keyframes| keyframes.cut_short_s(&path));
+    if let Some([last_s, shown_s]) = cut_short {
+        say!(
+            "note: {}: no frame shows the last keyframe, at {last_s:.3} s: the path ends at {shown_s:.3} s, with its \
+             last frame of {} a second",
+            file.display(),
+            path.fps
+        );
+    }
+    Ok(path)
+}
+
 /// The frames of a path file, or the one that a screenshot was taken of.
 fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
-    let (views, fps) = named(path::read_in(file, frame)?);
+    let (views, fps) = named(read_path(file, frame)?);
     Ok(Asked::Read {
         views,
         fps,

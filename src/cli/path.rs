@@ -1,12 +1,12 @@
 //! `lumigraph path`
 
 use super::Usage;
-use super::frames::derived;
+use super::frames::{derived, read_path};
 use super::output::{make_parent, print, say};
 use super::targets::{check_apart, check_file};
 use clap::ValueEnum;
 use render::path::{
-    self, CameraPath, NerfstudioFrame, is_nerfstudio, read_in, read_keyframes, write_nerfstudio,
+    self, CameraPath, NerfstudioFrame, is_nerfstudio, read_keyframes, write_nerfstudio,
 };
 use std::path::{Path, PathBuf};
 
@@ -108,7 +108,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let inputs: Vec<PathBuf> = inputs.flatten().cloned().collect();
     check_apart("the path is", "-o", [args.output.as_path()], &inputs)?;
     let frame = args.nerfstudio.frame()?;
-    let read = read_in(&args.path, &frame)?;
+    let read = read_path(&args.path, &frame)?;
     make_parent(&args.output)?;
     match args.format {
         Format::Nerfstudio => {

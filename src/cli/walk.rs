@@ -7,6 +7,7 @@ mod tour;
 use super::Usage;
 use super::captured::{Opened, Photos};
 use super::film::{FilmArgs, FrameChoice, frame_choice};
+use super::frames::read_path;
 use super::inputs::{files_behind, scenes_of, video_of};
 use super::interior::{check_holds_none, check_there};
 use super::made::{self, Made};
@@ -25,8 +26,8 @@ use calibrate::View;
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use lumigraph::scene::{Truth, picture_files};
+use render::CameraPath;
 use render::interior::{Painter, Pinhole, PinholeError, PortalFill, Splat, Walk, WalkOptions};
-use render::{CameraPath, path};
 use report::{Drawn, Report, Scored, Walked, ms, times_svg};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -481,7 +482,7 @@ fn held_out(photos: Option<&Photos>, size: Option<(u32, u32)>) -> anyhow::Result
 fn way(args: &Args, opened: &Opened) -> anyhow::Result<Way> {
     let (path, tour) = match &args.path {
         Some(file) => {
-            let read = path::read_in(file, &args.nerfstudio.frame()?)?;
+            let read = read_path(file, &args.nerfstudio.frame()?)?;
             (read, None)
         }
         None => {

@@ -38,6 +38,31 @@ fn two_frames_of_a_derived_path_show_two_places() {
 }
 
 #[test]
+fn a_last_keyframe_between_frames_is_told() {
+    let folder = with_wall();
+    let here = folder.path();
+    for (t_s, is_shown) in [(1.0, true), (1.0 + 1e-9, true), (1.2, false)] {
+        let mut path = keyframes();
+        path["keyframes"][1]["t_s"] = json!(t_s);
+        std::fs::write(here.join("own.json"), path.to_string()).unwrap();
+        let note = "note: own.json: no frame shows the last keyframe, at 1.200 s: the path ends at 1.000 s, with its \
+                    last frame of 2 a second\n";
+        for line in [
+            "path own.json --format lumigraph -o frames.json",
+            "path own.json --format nerfstudio -o theirs.json",
+            "render wall --proxy plane --path own.json --size 24x18 -o frames",
+        ] {
+            let said = lumigraph(here, line).ok().stderr;
+            let told = said.matches(note).count();
+            assert_eq!(told, usize::from(!is_shown), "{t_s}: {line}: {said}");
+            assert_eq!(said.contains("last keyframe"), !is_shown, "{line}: {said}");
+        }
+        let read = read(&here.join("frames.json")).unwrap();
+        assert_eq!(read.frames.len(), 3, "{t_s}");
+    }
+}
+
+#[test]
 fn paths_go_to_nerfstudio_and_back() {
     let folder = with_wall();
     let here = folder.path();

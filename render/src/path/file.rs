@@ -128,6 +128,17 @@ pub fn read(path: &Path) -> Result<CameraPath, PathFileError> {
 /// # Errors
 /// As for [`read`].
 pub fn read_in(path: &Path, frame: &NerfstudioFrame) -> Result<CameraPath, PathFileError> {
+    Ok(read_with_keyframes(path, frame)?.0)
+}
+
+/// As [`read_in`], with the keyframes that were sampled, where the path is of some.
+///
+/// # Errors
+/// As for [`read`].
+pub fn read_with_keyframes(
+    path: &Path,
+    frame: &NerfstudioFrame,
+) -> Result<(CameraPath, Option<KeyframeFile>), PathFileError> {
     parse_in(path, &bytes_of(path)?, frame)
 }
 
@@ -167,18 +178,18 @@ impl Form {
 /// # Errors
 /// As for [`read`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<CameraPath, PathFileError> {
-    parse_in(path, bytes, &NerfstudioFrame::default())
+    Ok(parse_in(path, bytes, &NerfstudioFrame::default())?.0)
 }
 
 fn parse_in(
     path: &Path,
     bytes: &[u8],
     frame: &NerfstudioFrame,
-) -> Result<CameraPath, PathFileError> {
+) -> Result<(CameraPath, Option<KeyframeFile>), PathFileError> {
     match Form::of(bytes) {
-        Form::Own => Ok(parse_own(path, bytes)?.0),
-        Form::Nerfstudio => nerfstudio::frames(path, bytes, frame),
-        Form::Shot => shot::parse_shot(path, bytes),
+        Form::Own => parse_own(path, bytes),
+        Form::Nerfstudio => Ok((nerfstudio::frames(path, bytes, frame)?, None)),
+        Form::Shot => Ok((shot::parse_shot(path, bytes)?, None)),
     }
 }
 
@@ -288,6 +299,17 @@ pub struct KeyframeFile {
     pub keyframes: Vec<Keyframe>,
     /// What happens between them.
     pub interpolation: Interpolation,
+}
+
+impl KeyframeFile {
+    /// When the last keyframe is passed, and when the last frame of the path that they make is, in seconds; `None`
+    /// where that is within a millisecond of it.
+    pub fn cut_short_s(&self, path: &CameraPath) -> Option<[f64; 2]> {
+        let (first, last) = (self.keyframes.first()?, self.keyframes.last()?);
+        let steps = path.frames.len().saturating_sub(1);
+        let shown_s = first.t_s + steps as f64 / path.fps;
+        (last.t_s - shown_s >= 1e-3).then_some([last.t_s, shown_s])
+    }
 }
 
 /// Reads a path's keyframes as they are, not sampled; `None` of a path that has frames instead. A

@@ -6,8 +6,8 @@ mod shot;
 mod spline;
 
 pub use file::{
-    KeyframeFile, PathFileError, is_nerfstudio, parse, read, read_in, read_keyframes, text, write,
-    write_keyframes,
+    KeyframeFile, PathFileError, is_nerfstudio, parse, read, read_in, read_keyframes,
+    read_with_keyframes, text, write, write_keyframes,
 };
 pub use nerfstudio::{NerfstudioFrame, write_nerfstudio};
 pub use shot::{SHOT_KEYWORD, ShotLook, read_shot_look, write_shot};
