@@ -19,7 +19,7 @@ pub struct MatteCoverage {
     pub covered_background: Option<f64>,
 }
 
-/// The share of the pixels at the given places that are covered: of the points that a photo
+/// The share of the given places whose pixels are covered, each counted: of the points that a photo
 /// shows and others see too, how many the picture shows. Places outside the picture do not
 /// count; `None` where none is inside.
 pub fn coverage_points(

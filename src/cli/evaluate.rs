@@ -25,8 +25,8 @@ use std::path::PathBuf;
 /// PSNR and SSIM over the whole picture (what is not covered counts as black), PSNR once the
 /// picture is given the photo's own exposure (psnr_exposed: channels are multiplied by what fits
 /// best by least squares, and then clipped at white), PSNR over the covered pixels,
-/// coverage (the mean alpha), the share of covered pixels among those that show sparse points
-/// which two or more other photos see (coverage_points), how far the photos that share a pixel
+/// coverage (the mean alpha), the share of the photo's sparse points, where two or more others see
+/// them, that fall on covered pixels (coverage_points), how far the photos that share a pixel
 /// are apart in steps of 255, details aside (seams), and processor time without decoding. There
 /// is no PSNR nor SSIM where neither photo nor picture shows anything. Where a photo has an
 /// ignore mask or a matte, also PSNR, SSIM and coverage inside; with a matte, the mean alpha
