@@ -12,6 +12,7 @@ use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text, say_lack};
+use super::targets::check_folder;
 use super::time::{AtArgs, Clock, TimeArgs};
 use super::unused::note_of_ldi_views;
 use anyhow::Context;
@@ -85,6 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         return Err(Usage(text).into());
     };
     check_holds_none(&args.output)?;
+    check_folder(&args.output)?;
     let given = &args.scene.scene;
     if args.hold_out.hold_out.is_some() && is_interior(given) {
         let text = "--hold-out: photos are held out of an interior when it is made; `lumigraph interior CAPTURE \

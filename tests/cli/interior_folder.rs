@@ -103,6 +103,8 @@ fn nothing_else_is_written_into_an_interiors_folder() {
         ),
         ("", format!("walk house {walk} -o house/walk")),
         ("house", format!("walk . {walk} -o ldi")),
+        ("", "view wall --proxy plane -o house/film".to_owned()),
+        ("house", "view .".to_owned()),
     ];
     for (from, line) in pictures.into_iter().chain(others) {
         let error = lumigraph(&here.join(from), &line).error(1);

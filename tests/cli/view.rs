@@ -79,6 +79,18 @@ fn without_a_display_one_line_says_what_to_do() {
 }
 
 #[test]
+fn a_folder_that_cannot_be_is_told_before_there_is_a_window() {
+    let folder = with_wall();
+    std::fs::write(folder.path().join("film"), "").unwrap();
+    for output in ["film", "film/today"] {
+        let line = format!("view wall --proxy plane -o {output}");
+        let said = said_without_a_display(&folder, &line);
+        let expected = "error: film: a file is where the folder was to be; choose another -o\n";
+        assert_eq!(said, expected, "{line}");
+    }
+}
+
+#[test]
 fn options_that_change_nothing_are_told() {
     let (wall, house) = (with_wall(), with_house());
     let of_time = "--period auto --proxy tunnel --renderer exact --grid 8";

@@ -35,8 +35,7 @@ pub(crate) fn write(
     picture: &RgbaImage,
     subject: Subject,
 ) -> Result<Shot, String> {
-    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
-    std::fs::create_dir_all(folder).map_err(failed)?;
+    make_folder(folder)?;
     let file = free_name(folder);
     let look = &request.look;
     let time_s = look.moment.map(|moment| moment.time_s);
@@ -44,6 +43,14 @@ pub(crate) fn write(
     write_shot(&file, picture, &request.view, time_s, &kept).map_err(|error| error.to_string())?;
     let note = note(look, &kept, subject);
     Ok(Shot { file, note })
+}
+
+/// Makes the session's folder where it is missing, or says why it cannot, for people.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let folder = folder.display();
+        format!("{folder}: this folder cannot be made: {error}; make it by hand, and try again")
+    })
 }
 
 /// What of a look the file knows.

@@ -2,6 +2,7 @@
 
 use super::{App, Event};
 use crate::keyframes::Keyframes;
+use crate::shot::make_folder;
 use render::path::{
     CameraPath, KeyframeFile, NerfstudioFrame, read_keyframes, write_keyframes, write_nerfstudio,
 };
@@ -14,6 +15,8 @@ pub(super) struct Saves {
     kept: Arc<Mutex<Kept>>,
     /// What writes the last one.
     thread: Option<JoinHandle<()>>,
+    /// The folder for what cannot be written to the session's own at the end.
+    elsewhere: PathBuf,
 }
 
 /// What was written, or opened.
@@ -31,6 +34,7 @@ impl Saves {
         Self {
             kept: Arc::new(Mutex::new(kept)),
             thread: None,
+            elsewhere: std::env::temp_dir().join(format!("lumigraph-view-{}", std::process::id())),
         }
     }
 
@@ -92,8 +96,9 @@ impl App {
         })
     }
 
-    /// Saves a path that is in no file, to one of its own: nobody asked. What people should know
-    /// of it, or why it is lost.
+    /// Saves a path that is in no file, to one of its own: nobody asked. Where the session's folder cannot be written
+    /// to by now, it goes elsewhere, since nobody can choose another any more. What people should know of it, or why it
+    /// is lost.
     pub(super) fn rescue_path(&mut self) -> Option<Result<String, String>> {
         self.saves.wait();
         let path = &self.state.keyframes;
@@ -101,9 +106,18 @@ impl App {
             return None;
         }
         let file = self.path_file()?;
-        let (folder, frame) = (&self.options.worker.output, &self.options.nerfstudio);
-        let number = path_number(folder, None, frame);
-        let written = write_path(folder, number, &file, frame);
+        let frame = &self.options.nerfstudio;
+        let write = |folder: &Path| {
+            let number = path_number(folder, None, frame);
+            write_path(folder, number, &file, frame)
+        };
+        let written = match write(&self.options.worker.output) {
+            Ok(said) => Ok(said),
+            Err(why) => match write(&self.saves.elsewhere) {
+                Ok(said) => Ok(format!("{said}; where it was to be it cannot: {why}")),
+                Err(other) => Err(format!("{why}; {other}")),
+            },
+        };
         if written.is_ok() {
             locked(&self.saves.kept).path = path.clone();
         }
@@ -141,7 +155,7 @@ fn write_path(
     frame: &NerfstudioFrame,
 ) -> Result<String, String> {
     let [own, other] = path_files(folder, number);
-    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    make_folder(folder)?;
     write_keyframes(&own, file).map_err(|error| error.to_string())?;
     let sampled = CameraPath::from_keyframes(&file.keyframes, file.interpolation, file.fps);
     let sampled = sampled.map_err(|error| format!("{}: {error}", own.display()))?;
@@ -257,6 +271,7 @@ mod tests {
         let in_the_way = folder.path().join("file");
         std::fs::write(&in_the_way, "").unwrap();
         let mut app = app(in_the_way.join("out"), Some(path(2.0)));
+        app.saves.elsewhere = in_the_way.join("either");
         app.state.keyframes.apart_s = 3.0;
         app.save_path();
         app.saves.wait();
@@ -270,5 +285,27 @@ mod tests {
         assert!(said.contains("path.json"), "{said}");
         assert_eq!(read(&out.join("path.json")), path(3.0));
         assert_eq!(app.rescue_path(), None);
+    }
+
+    #[test]
+    fn what_cannot_be_saved_where_it_was_to_be_is_saved_elsewhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let in_the_way = folder.path().join("file");
+        std::fs::write(&in_the_way, "").unwrap();
+        let mut app = app(in_the_way.clone(), Some(path(2.0)));
+        let elsewhere = folder.path().join("elsewhere");
+        app.saves.elsewhere = elsewhere.clone();
+        app.state.keyframes.apart_s = 3.0;
+        app.end();
+        assert!(app.error.is_none());
+        let said = app.said.take().unwrap();
+        let file = elsewhere.join("path.json");
+        assert!(
+            said.starts_with(&format!("saved {}", file.display())),
+            "{said}"
+        );
+        let why = format!("{}: this folder cannot be made", in_the_way.display());
+        assert!(said.contains(&why), "{said}");
+        assert_eq!(read(&file), path(3.0));
     }
 }
