@@ -1,6 +1,6 @@
 //! Ignore masks: where a photo does not count.
 
-use crate::pyramid::{MAX_LEVELS, halve};
+use crate::pyramid::{MAX_LEVELS, halve, halved_sizes, texels};
 use crate::score::HALF;
 use calibrate::Pixel;
 use image::GrayImage;
@@ -82,6 +82,13 @@ impl Mask {
         let levels = self.levels.iter().map(|l| l.as_raw().len());
         let blocks = self.blocks.iter().map(|b| 2 * b.ranges.len());
         levels.chain(blocks).sum()
+    }
+
+    /// Bytes that the mask of a photo of so many pixels takes.
+    pub fn bytes_of(width: u32, height: u32) -> u64 {
+        let levels = halved_sizes(width, height).take(MAX_LEVELS);
+        let blocks = halved_sizes(width.div_ceil(BLOCK), height.div_ceil(BLOCK));
+        texels(levels).saturating_add(texels(blocks).saturating_mul(2))
     }
 }
 

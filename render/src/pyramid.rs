@@ -90,6 +90,25 @@ impl Pyramid {
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|l| l.as_raw().len()).sum()
     }
+
+    /// Bytes that a photo of so many pixels takes with all its levels, which are rounded up where it is odd.
+    pub fn bytes_of(width: u32, height: u32) -> u64 {
+        texels(halved_sizes(width, height).take(MAX_LEVELS)).saturating_mul(4)
+    }
+}
+
+/// Width and height of what is so large, of that halved, and so on to a single texel.
+pub(crate) fn halved_sizes(width: u32, height: u32) -> impl Iterator<Item = (u32, u32)> {
+    let halved = |&(width, height): &(u32, u32)| {
+        (width > 1 || height > 1).then(|| (width.div_ceil(2), height.div_ceil(2)))
+    };
+    std::iter::successors(Some((width, height)), halved)
+}
+
+/// Texels of images of these sizes, together.
+pub(crate) fn texels(sizes: impl Iterator<Item = (u32, u32)>) -> u64 {
+    let areas = sizes.map(|(width, height)| u64::from(width) * u64::from(height));
+    areas.fold(0, u64::saturating_add)
 }
 
 impl fmt::Debug for Pyramid {
@@ -176,6 +195,16 @@ mod tests {
         assert_eq!(sizes, [(3, 2), (2, 1), (1, 1)]);
         assert_eq!(pyramid.levels[1].get_pixel(0, 0).0, [55, 0, 0, 255]);
         assert_eq!(pyramid.levels[1].get_pixel(1, 0).0, [70, 0, 0, 255]);
+    }
+
+    #[test]
+    fn what_a_photo_and_its_mask_take_is_known_before_they_are_decoded() {
+        for (width, height) in [(1, 1), (2, 1), (3, 500), (101, 77), (333, 251), (640, 512)] {
+            let photo = Pyramid::new(RgbaImage::new(width, height));
+            assert_eq!(Pyramid::bytes_of(width, height), photo.bytes() as u64);
+            let mask = Mask::new(GrayImage::new(width, height));
+            assert_eq!(Mask::bytes_of(width, height), mask.bytes() as u64);
+        }
     }
 
     #[test]

@@ -16,6 +16,7 @@ use glam::DVec3;
 use lumigraph::bench::median;
 use lumigraph::scene::{Photo, Scene, SceneError, other_models};
 use proxy::shown_number;
+use render::{Mask, Pyramid};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -37,11 +38,6 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
 }
-
-/// A photo and its mip levels: 4 bytes a pixel, a third more for the levels.
-const BYTES_PER_PIXEL: f64 = 4.0 * 4.0 / 3.0;
-/// An ignore mask likewise.
-const MASK_BYTES_PER_PIXEL: f64 = 4.0 / 3.0;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_no_interior(&args.scene.scene)?;
@@ -115,7 +111,7 @@ fn open(args: &Args) -> anyhow::Result<Scene> {
 fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Result<Value> {
     let reconstruction = &scene.reconstruction;
     let mut cameras = Vec::new();
-    let mut photo_bytes = 0.0;
+    let mut photo_bytes = 0_u64;
     for (id, camera) in &reconstruction.cameras {
         let names: BTreeSet<&str> = reconstruction
             .images
@@ -129,9 +125,13 @@ fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Re
         }
         let is_masked = |p: &&Photo| p.ignore_mask.is_some() && names.contains(p.name.as_str());
         let masks = scene.photos.iter().filter(is_masked).count();
-        let pixels = f64::from(camera.width) * f64::from(camera.height);
-        photo_bytes += photos as f64 * pixels * BYTES_PER_PIXEL;
-        photo_bytes += masks as f64 * pixels * MASK_BYTES_PER_PIXEL;
+        let (width, height) = (camera.width, camera.height);
+        for (count, bytes) in [
+            (photos, Pyramid::bytes_of(width, height)),
+            (masks, Mask::bytes_of(width, height)),
+        ] {
+            photo_bytes = photo_bytes.saturating_add(bytes.saturating_mul(count as u64));
+        }
         let errors = reconstruction.reprojection_errors_px(*id);
         let errors = errors.map_err(|source| SceneError::Camera {
             name: format!("id {}", id.0),
@@ -181,7 +181,7 @@ fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Re
         "spacing": cloud.map(|c| c.spacing),
         "isolated": cloud.map(|c| c.isolated),
         "proxy": own,
-        "memory_bytes": photo_bytes as u64,
+        "memory_bytes": photo_bytes,
     }))
 }
 

@@ -1,5 +1,6 @@
 //! Masks, mattes and depth maps beside the photos.
 
+use crate::memory::{MASK, PHOTO};
 use crate::run::{lumigraph, with_wall};
 use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage};
 use serde_json::{Value, json};
@@ -135,7 +136,7 @@ fn what_masks_cover_is_not_seen() {
     let info = lumigraph(folder.path(), "info scene --json").ok().json();
     assert_eq!(info["ignore_masks"], 9);
     assert_eq!(info["object_mattes"], 0);
-    assert_eq!(info["memory_bytes"], 9 * 96 * 72 * 20 / 3);
+    assert_eq!(info["memory_bytes"], 9 * (PHOTO + MASK));
     let text = lumigraph(folder.path(), "info wall").ok().stdout;
     assert!(
         text.contains("\nwith     9 ignore masks, 9 depth maps\n"),

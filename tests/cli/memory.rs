@@ -1,9 +1,39 @@
 //! Memory budgets for photos.
 
 use crate::run::{files, lumigraph, with_wall};
+use datasets::Options;
 
 /// Bytes of a photo of 96 × 72 with its mip levels.
-const PHOTO: u64 = 4 * (96 * 72 + 48 * 36 + 24 * 18 + 12 * 9 + 6 * 5 + 3 * 3 + 2 * 2);
+pub(crate) const PHOTO: u64 = 4 * (96 * 72 + 48 * 36 + 24 * 18 + 12 * 9 + 6 * 5 + 3 * 3 + 2 * 2);
+/// Of its mask, with the levels and the ranges of blocks of 8 × 8 pixels, of 2 × 2 such blocks and so on.
+pub(crate) const MASK: u64 = PHOTO / 4 + 2 * (12 * 9 + 6 * 5 + 3 * 3 + 2 * 2 + 1);
+
+#[test]
+fn the_memory_that_info_tells_is_what_all_photos_take() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // No level is half as large as the one before.
+    let options = Options {
+        size: Some((83, 61)),
+        samples_per_side: Some(1),
+        ..Options::default()
+    };
+    let wall = datasets::by_name("wall", &options).unwrap();
+    datasets::write(&wall, &here.join("wall")).unwrap();
+    let info = lumigraph(here, "info wall --json").ok().json();
+    let bytes = info["memory_bytes"].as_u64().unwrap();
+    let line = format!(
+        "render wall --proxy plane --path sweep --frames 2 --size 48x36 --no-skip --cpu-memory {bytes} --json -o out"
+    );
+    let report = lumigraph(here, &line).ok().json()["report"].clone();
+    assert_eq!(report["photos_decoded"], 9);
+    assert_eq!(report["photos_bytes"], bytes);
+    let took = &report["cpu_memory"];
+    assert_eq!(
+        (&took["evictions"], &took["level_cap"]),
+        (&0.into(), &0.into())
+    );
+}
 
 #[test]
 fn a_budget_that_is_no_size_is_a_usage_error() {

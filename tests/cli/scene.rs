@@ -1,5 +1,6 @@
 //! The scene's folder.
 
+use crate::memory::PHOTO;
 use crate::run::{files, lumigraph, with_wall};
 use calibrate::colmap;
 use serde_json::{Value, json};
@@ -367,7 +368,7 @@ fn info_measures() {
     assert!(error["observations"].as_u64().unwrap() > 1000);
     assert!(info["spacing"].as_f64().unwrap() > 0.0);
     assert_eq!(info["isolated"], 0);
-    assert_eq!(info["memory_bytes"], 9 * 96 * 72 * 16 / 3);
+    assert_eq!(info["memory_bytes"], 9 * PHOTO);
     assert!(info["proxy"].is_null());
     let text = lumigraph(folder.path(), "info wall").ok().stdout;
     assert!(
