@@ -111,6 +111,8 @@ pub struct Stop {
     pub name: String,
     /// Where it is, and with which lens: of a photo the photo's own.
     pub view: View,
+    /// The room that it shows, of an interior's.
+    pub cell: Option<CellId>,
 }
 
 impl Stop {
@@ -118,6 +120,7 @@ impl Stop {
         Self {
             name: source.name.clone(),
             view: source.view.clone(),
+            cell: None,
         }
     }
 }
@@ -256,6 +259,7 @@ impl Space {
                 stops.push(Stop {
                     name: cell.name.clone(),
                     view: view(pose),
+                    cell: Some(id),
                 });
             }
         }
@@ -272,6 +276,7 @@ impl Space {
             stops.push(Stop {
                 name: "the origin".to_owned(),
                 view: view(pose),
+                cell: None,
             });
         }
         Self {

@@ -246,6 +246,7 @@ mod tests {
                 height: 80,
                 camera_from_world: pose,
             },
+            cell: None,
         }
     }
 

@@ -4,7 +4,7 @@ mod hands;
 
 use crate::camera::{Glide, angle_between, pose_of};
 use crate::compose::nearest_stop;
-use crate::content::{Content, Space};
+use crate::content::{Content, Space, Stop};
 use crate::keyframes::Keyframes;
 use crate::picture::{DepthGrid, Layer, Look, Request, Shown};
 use calibrate::{Lens, Pixel, Rigid3, View};
@@ -363,10 +363,21 @@ impl State {
         };
     }
 
-    /// The stop that is nearest to where one is.
+    /// The stop that is nearest to where one is: a photo's camera by place and direction; in an interior that of the room
+    /// one is in, wherever one looks, and outside all of them the nearest by place alone.
     pub fn nearest(&self) -> Option<usize> {
         let space = self.space.as_ref()?;
-        nearest_stop(&space.stops, &self.view()?, space.depth)
+        if !space.is_interior {
+            return nearest_stop(&space.stops, &self.view()?, space.depth);
+        }
+        let cell = self.cell();
+        let own = |stop: &Stop| cell.is_some() && stop.cell == cell;
+        space.stops.iter().position(own).or_else(|| {
+            let eye = self.pose.center();
+            let ways = space.stops.iter().map(|stop| stop.view.center() - eye);
+            let ways = ways.map(DVec3::length).enumerate();
+            ways.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        })
     }
 
     fn go(&mut self, stop: usize) {

@@ -395,3 +395,42 @@ fn one_walks_in_a_house_at_eye_height() {
     step(&mut state, 2.0);
     assert_eq!(state.stop(), Some(1));
 }
+
+#[test]
+fn in_a_room_its_own_stop_is_the_nearest_wherever_one_looks() {
+    let content = two_rooms();
+    let mut state = State::new(Look::default());
+    state.resize(320, 240);
+    state.show_alone(content.clone());
+    let Content::Interior(house) = content else {
+        unreachable!("two rooms are no photos");
+    };
+    let stops = state.space().unwrap().stops.clone();
+    assert_eq!(stops.len(), 2);
+    let poses = [0, 1].map(|i: usize| stops[i].view.camera_from_world);
+    for here in [0, 1] {
+        let (own, other) = (poses[here], poses[1 - here]);
+        // As near to the other room as one gets, and looking as its stop does.
+        let on_way = |share: f64| own.center().lerp(other.center(), share);
+        let is_own = |eye: DVec3| {
+            let cell = house.contents.locate(&house.interior, eye);
+            cell.is_some() && cell == stops[here].cell
+        };
+        let shares = (0..=100).map(|i| f64::from(i) / 100.0);
+        let last = shares.take_while(|share| is_own(on_way(*share))).last();
+        let eye = on_way(last.unwrap());
+        state.be_at(pose_of(other.rotation, eye));
+        assert_eq!((state.stop(), state.nearest()), (None, Some(here)));
+        state.act(Action::Home);
+        step(&mut state, 2.0);
+        assert!(state.pose().center().distance(own.center()) < 1e-9);
+        // The next one is the other.
+        state.be_at(pose_of(other.rotation, eye));
+        state.act(Action::Next);
+        assert_eq!(state.stop(), Some(1 - here));
+        // Outside it is the nearest by place.
+        let outside = own.center() + 50.0 * (own.center() - other.center());
+        state.be_at(pose_of(other.rotation, outside));
+        assert_eq!((state.cell(), state.nearest()), (None, Some(here)));
+    }
+}
