@@ -103,8 +103,13 @@ pub(crate) fn shaded_picture(width: u32, height: u32, facing: &[Option<f64>]) ->
 }
 
 /// A photo as `view` would show it were all that it shows far away: the photo itself where the
-/// view is the photo's own camera.
-pub(crate) fn photo_picture(photo: &Pyramid, source: &View, view: &View) -> ColorImage {
+/// view is the photo's own camera. It is as light as the look's pictures, and where it ends, over their background.
+pub(crate) fn photo_picture(
+    photo: &Pyramid,
+    source: &View,
+    view: &View,
+    look: &Look,
+) -> ColorImage {
     let turn = source.camera_from_world.rotation * view.camera_from_world.rotation.conjugate();
     let level = (source.lens.mean_focal() / view.lens.mean_focal())
         .log2()
@@ -116,24 +121,27 @@ pub(crate) fn photo_picture(photo: &Pyramid, source: &View, view: &View) -> Colo
             let seen = source.lens.project(turn * ray)?;
             source.contains(seen).then_some(seen)
         });
-        let Some(seen) = seen else {
-            let [r, g, b] = BEHIND;
-            return Color32::from_rgb(r, g, b);
-        };
-        let color = reference::sample(photo, seen, level);
-        let channel = |c: usize| {
-            let behind = f64::from(BEHIND[c]) / 255.0;
-            (255.0 * (color[c] + (1.0 - color[3]) * behind))
-                .round()
-                .clamp(0.0, 255.0) as u8
-        };
-        Color32::from_rgb(channel(0), channel(1), channel(2))
+        let color = seen.map_or([0.0; 4], |seen| reference::sample(photo, seen, level));
+        // Straight alpha, as pictures have it.
+        let alpha = color[3];
+        let over = if alpha > 0.0 { alpha } else { 1.0 };
+        let byte = |v: f64| (255.0 * v).round().clamp(0.0, 255.0) as u8;
+        let [r, g, b] = [color[0], color[1], color[2]].map(|v| byte(v / over));
+        [r, g, b, byte(alpha)]
     };
-    let pixels = (0..width * height)
+    let pixels: Vec<[u8; 4]> = (0..width * height)
         .into_par_iter()
         .with_min_len(1024)
-        .map(at);
-    ColorImage::new([width, height], pixels.collect())
+        .map(at)
+        .collect();
+    let picture = RgbaImage::from_raw(view.width, view.height, pixels.into_flattened());
+    let picture = picture.expect("four bytes a pixel");
+    // What this photo does not cover others may.
+    let look = Look {
+        layer: Layer::Picture,
+        ..look.clone()
+    };
+    over_background(&picture, &look)
 }
 
 /// Which stop is the nearest to a view: in place, where `depth` counts as much as a radian, and
@@ -169,7 +177,9 @@ mod tests {
     #[test]
     fn a_photo_at_its_own_camera_is_the_photo() {
         let photo = RgbaImage::from_fn(32, 24, |x, y| Rgba([x as u8 * 7, y as u8 * 9, 100, 255]));
-        let shown = photo_picture(&Pyramid::new(photo.clone()), &view(30.0), &view(30.0));
+        let look = Look::default();
+        let pyramid = Pyramid::new(photo.clone());
+        let shown = photo_picture(&pyramid, &view(30.0), &view(30.0), &look);
         let pixels = shown.pixels.iter().zip(photo.pixels());
         for (shown, photo) in pixels {
             let (shown, photo) = (shown.to_array(), photo.0);
@@ -179,10 +189,35 @@ mod tests {
             );
         }
         // Twice as wide a view shows it in its middle.
-        let wide = photo_picture(&Pyramid::new(photo), &view(30.0), &view(15.0));
+        let wide = photo_picture(&pyramid, &view(30.0), &view(15.0), &look);
         let [r, g, b] = BEHIND;
         assert_eq!(wide.pixels[0], Color32::from_rgb(r, g, b));
         assert_eq!(wide.pixels[12 * 32 + 16].b(), 100);
+    }
+
+    #[test]
+    fn both_sides_of_a_wipe_are_as_light_and_over_the_same_background() {
+        let alphas = [255, 128, 0];
+        let photo = RgbaImage::from_fn(32, 24, |x, y| {
+            Rgba([x as u8 * 7, y as u8 * 9, 100, alphas[x as usize / 11]])
+        });
+        let pyramid = Pyramid::new(photo.clone());
+        let mut look = Look {
+            exposure_stops: 1.0,
+            background: Some([1, 2, 3]),
+            ..Look::default()
+        };
+        let picture = over_background(&photo, &look);
+        let shown = photo_picture(&pyramid, &view(30.0), &view(30.0), &look);
+        for (shown, picture) in shown.pixels.iter().zip(&picture.pixels) {
+            let (shown, picture) = (shown.to_array(), picture.to_array());
+            let is_close = (0..4).all(|c| shown[c].abs_diff(picture[c]) <= 2);
+            assert!(is_close, "{shown:?} {picture:?}");
+        }
+        // Beyond its border others may cover what it does not.
+        look.layer = Layer::Coverage;
+        let wide = photo_picture(&pyramid, &view(30.0), &view(15.0), &look);
+        assert_eq!(wide.pixels[0], Color32::from_rgb(1, 2, 3));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::compose::{depth_picture, nearest_stop, over_background, photo_picture
 use crate::content::Space;
 use crate::memory::Memories;
 use crate::overlay::mesh_of;
-use crate::picture::{DepthGrid, Hover, Layer, Lines, Request, Shown, Support};
+use crate::picture::{DepthGrid, Hover, Layer, Lines, Look, Request, Shown, Support};
 use calibrate::{Pixel, View};
 use egui::ColorImage;
 use glam::{DVec2, DVec3};
@@ -86,7 +86,7 @@ impl<'a> SceneDrawer<'a> {
         let mut stages = Vec::new();
         let image = timed(&mut stages, "photo", || {
             let photo = self.lumigraph.photos.get(nearest).ok()?;
-            Some(photo_picture(&photo, source, &view))
+            Some(photo_picture(&photo, source, &view, &request.look))
         });
         Some(Shown {
             id: request.id,
@@ -253,7 +253,7 @@ impl<'a> SceneDrawer<'a> {
         });
         let photo = look
             .photo
-            .then(|| timed(&mut stages, "photo", || self.photo(frame)));
+            .then(|| timed(&mut stages, "photo", || self.photo(frame, look)));
         let (depths, support) = timed(&mut stages, "support", || {
             let depths = DepthGrid::new(width, height, |p| inverse_depth(frame, p));
             (depths, support(frame, &picture))
@@ -288,11 +288,12 @@ impl<'a> SceneDrawer<'a> {
         Ok((picture, shown))
     }
 
-    fn photo(&self, frame: &Frame<'_>) -> Option<(usize, ColorImage)> {
+    fn photo(&self, frame: &Frame<'_>, look: &Look) -> Option<(usize, ColorImage)> {
         let nearest = nearest_stop(&self.space.stops, &frame.desired, self.space.depth)?;
         let photo = self.lumigraph.photos.get(nearest).ok()?;
         let source = &self.lumigraph.sources[nearest].view;
-        Some((nearest, photo_picture(&photo, source, &frame.desired)))
+        let picture = photo_picture(&photo, source, &frame.desired, look);
+        Some((nearest, picture))
     }
 }
 
