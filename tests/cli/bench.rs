@@ -2,6 +2,7 @@
 
 use crate::run::{files, lumigraph, with_wall};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
@@ -83,6 +84,20 @@ fn a_scene_is_measured_once_and_the_report_is_whole() {
 
     for bad in [">NaN", "\"NaN", "inf ", ">inf"] {
         assert!(!html.contains(bad), "{bad}");
+    }
+
+    // A setting's dots have one colour in both plots.
+    let mut colors: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for dot in html.split("r=\"4\" fill=\"").skip(1) {
+        let (color, rest) = dot.split_once("\"><title>").unwrap();
+        colors
+            .entry(rest.split(':').next().unwrap())
+            .or_default()
+            .push(color);
+    }
+    assert!(colors.values().any(|colors| colors.len() == 2));
+    for (name, colors) in colors {
+        assert!(colors.iter().all(|c| *c == colors[0]), "{name}: {colors:?}");
     }
 
     // What is there is not measured again; other pictures are.

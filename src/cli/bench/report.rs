@@ -121,13 +121,13 @@ fn section(html: &mut String, subject: &Subject, thumbnails: &Thumbnails) {
         );
     }
     let _ = writeln!(html, "{}", plot_of(subject, &verdict));
+    // Those that no axis of this one can show, too: colours are then those of the plot before.
     let steps: Vec<Dot<'_>> = subject
         .settings
         .iter()
-        .filter(|m| m.steps_from_exact > 0.0)
         .map(|m| dot(m, m.steps_from_exact))
         .collect();
-    if !steps.is_empty() {
+    if steps.iter().any(|dot| dot.at.1 > 0.0) {
         let across = Axis {
             title: "CPU ms a picture",
             is_log: true,

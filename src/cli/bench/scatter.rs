@@ -81,7 +81,7 @@ impl Scale {
 }
 
 /// A plot; `line` joins the named dots in that order. Dots that an axis cannot show (zero on a
-/// logarithmic one) are left out.
+/// logarithmic one) are left out, but have a share in which family has which colour.
 pub(super) fn scatter(
     dots: &[Dot<'_>],
     line: &[usize],
@@ -197,6 +197,9 @@ pub(super) fn scatter(
     }
     let mut at = left;
     for (k, family) in families.iter().enumerate() {
+        if !dots.iter().filter(shown).any(|dot| dot.family == *family) {
+            continue;
+        }
         let _ = writeln!(
             svg,
             "<text x=\"{at:.1}\" y=\"{:.1}\" fill=\"{}\">{}</text>",
@@ -269,6 +272,38 @@ mod tests {
         assert!(scatter(&[], &[], &log, &even).ends_with("</svg>\n"));
         let one = [dot("default", (10.0, 30.0))];
         assert!(!scatter(&one, &[0], &log, &even).contains("NaN"));
+    }
+
+    #[test]
+    fn a_family_has_one_colour_in_all_plots_of_the_same_dots() {
+        let even = Axis {
+            title: "dB",
+            is_log: false,
+        };
+        let log = Axis {
+            title: "steps",
+            is_log: true,
+        };
+        let of = |family: &'static str, up: f64| Dot {
+            name: family,
+            family,
+            at: (1.0, up),
+            is_default: false,
+        };
+        let grid = |dots: &[Dot<'_>], up: &Axis<'_>| {
+            let svg = scatter(dots, &[], &even, up);
+            let circles = svg.lines().filter(|line| line.contains("<title>grid"));
+            let colors = circles.map(|line| line.split('"').nth(7).unwrap().to_owned());
+            (
+                colors.collect::<Vec<String>>(),
+                svg.contains(">renderer</text>"),
+            )
+        };
+        let dots = [of("renderer", 0.0), of("grid", 2.0)];
+        let expected = vec![COLORS[1].to_owned()];
+        assert_eq!(grid(&dots, &even), (expected.clone(), true));
+        // What is not shown is not named either.
+        assert_eq!(grid(&dots, &log), (expected, false));
     }
 
     #[test]
