@@ -47,6 +47,8 @@ struct Ready<'a> {
     moment: Option<Moment>,
     frame: Frame<'a>,
     prepared: Prepared,
+    /// The share of the picture that photos cover, once it was drawn.
+    covered: OnceCell<f64>,
     /// The picture with its outlines drawn anew, once it was, and what want of memory did to it.
     smooth: OnceCell<(RgbaImage, String)>,
 }
@@ -176,12 +178,14 @@ impl<'a> SceneDrawer<'a> {
                 moment: look.moment,
                 frame,
                 prepared,
+                covered: OnceCell::new(),
                 smooth: OnceCell::new(),
             });
         }
         let Some(Ready {
             frame,
             prepared,
+            covered,
             smooth,
             ..
         }) = &self.ready
@@ -235,6 +239,17 @@ impl<'a> SceneDrawer<'a> {
                 shaded_picture(width, height, &facing)
             }),
         };
+        // Photos cover as much of a view whatever is shown of it: the proxy is there where no photo sees it, too.
+        let covered = match (covered.get(), look.layer) {
+            (Some(covered), _) => *covered,
+            (None, Layer::Picture | Layer::Coverage) => {
+                *covered.get_or_init(|| covered_share(&picture))
+            }
+            (None, Layer::Field | Layer::Depth | Layer::Shaded) => {
+                let drawn = timed(&mut stages, "draw", || engine.draw(frame, prepared))?;
+                *covered.get_or_init(|| covered_share(&drawn))
+            }
+        };
         // 3. What goes with it.
         let mut lines = Lines::default();
         let scale = f64::from(asked.width) / f64::from(width);
@@ -256,7 +271,7 @@ impl<'a> SceneDrawer<'a> {
             .then(|| timed(&mut stages, "photo", || self.photo(frame, look)));
         let (depths, support) = timed(&mut stages, "support", || {
             let depths = DepthGrid::new(width, height, |p| inverse_depth(frame, p));
-            (depths, support(frame, &picture))
+            (depths, support(frame, covered))
         });
         let hover = request.hover.map(|pixel| hover(frame, asked, pixel));
         let image = timed(&mut stages, "compose", || over_background(&picture, look));
@@ -335,9 +350,14 @@ fn facing(frame: &Frame<'_>, pixel: Pixel) -> Option<f64> {
     Some(cosine).filter(|c| c.is_finite())
 }
 
-fn support(frame: &Frame<'_>, picture: &RgbaImage) -> Support {
-    let (width, height) = picture.dimensions();
+/// The share of a picture's pixels that are covered by half or more.
+fn covered_share(picture: &RgbaImage) -> f64 {
     let covered = picture.pixels().filter(|p| p.0[3] >= 128).count();
+    covered as f64 / f64::from(picture.width() * picture.height()).max(1.0)
+}
+
+fn support(frame: &Frame<'_>, covered: f64) -> Support {
+    let (width, height) = (frame.desired.width, frame.desired.height);
     let (across, down) = ASKED;
     let difference = |i: u32| {
         let place =
@@ -358,7 +378,7 @@ fn support(frame: &Frame<'_>, picture: &RgbaImage) -> Support {
     differences.sort_by(f64::total_cmp);
     let median = differences.get(differences.len() / 2).copied();
     Support {
-        covered: covered as f64 / f64::from(width * height).max(1.0),
+        covered,
         difference: median.unwrap_or(std::f64::consts::PI),
     }
 }

@@ -613,6 +613,26 @@ mod tests {
     }
 
     #[test]
+    fn photos_cover_as_much_of_a_view_whatever_is_shown_of_it() {
+        let lumigraph = wall(0);
+        let space = Space::of_scene(&lumigraph);
+        let covered = |layer: Layer| {
+            let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
+            let mut drawer = SceneDrawer::new(&lumigraph, &space, render::Skips::ALL);
+            // The wall goes on where the photos end.
+            let mut request = request(1, 3.0);
+            request.look.layer = layer;
+            let (_, shown) = drawer.draw(&mut engine, &request, 1).unwrap();
+            shown.support.unwrap().covered
+        };
+        let expected = covered(Layer::Picture);
+        assert!((0.3..0.7).contains(&expected), "{expected}");
+        for layer in Layer::ALL {
+            assert_eq!(covered(layer), expected, "{layer:?}");
+        }
+    }
+
+    #[test]
     fn every_layer_and_size_is_drawn() {
         let lumigraph = wall(0);
         let space = Space::of_scene(&lumigraph);
