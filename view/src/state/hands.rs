@@ -61,14 +61,19 @@ impl State {
         if let (Some(view), Some(space)) = (self.view(), &self.space) {
             let up = space.up;
             let (yaw, pitch) = (TURN_PER_PIXEL * dx, TURN_PER_PIXEL * dy);
+            let scale = drag.depth / view.lens.mean_focal();
             let pose = match (drag.is_pan, self.mode) {
                 (true, Mode::Orbit | Mode::Fly) => {
-                    let scale = drag.depth / view.lens.mean_focal();
                     moved(&self.pose, DVec3::new(-dx * scale, -dy * scale, 0.0))
+                }
+                // Nobody walks upwards.
+                (true, Mode::Walk) => {
+                    let (_, right) = level_axes(&self.pose, up);
+                    self.walked(-dx * scale * right)
                 }
                 // What is under the cursor comes along.
                 (false, Mode::Orbit) => orbited(&self.pose, drag.pivot_in_world, up, -yaw, pitch),
-                (_, Mode::Fly | Mode::Walk) => turned(&self.pose, up, -yaw, -pitch),
+                (false, Mode::Fly | Mode::Walk) => turned(&self.pose, up, -yaw, -pitch),
             };
             self.be_at(pose);
         }

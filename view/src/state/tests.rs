@@ -397,6 +397,33 @@ fn one_walks_in_a_house_at_eye_height() {
 }
 
 #[test]
+fn who_walks_is_dragged_aside_and_does_not_turn() {
+    let mut state = State::new(Look::default());
+    state.resize(320, 240);
+    state.show_alone(two_rooms());
+    let stops = state.space().unwrap().stops.clone();
+    let at = Pixel::new(160.0, 120.0);
+    let mut farthest = 0.0_f64;
+    for stop in &stops {
+        for aside in [-60.0, 60.0] {
+            let start = stop.view.camera_from_world;
+            state.be_at(start);
+            state.press(Button::Other, at, false);
+            state.point(Some(Pixel::new(at.x + aside, at.y + 20.0)));
+            state.release(Button::Other);
+            let rotation = state.pose().rotation;
+            assert!(rotation.abs_diff_eq(start.rotation, 1e-9), "{rotation}");
+            let way = state.pose().center() - start.center();
+            assert!(way.y.abs() < 1e-9, "{way}");
+            // What is under the cursor comes along.
+            let right = start.rotation.conjugate() * DVec3::X;
+            farthest = farthest.max(-aside.signum() * way.dot(right));
+        }
+    }
+    assert!(farthest > 0.1, "{farthest}");
+}
+
+#[test]
 fn in_a_room_its_own_stop_is_the_nearest_wherever_one_looks() {
     let content = two_rooms();
     let mut state = State::new(Look::default());
