@@ -42,6 +42,13 @@ impl ExposureArgs {
         }
     }
 
+    /// Whether a scene has no gains, and is to be given some: until then it is drawn as without any.
+    #[cfg(feature = "window")]
+    pub(super) fn is_awaited(&self, scene: &Scene, without: &BTreeSet<String>) -> bool {
+        let has_none = scene.photos.iter().all(|photo| photo.gain.is_none());
+        !self.no_exposure && has_none && !keeps_own(scene, without)
+    }
+
     /// Gives the scene's photos the gains to draw with: its own if it has been written
     /// with some that rest on none of the photos in `without`, else new ones.
     pub(super) fn choose(&self, scene: &mut Scene, without: &BTreeSet<String>) -> ExposureUsed {

@@ -20,6 +20,12 @@ fn other_look(look: &ShotLook, options: &[String]) -> Option<String> {
             look.layer
         ));
     }
+    if !look.meanwhile.is_empty() {
+        return Some(format!(
+            "it was taken while loading went on, and drawn with {} until then; the picture may be another",
+            look.meanwhile
+        ));
+    }
     if options.contains(&look.options) {
         return None;
     }
@@ -67,6 +73,7 @@ mod tests {
             let look = ShotLook {
                 layer: layer.to_owned(),
                 options: own.to_owned(),
+                meanwhile: String::new(),
             };
             let given: Vec<String> = given.iter().map(|g| (*g).to_owned()).collect();
             other_look(&look, &given)
@@ -88,6 +95,16 @@ mod tests {
         assert_eq!(
             note("field", "", &[""]).unwrap(),
             "it shows the field of its view; what is drawn is the picture"
+        );
+        let early = ShotLook {
+            layer: "picture".to_owned(),
+            options: String::new(),
+            meanwhile: "--proxy points --no-exposure".to_owned(),
+        };
+        assert_eq!(
+            other_look(&early, &[String::new()]).unwrap(),
+            "it was taken while loading went on, and drawn with --proxy points --no-exposure until then; the picture may \
+             be another"
         );
     }
 }

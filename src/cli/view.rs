@@ -17,6 +17,7 @@ use super::time::{AtArgs, Clock, TimeArgs};
 use super::unused::note_of_ldi_views;
 use anyhow::Context;
 use lumigraph::scene::{Kind, Scene};
+use proxy::Proxy;
 use render::DeviceChoice;
 use render::interior::{CAPTURED_REFERENCE_SIZE, LibraryOptions, Painter, PortalFill, WalkOptions};
 use render::path::read_keyframes;
@@ -237,7 +238,7 @@ impl Load {
         let mut scene = self.scene.open()?;
         let without = self.hold_out.names(&scene)?;
         let mut clock = None;
-        let mut show = |scene: &Scene, without: &BTreeSet<String>, proxy: proxy::Proxy| {
+        let mut show = |scene: &Scene, without: &BTreeSet<String>, proxy: Proxy, until: &str| {
             let mut lumigraph = scene.lumigraph(without, proxy)?;
             lumigraph.photos.set_budget(budget::of_photos(self.budget));
             // Looking for a period takes a while.
@@ -248,25 +249,35 @@ impl Load {
             let first_s = lumigraph.sources.iter().filter_map(|s| s.time_s);
             let first_s = first_s.min_by(f64::total_cmp);
             let moment = clock.map(|clock| clock.moment("the scene", first_s));
-            teller.show_at(Content::Scene(Arc::new(lumigraph)), moment.transpose()?);
+            let content = Content::Scene(Arc::new(lumigraph));
+            teller.show_at(content, moment.transpose()?, until);
             anyhow::Ok(())
         };
         // 1. At once.
         exposure.forget(&mut scene);
         let is_ready = proxy.takes_own(&scene, &without)?;
+        // What of it is to be another, as options draw it.
+        let mut meanwhile = Vec::new();
         let quick = match &scene.proxy {
             Some(own) if is_ready => {
                 say_lack(&scene, own.surface()?, &without)?;
                 Some(own.surface()?.clone())
             }
             _ => {
-                let quick = scene.fit(Kind::Points, &without);
-                let quick = quick.or_else(|_| scene.fit(Kind::Plane, &without));
-                quick.ok().map(|fitted| fitted.proxy)
+                let mut kinds = [Kind::Points, Kind::Plane].into_iter();
+                let quick = kinds.find_map(|kind| Some((kind, scene.fit(kind, &without).ok()?)));
+                quick.map(|(kind, fitted)| {
+                    meanwhile.push(format!("--proxy {}", kind.name()));
+                    fitted.proxy
+                })
             }
         };
+        let is_awaited = exposure.is_awaited(&scene, &without);
+        if is_awaited {
+            meanwhile.push("--no-exposure".to_owned());
+        }
         if let Some(quick) = quick {
-            show(&scene, &without, quick)?;
+            show(&scene, &without, quick, &meanwhile.join(" "))?;
         }
         // 2. Behind.
         teller.doing("matching exposures");
@@ -277,17 +288,17 @@ impl Load {
             teller.say(Progress::Note(left_out_text(photo)));
         }
         let has_gains = scene.photos.iter().any(|photo| photo.gain.is_some());
-        let is_other = has_gains || !damaged.is_empty();
+        let is_other = has_gains || is_awaited || !damaged.is_empty();
         if !is_ready {
             let text = "choosing the proxy that shows best what photos show: this may take a while";
             teller.doing(text);
             let chosen = proxy.choose(&scene, &fewer, self.scene.strict)?;
             fewer.extend(chosen.left_out.into_keys());
             let text = proxy_text(&chosen.proxy);
-            show(&scene, &fewer, chosen.proxy)?;
+            show(&scene, &fewer, chosen.proxy, "")?;
             teller.say(Progress::Note(format!("proxy: {text}")));
         } else if let (true, Some(own)) = (is_other, &scene.proxy) {
-            show(&scene, &fewer, own.surface()?.clone())?;
+            show(&scene, &fewer, own.surface()?.clone(), "")?;
         }
         Ok(())
     }

@@ -148,6 +148,7 @@ fn a_screenshot_is_a_path_wherever_one_is_read() {
         let look = ShotLook {
             layer: layer.to_owned(),
             options: options.to_owned(),
+            meanwhile: String::new(),
         };
         write_shot(&here.join("shot_0001.png"), &picture, view, None, &look).unwrap();
     };

@@ -163,6 +163,9 @@ pub struct Space {
     pub is_interior: bool,
     /// Where time plays a part.
     pub times: Option<Times>,
+    /// The options that stand for what is still to be chosen as loading goes on, as `--proxy points`: what is drawn is as
+    /// with these until then. Empty of what stays.
+    pub meanwhile: String,
 }
 
 /// The tour's own camera; see `lumigraph walk`.
@@ -200,6 +203,7 @@ impl Space {
             cameras: Vec::new(),
             is_interior: false,
             times: None,
+            meanwhile: String::new(),
         }
     }
 
@@ -288,6 +292,7 @@ impl Space {
             cameras: house.cameras.clone(),
             is_interior: true,
             times: None,
+            meanwhile: String::new(),
         }
     }
 }

@@ -41,15 +41,17 @@ impl Teller {
     /// Shows something, in place of what was there before. What moving about in it needs to know is
     /// found here, not on the window's thread.
     pub fn show(&self, content: Content) {
-        self.show_at(content, None);
+        self.show_at(content, None, "");
     }
 
-    /// As [`Self::show`], a scene that moves at a moment.
-    pub fn show_at(&self, content: Content, moment: Option<Moment>) {
+    /// As [`Self::show`], a scene that moves at a moment; `meanwhile` are the options that stand for what is still to be
+    /// chosen, as `--proxy points`, or nothing.
+    pub fn show_at(&self, content: Content, moment: Option<Moment>, meanwhile: &str) {
         let mut space = Space::of(&content);
         if let (Content::Scene(lumigraph), Some(moment)) = (&content, moment) {
             space.times = Times::of(lumigraph, moment);
         }
+        meanwhile.clone_into(&mut space.meanwhile);
         self.say(Progress::Show(content, Arc::new(space)));
     }
 

@@ -260,6 +260,7 @@ mod tests {
             cameras: Vec::new(),
             is_interior: false,
             times: None,
+            meanwhile: String::new(),
         };
         let mut view = stop(0.0).view;
         view.camera_from_world = Rigid3::looking_at(-4.0 * DVec3::Z, DVec3::Z, DVec3::NEG_Y);

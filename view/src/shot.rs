@@ -16,10 +16,10 @@ pub struct Shot {
 }
 
 /// What a screenshot is of.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Subject {
-    /// A scene.
-    Scene,
+    /// A scene; see [`Space::meanwhile`](crate::content::Space::meanwhile).
+    Scene { meanwhile: String },
     /// An interior, whose LDIs are made of so many views, or of all that there are.
     Interior { ldi_views: Option<usize> },
 }
@@ -33,7 +33,7 @@ pub(crate) fn write(
     folder: &Path,
     request: &Request,
     picture: &RgbaImage,
-    subject: Subject,
+    subject: &Subject,
 ) -> Result<Shot, String> {
     make_folder(folder)?;
     let file = free_name(folder);
@@ -54,7 +54,7 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), String> {
 }
 
 /// What of a look the file knows.
-fn kept(look: &Look, subject: Subject) -> ShotLook {
+fn kept(look: &Look, subject: &Subject) -> ShotLook {
     ShotLook {
         // What no photo covers is marked on the screen only.
         layer: match look.layer {
@@ -62,16 +62,20 @@ fn kept(look: &Look, subject: Subject) -> ShotLook {
             layer => layer.name().to_owned(),
         },
         options: match subject {
-            Subject::Interior { ldi_views } => look.portals.spelled(ldi_views),
-            Subject::Scene => look.options.spelled(look.method),
+            Subject::Interior { ldi_views } => look.portals.spelled(*ldi_views),
+            Subject::Scene { .. } => look.options.spelled(look.method),
+        },
+        meanwhile: match subject {
+            Subject::Interior { .. } => String::new(),
+            Subject::Scene { meanwhile } => meanwhile.clone(),
         },
     }
 }
 
-fn note(look: &Look, kept: &ShotLook, subject: Subject) -> String {
+fn note(look: &Look, kept: &ShotLook, subject: &Subject) -> String {
     let command = match subject {
         Subject::Interior { .. } => "walk",
-        Subject::Scene => "render",
+        Subject::Scene { .. } => "render",
     };
     let mut note = String::new();
     if look.exposure_stops != 0.0 {
@@ -79,6 +83,12 @@ fn note(look: &Look, kept: &ShotLook, subject: Subject) -> String {
     }
     if kept.layer != Layer::Picture.name() {
         note += &format!("; of its view `{command}` draws the picture");
+    } else if !kept.meanwhile.is_empty() {
+        let with = format!("{} {}", kept.options, kept.meanwhile);
+        note += &format!(
+            "; as loading goes on, `{command}` draws it with {}",
+            with.trim_start()
+        );
     } else if !kept.options.is_empty() {
         note += &format!("; `{command}` draws it with {}", kept.options);
     }
@@ -116,9 +126,12 @@ mod tests {
             is_moving: false,
             hover: None,
         };
-        let (scene, all) = (Subject::Scene, Subject::Interior { ldi_views: None });
-        let three = Subject::Interior { ldi_views: Some(3) };
-        let mut told = |change: &dyn Fn(&mut Look), subject: Subject| {
+        let scene = &Subject::Scene {
+            meanwhile: String::new(),
+        };
+        let all = &Subject::Interior { ldi_views: None };
+        let three = &Subject::Interior { ldi_views: Some(3) };
+        let mut told = |change: &dyn Fn(&mut Look), subject: &Subject| {
             request.look = Look::default();
             change(&mut request.look);
             let picture = RgbaImage::new(8, 8);
@@ -159,5 +172,14 @@ mod tests {
         let coverage = |look: &mut Look| look.layer = Layer::Coverage;
         assert_eq!(told(&coverage, scene), texts("picture", "", ""));
         assert!(folder.path().join("shot_0007.png").is_file());
+        // What is chosen behind the window is another soon.
+        let early = &Subject::Scene {
+            meanwhile: "--proxy points".to_owned(),
+        };
+        let note = "; as loading goes on, `render` draws it with --proxy points";
+        assert_eq!(told(&|_| {}, early), texts("picture", "", note));
+        let fewer = |look: &mut Look| look.options.k = 3;
+        let note = "; as loading goes on, `render` draws it with --k 3 --proxy points";
+        assert_eq!(told(&fewer, early), texts("picture", "--k 3", note));
     }
 }

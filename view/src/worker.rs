@@ -242,7 +242,9 @@ impl<'s> Desk<'s> {
             options,
             tell,
             revision,
-            subject: Subject::Scene,
+            subject: Subject::Scene {
+                meanwhile: String::new(),
+            },
             last,
             reduction: 1,
         }
@@ -254,6 +256,9 @@ impl<'s> Desk<'s> {
         space: &Space,
         engine: &mut Engine,
     ) -> Option<Given> {
+        self.subject = Subject::Scene {
+            meanwhile: space.meanwhile.clone(),
+        };
         let mut drawer = SceneDrawer::new(lumigraph, space, self.options.skips);
         let mut notes = engine.notes().len();
         let mut gone = 0;
@@ -360,7 +365,7 @@ impl<'s> Desk<'s> {
                     }
                     if let Some((_, picture)) = &kept {
                         let folder = &self.options.output;
-                        let written = shot::write(folder, &request, picture, self.subject);
+                        let written = shot::write(folder, &request, picture, &self.subject);
                         (self.tell)(News::Shot(written));
                     }
                 }
@@ -504,6 +509,38 @@ mod tests {
         let mut engine = Engine::open(DeviceChoice::Cpu).unwrap();
         let expected = engine.render(&frame, render::Method::TRIANGULATED).unwrap();
         assert_eq!(image::open(&file).unwrap().into_rgba8(), expected);
+        worker.end(Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_shot_of_what_is_shown_until_all_is_chosen_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let (send, news) = channel();
+        let options = by_cpu(folder.path().to_owned());
+        let mut worker = Worker::start(options, move |news| send.send(news).unwrap());
+        let meanwhile = "--proxy points --no-exposure";
+        let content = Content::Scene(wall(0));
+        let mut space = Space::of(&content);
+        meanwhile.clone_into(&mut space.meanwhile);
+        worker.show(content, Arc::new(space), 1);
+        worker.ask(request(1, 0.25));
+        let shot = || {
+            worker.shoot();
+            let mut all = std::iter::from_fn(|| news.recv_timeout(Duration::from_secs(60)).ok());
+            let shot = all.find_map(|news| match news {
+                News::Shot(shot) => shot.ok(),
+                _ => None,
+            });
+            let shot = shot.unwrap();
+            let look = render::path::read_shot_look(&shot.file).unwrap();
+            (look.meanwhile, shot.note)
+        };
+        let (kept, note) = shot();
+        assert_eq!(kept, meanwhile);
+        assert!(note.ends_with(meanwhile), "{note}");
+        // What comes in its place stays.
+        show(&worker, 100, 2);
+        assert_eq!(shot(), (String::new(), String::new()));
         worker.end(Duration::from_secs(10));
     }
 

@@ -17,6 +17,7 @@ pub const SHOT_KEYWORD: &str = "lumigraph path";
 /// Those of the chunks that say what of its view the picture shows.
 const LAYER_KEYWORD: &str = "lumigraph layer";
 const OPTIONS_KEYWORD: &str = "lumigraph options";
+const MEANWHILE_KEYWORD: &str = "lumigraph meanwhile";
 /// What a PNG begins with.
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
@@ -33,6 +34,9 @@ pub struct ShotLook {
     /// The options that it was drawn with and that are not the defaults, as the command line spells
     /// them: `--k 11 --grid 64`.
     pub options: String,
+    /// Of one taken while loading went on: the options that stand for what was not chosen by then, as
+    /// `--proxy points --no-exposure`. Else empty.
+    pub meanwhile: String,
 }
 
 /// Writes a picture with the view that it was drawn for, the time that it shows the scene as of, in
@@ -74,7 +78,11 @@ pub fn write_shot(
             (SHOT_KEYWORD, &text),
             (LAYER_KEYWORD, &look.layer),
             (OPTIONS_KEYWORD, &look.options),
+            (MEANWHILE_KEYWORD, &look.meanwhile),
         ] {
+            if keyword == MEANWHILE_KEYWORD && text.is_empty() {
+                continue;
+            }
             encoder
                 .add_text_chunk(keyword.to_owned(), text.clone())
                 .map_err(png)?;
@@ -97,6 +105,7 @@ pub fn read_shot_look(file: &Path) -> Option<ShotLook> {
     Some(ShotLook {
         layer: texts.remove(LAYER_KEYWORD)?,
         options: texts.remove(OPTIONS_KEYWORD)?,
+        meanwhile: texts.remove(MEANWHILE_KEYWORD).unwrap_or_default(),
     })
 }
 
@@ -168,6 +177,7 @@ mod tests {
         ShotLook {
             layer: "picture".to_owned(),
             options: "--k 11 --beta 0.05".to_owned(),
+            meanwhile: String::new(),
         }
     }
 
@@ -184,6 +194,13 @@ mod tests {
         assert_eq!(path.frames[0].time_s, Some(1.5));
         assert_eq!(path.frames[0].name, "shot_0001");
         assert_eq!(read_shot_look(&file), Some(look()));
+        let early = ShotLook {
+            meanwhile: "--proxy points".to_owned(),
+            ..look()
+        };
+        let other = folder.path().join("shot_0002.png");
+        write_shot(&other, &picture, &view(), None, &early).unwrap();
+        assert_eq!(read_shot_look(&other), Some(early));
         // It begins a path of keyframes, too.
         let begun = read_keyframes(&file, &NerfstudioFrame::default());
         let KeyframeFile {
