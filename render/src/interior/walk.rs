@@ -89,7 +89,8 @@ pub struct FrameCost {
     /// Portals filled with images, even if mixed with geometry: those among them, and those seen through one
     /// that is near.
     pub filled: usize,
-    /// Triangles of the cells that are drawn as geometry, and of what is in none; of a capture all.
+    /// Triangles of the cells that are drawn as geometry, and of what is in none; of a capture all. Each counts as often
+    /// as it is drawn: for each portal through which it is, and for each cell that it lies in.
     pub triangles_in_cells: usize,
     /// Those of them in runs that are in sight.
     pub triangles_tried: usize,
