@@ -2,6 +2,7 @@
 
 use super::Usage;
 use super::output::say;
+use super::path::has_times;
 use super::report::UNSHOWN;
 use anyhow::bail;
 use calibrate::formats::{self, Format};
@@ -142,6 +143,18 @@ impl Asked {
     /// Whether it is a derived path, which has as many frames as one asks for.
     pub(super) fn is_derived(&self) -> bool {
         matches!(self, Self::Derived(_))
+    }
+
+    /// Whether the frames of a path, or a screenshot, are as of times of the scene.
+    pub(super) fn has_times(&self) -> bool {
+        match self {
+            Self::Read {
+                views,
+                fps,
+                are_images: false,
+            } => has_times(views.iter().map(|view| view.time_s), *fps),
+            Self::Read { .. } | Self::Derived(_) => false,
+        }
     }
 
     /// Why frames may show nothing, for people: where they see no proxy, and where no photo shows what they see of

@@ -5,9 +5,7 @@ use super::frames::{derived, read_path};
 use super::output::{make_parent, print, say};
 use super::targets::{check_apart, check_file};
 use clap::ValueEnum;
-use render::path::{
-    self, CameraPath, NerfstudioFrame, is_nerfstudio, read_keyframes, write_nerfstudio,
-};
+use render::path::{self, NerfstudioFrame, is_nerfstudio, read_keyframes, write_nerfstudio};
 use std::path::{Path, PathBuf};
 
 /// Turn a camera path into nerfstudio's format, or into this program's
@@ -83,11 +81,11 @@ impl NerfstudioArgs {
 /// Times nearer than this, in seconds, are the same but for rounding.
 const SAME_S: f64 = 1e-6;
 
-/// Whether a frame is of another time than the one at which a film shows it.
-fn has_times(path: &CameraPath) -> bool {
-    let frames = path.frames.iter().enumerate();
-    let mut timed = frames.filter_map(|(index, frame)| Some((index, frame.time_s?)));
-    timed.any(|(index, time_s)| (time_s - index as f64 / path.fps).abs() > SAME_S)
+/// Whether one of a path's frames, of such times, is of another time than the one at which a film shows it.
+pub(super) fn has_times(times_s: impl IntoIterator<Item = Option<f64>>, fps: f64) -> bool {
+    let frames = times_s.into_iter().enumerate();
+    let mut timed = frames.filter_map(|(index, time_s)| Some((index, time_s?)));
+    timed.any(|(index, time_s)| (time_s - index as f64 / fps).abs() > SAME_S)
 }
 
 /// Fails where what is given is the name of a path that is derived from photos; a remedy is what to do instead.
@@ -115,7 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let keyframes = read_keyframes(&args.path, &frame)?;
             let keyframes = keyframes.as_ref();
             write_nerfstudio(&args.output, &args.path, &read, keyframes, &frame)?;
-            if has_times(&read) {
+            if has_times(read.frames.iter().map(|frame| frame.time_s), read.fps) {
                 say!(
                     "note: left out: the scene's times; nerfstudio's format has no place for them, and \
                      read again a frame is of the time at which a film shows it"

@@ -101,6 +101,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     check_no_photos(&args.output, &scene)?;
     check_in_no_part(&args.output, "-o")?;
     let without = args.hold_out.names(&scene)?;
+    if let (Some(read), true) = (read, asked.has_times())
+        && let Some(note) = args.time.note_of_unused(args.at.time, &scene)
+    {
+        say!("note: {}: {note}", read.display());
+    }
     let asked = asked.in_scene(&scene);
     // What need not be derived is checked first: fitting a proxy may take long.
     let known: Vec<&NamedView> = match &asked {

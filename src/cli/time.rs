@@ -93,6 +93,25 @@ impl Span {
 }
 
 impl TimeArgs {
+    /// Whether photos count by their times; `time_s` is the moment for all views, if there is one.
+    fn plays_a_part(&self, time_s: Option<f64>) -> bool {
+        self.period.is_some() || self.time_window.is_some() || time_s.is_some()
+    }
+
+    /// What to say of views that have times of the scene, where those of its photos do not count.
+    pub(super) fn note_of_unused(
+        &self,
+        time_s: Option<f64>,
+        scene: &Scene,
+    ) -> Option<&'static str> {
+        let has_times = scene.photos.iter().any(|photo| photo.time_s.is_some());
+        let is_unused = has_times && !self.plays_a_part(time_s);
+        is_unused.then_some(
+            "its times of the scene change nothing without --period, --time-window or --time: all photos count, \
+             whenever they were taken",
+        )
+    }
+
     /// Fails early where a scene's photos have no times though they count by them; and, where no time is given
     /// for all, where one of the views, of such names and times, has none of its own.
     pub(super) fn check(
@@ -101,7 +120,7 @@ impl TimeArgs {
         scene: &Scene,
         views: impl IntoIterator<Item = (String, Option<f64>)>,
     ) -> anyhow::Result<()> {
-        if self.period.is_none() && self.time_window.is_none() && time_s.is_none() {
+        if !self.plays_a_part(time_s) {
             return Ok(());
         }
         if scene.photos.iter().all(|photo| photo.time_s.is_none()) {
@@ -134,7 +153,7 @@ impl Clock {
         time_s: Option<f64>,
         lumigraph: &Lumigraph,
     ) -> anyhow::Result<Option<Self>> {
-        if args.period.is_none() && args.time_window.is_none() && time_s.is_none() {
+        if !args.plays_a_part(time_s) {
             return Ok(None);
         }
         let times_s: Vec<f64> = lumigraph.sources.iter().filter_map(|s| s.time_s).collect();

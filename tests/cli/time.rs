@@ -1,7 +1,10 @@
 //! Scenes that move, through the command line.
 
 use crate::run::{files, lumigraph, with_wall};
+use calibrate::{View, colmap};
 use datasets::Options;
+use image::RgbaImage;
+use render::path::{ShotLook, write_shot};
 use std::fs;
 use tempfile::TempDir;
 
@@ -98,6 +101,44 @@ fn frames_show_their_moment() {
     // What plays no part is not decoded, and decoding it changes nothing.
     let (eager, _) = render(" --period 1.37 --time 0.25 --no-skip", "eager");
     assert!(eager == early);
+}
+
+#[test]
+fn times_of_frames_that_change_nothing_are_told() {
+    let folder = with_helicopter();
+    let here = folder.path();
+    let model = colmap::find_model(&here.join("helicopter")).unwrap();
+    let model = colmap::read_model(&model).unwrap();
+    let image = model.images.values().next().unwrap();
+    let camera = &model.cameras[&image.camera_id];
+    let view = View {
+        lens: camera.lens().unwrap(),
+        width: camera.width,
+        height: camera.height,
+        camera_from_world: image.camera_from_world,
+    };
+    // As the window takes them.
+    let look = ShotLook {
+        layer: "picture".to_owned(),
+        options: String::new(),
+        meanwhile: String::new(),
+    };
+    let picture = RgbaImage::new(camera.width, camera.height);
+    for (name, time_s) in [("timed.png", Some(0.5)), ("plain.png", None)] {
+        write_shot(&here.join(name), &picture, &view, time_s, &look).unwrap();
+    }
+    let note = "note: timed.png: its times of the scene change nothing without --period,";
+    for (options, is_told) in [
+        ("timed.png", true),
+        ("timed.png --period 1.37", false),
+        ("timed.png --time-window 0.5", false),
+        ("timed.png --time 0.5", false),
+        ("plain.png", false),
+    ] {
+        let line = format!("render helicopter --proxy plane -o out --views {options}");
+        let said = lumigraph(here, &line).ok().stderr;
+        assert_eq!(said.contains(note), is_told, "{options}: {said}");
+    }
 }
 
 #[test]
