@@ -119,22 +119,29 @@ impl Contradictions {
         }))
     }
 
-    /// Of the photos that share a pixel, how far their colours, 0…1, are from their mean: the root of its squares' mean.
-    pub fn at(&self, x: usize, y: usize) -> f32 {
-        let middle = self.cell_px / 2;
-        let place = |at: usize, side: usize| {
-            let place = (at as f32 - middle as f32) / self.cell_px as f32;
-            let place = place.clamp(0.0, (side - 1) as f32);
-            let first = place as usize;
-            (first, (first + 1).min(side - 1), place - first as f32)
+    /// Of the photos that share a pixel, how far their colours, 0…1, are from their mean: the root of its squares' mean; of
+    /// the pixels of a row, from the left.
+    pub fn row(&self, y: usize) -> impl Iterator<Item = f32> {
+        let (above, below, down) = self.between(y, self.rows);
+        let [above, below] =
+            [above, below].map(|row| &self.by_cell[row * self.columns..][..self.columns]);
+        let cells = above.iter().zip(below);
+        let cells: Vec<f32> = cells.map(|(a, b)| a + (b - a) * down).collect();
+        (0..).map(move |x| {
+            let (left, right, along) = self.between(x, self.columns);
+            cells[left] + (cells[right] - cells[left]) * along
+        })
+    }
+
+    /// The middles of cells, of so many in a row or column, between which a pixel lies, and how far from the first to
+    /// the second.
+    fn between(&self, at: usize, side: usize) -> (usize, usize, f32) {
+        let Some(past) = at.checked_sub(self.cell_px / 2) else {
+            return (0, 0, 0.0);
         };
-        let (left, right, along) = place(x, self.columns);
-        let (above, below, down) = place(y, self.rows);
-        let row = |row: usize| {
-            let row = &self.by_cell[row * self.columns..][..self.columns];
-            row[left] + (row[right] - row[left]) * along
-        };
-        row(above) + (row(below) - row(above)) * down
+        let first = (past / self.cell_px).min(side - 1);
+        let along = (past % self.cell_px) as f32 / self.cell_px as f32;
+        (first, (first + 1).min(side - 1), along)
     }
 }
 

@@ -65,16 +65,21 @@ fn soften_where(
 ) -> Softened {
     let size = [picture.width() as usize, picture.height() as usize];
     let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * size[0] + x]);
+    // 1. How coarse each is to be: where photos contradict each other, and of guesses.
     let longer = size[0].max(size[1]) as f32;
-    let excess_at = |x: usize, y: usize| {
-        let off = contradictions.map_or(0.0, |all| all.at(x, y));
-        (off - AGREE).max(0.0)
+    let of_row = |y: usize| {
+        let row = contradictions.map(|all| all.row(y));
+        let level = |off: f32| level(LEVEL_BY_CONTRADICTION * longer * (off - AGREE).max(0.0));
+        row.into_iter().flatten().take(size[0]).map(level)
     };
-    let is_soft = |x: usize, y: usize| excess_at(x, y) > 0.0 || is_guess(x, y);
+    let contradicted: Vec<f32> = (0..size[1]).into_par_iter().flat_map_iter(of_row).collect();
+    let contradicted_at = |x: usize, y: usize| contradicted.get(y * size[0] + x).copied();
+    let is_soft = |x: usize, y: usize| {
+        contradicted_at(x, y).is_some_and(|level| level > 0.0) || is_guess(x, y)
+    };
     let Some(soft) = Part::around(size, is_soft) else {
         return Softened::default();
     };
-    // 1. How coarse each is to be.
     let far = soft.and(1, 1, size);
     let distances = distances(&far, is_guess);
     let of_row = |y: usize| {
@@ -83,9 +88,7 @@ fn soften_where(
             .clone()
             .zip(&distances[(y - far.rows.start) * far.columns.len()..]);
         row.map(move |(x, distance)| {
-            let contradicted = LEVEL_BY_CONTRADICTION * longer * excess_at(x, y);
-            let more = contradicted.max(LEVEL_BY_DISTANCE * distance);
-            if more > 0.0 { (more + 1.0).log2() } else { 0.0 }
+            level(LEVEL_BY_DISTANCE * distance).max(contradicted_at(x, y).unwrap_or(0.0))
         })
     };
     let levels: Vec<f32> = far
@@ -136,6 +139,11 @@ fn soften_where(
         }
     }
     count
+}
+
+/// The level of the pyramid of what is so much wider than a pixel.
+fn level(more: f32) -> f32 {
+    if more > 0.0 { (more + 1.0).log2() } else { 0.0 }
 }
 
 /// A part of a picture.
