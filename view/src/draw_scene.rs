@@ -38,6 +38,8 @@ pub(crate) struct SceneDrawer<'a> {
     palette: Vec<[u8; 3]>,
     /// A photo that cannot be decoded.
     gone: Vec<usize>,
+    /// The share of the last picture that photos cover.
+    covered: f64,
 }
 
 struct Ready<'a> {
@@ -66,6 +68,7 @@ impl<'a> SceneDrawer<'a> {
             ready: None,
             palette: Vec::new(),
             gone: Vec::new(),
+            covered: 1.0,
         }
     }
 
@@ -206,6 +209,7 @@ impl<'a> SceneDrawer<'a> {
                 } else {
                     let draw = || engine.draw(frame, prepared);
                     let mut picture = timed(&mut stages, "draw", draw)?;
+                    covered.get_or_init(|| covered_share(&picture));
                     if !request.is_moving {
                         let finish = || {
                             engine.smooth(frame, prepared, EDGE_SAMPLES, &mut picture)?;
@@ -239,17 +243,13 @@ impl<'a> SceneDrawer<'a> {
                 shaded_picture(width, height, &facing)
             }),
         };
-        // Photos cover as much of a view whatever is shown of it: the proxy is there where no photo sees it, too.
-        let covered = match (covered.get(), look.layer) {
-            (Some(covered), _) => *covered,
-            (None, Layer::Picture | Layer::Coverage) => {
-                *covered.get_or_init(|| covered_share(&picture))
-            }
-            (None, Layer::Field | Layer::Depth | Layer::Shaded) => {
-                let drawn = timed(&mut stages, "draw", || engine.draw(frame, prepared))?;
-                *covered.get_or_init(|| covered_share(&drawn))
-            }
-        };
+        // Photos cover as much of a view whatever is shown of it: the proxy is there where no photo sees it, too. While one
+        // moves that is not worth a picture which nobody sees.
+        if covered.get().is_none() && !request.is_moving {
+            let drawn = timed(&mut stages, "draw", || engine.draw(frame, prepared))?;
+            covered.get_or_init(|| covered_share(&drawn));
+        }
+        self.covered = covered.get().copied().unwrap_or(self.covered);
         // 3. What goes with it.
         let mut lines = Lines::default();
         let scale = f64::from(asked.width) / f64::from(width);
@@ -271,7 +271,7 @@ impl<'a> SceneDrawer<'a> {
             .then(|| timed(&mut stages, "photo", || self.photo(frame, look)));
         let (depths, support) = timed(&mut stages, "support", || {
             let depths = DepthGrid::new(width, height, |p| inverse_depth(frame, p));
-            (depths, support(frame, covered))
+            (depths, support(frame, self.covered))
         });
         let hover = request.hover.map(|pixel| hover(frame, asked, pixel));
         let image = timed(&mut stages, "compose", || over_background(&picture, look));

@@ -257,7 +257,8 @@ impl Capture {
             quarter,
             cameras: self.centers.iter().map(spherical).collect(),
         };
-        (is_opposed || ring.surrounds()).then_some(ring)
+        // Without an up azimuths are about the line of sight, as likely as not.
+        (is_opposed || self.up.is_some() && ring.surrounds()).then_some(ring)
     }
 }
 
