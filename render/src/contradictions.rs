@@ -33,11 +33,14 @@ pub struct Contradictions {
 }
 
 impl Contradictions {
+    /// Whether they are of interest. Not those of a proxy that is a plane: whoever asks for one wants to see what lies off it.
+    pub(crate) fn may_be(frame: &Frame<'_>) -> bool {
+        matches!(&frame.surface, Surface::Facets(map) if !map.planes.is_empty())
+    }
+
     /// Looks at a frame's proxy in the middle of each cell. `variances` gives for some points that are near one another
     /// how far photos' colours, 0…1, are from their mean, squared, in the mean over channels and by what they weigh;
     /// `None` where no photo has one.
-    ///
-    /// Of a proxy that is a plane there are none: whoever asks for one wants to see what lies off it.
     ///
     /// # Errors
     /// Those of `variances`.
@@ -45,9 +48,10 @@ impl Contradictions {
         frame: &Frame<'_>,
         scratch: impl Fn() -> S + Sync + Send,
         variances: impl Fn(&mut S, &[ProxyPoint]) -> Result<Vec<Option<f32>>, PhotoError> + Sync + Send,
-    ) -> Result<Option<Self>, PhotoError> {
-        let Surface::Facets(map) = &frame.surface else {
-            return Ok(None);
+    ) -> Result<Self, PhotoError> {
+        let is_moved = |i: usize| match &frame.surface {
+            Surface::Facets(map) => map.is_moved(map.facet_of[i]),
+            _ => false,
         };
         let size = [frame.desired.width, frame.desired.height].map(|side| side as usize);
         let cell_px = cell_px(frame);
@@ -56,9 +60,11 @@ impl Contradictions {
         let point = |cell: [usize; 2]| {
             let [x, y]: [usize; 2] =
                 std::array::from_fn(|i| (cell[i] * cell_px + cell_px / 2).min(size[i] - 1));
-            let is_moved = map.is_moved(map.facet_of[y * size[0] + x]);
             let center = Pixel::center_of(x as u32, y as u32);
-            let point = frame.proxy_point(center).filter(|_| !is_moved)?;
+            let point = frame.proxy_point(center)?;
+            if is_moved(y * size[0] + x) {
+                return None;
+            }
             (point.inverse_distance >= 0.0).then_some(point)
         };
         let [across, down] = [columns, rows].map(|side| side.div_ceil(TOGETHER));
@@ -111,12 +117,12 @@ impl Contradictions {
                 0.0
             }
         };
-        Ok(Some(Self {
+        Ok(Self {
             cell_px,
             columns,
             rows,
             by_cell: (0..columns * rows).map(around).collect(),
-        }))
+        })
     }
 
     /// Of the photos that share a pixel, how far their colours, 0…1, are from their mean: the root of its squares' mean; of

@@ -72,6 +72,9 @@ pub(crate) fn contradictions(
     frame: &Frame<'_>,
     field: Option<&TriangulatedField>,
 ) -> Result<Option<Contradictions>, PhotoError> {
+    if !Contradictions::may_be(frame) {
+        return Ok(None);
+    }
     let among = field.map_or_else(|| frame.taking_part().collect(), TriangulatedField::listed);
     let photos = Held::again(frame, &among);
     let frame_of_cells = frame_of_cells(frame);
@@ -82,7 +85,7 @@ pub(crate) fn contradictions(
     let variances = |(): &mut (), points: &[ProxyPoint]| points.iter().map(variance).collect();
     let found = Contradictions::of(frame, || (), variances)?;
     frame.check_masks()?;
-    Ok(found)
+    Ok(Some(found))
 }
 
 /// The variance of the contributors' colours at a proxy point, 0…1, by what they weigh, in the mean over channels; `None`

@@ -67,10 +67,14 @@ fn soften_where(
     let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * size[0] + x]);
     // 1. How coarse each is to be: where photos contradict each other, and of guesses.
     let longer = size[0].max(size[1]) as f32;
+    let pixels = picture.as_raw().as_chunks::<4>().0;
     let of_row = |y: usize| {
-        let row = contradictions.map(|all| all.row(y));
-        let level = |off: f32| level(LEVEL_BY_CONTRADICTION * longer * (off - AGREE).max(0.0));
-        row.into_iter().flatten().take(size[0]).map(level)
+        let offs = contradictions.map(|all| all.row(y)).into_iter().flatten();
+        let level = |(off, pixel): (f32, &[u8; 4])| match pixel[3] {
+            0 => 0.0,
+            _ => level(LEVEL_BY_CONTRADICTION * longer * (off - AGREE).max(0.0)),
+        };
+        offs.zip(&pixels[y * size[0]..][..size[0]]).map(level)
     };
     let contradicted: Vec<f32> = (0..size[1]).into_par_iter().flat_map_iter(of_row).collect();
     let contradicted_at = |x: usize, y: usize| contradicted.get(y * size[0] + x).copied();
@@ -125,13 +129,12 @@ fn soften_where(
             let Some(at) = around.index(x, y) else {
                 continue;
             };
-            match is_guess(x, y) {
-                true => count.guessed += 1,
-                false => count.contradicted += 1,
-            }
             let sum = mixed.sums[at];
             let pixel = &mut picture.get_pixel_mut(x as u32, y as u32).0;
+            let is_guess = is_guess(x, y);
+            count.guessed += usize::from(is_guess);
             if pixel[3] > 0 && sum.w > 0.0 {
+                count.contradicted += usize::from(!is_guess);
                 let straight = (sum * (255.0 / sum.w) + 0.5).min(Vec4::splat(255.0));
                 let [r, g, b] = straight.truncate().to_array().map(|c| c as u8);
                 *pixel = [r, g, b, pixel[3]];

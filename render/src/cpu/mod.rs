@@ -115,12 +115,16 @@ impl Cpu {
         frame: &Frame<'_>,
         field: Option<&TriangulatedField>,
     ) -> Result<Option<Contradictions>, PhotoError> {
+        if !Contradictions::may_be(frame) {
+            return Ok(None);
+        }
         self.ask(frame, field, &frame_of_cells(frame), |engine, photos| {
             let variances = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
                 engine.variances(photos, scratch, points)
             };
             Contradictions::of(frame, Default::default, variances)
         })
+        .map(Some)
     }
 
     /// Asks about proxy points of a frame of `samples` of one that was drawn, of the photos that its field lists, if it has

@@ -341,11 +341,11 @@ fn a_view_at_a_photos_own_pose_gives_that_photo_back() {
     }
 }
 
-/// A shot with a large square through a point for its proxy, parallel to its plane.
-pub(crate) fn meshed(shot: &Shot, through: DVec3) -> Lumigraph {
+/// A shot with a square around a point for its proxy, half as wide as `reach`, parallel to its plane.
+pub(crate) fn meshed(shot: &Shot, around: DVec3, reach: f64) -> Lumigraph {
     let across = shot.plane.normal().any_orthonormal_vector();
     let along = shot.plane.normal().cross(across);
-    let corner = |x: f64, y: f64| through + 50.0 * (x * across + y * along);
+    let corner = |x: f64, y: f64| around + reach * (x * across + y * along);
     let mesh = quad([
         corner(-1.0, -1.0),
         corner(1.0, -1.0),
@@ -362,7 +362,7 @@ pub(crate) fn meshed(shot: &Shot, through: DVec3) -> Lumigraph {
 fn a_flat_mesh_is_a_plane() {
     let shot = Shot::of("wall", 6, None);
     let flat = shot.lumigraph();
-    let meshed = meshed(&shot, shot.plane.point());
+    let meshed = meshed(&shot, shot.plane.point(), 50.0);
     let desired = shot.views[0].between(&shot.views[3], 0.4);
     let of = |lumigraph: &Lumigraph, method| {
         let frame = Frame::new(lumigraph, desired.clone(), FieldOptions::default());

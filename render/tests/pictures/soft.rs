@@ -122,11 +122,11 @@ fn softened(by: DeviceChoice, frame: &Frame<'_>, mut picture: RgbaImage) -> (Rgb
     (picture, count)
 }
 
-/// A wall whose proxy is so much nearer to the photos as it is far.
-fn wall(shot: &Shot, nearer: f64) -> Lumigraph {
+/// A wall whose proxy is so much nearer to the photos as it is far, and reaches as many times as far to all sides.
+fn wall(shot: &Shot, nearer: f64, reach: f64) -> Lumigraph {
     let (point, center) = (shot.plane.point(), shot.views[0].center());
     let off = shot.plane.normal() * (center - point).dot(shot.plane.normal());
-    meshed(shot, point + nearer * off)
+    meshed(shot, point + nearer * off, reach * off.length())
 }
 
 #[test]
@@ -136,14 +136,14 @@ fn what_photos_contradict_each_other_of_is_drawn_softly() {
     let desired = shot.views[0].between(&shot.views[3], 0.4);
     let truth = datasets::render_view(&scene, &desired, 2);
     // Where they agree, all stays.
-    let right = wall(&shot, 0.0);
+    let right = wall(&shot, 0.0, 20.0);
     let right = frame(&right, &desired);
     let sharp = cpu::render(&right, Method::TRIANGULATED).unwrap();
     let (soft, count) = softened(DeviceChoice::Cpu, &right, sharp.clone());
     assert_eq!(count.contradicted, 0);
     assert!(unmoved(&right, &soft) == unmoved(&right, &sharp));
     // Of another place they show different things.
-    let wrong = wall(&shot, 0.4);
+    let wrong = wall(&shot, 0.4, 20.0);
     let wrong = frame(&wrong, &desired);
     let sharp = cpu::render(&wrong, Method::TRIANGULATED).unwrap();
     let (soft, count) = softened(DeviceChoice::Cpu, &wrong, sharp.clone());
@@ -164,7 +164,7 @@ fn what_photos_contradict_each_other_of_is_drawn_softly() {
 #[test]
 fn a_view_at_a_photos_own_pose_has_no_contradictions() {
     let shot = Shot::of("wall", 4, None);
-    let wrong = wall(&shot, 0.4);
+    let wrong = wall(&shot, 0.4, 20.0);
     for view in &shot.views {
         let frame = frame(&wrong, view);
         let sharp = cpu::render(&frame, Method::TRIANGULATED).unwrap();
@@ -172,4 +172,26 @@ fn a_view_at_a_photos_own_pose_has_no_contradictions() {
         assert_eq!(count, Softened::default());
         assert!(soft == sharp);
     }
+}
+
+#[test]
+fn what_is_not_covered_is_not_drawn_softly() {
+    let shot = Shot::of("wall", 6, None);
+    let desired = shot.views[0].between(&shot.views[3], 0.4);
+    let small = wall(&shot, 0.4, 0.1);
+    let frame = frame(&small, &desired);
+    let sharp = cpu::render(&frame, Method::TRIANGULATED).unwrap();
+    let (soft, count) = softened(DeviceChoice::Cpu, &frame, sharp.clone());
+    let covered = sharp.pixels().filter(|p| p.0[3] > 0).count();
+    assert!(covered > 300 && covered < 10_000, "{covered}");
+    assert!(count.contradicted > 100, "{count:?}");
+    assert!(
+        count.guessed + count.contradicted <= covered,
+        "{count:?} {covered}"
+    );
+    let bare = sharp
+        .pixels()
+        .zip(soft.pixels())
+        .filter(|(p, _)| p.0[3] == 0);
+    assert!(bare.into_iter().all(|(a, b)| a == b));
 }
