@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// How often, and how far apart, a run tries to hold a folder: ten seconds together. Others hold it for as long as
-/// writing the plan of a film and removing its frames takes.
+/// writing the plan of a film and removing its frames takes, or looking whether it is left of an import.
 const TRIES: u32 = 1000;
 const BETWEEN: Duration = Duration::from_millis(10);
 

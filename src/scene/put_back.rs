@@ -15,7 +15,7 @@ pub(super) const OLD_FOLDER: &str = "old";
 impl Scene {
     /// Where an import was killed as the parts of its scene took their places in a folder, puts those of the scene of
     /// before back, and those of the new one away. Whether there was one before. Killed meanwhile, it goes on where it
-    /// was.
+    /// was. Where folders cannot be locked nothing tells such an import from one that is at work, and nothing is done.
     ///
     /// # Errors
     /// Something cannot be listed or moved.
@@ -43,13 +43,17 @@ impl Scene {
 
 /// The same of one folder that a scene was made in.
 fn put_back_from(work: &Path, folder: &Path) -> Result<bool, SceneError> {
+    // An import that is still at work puts them where they belong. One that has just ended has done so: what lies
+    // here says what is left only once it is held.
+    let Ok(Some(_held)) = hold_now(work) else {
+        return Ok(false);
+    };
+    if Scene::is_scene(folder) {
+        return Ok(false);
+    }
     let [new, old] = [NEW_FOLDER, OLD_FOLDER].map(|name| work.join(name));
     // Of the new one this is the last to leave, and of the old one the first to come.
     let Some(file) = scene_file(&new).filter(|_| old.is_dir()) else {
-        return Ok(false);
-    };
-    // An import that is still at work puts them where they belong.
-    let Ok(_held) = hold_now(work) else {
         return Ok(false);
     };
     // 1. What has come of the new one: a part that it names and that is not with its others.
@@ -90,4 +94,53 @@ fn names(file: &SceneFile, part: &str) -> bool {
     let proxy = file.proxy.iter().map(|own| &own.file);
     let mut named = of_photos.chain(proxy).map(Path::new);
     part == MODEL_FOLDER || named.any(|path| path.starts_with(part))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::super::undistort::IMAGES_FOLDER;
+    use super::*;
+    use std::fs;
+    use std::path::PathBuf;
+
+    /// A folder with a scene's photo and model, as an import that is killed before its file comes leaves it, and the
+    /// folder that it was made in.
+    fn left(folder: &Path) -> [PathBuf; 2] {
+        let place = folder.join("scene");
+        let work = place.join(format!("{WORK_PREFIX}abc"));
+        for within in [work.join(NEW_FOLDER), work.join(OLD_FOLDER)] {
+            fs::create_dir_all(within).unwrap();
+        }
+        for part in [IMAGES_FOLDER, MODEL_FOLDER] {
+            fs::create_dir(place.join(part)).unwrap();
+        }
+        let text = r#"{"version": 1, "photos": [{"name": "a.png", "path": "images/a.png"}], "model": "model"}"#;
+        fs::write(work.join(NEW_FOLDER).join(SCENE_FILE), text).unwrap();
+        [place, work]
+    }
+
+    #[test]
+    fn what_became_a_scene_before_the_work_is_held_stays() {
+        let home = tempfile::tempdir().unwrap();
+        let [place, work] = left(home.path());
+        if !matches!(hold_now(&work), Ok(Some(_))) {
+            eprintln!("SKIPPED: no folder can be held here");
+            return;
+        }
+        let has = |part: &str| place.join(part).exists();
+        // Another import is still at work.
+        let held = hold_now(&work);
+        assert!(!put_back_from(&work, &place).unwrap());
+        assert!(has(IMAGES_FOLDER) && has(MODEL_FOLDER));
+        drop(held);
+        // It has ended.
+        let file = work.join(NEW_FOLDER).join(SCENE_FILE);
+        fs::copy(&file, place.join(SCENE_FILE)).unwrap();
+        assert!(!put_back_from(&work, &place).unwrap());
+        assert!(has(IMAGES_FOLDER) && has(MODEL_FOLDER));
+        // It was killed.
+        fs::remove_file(place.join(SCENE_FILE)).unwrap();
+        assert!(!put_back_from(&work, &place).unwrap());
+        assert!(!has(IMAGES_FOLDER) && !has(MODEL_FOLDER));
+    }
 }

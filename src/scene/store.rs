@@ -8,7 +8,7 @@ use super::relative::relative;
 use super::{Photo, Scene, SceneError, SceneProxy, Warning};
 use calibrate::colmap;
 use capture::folder::exchange;
-use capture::hold::hold_now;
+use capture::hold::hold;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -232,8 +232,8 @@ impl Scene {
         // 1. Everything into a folder within it, which goes away on errors.
         std::fs::create_dir_all(folder).map_err(|e| io(folder, "make the folder", e))?;
         let (made, new) = make_within(folder)?;
-        // So that no other import takes it for what is left of one that was killed.
-        let _held = hold_now(made.path());
+        // So that no other import takes it for what is left of one that was killed. One may be looking just now.
+        let _held = hold(made.path());
         fill(self, &new)?;
         colmap::write_text(&self.reconstruction, &new.join(MODEL_FOLDER))?;
         if let Some(own) = &mut self.proxy {
