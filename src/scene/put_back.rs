@@ -14,7 +14,7 @@ pub(super) const OLD_FOLDER: &str = "old";
 
 impl Scene {
     /// Where an import was killed as the parts of its scene took their places in a folder, puts those of the scene of
-    /// before back, and those of the new one away. Whether there was one before. Killed meanwhile, it goes on where it
+    /// before back, and removes those of the new one. Whether there was one before. Killed meanwhile, it goes on where it
     /// was. Where folders cannot be locked nothing tells such an import from one that is at work, and nothing is done.
     ///
     /// # Errors
@@ -68,6 +68,11 @@ fn put_back_from(work: &Path, folder: &Path) -> Result<bool, SceneError> {
         if is_there(&old.join(part)) {
             move_part(&old.join(part), &folder.join(part))?;
         }
+    }
+    // 3. What is left is no more to be put back, and in nobody's way where it cannot be removed. Nothing of the old one
+    // goes with it: a folder that is not empty stays.
+    if std::fs::remove_dir(&old).is_ok() {
+        let _ = std::fs::remove_dir_all(work);
     }
     Ok(is_before)
 }
@@ -142,5 +147,6 @@ mod tests {
         fs::remove_file(place.join(SCENE_FILE)).unwrap();
         assert!(!put_back_from(&work, &place).unwrap());
         assert!(!has(IMAGES_FOLDER) && !has(MODEL_FOLDER));
+        assert!(!work.exists());
     }
 }

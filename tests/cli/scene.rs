@@ -267,7 +267,7 @@ fn a_scene_that_was_to_be_replaced_is_put_back_where_that_was_killed() {
             assert!(ran.stderr.contains(said), "{}", ran.stderr);
             let error = ran.error(1);
             assert!(error.contains("holds a scene already"), "{error}");
-            fs::remove_dir_all(&work).unwrap();
+            assert!(!work.exists());
             let is_back = files(&scene) == files(&here.join(before));
             assert!(is_back, "{before}, {after}, {renames}");
             fs::remove_dir_all(&scene).unwrap();
@@ -278,7 +278,7 @@ fn a_scene_that_was_to_be_replaced_is_put_back_where_that_was_killed() {
         kill(None, "flat", renames);
         let ran = lumigraph(here, "import wall -o scene").ok();
         assert!(!ran.stderr.contains("an import was"), "{}", ran.stderr);
-        assert!(!scene.join("images").exists());
+        assert!(!scene.join("images").exists() && !work.exists());
         fs::remove_dir_all(&scene).unwrap();
     }
 }
