@@ -3,7 +3,7 @@
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
 use super::file::SceneFile;
 use super::store::io;
-use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER};
+use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER, files_of};
 use super::{Scene, SceneError};
 use capture::without_byte_order_mark;
 use std::collections::BTreeSet;
@@ -30,6 +30,8 @@ pub(super) const PARTS: [&str; 9] = [
 ];
 /// What scenes have in their model's folder.
 const MODEL_FILES: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
+/// What systems leave in folders that somebody looks into: nobody's own.
+const DROPPINGS: [&str; 3] = [".DS_Store", "Thumbs.db", "desktop.ini"];
 /// COLMAP's work, for photos without a calibration. Like the frames it stays when the scene
 /// is written again: both took long to make.
 pub(super) const COLMAP_FOLDER: &str = "colmap";
@@ -60,13 +62,14 @@ impl Scene {
         let entries = std::fs::read_dir(folder).map_err(|e| io(folder, "list the folder", e))?;
         let own = own_parts(folder);
         let stay = [COLMAP_FOLDER, FRAMES_FOLDER, PARTIAL_FRAMES];
+        let stay = stay.iter().chain(&DROPPINGS);
         for entry in entries {
             let entry = entry.map_err(|e| io(folder, "list the folder", e))?;
             let name = entry.file_name().to_string_lossy().into_owned();
             let is_left = [REPLACED_FRAMES, WORK_PREFIX]
                 .iter()
                 .any(|prefix| name.starts_with(prefix));
-            let mut known = own.iter().chain(&stay);
+            let mut known = own.iter().chain(stay.clone());
             if !is_left && !known.any(|part| *part == name) {
                 return Err(occupied(format!(
                     "holds {name}, which is no part of a scene; choose another folder"
@@ -146,9 +149,10 @@ fn unnamed_within(folder: &Path, parts: &[&str]) -> Result<Option<PathBuf>, Scen
             for entry in std::fs::read_dir(&path).map_err(failed)? {
                 let entry = entry.map_err(failed)?;
                 let name = within.join(entry.file_name());
+                let is_dropping = DROPPINGS.iter().any(|own| name.ends_with(own));
                 if entry.file_type().map_err(failed)?.is_dir() {
                     open.push(name);
-                } else if !named.contains(&folder.join(&name)) {
+                } else if !named.contains(&folder.join(&name)) && !is_dropping {
                     return Ok(Some(name));
                 }
             }
@@ -157,26 +161,92 @@ fn unnamed_within(folder: &Path, parts: &[&str]) -> Result<Option<PathBuf>, Scen
     Ok(None)
 }
 
-/// The files that the scene in a folder names, and those of its model.
+/// The files that the scene in a folder names, those of its model, and those that it may have of photos that it left out.
 fn named_files(folder: &Path) -> BTreeSet<PathBuf> {
-    let of_model = MODEL_FILES.map(|name| folder.join(MODEL_FOLDER).join(name));
-    let scene = scene_file(folder);
-    let photos = scene.into_iter().flat_map(|file| file.photos);
-    let of_photos = photos.flat_map(|photo| {
-        let beside = [
-            photo.ignore_mask,
-            photo.object_matte,
-            photo.silhouette,
-            photo.depth_map,
-        ];
-        beside.into_iter().flatten().chain([photo.path])
-    });
-    let of_photos = of_photos.map(|name| folder.join(name));
-    of_photos.chain(of_model).collect()
+    let of_model = MODEL_FILES.map(|name| Path::new(MODEL_FOLDER).join(name));
+    let mut files = BTreeSet::from(of_model);
+    if let Some(scene) = scene_file(folder) {
+        if scene.settings.undistorted {
+            files.extend(scene.left_out.iter().flat_map(|name| left_of(name)));
+        }
+        for photo in scene.photos {
+            let beside = [
+                photo.ignore_mask,
+                photo.object_matte,
+                photo.silhouette,
+                photo.depth_map,
+            ];
+            let named = beside.into_iter().flatten().chain([photo.path]);
+            files.extend(named.map(PathBuf::from));
+        }
+    }
+    files.iter().map(|name| folder.join(name)).collect()
+}
+
+/// What earlier versions left of a photo that undistorting left out, which the capture calls so, where what lies beside it was
+/// damaged: under each of the names that [`picture_files`](super::picture_files) may have given it.
+fn left_of(name: &str) -> impl Iterator<Item = PathBuf> {
+    let copied = PathBuf::from(name);
+    let names = [
+        copied.with_extension("png"),
+        PathBuf::from(format!("{name}.png")),
+        copied,
+    ];
+    names.into_iter().flat_map(|name| files_of(&name))
 }
 
 /// What makes a folder a scene, if that can be read.
 pub(super) fn scene_file(folder: &Path) -> Option<SceneFile> {
     let bytes = std::fs::read(folder.join(SCENE_FILE)).ok()?;
     serde_json::from_slice(without_byte_order_mark(&bytes)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn what_the_program_or_a_system_left_is_in_nobodys_way() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path();
+        let write = |file: &str, text: &str| {
+            let path = folder.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        let text = r#"{"version": 1, "photos": [], "left_out": ["a.jpg", "in/b.png"], "model": "model",
+            "settings": {"undistorted": true}}"#;
+        write(SCENE_FILE, text);
+        for file in [
+            "images/a.jpg",
+            "images/a.png",
+            "images/a.jpg.png",
+            "images/in/b.png",
+            "masks/a.png.png",
+            "mattes/a.jpg.png.png",
+            "silhouettes/in/b.png.png",
+            "depth/a.jpg.png",
+            ".DS_Store",
+            "images/in/.DS_Store",
+            "model/Thumbs.db",
+            "masks/desktop.ini",
+        ] {
+            write(file, "");
+            let free = Scene::check_free(folder, true);
+            assert!(free.is_ok(), "{file}: {free:?}");
+        }
+        for file in [
+            "images/b.png",
+            "images/a.png.png",
+            "masks/a.png",
+            "masks/my.DS_Store",
+            "model/a.png",
+        ] {
+            write(file, "");
+            let error = Scene::check_free(folder, true).unwrap_err().to_string();
+            assert!(error.contains(&format!("holds {file}")), "{error}");
+            fs::remove_file(folder.join(file)).unwrap();
+        }
+    }
 }

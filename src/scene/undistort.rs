@@ -211,19 +211,22 @@ fn beside(folder_name: &str, new_name: &Path) -> PathBuf {
     Path::new(folder_name).join(name)
 }
 
-/// Removes what [`write_photo`] wrote into the scene's folder before it failed: no part of the scene.
-fn remove_photo(new_name: &Path, folder: &Path) {
-    let folders = [
+/// The files that [`write_photo`] can write for a photo of this new name, by their paths from the scene's folder.
+pub(super) fn files_of(new_name: &Path) -> [PathBuf; 5] {
+    let [masks, mattes, silhouettes, depth] = [
         MASKS_FOLDER,
         MATTES_FOLDER,
         SILHOUETTES_FOLDER,
         DEPTH_FOLDER,
-    ];
-    let files = folders.map(|folder_name| beside(folder_name, new_name));
-    for file in files
-        .into_iter()
-        .chain([Path::new(IMAGES_FOLDER).join(new_name)])
-    {
+    ]
+    .map(|folder_name| beside(folder_name, new_name));
+    let photo = Path::new(IMAGES_FOLDER).join(new_name);
+    [photo, masks, mattes, silhouettes, depth]
+}
+
+/// Removes what [`write_photo`] wrote into the scene's folder before it failed: no part of the scene.
+fn remove_photo(new_name: &Path, folder: &Path) {
+    for file in files_of(new_name) {
         // Most of them are not there.
         let _ = std::fs::remove_file(folder.join(file));
     }
