@@ -14,6 +14,15 @@ pub(super) fn check_folder(folder: &Path) -> anyhow::Result<()> {
     check_outside(folder, "-o")
 }
 
+/// What to say of the window's folder that nobody named where it cannot be made or written to: that is no matter as long
+/// as nothing is saved. Fails where it would lie in that of an interior.
+#[cfg(feature = "window")]
+pub(super) fn note_of_unasked_folder(folder: &Path) -> anyhow::Result<Option<String>> {
+    check_outside(folder, "-o")?;
+    let writable = check_writable(folder, "to save screenshots or a path, choose another -o");
+    Ok(writable.err().map(|error| error.to_string()))
+}
+
 /// Fails where there is no writing to a scene's own folder, into which a command writes what has no `-o`.
 pub(super) fn check_scene_folder(folder: &Path) -> anyhow::Result<()> {
     check_writable(folder, "give a file elsewhere with -o")

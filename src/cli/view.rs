@@ -12,7 +12,7 @@ use super::options::{DrawArgs, FieldArgs, HoldOutArgs, SceneArgs};
 use super::output::say;
 use super::path::NerfstudioArgs;
 use super::surface::{ProxyArgs, proxy_text, say_lack};
-use super::targets::check_folder;
+use super::targets::{check_folder, note_of_unasked_folder};
 use super::time::{AtArgs, Clock, TimeArgs};
 use super::unused::note_of_ldi_views;
 use anyhow::Context;
@@ -69,13 +69,16 @@ pub(super) struct Args {
     #[command(flatten)]
     nerfstudio: NerfstudioArgs,
     /// The folder for screenshots (shot_0001.png, …) and the path (path.json; for nerfstudio
-    /// camera_path.json; path_2.json and so on beside those of an earlier session)
-    #[arg(short, long, value_name = "DIR", default_value = "lumigraph-view")]
-    output: PathBuf,
+    /// camera_path.json; path_2.json and so on beside those of an earlier session) [default: lumigraph-view]
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
     /// Write a line of JSON for each frame on the screen: where one is, and what took how long
     #[arg(long, value_name = "FILE", hide = true)]
     trace: Option<PathBuf>,
 }
+
+/// The folder for what is saved, where nobody names one.
+const OUTPUT: &str = "lumigraph-view";
 
 /// Of the window, in points.
 const SIZE: (u32, u32) = (1280, 800);
@@ -86,8 +89,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let text = format!("--portals: unknown {:?}; expected {known}", args.portals);
         return Err(Usage(text).into());
     };
-    check_holds_none(&args.output)?;
-    check_folder(&args.output)?;
+    let output = match &args.output {
+        Some(output) => {
+            check_holds_none(output)?;
+            check_folder(output)?;
+            output.clone()
+        }
+        None => {
+            let output = PathBuf::from(OUTPUT);
+            check_holds_none(&output)?;
+            // Who looks around may want to save nothing.
+            if let Some(note) = note_of_unasked_folder(&output)? {
+                say!("note: {note}");
+            }
+            output
+        }
+    };
     let given = &args.scene.scene;
     if args.hold_out.hold_out.is_some() && is_interior(given) {
         let text = "--hold-out: photos are held out of an interior when it is made; `lumigraph interior CAPTURE \
@@ -121,7 +138,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             gpu_memory: args.draw.gpu_memory,
             skips: args.draw.skips(),
             walk,
-            output: args.output.clone(),
+            output,
         },
         keyframes,
         nerfstudio,

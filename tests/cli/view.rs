@@ -91,6 +91,20 @@ fn a_folder_that_cannot_be_is_told_before_there_is_a_window() {
 }
 
 #[test]
+fn a_folder_that_nobody_named_keeps_nobody_from_looking() {
+    let folder = with_wall();
+    std::fs::write(folder.path().join("lumigraph-view"), "").unwrap();
+    let said = said_without_a_display(&folder, "view wall --proxy plane");
+    let note = "note: lumigraph-view: a file is where the folder was to be; to save screenshots or a path, choose \
+                another -o\nerror: no display to open a window on";
+    assert!(said.starts_with(note), "{said}");
+    // Named, it is asked for.
+    let line = "view wall --proxy plane -o lumigraph-view";
+    let said = said_without_a_display(&folder, line);
+    assert!(said.starts_with("error: lumigraph-view: "), "{said}");
+}
+
+#[test]
 fn options_that_change_nothing_are_told() {
     let (wall, house) = (with_wall(), with_house());
     let of_time = "--period auto --proxy tunnel --renderer exact --grid 8";
