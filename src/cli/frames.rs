@@ -10,7 +10,7 @@ use calibrate::{Reconstruction, View, colmap};
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError, Sizes, calibration_in, read_bare};
 use render::Lumigraph;
-use render::path::{self, CameraPath, NerfstudioFrame, PathFrame};
+use render::path::{self, CameraPath, KeyframeFile, NerfstudioFrame, PathFrame};
 use render::trajectory::{self, Trajectory};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -64,6 +64,8 @@ pub(super) enum Asked {
         fps: f64,
         /// Whether they are a model's images, which may call photos otherwise than the scene does.
         are_images: bool,
+        /// Whether the frames of a path, or a screenshot, are as of times of the scene.
+        has_times: bool,
     },
     /// A path that the photos' places are needed for.
     Derived(Trajectory),
@@ -95,6 +97,7 @@ impl Asked {
             views,
             fps: FPS,
             are_images: true,
+            has_times: false,
         })
     }
 
@@ -147,14 +150,13 @@ impl Asked {
 
     /// Whether the frames of a path, or a screenshot, are as of times of the scene.
     pub(super) fn has_times(&self) -> bool {
-        match self {
+        matches!(
+            self,
             Self::Read {
-                views,
-                fps,
-                are_images: false,
-            } => has_times(views.iter().map(|view| view.time_s), *fps),
-            Self::Read { .. } | Self::Derived(_) => false,
-        }
+                has_times: true,
+                ..
+            }
+        )
     }
 
     /// Why frames may show nothing, for people: where they see no proxy, and where no photo shows what they see of
@@ -271,8 +273,18 @@ fn of_images(
 
 /// Reads a path's file, and says so where no frame shows its last keyframe.
 pub(super) fn read_path(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<CameraPath> {
+    Ok(read_with_keyframes(file, frame)?.0)
+}
+
+/// The same, with the keyframes, where it has some: a screenshot has one.
+fn read_with_keyframes(
+    file: &Path,
+    frame: &NerfstudioFrame,
+) -> anyhow::Result<(CameraPath, Option<KeyframeFile>)> {
     let (path, keyframes) = path::read_with_keyframes(file, frame)?;
-    let cut_short = keyframes.and_then(|keyframes| keyframes.cut_short_s(&path));
+    let cut_short = keyframes
+        .as_ref()
+        .and_then(|keyframes| keyframes.cut_short_s(&path));
     if let Some([last_s, shown_s]) = cut_short {
         say!(
             "note: {}: no frame shows the last keyframe, at {last_s:.3} s: the path ends at {shown_s:.3} s, with its \
@@ -281,16 +293,23 @@ pub(super) fn read_path(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<
             path.fps
         );
     }
-    Ok(path)
+    Ok((path, keyframes))
 }
 
 /// The frames of a path file, or the one that a screenshot was taken of.
 fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
-    let (views, fps) = named(read_path(file, frame)?);
+    let (path, keyframes) = read_with_keyframes(file, frame)?;
+    let has_times = match keyframes {
+        // Frames between keyframes without times of their own have those of the path.
+        Some(read) => read.keyframes.iter().any(|k| k.time_s.is_some()),
+        None => has_times(path.frames.iter().map(|frame| frame.time_s), path.fps),
+    };
+    let (views, fps) = named(path);
     Ok(Asked::Read {
         views,
         fps,
         are_images: false,
+        has_times,
     })
 }
 

@@ -4,7 +4,7 @@ use crate::run::{files, lumigraph, with_wall};
 use calibrate::{View, colmap};
 use datasets::Options;
 use image::RgbaImage;
-use render::path::{ShotLook, write_shot};
+use render::path::{Interpolation, Keyframe, KeyframeFile, ShotLook, write_keyframes, write_shot};
 use std::fs;
 use tempfile::TempDir;
 
@@ -124,20 +124,45 @@ fn times_of_frames_that_change_nothing_are_told() {
         meanwhile: String::new(),
     };
     let picture = RgbaImage::new(camera.width, camera.height);
-    for (name, time_s) in [("timed.png", Some(0.5)), ("plain.png", None)] {
+    // The first photo's time is that of a window that was just opened.
+    for (name, time_s) in [
+        ("timed.png", Some(0.5)),
+        ("first.png", Some(0.0)),
+        ("plain.png", None),
+    ] {
         write_shot(&here.join(name), &picture, &view, time_s, &look).unwrap();
     }
-    let note = "note: timed.png: its times of the scene change nothing without --period,";
+    // A path may begin when it likes: that is no time of the scene's.
+    for (name, time_s) in [("timed.json", Some(0.5)), ("plain.json", None)] {
+        let keyframe = Keyframe {
+            t_s: 5.0,
+            camera_from_world: image.camera_from_world,
+            camera: camera.clone(),
+            time_s,
+        };
+        let file = KeyframeFile {
+            fps: 2.0,
+            keyframes: vec![keyframe],
+            interpolation: Interpolation::Spline,
+        };
+        write_keyframes(&here.join(name), &file).unwrap();
+    }
+    let note = ": its times of the scene change nothing without --period,";
     for (options, is_told) in [
         ("timed.png", true),
         ("timed.png --period 1.37", false),
         ("timed.png --time-window 0.5", false),
         ("timed.png --time 0.5", false),
+        ("first.png", true),
         ("plain.png", false),
+        ("timed.json", true),
+        ("plain.json", false),
     ] {
         let line = format!("render helicopter --proxy plane -o out --views {options}");
         let said = lumigraph(here, &line).ok().stderr;
-        assert_eq!(said.contains(note), is_told, "{options}: {said}");
+        let name = options.split(' ').next().unwrap();
+        let note = format!("note: {name}{note}");
+        assert_eq!(said.contains(&note), is_told, "{options}: {said}");
     }
 }
 

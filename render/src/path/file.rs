@@ -131,7 +131,7 @@ pub fn read_in(path: &Path, frame: &NerfstudioFrame) -> Result<CameraPath, PathF
     Ok(read_with_keyframes(path, frame)?.0)
 }
 
-/// As [`read_in`], with the keyframes that were sampled, where the path is of some.
+/// As [`read_in`], with the keyframes that were sampled, where the path is of some. A screenshot's frame is one.
 ///
 /// # Errors
 /// As for [`read`].
@@ -189,7 +189,11 @@ fn parse_in(
     match Form::of(bytes) {
         Form::Own => parse_own(path, bytes),
         Form::Nerfstudio => Ok((nerfstudio::frames(path, bytes, frame)?, None)),
-        Form::Shot => Ok((shot::parse_shot(path, bytes)?, None)),
+        Form::Shot => {
+            let shot = shot::parse_shot(path, bytes)?;
+            let keyframes = shot::keyframes(&shot);
+            Ok((shot, Some(keyframes)))
+        }
     }
 }
 
