@@ -1,7 +1,7 @@
 //! Folders that are made beside their place, and take it once they are complete.
 
 use std::borrow::Cow;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -38,6 +38,39 @@ pub fn place_of(folder: &Path) -> io::Result<PathBuf> {
 pub fn beside(place: &Path, what: &str) -> PathBuf {
     let name = place.file_name().unwrap_or_default().to_string_lossy();
     place.with_file_name(format!(".{}.{what}", shortened(&name)))
+}
+
+/// What processes that are gone have left beside a place, as [`beside`] names it of `partial-PROCESS` and whatever
+/// follows: each path, and what follows the process' number. Processes of other containers and machines count as gone.
+pub fn left_beside(place: &Path) -> Vec<(PathBuf, String)> {
+    let unnumbered = beside(place, "partial-");
+    let unnumbered = unnumbered.file_name().and_then(OsStr::to_str);
+    let (Some(unnumbered), Some(above)) = (unnumbered, place.parent()) else {
+        return Vec::new();
+    };
+    let above = match above.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => above,
+    };
+    let mut left = Vec::new();
+    for entry in fs::read_dir(above).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let numbered = name.to_str().and_then(|name| name.strip_prefix(unnumbered));
+        let Some(numbered) = numbered else { continue };
+        let end = numbered.trim_start_matches(|c: char| c.is_ascii_digit());
+        let process = &numbered[..numbered.len() - end.len()];
+        if is_gone(process) {
+            left.push((entry.path(), end.to_owned()));
+        }
+    }
+    left
+}
+
+/// Whether a process of that number is known not to run. Linux alone tells, where its `/proc` is to be seen.
+fn is_gone(process: &str) -> bool {
+    let all = Path::new("/proc");
+    let tells = cfg!(target_os = "linux") && all.join("self").exists();
+    tells && !process.is_empty() && !all.join(process).exists()
 }
 
 /// How long the part of another name may be that a hidden one has, in bytes: disks take 255 for the whole.

@@ -3,9 +3,8 @@
 use crate::picture::{LensRays, depth_through, render_through};
 use crate::{Dataset, DatasetError, Photo};
 use calibrate::{Reconstruction, colmap};
-use capture::folder::{beside, place_of, take_place};
+use capture::folder::{beside, left_beside, place_of, take_place};
 use image::{DynamicImage, ImageBuffer, Luma};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Depth maps of a [`Dataset`] hold this many steps to a world unit: millimetres, as its units are metres.
@@ -89,28 +88,13 @@ pub fn in_new_folder<E: From<DatasetError>>(
 
 /// Removes what processes that are gone have left of the same folder.
 fn remove_left(place: &Path) {
-    let unnumbered = beside(place, "partial-");
-    let unnumbered = unnumbered.file_name().and_then(OsStr::to_str);
-    let (Some(unnumbered), Some(above)) = (unnumbered, place.parent()) else {
-        return;
-    };
-    for entry in std::fs::read_dir(above).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let process = name.to_str().and_then(|name| name.strip_prefix(unnumbered));
-        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if is_folder && process.is_some_and(is_gone) {
+    for (left, end) in left_beside(place) {
+        let is_folder = std::fs::symlink_metadata(&left).is_ok_and(|left| left.is_dir());
+        if is_folder && end.is_empty() {
             // Others' that may not be removed are in nobody's way.
-            let _ = std::fs::remove_dir_all(entry.path());
+            let _ = std::fs::remove_dir_all(left);
         }
     }
-}
-
-/// Whether a process of that number is known not to run. Linux alone tells, where its `/proc` is to be seen.
-fn is_gone(process: &str) -> bool {
-    let is_number = !process.is_empty() && process.bytes().all(|byte| byte.is_ascii_digit());
-    let all = Path::new("/proc");
-    let tells = cfg!(target_os = "linux") && all.join("self").exists();
-    tells && is_number && !all.join(process).exists()
 }
 
 fn fill<'a>(dataset: &'a Dataset, folder: &Path) -> Result<(), DatasetError> {

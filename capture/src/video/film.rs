@@ -2,11 +2,11 @@
 
 use super::{EXACT, ffmpeg, scan};
 use crate::ToolError;
+use crate::folder::{beside, left_beside};
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What the names of films usually end in; ffmpeg may know others.
 pub const FILMS: [&str; 5] = ["mp4", "webm", "mkv", "mov", "avi"];
@@ -43,7 +43,8 @@ pub enum FilmError {
 /// Makes a video of frames, each the RGB bytes of a picture of `width` × `height`: H.264 in .mp4, or
 /// what else ffmpeg takes the file's name to mean. Films have even sizes: an odd width or
 /// height gains one more of its last column or row. The video appears complete or not at all: one that was there
-/// stays until then. Of several that are made of one name at once the last to be complete stays.
+/// stays until then. Of several that are made of one name at once the last to be complete stays. What a process that is
+/// killed leaves is removed by the next that makes a film of this name.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails, or leaves no film that can be read; a frame cannot be had or has another size.
@@ -53,7 +54,7 @@ pub fn encode(
     frames_per_second: f64,
     frames: impl Iterator<Item = io::Result<Vec<u8>>> + Send,
 ) -> Result<(), FilmError> {
-    let temporary = beside(video);
+    let temporary = begin(video);
     let mut arguments: Vec<OsString> = Vec::new();
     let own = [width as usize, height as usize];
     let [even_width, even_height] = own.map(|side| side.next_multiple_of(2));
@@ -102,17 +103,31 @@ pub fn encode(
     placed
 }
 
-/// Where a film lies until it is complete: hidden beside its place, with its ending, by which ffmpeg goes, and with a
-/// name that no other film in the making has, of this process or another.
-fn beside(video: &Path) -> PathBuf {
-    static FILMS_BEGUN: AtomicUsize = AtomicUsize::new(0);
-    let number = FILMS_BEGUN.fetch_add(1, Ordering::Relaxed);
-    let mut name = OsString::from(format!(".partial-{}-{number}", std::process::id()));
-    if let Some(end) = video.extension() {
-        name.push(".");
-        name.push(end);
+/// Begins the file in which a film lies until it is complete: hidden beside its place, called as the film and with its
+/// ending, by which ffmpeg goes, and one that no other film in the making has, of this process or another. Those that
+/// processes which were killed left of a film of this name are removed: nobody else would find them.
+fn begin(video: &Path) -> PathBuf {
+    for (left, end) in left_beside(video) {
+        let is_file = fs::symlink_metadata(&left).is_ok_and(|left| left.is_file());
+        if is_file && end.starts_with('-') {
+            // What may not be removed is in nobody's way.
+            let _ = fs::remove_file(left);
+        }
     }
-    video.with_file_name(name)
+    let mut number = 0_u32;
+    loop {
+        let hidden = beside(video, &format!("partial-{}-{number}", std::process::id()));
+        let mut path = hidden.into_os_string();
+        if let Some(end) = video.extension() {
+            path.push(".");
+            path.push(end);
+        }
+        match File::create_new(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            // Where it cannot be made, ffmpeg says why.
+            _ => return path.into(),
+        }
+    }
 }
 
 /// Fails of a film that is not there, is empty, or cannot be read, whatever ffmpeg said as it made it.
@@ -163,6 +178,38 @@ fn matrix_of(video: &Path) -> (&'static str, &'static str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_killed_runs_left_of_a_film_goes_as_it_is_made_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        // Beyond the numbers that Linux gives.
+        let gone = u32::MAX;
+        let own = std::process::id();
+        let left = at(&format!(".film.mp4.partial-{gone}-0.mp4"));
+        let stays = [
+            format!(".other.mp4.partial-{gone}-0.mp4"),
+            format!(".film.mp4.partial-{gone}.mp4"),
+            format!(".film.mp4.partial-{own}-0.mp4"),
+            "film.mp4".to_owned(),
+        ];
+        for path in stays.iter().map(|name| at(name)).chain([left.clone()]) {
+            fs::write(path, "of before").unwrap();
+        }
+        let film = at("film.mp4");
+        let begun = [begin(&film), begin(&film)];
+        let expected = [1, 2].map(|number| at(&format!(".film.mp4.partial-{own}-{number}.mp4")));
+        assert_eq!(begun, expected);
+        assert!(begun.iter().all(|path| path.is_file()));
+        for name in stays {
+            assert_eq!(fs::read(at(&name)).unwrap(), b"of before", "{name}");
+        }
+        let tells = cfg!(target_os = "linux") && Path::new("/proc/self").exists();
+        assert_eq!(left.exists(), !tells);
+        // A name as long as disks take leaves room.
+        let long = begin(&at(&format!("{}.mp4", "n".repeat(251))));
+        assert!(long.is_file() && is_film(&long));
+    }
 
     #[test]
     fn odd_frames_gain_one_more_of_their_last_column_and_row() {
