@@ -1,5 +1,6 @@
 use super::{ColmapError, Format, STEMS, binary, check, find, text};
 use crate::Reconstruction;
+use capture::folder::exchange;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,8 @@ use std::path::{Path, PathBuf};
 ///
 /// [`ModelKind::colmap_id`]: crate::ModelKind::colmap_id
 ///
-/// The files are written under temporary names and renamed once all three are complete.
+/// The files are written to a folder within and moved once all three are complete; where that fails, those of an
+/// earlier model stay.
 ///
 /// # Errors
 /// What [`read_model`](super::read_model) would refuse is refused here, before anything
@@ -41,7 +43,8 @@ pub fn fits_text(name: &str) -> bool {
 /// Writes `cameras.bin`, `images.bin` and `points3D.bin` into `folder`, which is made
 /// where it is missing. Every number reads back to the last bit, every id is kept.
 ///
-/// The files are written under temporary names and renamed once all three are complete.
+/// The files are written to a folder within and moved once all three are complete; where that fails, those of an
+/// earlier model stay.
 ///
 /// # Errors
 /// What [`read_model`](super::read_model) would refuse is refused here, before anything
@@ -94,38 +97,35 @@ fn write(
         }
     }
 
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| ColmapError::Write { path, source }
+    };
     let further = FURTHER.map(|stem| folder.join(format!("{stem}.{}", format.extension())));
     if let Some(path) = further.into_iter().find(|file| file.exists()) {
         return Err(ColmapError::Rigs { path });
     }
 
+    // Files of an earlier model are removed in the end. A folder of such a name is none, and may hold anything.
+    let is_folder = |file: &&PathBuf| fs::symlink_metadata(file).is_ok_and(|file| file.is_dir());
+    if let Some(path) = files.iter().find(is_folder) {
+        return Err(failed(path)(io::ErrorKind::IsADirectory.into()));
+    }
+
     // 2. Write beside the final names.
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| ColmapError::Write { path, source }
-    };
     fs::create_dir_all(folder).map_err(failed(folder))?;
-    let mut temporary = Temporary(Vec::new());
-    for (stem, write_file) in STEMS.into_iter().zip(write_files) {
-        let path = folder.join(format!(
-            ".{stem}.{}.{}.tmp",
-            format.extension(),
-            std::process::id()
-        ));
-        temporary.0.push(path.clone());
+    let work = Work::new(folder).map_err(failed(folder))?;
+    let names = STEMS.map(|stem| format!("{stem}.{}", format.extension()));
+    for (name, write_file) in names.iter().zip(write_files) {
+        let path = work.new.join(name);
         write_one(&path, |out| write_file(reconstruction, out)).map_err(failed(&path))?;
     }
 
-    // 3. All three are complete: give them their names. One of an earlier model's goes first, so that a process which is
-    // killed between them leaves no model, rather than one of both.
-    let [.., points] = &files;
-    match fs::remove_file(points) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(points)(error)),
-        _ => {}
-    }
-    for (path, file) in temporary.0.iter().zip(&files) {
-        fs::rename(path, file).map_err(failed(file))?;
-    }
+    // 3. All three are complete: they take the places of an earlier model's. Its points go first, and the new ones come
+    // last, so that a process which is killed between them leaves no model, rather than one of both.
+    exchange(&names, &work.new, folder, &work.old).map_err(failed(folder))?;
+    // There is nothing to do about it where this fails.
+    let _ = fs::remove_dir_all(&work.old);
     Ok(())
 }
 
@@ -135,14 +135,44 @@ fn write_one(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
     out.flush()
 }
 
-/// Temporary files, removed at the end where they still exist.
-struct Temporary(Vec<PathBuf>);
+/// A hidden folder for files that are to take the places of others, and for those. It goes at the end, unless there are
+/// still some of the others in it.
+struct Work {
+    itself: PathBuf,
+    new: PathBuf,
+    old: PathBuf,
+}
 
-impl Drop for Temporary {
+impl Work {
+    /// One within a folder. A process that was killed may have left one, and in containers processes share their
+    /// numbers.
+    fn new(folder: &Path) -> io::Result<Self> {
+        let mut number = std::process::id();
+        let itself = loop {
+            let itself = folder.join(format!(".model.{number}.tmp"));
+            match fs::create_dir(&itself) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                    number = number.wrapping_add(1);
+                }
+                made => {
+                    made?;
+                    break itself;
+                }
+            }
+        };
+        let [new, old] = ["new", "old"].map(|name| itself.join(name));
+        let work = Self { itself, new, old };
+        fs::create_dir(&work.new)?;
+        fs::create_dir(&work.old)?;
+        Ok(work)
+    }
+}
+
+impl Drop for Work {
     fn drop(&mut self) {
-        for path in &self.0 {
-            // Renamed files are no longer there: nothing to remove is the usual case.
-            let _ = fs::remove_file(path);
-        }
+        let _ = fs::remove_dir_all(&self.new);
+        // Only empty ones go this way.
+        let _ = fs::remove_dir(&self.old);
+        let _ = fs::remove_dir(&self.itself);
     }
 }

@@ -429,16 +429,28 @@ fn a_text_model_is_not_hidden_behind_a_binary_one() {
 }
 
 #[test]
-fn a_model_that_is_replaced_in_part_is_none() {
+fn a_model_that_cannot_be_replaced_stays() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
+    let count = || fs::read_dir(folder.path()).unwrap().count();
     write_binary(&small(), folder.path()).unwrap();
-    // Of three renames the second fails.
+    for name in ["cameras.bin", "points3D.bin"] {
+        fs::write(at(name), "of before").unwrap();
+    }
+    // The second of three files cannot take its place.
     fs::remove_file(at("images.bin")).unwrap();
     fs::create_dir(at("images.bin")).unwrap();
     let error = write_binary(&small(), folder.path()).unwrap_err();
     assert!(error.to_string().contains("images.bin"), "{error}");
-    assert!(at("cameras.bin").exists() && !at("points3D.bin").exists());
+    for name in ["cameras.bin", "points3D.bin"] {
+        assert_eq!(fs::read(at(name)).unwrap(), b"of before", "{name}");
+    }
+    assert_eq!(count(), 3);
+    // Files that can are replaced, and nothing else stays.
+    fs::remove_dir(at("images.bin")).unwrap();
+    write_binary(&small(), folder.path()).unwrap();
+    assert_eq!(count(), 3);
+    assert_eq!(read_model(folder.path()).unwrap(), small());
 }
 
 /// COLMAP 4 cannot open three files of one model and rigs and frames of another.
