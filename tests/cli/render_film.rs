@@ -143,7 +143,8 @@ printf '%s' "$film" >"${{last#file:}}"
         ),
         (
             "half a film",
-            "film.mp4: ffmpeg cannot read the film that it made; check",
+            "film.mp4: ffmpeg cannot read the film that it made; check that the disk is not full, and that this ffmpeg \
+             has a decoder",
         ),
     ] {
         let path = with_script(here, "ffmpeg", &script(left));

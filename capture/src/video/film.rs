@@ -26,8 +26,11 @@ pub enum FilmError {
     /// The program reports success, but left nothing.
     #[error("ffmpeg left no film, or an empty file; check that the disk is not full")]
     Empty,
-    /// The program reports success, but cannot read what it made.
-    #[error("ffmpeg cannot read the film that it made; check that the disk is not full: {source}")]
+    /// The program reports success, but cannot read even the first frame of what it made.
+    #[error(
+        "ffmpeg cannot read the film that it made; check that the disk is not full, and that this ffmpeg has a decoder \
+         for such films, not only an encoder: {source}"
+    )]
     Unreadable {
         /// What it says.
         source: ToolError,
@@ -130,7 +133,9 @@ fn begin(video: &Path) -> PathBuf {
     }
 }
 
-/// Fails of a film that is not there, is empty, or cannot be read, whatever ffmpeg said as it made it.
+/// Fails of a film that is not there, is empty, or of which not even the first frame can be read, whatever ffmpeg said as
+/// it made it. Of a film that lacks its end this finds those that cannot be read without (.mp4, .mov); others (.mkv, .webm,
+/// .avi) begin as they should, and that ffmpeg tells of their end, by -xerror, is all there is.
 fn check(made: &Path) -> Result<(), FilmError> {
     if fs::metadata(made).map_or(0, |file| file.len()) == 0 {
         return Err(FilmError::Empty);
