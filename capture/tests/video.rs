@@ -6,7 +6,8 @@ use capture::{Tool, ToolError};
 use image::{Rgb, RgbImage, imageops};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Barrier;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 /// ffmpeg; `None`, said aloud, where it is missing, unless the environment has
 /// `LUMIGRAPH_REQUIRE_TOOLS=1`.
@@ -268,20 +269,24 @@ fn films_of_one_name_may_be_made_at_once() {
     let here = tempfile::tempdir().unwrap();
     let film = here.path().join("film.mp4");
     // Both are at work when either gives its last frame: the first do not fit into a pipe.
-    let meet = Barrier::new(2);
-    let make = |count: usize| {
-        let frames = (0..count).map(|i| {
+    let make = |count: usize, (other, own): (Sender<()>, Receiver<()>)| {
+        let frames = (0..count).map(move |i| -> std::io::Result<Vec<u8>> {
             if i == 0 || i == count - 1 {
-                meet.wait();
+                // Where the other has failed, it neither hears nor says anything more.
+                let _ = other.send(());
+                let met = own.recv_timeout(Duration::from_secs(120));
+                met.map_err(std::io::Error::other)?;
             }
             Ok(frame(i as u32).into_raw())
         });
         video::encode(&film, (320, 240), 8.0, frames)
     };
+    let ((to_long, of_long), (to_short, of_short)) = (channel(), channel());
     std::thread::scope(|scope| {
-        let other = scope.spawn(|| make(4));
-        make(9).unwrap();
-        other.join().unwrap().unwrap();
+        let other = scope.spawn(|| make(4, (to_long, of_short)));
+        let long = make(9, (to_short, of_long));
+        let short = other.join().unwrap();
+        assert!(long.is_ok() && short.is_ok(), "{long:?}, {short:?}");
     });
     let frames = video::scan(&ffmpeg, &film, &mut |_| {}).unwrap().len();
     assert!([4, 9].contains(&frames), "{frames}");
