@@ -114,6 +114,20 @@ pub struct PhotoEntry {
     pub other: Extra,
 }
 
+impl PhotoEntry {
+    /// The files that it names: the photo's, and those of what lies beside it.
+    pub(super) fn files(&self) -> impl Iterator<Item = &str> {
+        let beside = [
+            &self.ignore_mask,
+            &self.object_matte,
+            &self.silhouette,
+            &self.depth_map,
+        ];
+        let beside = beside.into_iter().flatten();
+        beside.chain([&self.path]).map(String::as_str)
+    }
+}
+
 /// The scene's own proxy.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ProxyEntry {

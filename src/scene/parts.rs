@@ -1,7 +1,7 @@
 //! What lies in a scene's folder: its parts, which go when it is written again, and what is in the way of that.
 
 use super::beside::{DEPTH_FOLDER, MASKS_FOLDER};
-use super::file::SceneFile;
+use super::file::{PhotoEntry, SceneFile};
 use super::store::io;
 use super::undistort::{IMAGES_FOLDER, MATTES_FOLDER, SILHOUETTES_FOLDER, files_of};
 use super::{Scene, SceneError};
@@ -169,16 +169,8 @@ fn named_files(folder: &Path) -> BTreeSet<PathBuf> {
         if scene.settings.undistorted {
             files.extend(scene.left_out.iter().flat_map(|name| left_of(name)));
         }
-        for photo in scene.photos {
-            let beside = [
-                photo.ignore_mask,
-                photo.object_matte,
-                photo.silhouette,
-                photo.depth_map,
-            ];
-            let named = beside.into_iter().flatten().chain([photo.path]);
-            files.extend(named.map(PathBuf::from));
-        }
+        let named = scene.photos.iter().flat_map(PhotoEntry::files);
+        files.extend(named.map(PathBuf::from));
     }
     files.iter().map(|name| folder.join(name)).collect()
 }

@@ -1,6 +1,6 @@
 //! What an import leaves that was killed while its scene's parts took their places, some renames long.
 
-use super::file::SceneFile;
+use super::file::{PhotoEntry, SceneFile};
 use super::parts::{MODEL_FOLDER, PARTS, SCENE_FILE, WORK_PREFIX, scene_file};
 use super::store::io;
 use super::{Scene, SceneError};
@@ -87,16 +87,8 @@ fn move_part(from: &Path, to: &Path) -> Result<(), SceneError> {
 
 /// Whether a scene has a part, by its file.
 fn names(file: &SceneFile, part: &str) -> bool {
-    let of_photos = file.photos.iter().flat_map(|photo| {
-        let beside = [
-            &photo.ignore_mask,
-            &photo.object_matte,
-            &photo.silhouette,
-            &photo.depth_map,
-        ];
-        beside.into_iter().flatten().chain([&photo.path])
-    });
-    let proxy = file.proxy.iter().map(|own| &own.file);
+    let of_photos = file.photos.iter().flat_map(PhotoEntry::files);
+    let proxy = file.proxy.iter().map(|own| own.file.as_str());
     let mut named = of_photos.chain(proxy).map(Path::new);
     part == MODEL_FOLDER || named.any(|path| path.starts_with(part))
 }

@@ -45,8 +45,8 @@ const ONE_PLACE: f64 = 1e-6;
 /// The mean rotation of cameras about a place near the end of a row is that of a place farther in, which may differ by
 /// more than they see. Wider ones show much the same, and the mean is smoother than a fit.
 const LONG: f64 = 2.5;
-/// The sine of 25°: a camera that looks straight up or down but for that, and one beside it that looks at the same
-/// place, by up to 14° another way, need not be level to stand as the photos do.
+/// The sine of 25°: a camera that looks straight up or down but for that need not be level to stand as the photos do, nor
+/// one beside it, which looks at the same place another way.
 const STEEP: f64 = 0.42;
 /// Directions to within 10° of straight above or below something tell no azimuth.
 const POLE: f64 = PI / 18.0;
