@@ -164,7 +164,11 @@ impl<'f> Edges<'f> {
         let desired = &self.frame.desired;
         let in_world = desired.camera_from_world.rotation.conjugate() * ray;
         let hit = self.solid.first_hit(desired.center(), in_world)?;
-        Some(self.map.planes[hit.triangle_idx as usize])
+        Some(FacetMap::plane_of_triangle(
+            self.solid,
+            hit.triangle_idx,
+            desired,
+        ))
     }
 
     /// Of a pixel and those around it what they meet, by its inverse distance, and where to that was moved, if it was; none

@@ -408,24 +408,35 @@ impl FacetMap {
     }
 
     pub(crate) fn of_mesh(solid: &Solid, desired: &View, rays: Option<&Rays>) -> Self {
-        let center = desired.center();
-        let rotation = desired.camera_from_world.rotation;
-        let plane =
-            |i: usize| Self::plane_through(solid.corners(i).map(|p| rotation * (p - center)));
-        let triangles = (0..solid.triangle_count()).into_par_iter();
-        let planes: Vec<DVec3> = triangles.map(plane).collect();
-        if let Some(rays) = rays {
-            let mut facet_of =
-                PixelNumbers::of_any(desired.width as usize * desired.height as usize);
-            solid.triangles_along(desired, rays, &mut facet_of);
-            return Self::of_pixels(planes, facet_of, desired);
-        }
-        let world_from_camera = rotation.conjugate();
-        let facet_of = Self::found(desired, |ray, _| {
-            let hit = solid.first_hit(center, world_from_camera * ray);
-            hit.map_or(NO_FACET, |hit| hit.triangle_idx)
-        });
+        // 1. The triangle at each pixel's centre.
+        let mut facet_of = match rays {
+            Some(rays) => {
+                let pixels = desired.width as usize * desired.height as usize;
+                let mut triangle_of = PixelNumbers::of_any(pixels);
+                solid.triangles_along(desired, rays, &mut triangle_of);
+                triangle_of
+            }
+            None => {
+                let world_from_camera = desired.camera_from_world.rotation.conjugate();
+                let found = Self::found(desired, |ray, _| {
+                    let hit = solid.first_hit(desired.center(), world_from_camera * ray);
+                    hit.map_or(NO_FACET, |hit| hit.triangle_idx)
+                });
+                found.into()
+            }
+        };
+        // 2. Those that are seen, which of a fine mesh are few, are the facets.
+        let seen = numbered(&mut facet_of, solid.triangle_count());
+        let plane = |i: &u32| Self::plane_of_triangle(solid, *i, desired);
+        let planes = seen.par_iter().with_min_len(256).map(plane).collect();
         Self::of_pixels(planes, facet_of, desired)
+    }
+
+    /// The plane of a mesh's triangle, in the desired camera's frame.
+    pub(crate) fn plane_of_triangle(solid: &Solid, triangle_idx: u32, desired: &View) -> DVec3 {
+        let (center, rotation) = (desired.center(), desired.camera_from_world.rotation);
+        let corners = solid.corners(triangle_idx as usize);
+        Self::plane_through(corners.map(|p| rotation * (p - center)))
     }
 
     /// The facet at each pixel's centre, row by row: `find` says which a ray meets, given what its
@@ -448,6 +459,33 @@ impl FacetMap {
         let rows: Vec<Vec<u32>> = (0..height).into_par_iter().map(row).collect();
         rows.concat()
     }
+}
+
+/// Numbers what pixels see, of so many things, as they first come, row by row, and says which each number stands for.
+fn numbered(seen: &mut [u32], count: usize) -> Vec<u32> {
+    let mut things = Vec::new();
+    // One more than each thing's number; zero where it has none yet.
+    let mut numbers = vec![0_u32; count];
+    // Neighbours mostly see the same.
+    let mut last = (NO_FACET, NO_FACET);
+    for own in seen {
+        if *own != last.0 {
+            let number = match *own {
+                NO_FACET => NO_FACET,
+                thing => {
+                    let number = &mut numbers[thing as usize];
+                    if *number == 0 {
+                        things.push(thing);
+                        *number = things.len() as u32;
+                    }
+                    *number - 1
+                }
+            };
+            last = (*own, number);
+        }
+        *own = last.1;
+    }
+    things
 }
 
 #[cfg(test)]

@@ -36,6 +36,9 @@ struct Side {
     enters: bool,
 }
 
+/// A triangle of the mesh, and whether rays enter there.
+type Crossed = (Prepared, bool);
+
 impl Side {
     fn kept(self) -> Kept {
         Kept::On {
@@ -104,14 +107,12 @@ impl Solid {
             Some((prepared, enters))
         });
         let [width, height] = rays.size;
-        let bands = by_bands(triangles.iter().map(|(triangle, _)| &triangle.rows), height);
-        let band = |(band_idx, (points, band)): (usize, (&[f64], &Vec<u32>))| {
+        let bands = by_bands(triangles.iter().flatten(), |(triangle, _)| triangle, height);
+        let band = |(band_idx, (points, band)): (usize, (&[f64], &Vec<&Crossed>))| {
             let first = band_idx * BAND;
             let mut around = vec![Around::default(); points.len()];
-            for &i in band {
-                let (triangle, enters) = &triangles[i as usize];
-                let end = triangle.rows.end.min(first + points.len() / width);
-                for row in triangle.rows.start.max(first)..end {
+            for (triangle, enters) in band {
+                for row in triangle.rows_in(first, width, points.len()) {
                     let pixels = (row - first) * width..(row + 1 - first) * width;
                     let (around, points) = (&mut around[pixels.clone()], &points[pixels]);
                     triangle.each_pixel(row, rays, |column, inverse| {

@@ -37,6 +37,10 @@ pub struct Scan {
 
 /// Rows that are scanned together.
 const BAND: usize = 16;
+/// Of which so many are asked at once for their columns.
+const TOGETHER: usize = 4;
+/// Runs of triangles that are prepared together.
+const RUNS: usize = 8;
 /// How far beyond its sides a triangle is still met, relative to the terms that are added up to
 /// find them: neighbours leave no gap. It is 1e-9 pixels or so.
 const SLACK: f64 = 1e-12;
@@ -45,6 +49,9 @@ impl Scan {
     /// No triangle.
     pub const NOTHING: u32 = u32::MAX;
 }
+
+/// All, part after part as they were made, which are not copied side by side.
+type InOrder<T> = Vec<Vec<T>>;
 
 /// A triangle, ready to be scanned.
 struct Prepared {
@@ -79,7 +86,7 @@ impl Solid {
     }
 
     fn scan_by(&self, threads: Threads, view: &View, rays: &Rays) -> Scan {
-        let mut scan = Scan::of(self.prepared(threads, view, rays), threads, rays);
+        let mut scan = Scan::of(&self.prepared(threads, view, rays), threads, rays);
         if let Some(hull) = self.within() {
             let kept = hull.keep_by(threads, view, rays, &scan.inverse_depth);
             scan.keep(&kept, self.mesh().triangles.len() as u32);
@@ -103,14 +110,26 @@ impl Solid {
     }
 
     /// The triangles that rays may meet, in order.
-    fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> Vec<Prepared> {
+    fn prepared(&self, threads: Threads, view: &View, rays: &Rays) -> InOrder<Prepared> {
         let front_only = self.kind().has_front_sides_only();
-        self.in_sight_of(threads, view, rays, |i, corners| {
-            Prepared::new(i, corners, rays, |sides| {
-                let is_seen = !(front_only && sides.volume >= 0.0);
-                is_seen.then(|| sides.inverse_depth())
-            })
-        })
+        self.in_sight_of(
+            threads,
+            view,
+            rays,
+            #[inline(always)]
+            |i, corners| {
+                Prepared::new(
+                    i,
+                    corners,
+                    rays,
+                    #[inline(always)]
+                    |sides| {
+                        let is_seen = !(front_only && sides.volume >= 0.0);
+                        is_seen.then(|| sides.inverse_depth())
+                    },
+                )
+            },
+        )
     }
 
     /// What `prepare` makes of triangles that rays may meet, in order: of each one's number, and its corners where a
@@ -121,18 +140,30 @@ impl Solid {
         view: &View,
         rays: &Rays,
         prepare: impl Fn(u32, [DVec3; 3]) -> Option<T> + Sync,
-    ) -> Vec<T> {
+    ) -> InOrder<T> {
         let plane_from_world =
             rays.plane_from_camera() * DMat3::from_quat(view.camera_from_world.rotation);
         let center = view.center();
-        let of_triangle = |i: usize| {
-            let corners = self.mesh().corners(i);
-            prepare(i as u32, corners.map(|p| plane_from_world * (p - center)))
+        let of_runs = |runs: &[Range<usize>]| {
+            let mut all = Vec::new();
+            Arch::new().dispatch(
+                #[inline(always)]
+                || {
+                    for i in runs.iter().cloned().flatten() {
+                        let corners = self.mesh().corners(i);
+                        let corners = corners.map(
+                            #[inline(always)]
+                            |p| plane_from_world * (p - center),
+                        );
+                        all.extend(prepare(i as u32, corners));
+                    }
+                },
+            );
+            all
         };
         let runs = self.in_sight(&rays.sight(center, plane_from_world));
-        let runs = runs.into_par_iter().with_min_len(threads.at_least(4));
-        runs.flat_map_iter(|run| run.filter_map(of_triangle))
-            .collect()
+        let runs = runs.par_chunks(RUNS).with_min_len(threads.at_least(1));
+        runs.map(of_runs).collect()
     }
 }
 
@@ -170,7 +201,7 @@ impl Facets {
         };
         let facets = (0..self.triangles.len()).into_par_iter();
         let facets = facets.with_min_len(256).filter_map(prepare).collect();
-        Scan::of(facets, Threads::All, rays)
+        Scan::of(&[facets], Threads::All, rays)
     }
 }
 
@@ -196,6 +227,7 @@ impl Rays {
     }
 
     /// Columns and rows whose pixels may see a triangle of corners that are all ahead.
+    #[inline(always)]
     fn around(&self, corners: [DVec3; 3]) -> [Range<usize>; 2] {
         let [a, b, c] = corners.map(|p| p.truncate() / p.z);
         let (least, most) = (a.min(b).min(c), a.max(b).max(c));
@@ -231,7 +263,7 @@ impl Rays {
 
 impl Scan {
     /// Of triangles in order.
-    fn of(triangles: Vec<Prepared>, threads: Threads, rays: &Rays) -> Self {
+    fn of(triangles: &[Vec<Prepared>], threads: Threads, rays: &Rays) -> Self {
         let [width, height] = rays.size;
         let mut scan = Self {
             width,
@@ -239,7 +271,7 @@ impl Scan {
             inverse_depth: vec![0.0; width * height],
         };
         let depths = Some(scan.inverse_depth.as_mut_slice());
-        draw_all(&triangles, threads, rays, &mut scan.triangle_of, depths);
+        draw_all(triangles, threads, rays, &mut scan.triangle_of, depths);
         scan
     }
 
@@ -261,109 +293,127 @@ impl Scan {
 
 /// Which triangle each pixel sees first, over whatever is there; and the inverse depths, over zeros.
 fn draw_all(
-    triangles: &[Prepared],
+    triangles: &[Vec<Prepared>],
     threads: Threads,
     rays: &Rays,
     ids: &mut [u32],
     depths: Option<&mut [f64]>,
 ) {
     let [width, height] = rays.size;
-    let bands = by_bands(triangles.iter().map(|triangle| &triangle.rows), height);
+    let bands = by_bands(triangles.iter().flatten(), |triangle| triangle, height);
     let pixels = (BAND * width).max(1);
-    let draw = |(band_idx, ids): (usize, &mut [u32]), mut depths: Option<&mut [f64]>| {
-        // 1. What each row meets, triangle by triangle.
-        let first = band_idx * BAND;
-        let mut rows: [Vec<Span>; BAND] = Default::default();
-        for &i in &bands[band_idx] {
-            let triangle = &triangles[i as usize];
-            let end = triangle.rows.end.min(first + ids.len() / width);
-            for row in triangle.rows.start.max(first)..end {
-                let columns = match &rays.bent {
-                    None => triangle.columns_in(row, width),
-                    Some(_) => triangle.columns.clone(),
-                };
-                if !columns.is_empty() {
-                    rows[row - first].push((columns.start as u32, columns.end as u32, i));
-                }
-            }
-        }
-        // 2. What is nearest.
-        let mut own = match &depths {
-            None => vec![0.0; width],
-            Some(_) => Vec::new(),
-        };
-        for (i, (spans, ids)) in rows.iter_mut().zip(ids.chunks_mut(width)).enumerate() {
-            let row = first + i;
+    let draw =
+        |own: &mut Vec<f64>, band_idx: usize, ids: &mut [u32], depths: Option<&mut [f64]>| {
+            let (band, first) = (&bands[band_idx][..], band_idx * BAND);
             ids.fill(Scan::NOTHING);
-            let depths = match &mut depths {
-                Some(depths) => &mut depths[i * width..(i + 1) * width],
-                None if rays.bent.is_none() && are_apart(spans, triangles, row, width) => {
-                    for (start, end, i) in spans {
-                        ids[*start as usize..*end as usize]
-                            .fill(triangles[*i as usize].triangle_idx);
-                    }
-                    continue;
+            let depths = match depths {
+                Some(depths) => depths,
+                None if rays.bent.is_none() && are_few(band, width) => {
+                    return draw_few(band, first, width, ids);
                 }
                 None => {
-                    own.fill(0.0);
+                    own.clear();
+                    own.resize(ids.len(), 0.0);
                     own.as_mut_slice()
                 }
             };
-            if let Some(bent) = &rays.bent {
-                for (_, _, i) in spans {
-                    triangles[*i as usize].draw_bent(row, bent, ids, depths);
-                }
-                continue;
-            }
             Arch::new().dispatch(
                 #[inline(always)]
-                move || {
-                    for (start, end, i) in spans {
-                        let columns = *start as usize..*end as usize;
-                        triangles[*i as usize].draw(row, columns, ids, depths);
+                move || match &rays.bent {
+                    None => {
+                        for triangle in band {
+                            triangle.draw(first, width, ids, depths);
+                        }
+                    }
+                    Some(bent) => {
+                        for triangle in band {
+                            triangle.draw_bent(first, width, bent, ids, depths);
+                        }
                     }
                 },
             );
-        }
-    };
+        };
     let ids = ids.par_chunks_mut(pixels).enumerate();
     let ids = ids.with_min_len(threads.at_least(1));
     match depths {
-        None => ids.for_each(|ids| draw(ids, None)),
+        None => ids.for_each_init(Vec::new, |own, (i, ids)| draw(own, i, ids, None)),
         Some(depths) => {
             let both = ids.zip(depths.par_chunks_mut(pixels));
-            both.for_each(|(ids, depths)| draw(ids, Some(depths)));
+            both.for_each(|((i, ids), depths)| draw(&mut Vec::new(), i, ids, Some(depths)));
         }
     }
 }
 
-/// Columns of a row from … to before, and which triangle's.
-type Span = (u32, u32, u32);
+/// Whether triangles are so few for a band of so wide a picture that pixels may well be in one at most.
+fn are_few(band: &[&Prepared], width: usize) -> bool {
+    const PIXELS: usize = 8;
+    band.len() * PIXELS <= width
+}
+
+/// Which of few triangles a pinhole's pixels in a band of rows see first, over nothing: where each pixel of a row is in one at
+/// most no depths are compared.
+fn draw_few(band: &[&Prepared], first: usize, width: usize, ids: &mut [u32]) {
+    // 1. What each row meets, triangle by triangle.
+    let mut rows: [Vec<Span<'_>>; BAND] = Default::default();
+    for triangle in band {
+        triangle.each_row(first, width, ids.len(), |row, columns| {
+            if !columns.is_empty() {
+                rows[row - first].push((columns, triangle));
+            }
+        });
+    }
+    // 2. What is nearest.
+    let mut depths = Vec::new();
+    for (i, (spans, ids)) in rows.iter().zip(ids.chunks_mut(width)).enumerate() {
+        let row = first + i;
+        if are_apart(spans, row) {
+            for (columns, triangle) in spans {
+                ids[columns.clone()].fill(triangle.triangle_idx);
+            }
+            continue;
+        }
+        depths.clear();
+        depths.resize(width, 0.0);
+        Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for (columns, triangle) in spans {
+                    let (ids, depths) = (&mut ids[columns.clone()], &mut depths[columns.clone()]);
+                    triangle.draw_columns(row, columns.start, ids, depths);
+                }
+            },
+        );
+    }
+}
+
+/// Columns of a row, and which triangle's.
+type Span<'a> = (Range<usize>, &'a Prepared);
 
 /// Whether each pixel of a pinhole's row is in one span at most, all in front: then nothing need be
-/// compared. Not asked where spans are many, for they are short.
-fn are_apart(spans: &[Span], triangles: &[Prepared], row: usize, width: usize) -> bool {
-    const PIXELS: usize = 16;
-    if spans.len() * PIXELS > width {
-        return false;
-    }
-    let mut columns: Vec<[u32; 2]> = spans.iter().map(|(start, end, _)| [*start, *end]).collect();
+/// compared.
+fn are_apart(spans: &[Span<'_>], row: usize) -> bool {
+    let mut columns: Vec<[usize; 2]> = spans.iter().map(|(c, _)| [c.start, c.end]).collect();
     columns.sort_unstable();
-    let is_in_front = |(start, end, i): &Span| {
-        let mut ends = [*start, *end - 1].into_iter();
-        ends.all(|column| triangles[*i as usize].inverse_depth_at(row, column as usize) > 0.0)
+    let is_in_front = |(columns, triangle): &Span<'_>| {
+        let mut ends = [columns.start, columns.end - 1].into_iter();
+        ends.all(|column| triangle.inverse_depth_at(row, column) > 0.0)
     };
     columns.windows(2).all(|two| two[0][1] <= two[1][0]) && spans.iter().all(is_in_front)
 }
 
-/// Which triangles, given by the rows they reach, reach which bands: their indices, in order.
-fn by_bands<'a>(rows: impl Iterator<Item = &'a Range<usize>>, height: usize) -> Vec<Vec<u32>> {
-    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
-    for (i, rows) in rows.enumerate() {
+/// Which of some, that have triangles, reach which bands, in order.
+fn by_bands<'a, T>(
+    all: impl Iterator<Item = &'a T>,
+    triangle: impl Fn(&T) -> &Prepared,
+    height: usize,
+) -> Vec<Vec<&'a T>> {
+    let mut bands: Vec<Vec<&T>> = vec![Vec::new(); height.div_ceil(BAND)];
+    for own in all {
+        let rows = &triangle(own).rows;
         let last = (rows.end - 1) / BAND;
         bands[rows.start / BAND..=last]
             .iter_mut()
-            .for_each(|band| band.push(i as u32));
+            .for_each(|band| band.push(own));
     }
     bands
 }
@@ -377,6 +427,7 @@ struct Sides {
 }
 
 impl Sides {
+    #[inline(always)]
     fn new([a, b, c]: [DVec3; 3]) -> Self {
         let of = [b.cross(c), c.cross(a), a.cross(b)];
         Self {
@@ -386,6 +437,7 @@ impl Sides {
     }
 
     /// 1/z: times (x, y, 1).
+    #[inline(always)]
     fn inverse_depth(&self) -> DVec3 {
         (self.of[0] + self.of[1] + self.of[2]) / self.volume
     }
@@ -394,6 +446,7 @@ impl Sides {
 impl Prepared {
     /// Of corners where a pixel's ray is (x, y, 1); 1/z is what its sides say, times that. `None` for one that no pixel
     /// sees.
+    #[inline(always)]
     fn new(
         triangle_idx: u32,
         corners: [DVec3; 3],
@@ -441,55 +494,99 @@ impl Prepared {
         })
     }
 
-    /// Draws it over what is farther in a row, ray by ray.
-    fn draw_bent(&self, row: usize, bent: &Bent, ids: &mut [u32], depths: &mut [f64]) {
-        let width = ids.len();
+    /// The rows of it that lie in a band that begins with one of a picture so wide, and has so many pixels.
+    #[inline(always)]
+    fn rows_in(&self, first: usize, width: usize, pixels: usize) -> Range<usize> {
+        self.rows.start.max(first)..self.rows.end.min(first + pixels / width)
+    }
+
+    /// Draws it over what is farther in a band of rows, ray by ray.
+    #[inline(always)]
+    fn draw_bent(
+        &self,
+        first: usize,
+        width: usize,
+        bent: &Bent,
+        ids: &mut [u32],
+        depths: &mut [f64],
+    ) {
         let is_beyond = |bounds: &rays::Bounds| {
             let mut sides = self.sides.iter().zip(self.slack);
             sides.any(|(side, slack)| bounds.most_of(*side) < -slack)
         };
-        if is_beyond(&bent.rows[row]) {
-            return;
-        }
+        // What is narrower is as soon asked ray by ray.
+        let is_wide = self.columns.len() > BLOCK;
         let [a, b, c] = self.sides;
         let [least_a, least_b, least_c] = self.slack.map(|slack| -slack);
         let blocks = width.div_ceil(BLOCK);
-        for block in self.columns.start / BLOCK..self.columns.end.div_ceil(BLOCK) {
-            if is_beyond(&bent.blocks[row * blocks + block]) {
+        for row in self.rows_in(first, width, ids.len()) {
+            if is_wide && is_beyond(&bent.rows[row]) {
                 continue;
             }
-            let pixels = block * BLOCK..((block + 1) * BLOCK).min(width);
-            let at = &bent.at[row * width..][pixels.clone()];
-            let drawn = ids[pixels.clone()].iter_mut().zip(&mut depths[pixels]);
-            for ((id, depth), at) in drawn.zip(at) {
-                let of = |side: DVec3| side.x * at.x + side.y * at.y + side.z;
-                let here = of(self.inverse_depth);
-                let is_inside = (of(a) >= least_a) & (of(b) >= least_b) & (of(c) >= least_c);
-                let is_nearer = is_inside & (here > *depth);
-                *depth = if is_nearer { here } else { *depth };
-                *id = if is_nearer { self.triangle_idx } else { *id };
+            let of_row = (row - first) * width;
+            for block in self.columns.start / BLOCK..self.columns.end.div_ceil(BLOCK) {
+                if is_wide && is_beyond(&bent.blocks[row * blocks + block]) {
+                    continue;
+                }
+                let start = self.columns.start.max(block * BLOCK);
+                let end = self.columns.end.min((block + 1) * BLOCK);
+                let at = &bent.at[row * width..][start..end];
+                let drawn = ids[of_row..][start..end].iter_mut();
+                let drawn = drawn.zip(&mut depths[of_row..][start..end]);
+                for ((id, depth), at) in drawn.zip(at) {
+                    let of = |side: DVec3| side.x * at.x + side.y * at.y + side.z;
+                    let here = of(self.inverse_depth);
+                    let is_inside = (of(a) >= least_a) & (of(b) >= least_b) & (of(c) >= least_c);
+                    let is_nearer = is_inside & (here > *depth);
+                    *depth = if is_nearer { here } else { *depth };
+                    *id = if is_nearer { self.triangle_idx } else { *id };
+                }
             }
         }
     }
 
-    /// The columns of a pinhole's row whose centres are inside of all sides.
-    fn columns_in(&self, row: usize, width: usize) -> Range<usize> {
-        let y = row as f64 + 0.5;
-        let (mut least, mut most) = (0.0_f64, width as f64);
-        for (side, slack) in self.sides.iter().zip(self.slack) {
-            // side.x · x + rest ≥ 0
-            let rest = side.y * y + side.z + slack;
-            let at = -rest / side.x - 0.5;
-            if side.x > 0.0 {
-                least = least.max(at.ceil());
-            } else if side.x < 0.0 {
-                most = most.min(at.floor() + 1.0);
-            } else if rest < 0.0 {
-                return 0..0;
+    /// Calls `each` with the rows of it in a band, as [`Self::rows_in`] has them, and the columns of a pinhole's pixels there
+    /// whose centres are inside of all sides.
+    #[inline(always)]
+    fn each_row(
+        &self,
+        first: usize,
+        width: usize,
+        pixels: usize,
+        mut each: impl FnMut(usize, Range<usize>),
+    ) {
+        let rows = self.rows_in(first, width, pixels);
+        for start in rows.clone().step_by(TOGETHER) {
+            let columns = self.columns_in(start, width);
+            for (row, [least, most]) in (start..rows.end).zip(columns) {
+                each(row, least..most);
             }
         }
-        let end = most.max(0.0) as usize;
-        (least as usize).min(end)..end
+    }
+
+    /// From which column to before which, of a pinhole's row and of the next, the centres of pixels are inside of all sides.
+    #[inline(always)]
+    fn columns_in(&self, row: usize, width: usize) -> [[usize; 2]; TOGETHER] {
+        let (mut least, mut most) = ([0.0_f64; TOGETHER], [width as f64; TOGETHER]);
+        for (side, slack) in self.sides.iter().zip(self.slack) {
+            for k in 0..TOGETHER {
+                // side.x · x + rest ≥ 0
+                let y = (row + k) as f64 + 0.5;
+                let rest = side.y * y + side.z + slack;
+                let at = -rest / side.x - 0.5;
+                if side.x > 0.0 {
+                    least[k] = least[k].max(at.ceil());
+                } else if side.x < 0.0 {
+                    most[k] = most[k].min(at.floor() + 1.0);
+                } else if rest < 0.0 {
+                    most[k] = 0.0;
+                }
+            }
+        }
+        std::array::from_fn(|k| {
+            let most = most[k].max(0.0);
+            [least[k].min(most), most].map(|column| column as usize)
+        })
     }
 
     /// Calls `put(column, 1/z)` for all pixels of a row that look at it or, where the viewer is
@@ -500,7 +597,8 @@ impl Prepared {
             None => {
                 let at = DVec3::new(0.0, row as f64 + 0.5, 1.0);
                 let rest = self.inverse_depth.dot(at);
-                for column in self.columns_in(row, width) {
+                let [[least, most], ..] = self.columns_in(row, width);
+                for column in least..most {
                     put(column, self.inverse_depth.x * (column as f64 + 0.5) + rest);
                 }
             }
@@ -522,15 +620,30 @@ impl Prepared {
         self.inverse_depth.x * (column as f64 + 0.5) + rest
     }
 
-    /// Draws columns of a pinhole's row over what is farther.
+    /// Draws it over what is farther in a band of a pinhole's rows.
     #[inline(always)]
-    fn draw(&self, row: usize, columns: Range<usize>, ids: &mut [u32], depths: &mut [f64]) {
+    fn draw(&self, first: usize, width: usize, ids: &mut [u32], depths: &mut [f64]) {
+        self.each_row(
+            first,
+            width,
+            ids.len(),
+            #[inline(always)]
+            |row, columns| {
+                let of_row = (row - first) * width;
+                let ids = &mut ids[of_row..][columns.clone()];
+                let depths = &mut depths[of_row..][columns.clone()];
+                self.draw_columns(row, columns.start, ids, depths);
+            },
+        );
+    }
+
+    /// Draws it over what is farther in pixels of a pinhole's row, from a column on.
+    #[inline(always)]
+    fn draw_columns(&self, row: usize, first: usize, ids: &mut [u32], depths: &mut [f64]) {
         let rest = self.inverse_depth.y * (row as f64 + 0.5) + self.inverse_depth.z;
         let slope = self.inverse_depth.x;
-        let start = columns.start;
-        let pixels = ids[columns.clone()].iter_mut().zip(&mut depths[columns]);
-        for (i, (id, depth)) in pixels.enumerate() {
-            let here = slope * ((start + i) as f64 + 0.5) + rest;
+        for (column, (id, depth)) in (first as i32..).zip(ids.iter_mut().zip(depths)) {
+            let here = slope * (f64::from(column) + 0.5) + rest;
             let is_nearer = here > *depth;
             *depth = if is_nearer { here } else { *depth };
             *id = if is_nearer { self.triangle_idx } else { *id };

@@ -189,17 +189,26 @@ fn consistent_threshold(terms: &[Term], order: &[usize], m: f32) -> Lane {
 /// The n-th smallest diff among the candidates of one pixel, or the largest if there are
 /// fewer; at least [`SMALLEST_THRESHOLD`].
 fn nth_smallest(terms: &[Term], order: &[usize], k: usize, n: usize) -> f32 {
-    let mut diffs: Vec<f32> = order
-        .iter()
-        .map(|&i| &terms[i])
-        .filter(|t| t.a[k] > 0.0)
-        .map(|t| t.diff[k])
-        .collect();
-    if diffs.is_empty() {
+    /// Of so many at most they need no memory of their own: this is asked pixel by pixel.
+    const FEW: usize = 128;
+    let (mut few, mut many) = ([0.0; FEW], Vec::new());
+    let diffs: &mut [f32] = match order.len() {
+        ..=FEW => &mut few,
+        count => {
+            many.resize(count, 0.0);
+            &mut many
+        }
+    };
+    let mut count = 0;
+    for term in order.iter().map(|&i| &terms[i]).filter(|t| t.a[k] > 0.0) {
+        diffs[count] = term.diff[k];
+        count += 1;
+    }
+    if count == 0 {
         return SMALLEST_THRESHOLD;
     }
-    let nth = n.min(diffs.len()) - 1;
-    diffs
+    let nth = n.min(count) - 1;
+    diffs[..count]
         .select_nth_unstable_by(nth, f32::total_cmp)
         .1
         .max(SMALLEST_THRESHOLD)

@@ -410,7 +410,7 @@ fn photos_of_other_moments_might_as_well_not_be_there() {
             [&all, &some].map(|of| Frame::with(of, desired.clone(), options, &part));
         assert_eq!(of_all.taking_part().collect::<Vec<_>>(), [0, 1, 2]);
         if let Surface::Facets(map) = &of_all.surface {
-            moved += map.planes.len() - solid_of(&all).triangle_count();
+            moved += map.moved().filter(|is_moved| *is_moved).count();
         }
         for method in METHODS {
             let pictures = by_all(&of_all, method)
