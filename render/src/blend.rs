@@ -155,17 +155,17 @@ impl FieldOptions {
             return false;
         }
         let (mut sum, mut count, mut nearer) = (0.0, 0, 0);
-        for diff in diffs.filter(|diff| *diff <= most) {
+        diffs.filter(|diff| *diff <= most).any(|diff| {
             sum += 1.0 - diff / most;
             count += 1;
             nearer += usize::from(diff < most);
-        }
-        let suffice = match self.blend {
-            Blend::Paper => nearer >= self.k,
-            // The threshold is where the sum is so much, and the sum grows with it.
-            Blend::Consistent => sum >= self.full_weight() * (1.0 + MARGIN),
-        };
-        suffice || count > MAX_CONTRIBUTORS
+            let suffice = match self.blend {
+                Blend::Paper => nearer >= self.k,
+                // The threshold is where the sum is so much, and the sum grows with it.
+                Blend::Consistent => sum >= self.full_weight() * (1.0 + MARGIN),
+            };
+            suffice || count > MAX_CONTRIBUTORS
+        })
     }
 }
 

@@ -29,10 +29,16 @@ pub(crate) struct Near {
 /// Source views that are asked before it is seen whether others may count, and again after so many more.
 const FIRST_ASKED: usize = 6;
 const THEN_ASKED: usize = 2;
+/// From here on after a share of those that were asked, so that to see takes no longer than to ask.
+const MANY_ASKED: usize = 128;
 
 /// Whether to see, once so many were asked, whether others may count.
 pub(crate) fn is_time_to_see(asked: usize) -> bool {
-    asked >= FIRST_ASKED && (asked - FIRST_ASKED).is_multiple_of(THEN_ASKED)
+    let then = match asked {
+        ..MANY_ASKED => THEN_ASKED,
+        _ => THEN_ASKED << (asked / MANY_ASKED).ilog2(),
+    };
+    asked >= FIRST_ASKED && (asked - FIRST_ASKED).is_multiple_of(then)
 }
 
 impl Near {
@@ -190,5 +196,20 @@ impl Frame<'_> {
     pub fn blend_at(&self, point: &ProxyPoint) -> Vec<Contributor> {
         let near = self.near(point, 0.0, self.first_guess());
         blend(&near.candidates, &self.options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn to_see_whether_others_count_takes_no_longer_than_to_ask() {
+        for asked in [100, 1000, 20_000, 300_000] {
+            let seen: usize = (0..asked).filter(|asked| is_time_to_see(*asked)).sum();
+            assert!(seen > asked && seen < 150 * asked, "{asked}: {seen}");
+        }
+        let first: Vec<usize> = (0..12).filter(|asked| is_time_to_see(*asked)).collect();
+        assert_eq!(first, [6, 8, 10]);
     }
 }

@@ -15,7 +15,7 @@ pub(super) struct Known {
 /// Not among what a corner knows.
 pub(super) const NOWHERE: u32 = u32::MAX;
 
-/// Views that are sorted at once: mostly no more are needed.
+/// Views that are sorted at first: mostly no more are needed. Then as many again as there were so far.
 const SORTED: usize = 24;
 
 /// The views that three corners know of, in order. What is not among what one knows differs by `others` there,
@@ -81,9 +81,10 @@ impl Iterator for ByLeast {
                 by_least.then(x.source_idx.cmp(&y.source_idx))
             };
             let rest = &mut self.known[self.sorted..];
-            let count = rest.len().min(SORTED);
-            if rest.len() > SORTED {
-                rest.select_nth_unstable_by(SORTED, order);
+            let more = self.sorted.max(SORTED);
+            let count = rest.len().min(more);
+            if rest.len() > more {
+                rest.select_nth_unstable_by(more, order);
             }
             rest[..count].sort_unstable_by(order);
             self.sorted += count;
