@@ -6,6 +6,7 @@
 
 mod capture;
 mod gaze;
+mod ring;
 mod stray;
 mod upright;
 
@@ -14,9 +15,10 @@ pub use upright::{Standing, Upright, upright};
 use crate::lumigraph::SourceView;
 use crate::path::{CameraPath, Curve, Interpolation, PathError, PathFrame, default_name};
 use calibrate::{Camera, ModelKind, Rigid3, View};
-use capture::{Capture, Ring};
+use capture::Capture;
 use glam::DVec3;
 use proxy::Proxy;
+use ring::Ring;
 use std::f64::consts::{PI, TAU};
 use stray::without_strays;
 use upright::turned;
