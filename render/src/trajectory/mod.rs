@@ -32,8 +32,9 @@ pub enum Trajectory {
     /// From the middle of the capture towards the scene, back and beyond, and to the middle again;
     /// where the cameras were walked forwards, along the walk.
     Dolly,
-    /// Along the longest direction of the camera positions and back; where few cameras surround an object, around half of
-    /// it, or along their arc.
+    /// Along the longest direction of the camera positions and back, looking as the cameras there do, or at the object that
+    /// they surround and look at. Around half of it, or along their arc, where they are few or that way would lead inside
+    /// them or over its top.
     Sweep,
 }
 
@@ -158,21 +159,42 @@ fn there_and_back(frames: usize) -> Vec<f64> {
 }
 
 fn sweep(capture: &Capture, frames: usize) -> Vec<Rigid3> {
-    // The mean of few cameras around something would be in the midst of it.
+    let shares = there_and_back(frames);
     let ring = capture.ring();
-    if let Some(ring) = ring.filter(|ring| ring.is_sparse(capture.spacing)) {
-        let (from, to) = match ring.arc() {
-            // The half that the reference camera is in the middle of.
-            (_, _, true) => (-0.5 * PI, 0.5 * PI),
-            (from, to, false) => (from, to),
-        };
-        return along_the_ring(&ring, from, to, there_and_back(frames));
+    // The mean of few cameras around something would be in the midst of it.
+    if let Some(ring) = ring.as_ref().filter(|r| r.is_sparse(capture.spacing)) {
+        return half_around(ring, shares);
     }
-    let Some((curve, length, _)) = along_the_cameras(capture) else {
+    let Some(mut way) = along_the_cameras(capture) else {
         return vec![capture.reference_pose(); frames];
     };
-    let shares = there_and_back(frames).into_iter();
-    shares.map(|share| curve.at(length * share)).collect()
+    // The mean of gazes that meet in one place, of cameras side by side and one above the other, meets nothing.
+    if let Some(ring) = ring.filter(|ring| capture.is_looked_at(ring.focus)) {
+        let is_beside = |(_, pose): &(f64, Rigid3)| ring.is_beside(pose.center());
+        match way.knots.iter().all(is_beside) {
+            // Where they do not go around it in plan there are none to go around.
+            false if ring.surrounds() => return half_around(&ring, shares),
+            false => {}
+            true => {
+                for (_, pose) in &mut way.knots {
+                    *pose = Rigid3::looking_at(pose.center(), ring.focus, ring.up);
+                }
+            }
+        }
+    }
+    let length = way.length();
+    let curve = way.curve();
+    let places = shares.into_iter().map(|share| length * share);
+    places.map(|place| curve.at(place)).collect()
+}
+
+/// Around the half of the object that the reference camera is in the middle of, or along the cameras' arc.
+fn half_around(ring: &Ring, shares: Vec<f64>) -> Vec<Rigid3> {
+    let (from, to) = match ring.arc() {
+        (_, _, true) => (-0.5 * PI, 0.5 * PI),
+        (from, to, false) => (from, to),
+    };
+    along_the_ring(ring, from, to, shares)
 }
 
 fn dolly(capture: &Capture, frames: usize) -> Vec<Rigid3> {
@@ -191,9 +213,11 @@ fn dolly(capture: &Capture, frames: usize) -> Vec<Rigid3> {
     let long = capture.half_extents[0] > 3.0 * capture.half_extents[1];
     if long
         && capture.axes[0].dot(forward).abs() > 0.8
-        && let Some((curve, length, middle)) = along_the_cameras(capture)
+        && let Some(way) = along_the_cameras(capture)
     {
-        let reach = reach.min(middle).min(length - middle);
+        let middle = way.middle;
+        let reach = reach.min(middle).min(way.length() - middle);
+        let curve = way.curve();
         return along.map(|t| curve.at(middle + reach * t)).collect();
     }
     along
@@ -204,13 +228,30 @@ fn dolly(capture: &Capture, frames: usize) -> Vec<Rigid3> {
         .collect()
 }
 
-/// The curve through the middle of the cameras, from 10 % to 90 % of their extent along the
-/// principal axis, by arc length; its length, and where it passes the reference camera.
-/// `None` where the cameras have no extent.
+/// A way through the middle of the cameras.
+struct Way {
+    /// Poses by arc length.
+    knots: Vec<(f64, Rigid3)>,
+    /// Where it passes the reference camera.
+    middle: f64,
+}
+
+impl Way {
+    fn length(&self) -> f64 {
+        self.knots.last().map_or(0.0, |last| last.0)
+    }
+
+    fn curve(self) -> Curve {
+        Curve::new(self.knots, Interpolation::Spline)
+    }
+}
+
+/// The way through the middle of the cameras, from 10 % to 90 % of their extent along the
+/// principal axis. `None` where the cameras have no extent.
 ///
 /// It starts at the reference camera and follows the cameras about it both ways, so that
 /// of a ring it takes one side rather than the middle between both.
-fn along_the_cameras(capture: &Capture) -> Option<(Curve, f64, f64)> {
+fn along_the_cameras(capture: &Capture) -> Option<Way> {
     let axis = capture.axes[0];
     if !capture.has_extent() {
         return None;
@@ -267,7 +308,7 @@ fn along_the_cameras(capture: &Capture) -> Option<(Curve, f64, f64)> {
         knots.push((length, Rigid3::new(rotation, -(rotation * centers[k]))));
     }
     let middle = knots[start].0;
-    Some((Curve::new(knots, Interpolation::Spline), length, middle))
+    Some(Way { knots, middle })
 }
 
 fn orbit(capture: &Capture, frames: usize) -> Vec<Rigid3> {

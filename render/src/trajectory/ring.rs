@@ -14,6 +14,12 @@ const LEAST_ARC: f64 = 2.0 * PI / 3.0;
 /// A mean of those about a place lies well within the ring, where no photo was taken.
 const FEW_AROUND: f64 = 0.5;
 
+/// Nearer to what they surround than so many times the nearest camera is, means of their places lie within the ring.
+const WITHIN: f64 = 0.9;
+/// The sine of 25°. Whoever passes by closer to straight above something, looking at it, whirls round: by more than
+/// twice as much as anywhere else.
+const ABOVE: f64 = 0.42;
+
 /// Cameras around a place.
 pub(super) struct Ring {
     pub(super) focus: DVec3,
@@ -42,6 +48,16 @@ impl Ring {
         let in_plan = |c: &[f64; 3]| c[2] * c[1].cos();
         let radius = median(self.cameras.iter().map(in_plan).collect());
         radius.is_some_and(|radius| spacing >= FEW_AROUND * radius)
+    }
+
+    /// Whether a place is as far off as cameras are, and beside what they surround rather than above or below it; see
+    /// [`WITHIN`] and [`ABOVE`].
+    pub(super) fn is_beside(&self, place: DVec3) -> bool {
+        let distances = self.cameras.iter().map(|c| c[2]);
+        let nearest = distances.fold(f64::INFINITY, f64::min);
+        let off = place - self.focus;
+        let far = off.length();
+        far >= WITHIN * nearest && off.cross(self.up).length() >= ABOVE * far
     }
 
     /// Azimuths from where to where, and whether that is all around: it is where no gap

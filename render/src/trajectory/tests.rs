@@ -1,5 +1,6 @@
 //! Paths of captures of usual shapes.
 
+mod aimed;
 mod strays;
 
 use super::*;
