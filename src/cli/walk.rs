@@ -2,6 +2,7 @@
 
 mod empty;
 mod report;
+mod scant;
 mod tour;
 
 use super::Usage;
@@ -247,6 +248,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         say_others(args, &walks)?;
         notes.say_new(walk.painter());
         if let Some(note) = empty::note(args, &walks) {
+            notes.say(note);
+        }
+        if let Some(captured) = walk.painter().captured().filter(|_| !args.held_out)
+            && let Some(note) = scant::note(interior, contents, captured, &walks)
+        {
             notes.say(note);
         }
         let frames_empty = empty::count(&walks);
@@ -568,7 +574,7 @@ fn draw(
             scored = Some(Scored { score, cpu_ms });
         }
         let picture = walk.picture().picture();
-        let is_empty = is_empty(&picture);
+        let (is_empty, shown) = (is_empty(&picture), scant::shown(&picture));
         film.write(file, picture)?;
         bar.suspend(|| notes.say_new(walk.painter()));
         drawn.push(Drawn {
@@ -578,6 +584,7 @@ fn draw(
             cost,
             scored,
             is_empty,
+            shown,
         });
         bar.inc(1);
     }

@@ -203,6 +203,66 @@ fn a_captures_rooms_are_drawn_from_its_photos() {
     .ok();
 }
 
+/// Photos that were taken there look the other way than the tour does.
+#[test]
+fn rooms_that_photos_show_little_of_are_named_after_a_walk() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    hallway(here, |_| {});
+    // All photos look along -z, half of them from the back.
+    let rooms = r#"{"version": 1, "rooms": [
+        {"name": "front", "min": [-1, 0, -6], "max": [1, 2.4, 2]},
+        {"name": "back", "min": [-1, 0, 2], "max": [1, 2.4, 6]}],
+        "openings": [{"name": "across", "between": ["front", "back"], "radius": 0.5,
+            "polygon": [[-1, 0, 2], [1, 0, 2], [1, 2.4, 2], [-1, 2.4, 2]]}]}"#;
+    std::fs::write(here.join("rooms.json"), rooms).unwrap();
+    lumigraph(here, "interior hall --rooms rooms.json -o two").ok();
+    let walk = |more: &str| {
+        let line = format!("walk two {more} --device cpu --json");
+        let ran = lumigraph(here, &line).ok();
+        let report = ran.json();
+        let notes = report["report"]["notes"].as_array().unwrap().iter();
+        let notes = notes.map(|note| note.as_str().unwrap());
+        let little = notes.filter(|note| note.starts_with("frames show little in "));
+        let little: Vec<String> = little.map(str::to_owned).collect();
+        for note in &little {
+            let line = format!("note: {note}\n");
+            assert!(ran.stderr.contains(&line), "{}", ran.stderr);
+        }
+        (report, little)
+    };
+    // The tour goes from front to back.
+    let (report, notes) = walk("--frames 12 --size 48x36 -o tour");
+    let frames = report["walks"][0]["frames"].as_array().unwrap().iter();
+    let in_back = frames.filter(|frame| frame["cell"] == "back");
+    let shown = in_back.map(|frame| {
+        let file = here.join(frame["file"].as_str().unwrap());
+        let picture = image::open(file).unwrap().into_rgba8();
+        let alphas = picture.pixels().map(|pixel| f64::from(pixel.0[3]));
+        alphas.sum::<f64>() / (255.0 * 48.0 * 36.0)
+    });
+    let shown: Vec<f64> = shown.collect();
+    let percent = 100.0 * shown.iter().sum::<f64>() / shown.len() as f64;
+    assert!(percent > 30.0 && percent < 65.0, "{percent}");
+    let said = format!(
+        "frames show little in back ({percent:.0} % of the pixels of {} frames; photos taken there: 14 of 28): take more \
+         photos of what one sees from there, or give a --path that stays out or looks another way",
+        shown.len()
+    );
+    assert_eq!(notes, [said]);
+    // Of who looks as the photos do nothing is said, nor without photos.
+    let mut path = render::path::read(&here.join("tour/path.json")).unwrap();
+    path.extra.clear();
+    for frame in &mut path.frames {
+        let turn = calibrate::Rigid3::new(DQuat::from_rotation_y(PI), glam::DVec3::ZERO);
+        frame.view.camera_from_world = turn * frame.view.camera_from_world;
+    }
+    render::path::write(&here.join("ahead.json"), &path).unwrap();
+    let none: [String; 0] = [];
+    assert_eq!(walk("--path ahead.json --size 48x36 -o ahead").1, none);
+    assert_eq!(walk("--frames 2 --size 48x36 --no-photos -o plain").1, none);
+}
+
 #[test]
 fn a_capture_without_depth_needs_a_mesh() {
     let folder = tempfile::tempdir().unwrap();

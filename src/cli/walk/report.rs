@@ -39,6 +39,8 @@ pub(super) struct Drawn {
     pub(super) scored: Option<Scored>,
     /// No pixel is covered, not even in part.
     pub(super) is_empty: bool,
+    /// The share of its pixels that are covered.
+    pub(super) shown: f64,
 }
 
 /// What a held-out photo's picture scores.
@@ -358,6 +360,7 @@ mod tests {
             },
             scored: None,
             is_empty: false,
+            shown: 1.0,
         };
         let frames: Vec<Drawn> = frames.iter().enumerate().map(drawn).collect();
         Walked {
