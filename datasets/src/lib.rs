@@ -63,4 +63,4 @@ pub use shelf::shelf;
 pub use survey::{Survey, survey, write_survey};
 pub use texture::{Motif, Texture};
 pub use wall::wall;
-pub use write::{DEPTH_STEPS_PER_UNIT, Written, check_free, in_new_folder, write};
+pub use write::{DEPTH_STEPS_PER_UNIT, Written, check_free, files, in_new_folder, write};

@@ -10,6 +10,12 @@ use std::path::{Path, PathBuf};
 /// Depth maps of a [`Dataset`] hold this many steps to a world unit: millimetres, as its units are metres.
 pub const DEPTH_STEPS_PER_UNIT: f64 = 1000.0;
 
+/// The photos that are kept aside.
+const SPLIT: &str = "split.json";
+const README: &str = "README.md";
+/// When photos were taken, where something moves.
+const TIMES: &str = "times.csv";
+
 /// What [`write()`] has written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
@@ -37,6 +43,25 @@ pub struct Written {
 pub fn write(dataset: &Dataset, folder: &Path) -> Result<Written, DatasetError> {
     in_new_folder(folder, |_| false, |partial| fill(dataset, partial))?;
     Ok(capture_of(dataset).written(folder))
+}
+
+/// The files that [`write()`] makes of a dataset, by path from its folder.
+pub fn files(dataset: &Dataset) -> Vec<PathBuf> {
+    let of_photo = |photo: &Photo| {
+        let images = Path::new("images").join(&photo.name);
+        [images, depth_map_of(photo)]
+    };
+    let model = ["cameras", "images", "points3D"].map(|file| format!("sparse/0/{file}.bin"));
+    let mut files: Vec<PathBuf> = dataset.photos.iter().flat_map(of_photo).collect();
+    files.extend(model.map(PathBuf::from));
+    files.extend([SPLIT, README].map(PathBuf::from));
+    files.extend(dataset.motion.is_some().then(|| PathBuf::from(TIMES)));
+    files
+}
+
+/// A photo's depth map, by path from the dataset's folder.
+fn depth_map_of(photo: &Photo) -> PathBuf {
+    Path::new("depth").join(Path::new(&photo.name).with_extension("png"))
 }
 
 /// Whether [`in_new_folder`] may fill a folder: to be asked before long work.
@@ -119,7 +144,7 @@ fn fill<'a>(dataset: &'a Dataset, folder: &Path) -> Result<(), DatasetError> {
     };
     capture_of(dataset).fill(folder, seen)?;
     if dataset.motion.is_some() {
-        write_text(&folder.join("times.csv"), &times(dataset))?;
+        write_text(&folder.join(TIMES), &times(dataset))?;
     }
     Ok(())
 }
@@ -162,11 +187,10 @@ impl<'a> Capture<'a> {
             let (picture, depth) = seen(photo);
             save(picture, &images.join(&photo.name))?;
             let depth = DynamicImage::from(depth_steps(photo, &depth, self.depth_steps_per_unit));
-            let name = Path::new(&photo.name).with_extension("png");
-            save(depth, &depths.join(name))?;
+            save(depth, &folder.join(depth_map_of(photo)))?;
         }
-        write_text(&folder.join("split.json"), &split(self.held_out))?;
-        write_text(&folder.join("README.md"), &self.readme)
+        write_text(&folder.join(SPLIT), &split(self.held_out))?;
+        write_text(&folder.join(README), &self.readme)
     }
 
     pub(crate) fn written(&self, folder: &Path) -> Written {

@@ -2,10 +2,11 @@
 
 use calibrate::Pixel;
 use datasets::{
-    DEPTH_STEPS_PER_UNIT, Dataset, DatasetError, Finish, Options, by_name, names, render_depth,
-    render_view, srgb_from_linear, write,
+    DEPTH_STEPS_PER_UNIT, Dataset, DatasetError, Finish, Options, by_name, files, names,
+    render_depth, render_view, srgb_from_linear, write,
 };
 use glam::DVec3;
+use std::path::{Path, PathBuf};
 
 fn small(name: &str, views: usize) -> Dataset {
     let options = Options {
@@ -221,12 +222,29 @@ fn what_is_written_reads_back_equal() {
         );
         let readme = std::fs::read_to_string(destination.join("README.md")).unwrap();
         assert!(readme.contains("9 images of 160 x 120"), "{readme}");
+        let mut listed = files(&dataset);
+        listed.sort();
+        assert_eq!(listed, all_below(&destination, Path::new("")));
     }
     // Nothing else was left.
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
         names().len()
     );
+}
+
+/// All files in a folder within another, and in those within it, by path from that other one, sorted.
+fn all_below(folder: &Path, within: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder.join(within)).unwrap() {
+        let path = within.join(entry.unwrap().file_name());
+        match folder.join(&path).is_dir() {
+            true => found.extend(all_below(folder, &path)),
+            false => found.push(path),
+        }
+    }
+    found.sort();
+    found
 }
 
 #[test]

@@ -56,6 +56,7 @@ pub use import::ImportOptions;
 pub use misfit::DOUBTFUL_PX;
 pub use names::{NameError, picture_files};
 pub use own::{LostProxy, SceneProxy};
+pub use parts::other_within;
 pub use relative::{relative, relative_lossy};
 pub use rooms::SceneSurface;
 pub use source::{calibration_in, other_models, unused_keys};

@@ -142,19 +142,35 @@ fn unnamed_within(folder: &Path, parts: &[&str]) -> Result<Option<PathBuf>, Scen
         if !found.is_dir() {
             continue;
         }
-        let mut open = vec![PathBuf::from(part)];
-        while let Some(within) = open.pop() {
-            let path = folder.join(&within);
-            let failed = |error| io(&path, "list the folder", error);
-            for entry in std::fs::read_dir(&path).map_err(failed)? {
-                let entry = entry.map_err(failed)?;
-                let name = within.join(entry.file_name());
-                let is_dropping = DROPPINGS.iter().any(|own| name.ends_with(own));
-                if entry.file_type().map_err(failed)?.is_dir() {
-                    open.push(name);
-                } else if !named.contains(&folder.join(&name)) && !is_dropping {
-                    return Ok(Some(name));
-                }
+        let other = other_within(&folder.join(part), |file| named.contains(file))?;
+        if let Some(other) = other {
+            let name = other.strip_prefix(folder).unwrap_or(&other);
+            return Ok(Some(name.to_owned()));
+        }
+    }
+    Ok(None)
+}
+
+/// A file in a folder, or in those within it, that is none of those that `is_own` knows by their paths: somebody's own.
+/// What systems leave there is not, and what a link leads to is not looked at.
+///
+/// # Errors
+/// A folder cannot be listed.
+pub fn other_within(
+    folder: &Path,
+    is_own: impl Fn(&Path) -> bool,
+) -> Result<Option<PathBuf>, SceneError> {
+    let mut open = vec![folder.to_owned()];
+    while let Some(within) = open.pop() {
+        let failed = |error| io(&within, "list the folder", error);
+        for entry in std::fs::read_dir(&within).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let path = entry.path();
+            let is_dropping = DROPPINGS.iter().any(|own| path.ends_with(own));
+            if entry.file_type().map_err(failed)?.is_dir() {
+                open.push(path);
+            } else if !is_dropping && !is_own(&path) {
+                return Ok(Some(path));
             }
         }
     }

@@ -236,12 +236,20 @@ fn the_help_says_that_exposed_pictures_are_clipped_at_white() {
 
 #[test]
 fn the_demo_ends_with_scores_and_files() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_wall();
     let old = folder.path().join("lumigraph-demo");
     std::fs::create_dir_all(old.join("frames")).unwrap();
-    for file in ["lumigraph-demo.txt", "frames/of-last-time.png", "mine.txt"] {
+    // One was killed as it wrote a frame.
+    let unfinished = "frames/.frame_0001.png.123.tmp";
+    for file in [
+        "lumigraph-demo.txt",
+        "frames/frame_0000.png",
+        unfinished,
+        "mine.txt",
+    ] {
         std::fs::write(old.join(file), "").unwrap();
     }
+    lumigraph(folder.path(), "import wall -o lumigraph-demo/scene").ok();
     let ran = lumigraph(folder.path(), "demo").ok();
     let (_, end) = ran.stdout.split_once("psnr_covered").unwrap();
     assert!(end.contains("\nmean "), "{end}");
@@ -253,7 +261,34 @@ fn the_demo_ends_with_scores_and_files() {
         assert!(old.join(part).exists());
     }
     assert!(old.join("mine.txt").exists());
-    assert!(!old.join("frames/of-last-time.png").exists());
+    assert!(!old.join(unfinished).exists());
+    let frame = std::fs::metadata(old.join("frames/frame_0000.png")).unwrap();
+    assert!(frame.len() > 0);
+
+    // What somebody put there since is neither removed nor in the way for good.
+    let before = crate::run::files(&old);
+    for own in [
+        "capture/masks/a.png",
+        "capture/images/0020.png",
+        "scene/painted/a.txt",
+        "scene/model/notes.txt",
+        "frames/film.mp4",
+        "frames/frame_0012.png",
+        "evaluation/in/0001.png",
+    ] {
+        let file = old.join(own);
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(&file, "mine").unwrap();
+        let error = lumigraph(folder.path(), "demo").error(1);
+        let (_, last) = own.split_once('/').unwrap();
+        let named = last.split('/').next().unwrap();
+        assert!(error.contains(named), "{own}: {error}");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+        std::fs::remove_file(&file).unwrap();
+        // Of a scene, a folder that is none of its parts is in the way, too.
+        let _ = std::fs::remove_dir(file.parent().unwrap());
+        assert!(crate::run::files(&old) == before, "{own}");
+    }
 }
 
 #[test]
