@@ -97,7 +97,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let times = held_out
         .iter()
         .map(|name| (named(name), scene.time_s(name)));
-    args.time.check(None, &scene, times)?;
+    let remedy = "`import --times FILE.csv` gives it one; or hold out photos that have one";
+    args.time.check(None, &scene, times, remedy)?;
     let kept = files_behind_scene(&args.scene.scene, &scene);
     let mut session = Session::new(
         scene,

@@ -108,12 +108,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let path = args.path.as_deref();
     let asked = path.map(|path| Asked::path(path, &NerfstudioFrame::default()));
     let count = args.frames.unwrap_or(FRAMES);
+    let check_time = |name: String, own: Option<f64>, remedy: &str| {
+        let remedy = format!("{remedy}, or give --time");
+        args.time
+            .check(args.at.time, &scene, [(name, own)], &remedy)
+    };
     // What need not be derived is found first: fitting a proxy may take long.
     let known = match asked.transpose()? {
-        None => Ok((scene.view(&photo)?, scene.time_s(&photo))),
-        Some(Asked::Read { views, .. }) => {
+        None => {
+            let (view, time_s) = (scene.view(&photo)?, scene.time_s(&photo));
+            let remedy = "`import --times FILE.csv` gives it one";
+            check_time(format!("photo {photo}"), time_s, remedy)?;
+            Ok((view, time_s))
+        }
+        Some(Asked::Read { views, untimed, .. }) => {
             check_no_count(args)?;
-            Ok(frame_of(views, &args.view)?)
+            let frame = frame_of(views, &args.view)?;
+            let named = format!("{}: {}", path.unwrap_or_default(), args.view);
+            check_time(named, frame.1, untimed)?;
+            Ok(frame)
         }
         Some(derived) => {
             let names: Vec<String> = (0..count as usize).map(default_name).collect();

@@ -66,6 +66,8 @@ pub(super) enum Asked {
         are_images: bool,
         /// Whether the frames of a path, or a screenshot, are as of times of the scene.
         has_times: bool,
+        /// What gives one a time that has none, for people.
+        untimed: &'static str,
     },
     /// A path that the photos' places are needed for.
     Derived(Trajectory),
@@ -88,9 +90,12 @@ impl Asked {
             );
             return Err(Usage(message).into());
         }
-        let views = match transforms_of(views) {
-            Some(file) => of_transforms(&file)?,
-            None if views.is_dir() => of_model(views)?,
+        let (views, untimed) = match transforms_of(views) {
+            Some(file) => (of_transforms(&file)?, "give its frame a \"time\""),
+            None if views.is_dir() => {
+                let untimed = "give the photo of its name one (`import --times FILE.csv`)";
+                (of_model(views)?, untimed)
+            }
             None => return of_file(views, frame),
         };
         Ok(Self::Read {
@@ -98,6 +103,7 @@ impl Asked {
             fps: FPS,
             are_images: true,
             has_times: false,
+            untimed,
         })
     }
 
@@ -157,6 +163,14 @@ impl Asked {
                 ..
             }
         )
+    }
+
+    /// What gives a view a time that has none, for people; those of derived paths have one.
+    pub(super) fn untimed(&self) -> &'static str {
+        match self {
+            Self::Read { untimed, .. } => untimed,
+            Self::Derived(_) => "",
+        }
     }
 
     /// Why frames may show nothing, for people: where they see no proxy, and where no photo shows what they see of
@@ -310,6 +324,7 @@ fn of_file(file: &Path, frame: &NerfstudioFrame) -> anyhow::Result<Asked> {
         fps,
         are_images: false,
         has_times,
+        untimed: "give it a \"time_s\"",
     })
 }
 

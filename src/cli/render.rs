@@ -113,8 +113,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Asked::Derived(_) => Vec::new(),
     };
     desired(args, &known)?;
-    let times = known.iter().map(|f| (f.name.clone(), f.time_s));
-    args.time.check(args.at.time, &scene, times)?;
+    let file = read.map_or(String::new(), |read| format!("{}: ", read.display()));
+    let times = known
+        .iter()
+        .map(|f| (format!("{file}{}", f.name), f.time_s));
+    let remedy = format!("{}, or --time for all", asked.untimed());
+    args.time.check(args.at.time, &scene, times, &remedy)?;
     let mut session = Session::new(
         scene,
         without,

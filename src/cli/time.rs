@@ -3,7 +3,7 @@
 use super::options::positive;
 use super::output::say;
 use super::session::spinner;
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use lumigraph::scene::Scene;
 use render::{Lumigraph, Moment, WINDOW_TURNS};
@@ -113,12 +113,13 @@ impl TimeArgs {
     }
 
     /// Fails early where a scene's photos have no times though they count by them; and, where no time is given
-    /// for all, where one of the views, of such names and times, has none of its own.
+    /// for all, where one of the views, of such names and times, has none of its own: a remedy is what gives it one.
     pub(super) fn check(
         &self,
         time_s: Option<f64>,
         scene: &Scene,
         views: impl IntoIterator<Item = (String, Option<f64>)>,
+        remedy: &str,
     ) -> anyhow::Result<()> {
         if !self.plays_a_part(time_s) {
             return Ok(());
@@ -128,7 +129,7 @@ impl TimeArgs {
         }
         let mut views = views.into_iter();
         match views.find(|(_, own)| own.or(time_s).is_none()) {
-            Some((name, _)) => Err(no_time(&name)),
+            Some((name, _)) => bail!("{name} has no time; {remedy}"),
             None => Ok(()),
         }
     }
@@ -139,10 +140,6 @@ fn no_times() -> anyhow::Error {
         "no photo has a time; import the photos with --times FILE.csv (name,seconds) \
          or --frame-rate F"
     )
-}
-
-fn no_time(name: &str) -> anyhow::Error {
-    anyhow!("{name} has no time; give one, or --time for all")
 }
 
 impl Clock {
@@ -178,7 +175,8 @@ impl Clock {
     pub(super) fn moment(&self, name: &str, own: Option<f64>) -> anyhow::Result<Moment> {
         static SAID: Once = Once::new();
         let asked_s = self.time_s.or(own);
-        let asked_s = asked_s.ok_or_else(|| no_time(name))?;
+        // Which [`TimeArgs::check`] has said before, and how it gets one.
+        let asked_s = asked_s.with_context(|| format!("{name} has no time"))?;
         let mut time_s = asked_s;
         if self.period_s.is_none() {
             time_s = self.photos.nearest_s(asked_s, self.window_s);

@@ -239,12 +239,51 @@ fn times_are_imported_from_lists_names_and_frame_rates() {
     }
     // A held-out photo without a time cannot be drawn at its own.
     let error = lumigraph(folder.path(), "evaluate list --every 2 --time-window 1").error(1);
-    assert!(error.contains("photo 0000.png has no time"), "{error}");
-    let line = "render list --views helicopter --frames 0..1 --time-window 1 -o out";
-    let error = lumigraph(folder.path(), line).error(1);
-    assert_eq!(error, "0000.png has no time; give one, or --time for all");
+    let said = "photo 0000.png has no time; `import --times FILE.csv` gives it one; or hold out photos that have one";
+    assert_eq!(error, said);
+    // Nor can others that have none: it is said what gives them one, and where.
+    fs::write(folder.path().join("path.json"), UNTIMED).unwrap();
+    lumigraph(
+        folder.path(),
+        "export helicopter --format transforms -o t.json",
+    )
+    .ok();
+    let text = fs::read_to_string(folder.path().join("t.json")).unwrap();
+    let text = text.replace("\"time\"", "\"no_time\"");
+    fs::write(folder.path().join("t.json"), text).unwrap();
+    for (line, said) in [
+        (
+            "render list --views helicopter --frames 0..1 -o out",
+            "helicopter: 0000.png has no time; give the photo of its name one (`import --times FILE.csv`), or --time \
+             for all",
+        ),
+        (
+            "render list --path path.json -o out",
+            "path.json: f0 has no time; give it a \"time_s\", or --time for all",
+        ),
+        (
+            "render list --views t.json -o out",
+            "t.json: 0000.png has no time; give its frame a \"time\", or --time for all",
+        ),
+        (
+            "field list --view 0000.png -o f.png",
+            "photo 0000.png has no time; `import --times FILE.csv` gives it one, or give --time",
+        ),
+        (
+            "field list --path path.json --view f0 -o f.png",
+            "path.json: f0 has no time; give it a \"time_s\", or give --time",
+        ),
+    ] {
+        let line = format!("{line} --time-window 1");
+        assert_eq!(lumigraph(folder.path(), &line).error(1), said);
+    }
     assert!(!folder.path().join("out").exists());
 }
+
+/// A path of one frame that has no time.
+const UNTIMED: &str = r#"{"version": 1, "fps": 24, "frames": [{"name": "f0", "camera_from_world":
+    [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+    "width": 32, "height": 24, "model": "PINHOLE", "params": [30, 30, 16, 12]}]}"#;
 
 #[test]
 fn a_scene_without_times_or_period_says_so() {
