@@ -12,8 +12,10 @@ use lumigraph::scene::{Scene, SceneError, Sizes, calibration_in, read_bare};
 use render::Lumigraph;
 use render::path::{self, CameraPath, KeyframeFile, NerfstudioFrame, PathFrame};
 use render::trajectory::{self, Trajectory};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::path::{Component, Path, PathBuf};
 
 /// Which views to render.
 #[derive(clap::Args)]
@@ -255,7 +257,53 @@ fn of_transforms(file: &Path) -> anyhow::Result<Vec<NamedView>> {
             file.display()
         );
     }
-    of_images(&whole, &formats::read_files_beside(file)?.times)
+    let mut views = of_images(&whole, &formats::read_files_beside(file)?.times)?;
+    name_from_shared(&mut views, file)?;
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(views)
+}
+
+/// Where names lead out of their file's folder, as those of a scene's photos do, has all views called by the way from
+/// the deepest folder that all of them share.
+fn name_from_shared(views: &mut [NamedView], file: &Path) -> anyhow::Result<()> {
+    let leads_out = |view: &NamedView| {
+        let mut parts = Path::new(&view.name).components();
+        !parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+    };
+    if !views.iter().any(leads_out) {
+        return Ok(());
+    }
+    let whole = std::path::absolute(file)?;
+    let folder = whole.parent().unwrap_or(&whole);
+    let pictures = views.iter().map(|view| straight(&folder.join(&view.name)));
+    let pictures: Vec<PathBuf> = pictures.collect();
+    let around = pictures.first().and_then(|picture| picture.parent());
+    let mut shared = around.map_or_else(PathBuf::new, Path::to_owned);
+    for picture in &pictures {
+        while !picture.starts_with(&shared) && shared.pop() {}
+    }
+    for (view, picture) in views.iter_mut().zip(&pictures) {
+        if let Ok(way) = picture.strip_prefix(&shared) {
+            let parts: Vec<Cow<'_, str>> = way.iter().map(OsStr::to_string_lossy).collect();
+            view.name = parts.join("/");
+        }
+    }
+    Ok(())
+}
+
+/// An absolute path without the folders that it enters and leaves again.
+fn straight(path: &Path) -> PathBuf {
+    let mut straight = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                straight.pop();
+            }
+            part => straight.push(part),
+        }
+    }
+    straight
 }
 
 /// The images of a calibration, by name; `times`, in seconds, are by name, too.

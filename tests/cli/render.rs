@@ -5,6 +5,7 @@ use crate::run::{files, lumigraph, with_wall};
 use calibrate::{Rigid3, colmap};
 use render::path::{CameraPath, PathFrame};
 use std::fs;
+use std::path::{Path, PathBuf};
 
 #[test]
 fn a_source_view_gives_its_photo_back() {
@@ -141,6 +142,34 @@ fn names_that_clash_are_refused_before_rendering() {
     )
     .error(1);
     assert!(error.contains("leads out of the output folder"), "{error}");
+}
+
+#[test]
+fn views_of_an_exported_calibration_are_called_as_its_photos() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    // Its photos lie outside its own folder.
+    lumigraph(
+        here,
+        "export scene --format transforms -o scene/transforms.json",
+    )
+    .ok();
+    let text = std::fs::read_to_string(here.join("scene/transforms.json")).unwrap();
+    assert!(text.contains("\"../wall/images/0000.png\""), "{text}");
+    let line = "render wall --proxy plane --size 32x24 --views scene/transforms.json -o out";
+    lumigraph(here, line).ok();
+    let written: Vec<_> = files(&here.join("out")).into_keys().collect();
+    let expected = (0..9).map(|i| PathBuf::from(format!("000{i}.png")));
+    assert_eq!(written, expected.collect::<Vec<_>>());
+    // From the deepest folder that holds all of them.
+    let text = text.replace("../wall/images/0000.png", "../other/a/../0000.png");
+    std::fs::write(here.join("scene/transforms.json"), text).unwrap();
+    lumigraph(here, &format!("{line} --frames 0..2")).ok();
+    let written = files(&here.join("out"));
+    for name in ["other/0000.png", "wall/images/0001.png"] {
+        assert!(written.contains_key(Path::new(name)), "{name}");
+    }
 }
 
 #[test]
