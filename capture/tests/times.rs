@@ -106,10 +106,13 @@ fn lists_are_read_with_or_without_a_header() {
         "name,seconds\na.jpg,1.5\nb/b.jpg,-0.2\n",
         "\u{feff}# by hand\r\n\r\nphoto, time in s\r\n a.jpg , 1.5 \r\n\"b/b.jpg\",-2e-1\r\n",
         "name,seconds\ra.jpg,1.5\r\rb/b.jpg,-0.2\r",
+        "\"name\",\"seconds\"\r\n\"a.jpg\",\"1.5\"\r\n\"b/b.jpg\" , \" -0.2\" \r\n",
     ] {
         assert_eq!(read(text).unwrap(), expected, "{text}");
     }
-    assert_eq!(read("\"c,d.jpg\",3\n").unwrap()["c,d.jpg"], 3.0);
+    for text in ["\"c,d.jpg\",3\n", "\"c,d.jpg\",\"3\"\n"] {
+        assert_eq!(read(text).unwrap()["c,d.jpg"], 3.0);
+    }
 }
 
 #[test]
@@ -159,6 +162,16 @@ fn mistakes_in_lists_are_told_by_line() {
         .to_string();
     assert!(
         error.starts_with("nowhere.csv: cannot read the times: "),
+        "{error}"
+    );
+    // As some shells and spreadsheets write text: the path is right.
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("times.csv");
+    let text = "\u{feff}a.jpg,1\r\n".encode_utf16();
+    fs::write(&path, text.flat_map(u16::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+    let error = read_times(&path, |_| true).unwrap_err().to_string();
+    assert!(
+        error.ends_with("times.csv: the times are not in UTF-8; save the list as UTF-8"),
         "{error}"
     );
 }

@@ -17,6 +17,9 @@ pub enum TimeListError {
         /// Why.
         source: io::Error,
     },
+    /// The file is no text, or one in another encoding: of some programs UTF-16.
+    #[error("{}: the times are not in UTF-8; save the list as UTF-8", .0.display())]
+    NotUtf8(PathBuf),
     /// A line is not what it should be.
     #[error("{}, line {line}: {problem}", path.display())]
     Line {
@@ -36,8 +39,8 @@ pub enum TimeListError {
 }
 
 /// Reads seconds by photo from a file of lines `name,seconds`. The first line may be a
-/// header; empty lines and those that begin with `#` are passed over. Names may be in
-/// double quotes.
+/// header; empty lines and those that begin with `#` are passed over. Both fields may be
+/// in double quotes.
 ///
 /// # Errors
 /// A file that cannot be read or holds no time; a line that is not a name and a finite
@@ -46,10 +49,11 @@ pub fn read_times(
     path: &Path,
     is_photo: impl Fn(&str) -> bool,
 ) -> Result<BTreeMap<String, f64>, TimeListError> {
-    let text = fs::read_to_string(path).map_err(|source| TimeListError::Read {
+    let bytes = fs::read(path).map_err(|source| TimeListError::Read {
         path: path.to_owned(),
         source,
     })?;
+    let text = String::from_utf8(bytes).map_err(|_| TimeListError::NotUtf8(path.to_owned()))?;
     let mut times: BTreeMap<String, f64> = BTreeMap::new();
     let mut line_of: BTreeMap<String, usize> = BTreeMap::new();
     let mut is_first = true;
@@ -65,7 +69,7 @@ pub fn read_times(
             problem,
         };
         let fields = content.rsplit_once(',');
-        let fields = fields.map(|(name, seconds)| (unquoted(name), seconds.trim()));
+        let fields = fields.map(|(name, seconds)| (unquoted(name), unquoted(seconds)));
         if !fields.as_ref().is_some_and(|(name, _)| is_photo(name))
             && let Some(separator) = other_separator(content, &is_photo)
         {
@@ -78,7 +82,7 @@ pub fn read_times(
             let problem = format!("found {content:?}; expected name,seconds, as in a.jpg,12.5");
             return Err(refuse(problem));
         };
-        let time_s = match seconds.parse::<f64>() {
+        let time_s = match seconds.trim().parse::<f64>() {
             Ok(time_s) if time_s.is_finite() => time_s,
             Err(_) if may_be_header && !is_photo(&name) => continue,
             _ => {
