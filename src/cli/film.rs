@@ -117,7 +117,7 @@ pub(super) struct FilmArgs {
     /// the film has one more of their last column or row
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
-    /// Its frames a second [default: the path's own, else 30]
+    /// Its frames a second [default: the path's own, else 30]; which moments of the scene frames show stays as it is
     #[arg(long, value_name = "N", value_parser = positive, requires = "video")]
     fps: Option<f64>,
     /// What is behind where nothing is shown: #RRGGBB, or transparent; in a film transparent
@@ -324,6 +324,28 @@ impl FilmArgs {
         super::output::make_parent(video)?;
         capture::video::encode(video, size, self.fps.unwrap_or(fps), frames)
             .with_context(|| video.display().to_string())
+    }
+
+    /// What to say of a film whose frames are as of moments of the scene so many seconds apart, where it shows them
+    /// at another rate.
+    pub(super) fn note_of_rate(&self, apart_s: f64) -> Option<String> {
+        let asked = self.fps?;
+        let pace = asked * apart_s.abs();
+        if !(pace > 0.0) {
+            return None;
+        }
+        let (times, how) = match pace < 1.0 {
+            true => (pace.recip(), "slower"),
+            false => (pace, "faster"),
+        };
+        let times = (100.0 * times).round() / 100.0;
+        let fps = (100.0 / apart_s.abs()).round() / 100.0;
+        (times != 1.0).then(|| {
+            format!(
+                "--fps {asked}: frames show the moments of a path of {fps} frames a second: in the film what moves is \
+                 {times} times {how}"
+            )
+        })
     }
 
     /// The film's file, if one is asked for.

@@ -224,6 +224,13 @@ pub(super) fn note_of_still(frames: &[NamedView], photos: usize) -> Option<&'sta
     })
 }
 
+/// How far apart the moments of frames are that follow one another, in the mean; `None` of fewer than two, and where
+/// one has none.
+pub(super) fn apart_s(frames: &[NamedView]) -> Option<f64> {
+    let (first, last) = (frames.first()?.time_s?, frames.last()?.time_s?);
+    (frames.len() > 1).then(|| (last - first) / (frames.len() - 1) as f64)
+}
+
 /// Frames of a derived path where nobody says.
 pub(super) const FRAMES: u32 = 30;
 

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Of keyframes the frames between them are written; nerfstudio's file keeps the keyframes beside
 /// them, for its viewer. It knows pinholes alone, with square pixels and their principal point in
 /// the middle: those that `view` and derived paths have. It has no place for times of the scene:
-/// read again, a frame is of the time at which a film shows it.
+/// read again, a frame is of the time at which a film of the file's own frames a second shows it.
 ///
 ///     lumigraph path film/path.json --format nerfstudio -o camera_path.json
 ///     lumigraph path camera_path.json --format lumigraph -o path.json
@@ -81,7 +81,8 @@ impl NerfstudioArgs {
 /// Times nearer than this, in seconds, are the same but for rounding.
 const SAME_S: f64 = 1e-6;
 
-/// Whether one of a path's frames, of such times, is of another time than the one at which a film shows it.
+/// Whether one of a path's frames, of such times, is of another time than the one at which a film of so many a second
+/// shows it.
 pub(super) fn has_times(times_s: impl IntoIterator<Item = Option<f64>>, fps: f64) -> bool {
     let frames = times_s.into_iter().enumerate();
     let mut timed = frames.filter_map(|(index, time_s)| Some((index, time_s?)));
@@ -116,7 +117,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             if has_times(read.frames.iter().map(|frame| frame.time_s), read.fps) {
                 say!(
                     "note: left out: the scene's times; nerfstudio's format has no place for them, and \
-                     read again a frame is of the time at which a film shows it"
+                     read again a frame is of the time at which a film of {} frames a second shows it",
+                    read.fps
                 );
             }
         }

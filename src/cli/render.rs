@@ -2,7 +2,7 @@
 
 use super::exposure::ExposureArgs;
 use super::film::{FilmArgs, FrameChoice, frame_choice};
-use super::frames::{Asked, FRAMES, NamedView, ViewArgs, note_of_still};
+use super::frames::{Asked, FRAMES, NamedView, ViewArgs, apart_s, note_of_still};
 use super::inputs::{files_behind, files_behind_scene, files_of};
 use super::options::{DrawArgs, FieldArgs, FinishArgs, HoldOutArgs, SceneArgs, max_error};
 use super::output::say;
@@ -136,6 +136,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let points = || session.points();
     let count = chosen.count(FRAMES);
     let is_derived = asked.is_derived();
+    // Views of a model have their photos' times, at no rate.
+    let is_path = !matches!(
+        asked,
+        Asked::Read {
+            are_images: true,
+            ..
+        }
+    );
     let (frames, fps) = asked.frames(count, session.lumigraph(), points)?;
     // Of all frames: those of several parts of a path share a folder.
     let names = frames.iter().map(|f| (f.name.as_str(), true));
@@ -143,6 +151,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let photos = session.lumigraph().sources.len();
     if let Some(note) = note_of_still(&frames, photos).filter(|_| is_derived) {
         session.note(note);
+    }
+    if is_path
+        && args.at.time.is_none()
+        && args.time.plays_a_part(None)
+        && let Some(apart_s) = apart_s(&frames)
+        && let Some(note) = args.film.note_of_rate(apart_s)
+    {
+        session.note(&note);
     }
     let frames = chosen.of(frames)?;
     let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;

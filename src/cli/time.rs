@@ -94,7 +94,7 @@ impl Span {
 
 impl TimeArgs {
     /// Whether photos count by their times; `time_s` is the moment for all views, if there is one.
-    fn plays_a_part(&self, time_s: Option<f64>) -> bool {
+    pub(super) fn plays_a_part(&self, time_s: Option<f64>) -> bool {
         self.period.is_some() || self.time_window.is_some() || time_s.is_some()
     }
 

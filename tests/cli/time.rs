@@ -167,6 +167,52 @@ fn times_of_frames_that_change_nothing_are_told() {
 }
 
 #[test]
+fn films_that_show_motion_at_another_speed_are_told() {
+    let folder = with_helicopter();
+    let render = "render helicopter --proxy plane --path orbit --frames 2 --size 32x24 -o out";
+    for (options, speed) in [
+        ("--period 1.37 --fps 5", Some("6 times slower")),
+        ("--period 1.37 --fps 45", Some("1.5 times faster")),
+        ("--period 1.37 --fps 30", None),
+        ("--period 1.37", None),
+        ("--period 1.37 --time 0.5 --fps 5", None),
+        ("--fps 5", None),
+    ] {
+        let line = format!("{render} --video f.mp4 {options}");
+        let said = lumigraph(folder.path(), &line).ok().stderr;
+        let path =
+            ": frames show the moments of a path of 30 frames a second: in the film what moves is ";
+        let note = speed.map(|speed| format!("{path}{speed}\n"));
+        assert_eq!(said.contains(path), note.is_some(), "{options}: {said}");
+        assert!(note.is_none_or(|note| said.contains(&note)), "{said}");
+    }
+    // Of a path's own moments those count, not its rate.
+    let file = folder.path().join("out/path.json");
+    let path: serde_json::Value = serde_json::from_slice(&fs::read(file).unwrap()).unwrap();
+    for (apart_s, speed) in [
+        (0.2, None),
+        (
+            0.1,
+            Some("frames a second: in the film what moves is 2 times slower"),
+        ),
+        (0.0, None),
+    ] {
+        let mut timed = path.clone();
+        let frames = timed["frames"].as_array_mut().unwrap();
+        for (i, frame) in frames.iter_mut().enumerate() {
+            frame["time_s"] = (apart_s * i as f64).into();
+        }
+        fs::write(folder.path().join("timed.json"), timed.to_string()).unwrap();
+        let line = "render helicopter --proxy plane --path timed.json --size 32x24 -o timed --video t.mp4 \
+                    --period 1.37 --fps 5";
+        let said = lumigraph(folder.path(), line).ok().stderr;
+        let told = "in the film what moves is ";
+        assert_eq!(said.contains(told), speed.is_some(), "{apart_s}: {said}");
+        assert!(speed.is_none_or(|speed| said.contains(speed)), "{said}");
+    }
+}
+
+#[test]
 fn a_moment_beyond_all_photos_is_told_and_shown_by_the_nearest() {
     let folder = with_helicopter();
     let render = |options: &str, out: &str| {
