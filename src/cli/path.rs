@@ -114,7 +114,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let keyframes = read_keyframes(&args.path, &frame)?;
             let keyframes = keyframes.as_ref();
             write_nerfstudio(&args.output, &args.path, &read, keyframes, &frame)?;
-            if has_times(read.frames.iter().map(|frame| frame.time_s), read.fps) {
+            // Frames between keyframes without times of their own have those of the path.
+            let is_timed =
+                keyframes.is_none_or(|file| file.keyframes.iter().any(|k| k.time_s.is_some()));
+            let times_s = read.frames.iter().map(|frame| frame.time_s);
+            if is_timed && has_times(times_s, read.fps) {
                 say!(
                     "note: left out: the scene's times; nerfstudio's format has no place for them, and \
                      read again a frame is of the time at which a film of {} frames a second shows it",

@@ -290,6 +290,15 @@ fn times_of_the_scene_that_are_lost_are_told() {
         let said = run(times, format).ok().stderr;
         assert_eq!(said.contains(note), is_told, "{times:?} {format}: {said}");
     }
+    // A path may begin when it likes.
+    let mut late = keyframes();
+    for keyframe in late["keyframes"].as_array_mut().unwrap() {
+        keyframe["t_s"] = json!(keyframe["t_s"].as_f64().unwrap() + 5.0);
+    }
+    std::fs::write(here.join("late.json"), late.to_string()).unwrap();
+    let line = "path late.json --format nerfstudio -o late_theirs.json";
+    let said = lumigraph(here, line).ok().stderr;
+    assert!(!said.contains("left out"), "{said}");
     // With one of them nobody would know the other.
     let error = run([Some(0.7), None], "lumigraph").error(1);
     let expected = "own.json: keyframe 1: it has no time_s, though keyframe 0 has one; give one to all \
