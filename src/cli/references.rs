@@ -39,7 +39,8 @@ pub(super) struct ReferenceArgs {
     #[arg(long, value_enum, default_value = "auto")]
     device: Device,
     /// Keep reference images within so many bytes (512MiB, 1.5GB) between frames, and decoded photos,
-    /// too; those not used for longest are made again when they are needed [default: no limit]
+    /// too; those not used for longest are made again when they are needed [default: no limit for images,
+    /// half of the machine's memory for photos]
     #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     pub(super) cpu_memory: Option<u64>,
 }

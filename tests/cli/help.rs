@@ -214,22 +214,33 @@ fn why_frames_may_show_nothing_depends_on_where_their_path_is_from() {
     }
 }
 
+/// The help of a command, its words separated by single spaces.
+fn help_of(command: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = lumigraph(folder.path(), &format!("{command} --help")).ok();
+    let said: Vec<&str> = ran.stdout.split_whitespace().collect();
+    said.join(" ")
+}
+
+#[test]
+fn the_help_says_what_limits_memory_where_nobody_does() {
+    for command in ["walk", "ldis"] {
+        let said = help_of(command);
+        let expected = "[default: no limit for images, half of the machine's memory for photos]";
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
 /// Of portraits, too: the width is their shorter side.
 #[test]
 fn the_help_says_along_which_side_a_grid_is_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    let ran = lumigraph(folder.path(), "render --help").ok();
-    let said: Vec<&str> = ran.stdout.split_whitespace().collect();
-    let said = said.join(" ");
+    let said = help_of("render");
     assert!(said.contains("grid across the image's width;"), "{said}");
 }
 
 #[test]
 fn the_help_says_that_exposed_pictures_are_clipped_at_white() {
-    let folder = tempfile::tempdir().unwrap();
-    let ran = lumigraph(folder.path(), "evaluate --help").ok();
-    let said: Vec<&str> = ran.stdout.split_whitespace().collect();
-    let said = said.join(" ");
+    let said = help_of("evaluate");
     let expected = "multiplied by what fits best by least squares, and then clipped at white)";
     assert!(said.contains(expected), "{said}");
 }
