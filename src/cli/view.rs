@@ -34,7 +34,11 @@ use view::{Content, House, Look, Progress, Teller, ViewOptions, WorkerOptions};
 ///     lumigraph view scene
 ///     lumigraph view house -o film
 #[derive(clap::Args)]
-#[command(verbatim_doc_comment)]
+#[command(
+    verbatim_doc_comment,
+    mut_arg("scene", |arg| arg.help(SCENE_HELP)),
+    mut_arg("size", |arg| arg.help(SIZE_HELP))
+)]
 pub(super) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
@@ -77,10 +81,15 @@ pub(super) struct Args {
     trace: Option<PathBuf>,
 }
 
+// What options that other commands have, too, are here.
+const SCENE_HELP: &str =
+    "A scene written by `import`, a capture (photos with a calibration), or an interior";
+const SIZE_HELP: &str = "Size of the window [default: 1280x800]";
+
 /// The folder for what is saved, where nobody names one.
 const OUTPUT: &str = "lumigraph-view";
 
-/// Of the window, in points.
+/// Of the window, in points, as the help has it.
 const SIZE: (u32, u32) = (1280, 800);
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {

@@ -231,6 +231,20 @@ fn the_help_says_what_limits_memory_where_nobody_does() {
     }
 }
 
+#[cfg(feature = "window")]
+#[test]
+fn the_help_of_the_window_speaks_of_the_window() {
+    let said = help_of("view");
+    for expected in [
+        "<SCENE> A scene written by `import`, a capture (photos with a calibration), or an interior",
+        "--size <WxH> Size of the window [default: 1280x800]",
+    ] {
+        assert!(said.contains(expected), "{said}");
+    }
+    let of_pictures = "Size of the pictures in pixels [default: each view's own]";
+    assert!(help_of("render").contains(of_pictures));
+}
+
 /// Of portraits, too: the width is their shorter side.
 #[test]
 fn the_help_says_along_which_side_a_grid_is_counted() {
