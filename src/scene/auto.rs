@@ -135,7 +135,7 @@ impl Scene {
         let takes_long = |kind: Kind| kind == Kind::Dense && photos > MOST_COMPARED;
         // Of one photo of several none is left, as nobody else saw them.
         let points = self.observed(without)?.1.len();
-        // What is made of who sees what for every view shows nothing of one alone.
+        // Points of one alone, where it has some, lie where no other agrees that they do; dense ones it has not.
         let needs_others = |kind: Kind| matches!(kind, Kind::Points | Kind::Dense);
         let mut said = vec![why];
         for kind in [Kind::Points, Kind::Hull, Kind::Dense] {
@@ -292,7 +292,7 @@ mod tests {
 
     /// As of a capture of one photo, whose points nobody else saw from the start.
     #[test]
-    fn of_one_photo_a_plane_is_taken_as_points_show_nothing_of_it() {
+    fn of_one_photo_a_plane_is_taken_as_no_other_agrees_on_its_points() {
         let (_folder, mut scene) = wall();
         scene.photos.truncate(1);
         let name = scene.photos[0].name.clone();
