@@ -43,6 +43,12 @@ pub enum FileError {
     /// JSON is no place for a mesh.
     #[error("{path}: a mesh is written as .ply (exact) or .glb", path = .0.display())]
     NoMesh(PathBuf),
+    /// The same of one that is read.
+    #[error(
+        "{path}: its kind is a mesh's, and JSON holds none; give the .ply or .glb that `lumigraph proxy` wrote of it",
+        path = .0.display()
+    )]
+    MeshInJson(PathBuf),
     /// PLY is for meshes.
     #[error("{path}: a plane is written as .json (exact) or .glb", path = .0.display())]
     NoPlane(PathBuf),
@@ -368,7 +374,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Proxy, FileError> {
     match extension(path).as_str() {
         "json" => {
             let stored = Stored::parse(path, without_byte_order_mark(bytes))?;
-            stored.proxy(path, || Err(FileError::NoMesh(path.to_owned())))
+            stored.proxy(path, || Err(FileError::MeshInJson(path.to_owned())))
         }
         "glb" => {
             let extras = glb::extras(bytes).map_err(|e| FileError::Glb(path.to_owned(), e))?;

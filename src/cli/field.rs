@@ -3,7 +3,7 @@
 use super::Usage;
 use super::damaged::leave_out;
 use super::exposure::ExposureArgs;
-use super::film::write_picture;
+use super::film::{frame_count, write_picture};
 use super::frames::{Asked, FRAMES, NamedView};
 use super::inputs::files_behind_scene;
 use super::npz::{Weights, npz};
@@ -50,7 +50,7 @@ pub(super) struct Args {
     path: Option<String>,
     /// Frames of a derived path [default: 30]
     #[arg(long, value_name = "N", requires = "path", conflicts_with = "without_view",
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        value_parser = frame_count)]
     frames: Option<u32>,
     #[command(flatten)]
     hold_out: HoldOutArgs,

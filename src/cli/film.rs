@@ -27,10 +27,21 @@ pub(super) struct FrameChoice {
 
 const MOST: u32 = 100_000;
 
+/// A number of frames.
+fn count(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|n| (1..=MOST).contains(n))
+}
+
+/// `60`: how many frames a derived path has of which one is looked at.
+pub(super) fn frame_count(text: &str) -> Result<u32, String> {
+    count(text).ok_or_else(|| {
+        format!("expected a number of frames up to {MOST}, as in 60; --view names one of them")
+    })
+}
+
 /// `60`, `120..240` or `120..240/300`.
 pub(super) fn frame_choice(text: &str) -> Result<FrameChoice, String> {
     let parse = || {
-        let count = |text: &str| text.parse().ok().filter(|n| (1..=MOST).contains(n));
         let Some((first, rest)) = text.split_once("..") else {
             let count = Some(count(text)?);
             return Some(FrameChoice { count, range: None });

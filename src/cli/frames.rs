@@ -7,6 +7,7 @@ use super::report::UNSHOWN;
 use anyhow::bail;
 use calibrate::formats::{self, Format};
 use calibrate::{Reconstruction, View, colmap};
+use capture::as_argument;
 use glam::DVec3;
 use lumigraph::scene::{Scene, SceneError, Sizes, calibration_in, read_bare};
 use render::Lumigraph;
@@ -97,6 +98,14 @@ impl Asked {
             None if views.is_dir() => {
                 let untimed = "give the photo of its name one (`import --times FILE.csv`)";
                 (of_model(views)?, untimed)
+            }
+            None if colmap::is_part(views) => {
+                let folder = views.parent().filter(|folder| *folder != Path::new(""));
+                bail!(
+                    "{}: a file of a COLMAP model; its views are those of its folder: --views {}",
+                    views.display(),
+                    as_argument(folder.unwrap_or(Path::new(".")))
+                );
             }
             None => return of_file(views, frame),
         };

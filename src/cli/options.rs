@@ -364,16 +364,16 @@ impl DrawArgs {
         self.device.choice()
     }
 
-    /// A frame's view at the size asked for.
+    /// A frame's view at the size asked for; `named` is what is said of the frame.
     ///
     /// # Errors
     /// It has more pixels on a side than are drawn.
-    pub(super) fn resized(&self, name: &str, view: View) -> anyhow::Result<View> {
+    pub(super) fn resized(&self, named: &str, view: View) -> anyhow::Result<View> {
         let view = cut(view, self.size);
         let (width, height) = (view.width, view.height);
         if width.max(height) > MAX_SIDE {
             anyhow::bail!(
-                "frame {name} has {width} x {height} pixels; at most {MAX_SIDE} are drawn each way: give \
+                "{named} has {width} x {height} pixels; at most {MAX_SIDE} are drawn each way: give \
                  --size"
             );
         }

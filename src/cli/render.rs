@@ -112,8 +112,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Asked::Read { views, .. } => chosen.of(views.iter().collect())?,
         Asked::Derived(_) => Vec::new(),
     };
-    desired(args, &known)?;
     let file = read.map_or(String::new(), |read| format!("{}: ", read.display()));
+    desired(args, &file, &known)?;
     let times = known
         .iter()
         .map(|f| (format!("{file}{}", f.name), f.time_s));
@@ -161,7 +161,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         session.note(&note);
     }
     let frames = chosen.of(frames)?;
-    let desired = desired(args, &frames.iter().collect::<Vec<_>>())?;
+    let desired = desired(args, &file, &frames.iter().collect::<Vec<_>>())?;
     let all_files = all_files?;
     let files = chosen.of(all_files.clone())?;
     check_inputs(all_files.iter().map(PathBuf::as_path), &kept)?;
@@ -246,12 +246,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     ))
 }
 
-/// The views of frames in the size that is asked for.
+/// The views of frames in the size that is asked for; what is said of one begins with `file`, which it is read from.
 ///
 /// # Errors
 /// One cannot be drawn so large; a film is asked for, and they are not of one size.
-fn desired(args: &Args, frames: &[&NamedView]) -> anyhow::Result<Vec<View>> {
-    let resized = |frame: &&NamedView| args.draw.resized(&frame.name, frame.view.clone());
+fn desired(args: &Args, file: &str, frames: &[&NamedView]) -> anyhow::Result<Vec<View>> {
+    let resized = |frame: &&NamedView| {
+        let named = format!("{file}frame {}", frame.name);
+        args.draw.resized(&named, frame.view.clone())
+    };
     let desired = frames
         .iter()
         .map(resized)

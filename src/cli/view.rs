@@ -16,6 +16,7 @@ use super::targets::{check_folder, note_of_unasked_folder};
 use super::time::{AtArgs, Clock, TimeArgs};
 use super::unused::note_of_ldi_views;
 use anyhow::Context;
+use capture::as_argument;
 use lumigraph::scene::{Kind, Scene};
 use proxy::Proxy;
 use render::DeviceChoice;
@@ -124,7 +125,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let keyframes = match &args.path {
         Some(path) => {
             let file = read_keyframes(path, &nerfstudio)?;
-            let none = || format!("{}: it has frames, not keyframes", path.display());
+            let none = || {
+                let command = match is_interior(given) {
+                    true => "walk",
+                    false => "render",
+                };
+                let transforms = args.nerfstudio.file();
+                let transforms = transforms
+                    .map(|file| format!(" --dataparser-transforms {}", as_argument(file)));
+                format!(
+                    "{}: it has frames, not keyframes, which alone can be moved here; `lumigraph {command} {} --path {}{} \
+                     -o FRAMES` draws it",
+                    path.display(),
+                    as_argument(given),
+                    as_argument(path),
+                    transforms.unwrap_or_default()
+                )
+            };
             Some(file.with_context(none)?)
         }
         None => None,

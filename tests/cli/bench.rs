@@ -185,7 +185,7 @@ fn scenes_of_one_name_and_none_are_refused() {
     fs::create_dir(folder.path().join("other")).unwrap();
     fs::rename(folder.path().join("wall"), folder.path().join("other/wall")).unwrap();
     let missing = lumigraph(folder.path(), "bench wall -o out").error(1);
-    assert!(missing.contains("wall: no such folder"), "{missing}");
+    assert_eq!(missing, "wall: there is no such folder; check the path");
     let twice = lumigraph(folder.path(), "bench other/wall other/../other/wall -o out");
     let twice = twice.error(2);
     assert!(twice.contains("have the same name"), "{twice}");

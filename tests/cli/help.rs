@@ -36,6 +36,10 @@ fn usage_errors_exit_with_2() {
             "evaluate wall --every -3",
             "a whole number above one, as in 8",
         ),
+        (
+            "field wall --view frame_0001 --path orbit --frames 0..2/3 -o f.png",
+            "expected a number of frames up to 100000, as in 60; --view names one of them",
+        ),
         ("proxy wall plane", "-o"),
         ("proxy wall plane --point 1,2,3", "--normal"),
         (

@@ -307,6 +307,42 @@ fn times_of_the_scene_that_are_lost_are_told() {
 }
 
 #[test]
+fn what_cannot_be_drawn_is_said_with_its_file_and_what_to_do() {
+    let folder = with_wall();
+    let here = folder.path();
+    for (name, size) in [("large.json", 100_000), ("small.json", 64)] {
+        let mut frame = keyframes()["keyframes"][0].take();
+        frame.as_object_mut().unwrap().remove("t_s");
+        frame["name"] = json!("f0");
+        for side in ["width", "height"] {
+            frame[side] = json!(size);
+        }
+        let path = json!({"version": 1, "fps": 2, "frames": [frame]});
+        std::fs::write(here.join(name), path.to_string()).unwrap();
+    }
+    let render = "render wall --proxy plane -o x";
+    for (line, said) in [
+        (
+            format!("{render} --path large.json"),
+            "large.json: frame f0 has 100000 x 100000 pixels; at most 16384 are drawn each way: give --size",
+        ),
+        (
+            format!("{render} --views wall/sparse/0/images.bin"),
+            "wall/sparse/0/images.bin: a file of a COLMAP model; its views are those of its folder: --views wall/sparse/0",
+        ),
+        #[cfg(feature = "window")]
+        (
+            "view wall --path small.json".to_owned(),
+            "small.json: it has frames, not keyframes, which alone can be moved here; `lumigraph render wall --path \
+             small.json -o FRAMES` draws it",
+        ),
+    ] {
+        assert_eq!(lumigraph(here, &line).error(1), said);
+    }
+    assert!(!here.join("x").exists());
+}
+
+#[test]
 fn transforms_that_no_path_needs_are_told() {
     let folder = with_wall();
     let here = folder.path();

@@ -31,6 +31,14 @@ fn what_editors_put_before_text_is_passed_over() {
 }
 
 #[test]
+fn meshes_are_not_looked_for_in_json() {
+    let text = r#"{"version": 1, "kind": "hull"}"#;
+    let error = parse(Path::new("h.json"), text.as_bytes()).unwrap_err();
+    let said = "h.json: its kind is a mesh's, and JSON holds none; give the .ply or .glb that `lumigraph proxy` wrote of it";
+    assert_eq!(error.to_string(), said);
+}
+
+#[test]
 fn later_versions_are_told_whatever_else_they_say() {
     let triangle = mesh::Mesh {
         positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],

@@ -26,7 +26,7 @@ use anyhow::Context;
 use datasets::house::{HouseOptions, house};
 use indicatif::ProgressBar;
 use judge::judge;
-use lumigraph::scene::Scene;
+use lumigraph::scene::{Scene, SceneError};
 use measured::{Effort, Pictures, Subject};
 use proxy::interior::Contents;
 use render::interior::Painter;
@@ -221,8 +221,11 @@ fn given(scenes: &[PathBuf]) -> anyhow::Result<Vec<(Given, String)>> {
     }
     let mut all: Vec<(Given, String)> = Vec::new();
     for folder in scenes {
+        if !folder.exists() {
+            return Err(SceneError::NoFolder(folder.clone()).into());
+        }
         let full = std::fs::canonicalize(folder);
-        let full = full.with_context(|| format!("{}: no such folder", folder.display()))?;
+        let full = full.with_context(|| folder.display().to_string())?;
         let name = full.file_name().unwrap_or(full.as_os_str());
         let name = name.to_string_lossy().into_owned();
         if let Some((Given::Folder(other), _)) = all.iter().find(|(_, n)| *n == name) {
