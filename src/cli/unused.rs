@@ -79,7 +79,7 @@ fn say_unused_of_walk(portals: &[&str], is_given: impl Fn(&str) -> bool) {
     type Holds = fn(&PortalFill) -> bool;
     let is_ldi: Holds = |fill| *fill == PortalFill::Ldi;
     let is_warped: Holds = |fill| matches!(fill, PortalFill::Warp1 | PortalFill::Warp2);
-    let is_image: Holds = |fill| *fill == PortalFill::Ldi || fill.references() > 0;
+    let is_image: Holds = |fill| fill.shows_images();
     let of_images = ["near", "persist", "reference_size", "reference_views"];
     let of_ldis = ["ldi_views", "ldi_from", "no_ldi_files", COLUMNS];
     for (is_meant, ids, why) in [

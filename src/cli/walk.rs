@@ -146,7 +146,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let chosen = args.chosen();
     chosen.check(args.path.is_none())?;
-    if args.persist && chosen.is_part() {
+    let keeps_colors = args.persist && fills.iter().any(|fill| fill.shows_images());
+    if keeps_colors && chosen.is_part() {
         let text = "--persist: what a frame keeps is of the one before; draw all of the path";
         return Err(Usage(text.to_owned()).into());
     }

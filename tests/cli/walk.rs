@@ -58,6 +58,11 @@ fn options_of_what_portals_do_not_show_are_said_to_change_nothing() {
     let of_ldis = format!("note: --ldi-from changes {why}\n");
     assert!(ran.stderr.contains(&of_ldis), "{}", ran.stderr);
     assert_eq!(said("--persist"), [format!("note: {images}")]);
+    // What changes nothing is in no way of drawing a part, either.
+    let part = "walk house --frames 0..1/2 --size 16x12 --persist -o part";
+    let stderr = lumigraph(folder.path(), part).ok().stderr;
+    let note = "note: --persist changes nothing";
+    assert!(stderr.contains(note), "{stderr}");
 }
 
 #[test]
@@ -257,7 +262,7 @@ fn a_walk_becomes_a_film() {
     );
     for (more, said) in [
         ("--video f.mp4 --portals geometry,ldi", "one kind"),
-        ("--persist --frames 1..2", "--persist"),
+        ("--persist --frames 1..2 --portals ldi", "--persist"),
         ("--persist --resume", "cannot be used with"),
         ("--frames 1..9/6", "the path has 6 frames"),
         ("--fps 3", "--video"),

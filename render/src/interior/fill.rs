@@ -55,6 +55,11 @@ impl PortalFill {
         all.find(|fill| fill.name() == name)
     }
 
+    /// Whether one sees images of any kind, and not geometry alone.
+    pub fn shows_images(self) -> bool {
+        !matches!(self, Self::Geometry | Self::Whole)
+    }
+
     /// How many reference images a frame takes. An LDI is made of all of them once.
     pub fn references(self) -> usize {
         match self {

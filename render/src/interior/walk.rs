@@ -281,8 +281,7 @@ impl<'a> Walk<'a> {
         cost.portals = own.len();
         // Where there are too many portals to tell what one sees through them, all is geometry.
         let is_known = !passes.is_empty() || visibility.cells.len() <= 1;
-        let has_images = fill.references() > 0 || fill == PortalFill::Ldi;
-        let has_images = has_images && cell.is_some() && is_known;
+        let has_images = fill.shows_images() && cell.is_some() && is_known;
         let (openings, mut fills) = match has_images {
             true => self.fills(fill, cell, passes, &camera),
             false => Default::default(),

@@ -220,7 +220,7 @@ impl Walked {
 
     /// Whether its portals do.
     fn shows_images(&self) -> bool {
-        self.fill == PortalFill::Ldi || self.fill.references() > 0
+        self.fill.shows_images()
     }
 
     /// How many frames were there before.
