@@ -4,6 +4,8 @@ use crate::mask::Mask;
 use crate::pyramid::Pyramid;
 use crate::residency::{Residency, photo_bytes};
 use image::{GrayImage, RgbaImage};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -36,6 +38,8 @@ pub struct PhotoStore {
     load_mask: Box<Load<GrayImage>>,
     /// Stands in for a mask that cannot be decoded.
     nothing: Mask,
+    /// What drawings asked for in vain, by source view.
+    missed: Mutex<BTreeMap<usize, PhotoError>>,
     id: u64,
     /// How many photos the last drawing sampled.
     sampled: AtomicUsize,
@@ -125,6 +129,7 @@ impl PhotoStore {
             masks: Vec::new(),
             load_mask: Box::new(|_| Err("there is no mask".to_owned())),
             nothing: Mask::nothing(),
+            missed: Mutex::default(),
             id,
             sampled: AtomicUsize::new(0),
             decode_nanos: AtomicU64::new(0),
@@ -157,18 +162,20 @@ impl PhotoStore {
         self
     }
 
-    /// Goes on where another store ends, of the same photos and one more: that of its source view
+    /// Goes on where another store ends, of the same photos and some more: those of its source views
     /// `gone`. What it holds of the others stays in memory, and its counts and its budget hold for
     /// both.
     ///
     /// # Panics
-    /// If the other has not one photo more.
-    pub fn go_on_from(&mut self, other: Self, gone: usize) {
-        assert_eq!(other.len(), self.len() + 1);
+    /// If the other has not these photos more.
+    pub fn go_on_from(&mut self, other: Self, gone: &BTreeSet<usize>) {
+        assert_eq!(other.len(), self.len() + gone.len());
         let shelf = other.shelf.into_inner();
         let mut shelf = shelf.unwrap_or_else(PoisonError::into_inner);
-        shelf.put(gone, None);
-        shelf.slots.remove(gone);
+        gone.iter().for_each(|&i| shelf.put(i, None));
+        let slots = std::mem::take(&mut shelf.slots).into_iter().enumerate();
+        let stay = slots.filter(|(source_idx, _)| !gone.contains(source_idx));
+        shelf.slots = stay.map(|(_, slot)| slot).collect();
         shelf.awaited = 0;
         for (source_idx, slot) in shelf.slots.iter_mut().enumerate() {
             slot.awaited = 0;
@@ -180,7 +187,7 @@ impl PhotoStore {
         *self.decode_nanos.get_mut() += other.decode_nanos.into_inner();
         // Those that cannot be decoded say so again, by their new places.
         let masks = other.masks.into_iter().enumerate();
-        let masks = masks.filter(|(source_idx, _)| *source_idx != gone);
+        let masks = masks.filter(|(source_idx, _)| !gone.contains(source_idx));
         for (own, (_, mask)) in self.masks.iter_mut().zip(masks) {
             if let (Some(own), Some(Ok(mask))) = (own, mask.and_then(OnceLock::into_inner)) {
                 *own = OnceLock::from(Ok(mask));
@@ -291,14 +298,39 @@ impl PhotoStore {
     /// Whether every mask of these source views that was asked for could be decoded.
     ///
     /// # Errors
-    /// The first of those that could not.
+    /// The first of those that could not; [`Self::take_missed`] tells all.
     pub fn check_masks(&self, of: impl IntoIterator<Item = usize>) -> Result<(), PhotoError> {
         let masks = of.into_iter().filter_map(|i| self.masks.get(i)?.as_ref());
-        let mut asked = masks.filter_map(OnceLock::get);
-        match asked.find_map(|mask| mask.as_ref().err()) {
-            Some(error) => Err(error.clone()),
-            None => Ok(()),
-        }
+        let asked = masks.filter_map(OnceLock::get);
+        let mut failed = asked.filter_map(|mask| mask.as_ref().err());
+        let Some(first) = failed.next() else {
+            return Ok(());
+        };
+        std::iter::once(first)
+            .chain(failed)
+            .for_each(|error| self.miss(error));
+        Err(first.clone())
+    }
+
+    /// What drawings asked for in vain, in the order of the source views, and forgets it. A drawing returns the
+    /// first that it meets as its error, but goes on to ask for what else it needs, so that all can be left out
+    /// at once.
+    pub fn take_missed(&self) -> Vec<PhotoError> {
+        std::mem::take(&mut *lock(&self.missed))
+            .into_values()
+            .collect()
+    }
+
+    /// Asks for all of these, as a drawing did for one in vain.
+    pub(crate) fn find_missed(&self, wanted: &[usize]) {
+        let failed = wanted.par_iter().filter_map(|&i| self.get(i).err());
+        failed.for_each(|error| self.miss(&error));
+    }
+
+    fn miss(&self, error: &PhotoError) {
+        let mut missed = lock(&self.missed);
+        let known = missed.entry(error.source_idx);
+        known.or_insert_with(|| error.clone());
     }
 
     /// The photo of a source view, in full; kept if the budget has room for it.
@@ -318,7 +350,7 @@ impl PhotoStore {
         })
     }
 
-    /// The photo of a source view from a mip level on, kept whatever the budget: room was made
+    /// The photo of a source view from a mip level on, for a drawing, kept whatever the budget: room was made
     /// before.
     pub(crate) fn get_from_level(
         &self,
@@ -328,6 +360,7 @@ impl PhotoStore {
         self.find_or_decode(source_idx, finest, |shelf, photo| {
             shelf.put(source_idx, Some(Arc::clone(photo)));
         })
+        .inspect_err(|error| self.miss(error))
     }
 
     fn find_or_decode(
@@ -522,8 +555,10 @@ mod tests {
             message: "c.png: corrupt".to_owned(),
         };
         assert_eq!(store.check_masks(0..3), Err(expected.clone()));
+        assert_eq!(store.take_missed(), std::slice::from_ref(&expected));
         // It is no matter to those that do without.
         assert_eq!(store.check_masks(0..2), Ok(()));
+        assert!(store.take_missed().is_empty());
         assert_eq!(store.get(2), Err(expected));
         assert_eq!(
             store.get(0).unwrap_err().to_string(),
@@ -558,7 +593,7 @@ mod tests {
         after = after.with_masks(&[true, true, true, false], |i| {
             Err(format!("{i} was there"))
         });
-        after.go_on_from(before, 1);
+        after.go_on_from(before, &BTreeSet::from([1]));
         assert_eq!((after.residency(), after.decode_time()), (counted, time));
         assert_eq!(after.get(0).unwrap().levels[0].dimensions(), (4, 4));
         assert_eq!(after.get(1).unwrap().levels[0].dimensions(), (6, 4));
@@ -570,6 +605,39 @@ mod tests {
         // 3. What was not is counted on top.
         assert!(!after.was_decoded(3) && after.get(3).is_ok());
         assert_eq!((after.decoded(), after.residency().loads), (4, 5));
+
+        // 4. Nor is it where several go at once.
+        let mut last = PhotoStore::new(2, |i| Err(format!("{i} was there")));
+        last = last.with_masks(&[true, false], |i| Err(format!("{i} was there")));
+        last.go_on_from(after, &BTreeSet::from([1, 2]));
+        assert_eq!(last.get(0).unwrap().levels[0].dimensions(), (4, 4));
+        assert_eq!(last.get(1).unwrap().levels[0].dimensions(), (8, 4));
+        assert!(last.try_mask(0).is_ok());
+        assert_eq!(last.residency().loads, 5);
+    }
+
+    #[test]
+    fn what_drawings_ask_for_in_vain_is_told_once_in_order() {
+        let store = PhotoStore::new(5, |i| match i {
+            1 | 3 | 4 => Err(format!("{i}.png: corrupt")),
+            _ => Ok(RgbaImage::new(4, 4)),
+        });
+        let error = |source_idx: usize| PhotoError {
+            source_idx,
+            message: format!("{source_idx}.png: corrupt"),
+        };
+        // 1. Who only looks into photos, or decodes ahead, draws nothing.
+        assert_eq!(store.get(1), Err(error(1)));
+        store.decode_ahead(4, [4, 4], &[false; 5]);
+        assert!(store.take_missed().is_empty());
+        // 2. What a drawing met, whichever it met first, and what it would have asked for then.
+        for i in [3, 0, 1, 3] {
+            assert_eq!(store.get_from_level(i, 0).is_ok(), i == 0);
+        }
+        assert_eq!(store.take_missed(), [error(1), error(3)]);
+        store.find_missed(&[4, 2, 3]);
+        assert_eq!(store.take_missed(), [error(3), error(4)]);
+        assert!(store.take_missed().is_empty());
     }
 
     #[test]

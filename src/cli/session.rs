@@ -1,6 +1,8 @@
 //! A scene, a proxy and an engine, drawing views one after the other.
 
 mod in_order;
+#[cfg(test)]
+mod tests;
 
 use super::budget;
 use super::damaged::{leave_out, left_out_text};
@@ -239,7 +241,7 @@ impl Session {
         self.sharp = finish.sharp;
     }
 
-    /// Draws a view. A photo that turns out corrupt is reported and left out from then on
+    /// Draws a view. Photos that turn out corrupt are reported and left out from then on
     /// and the view drawn again, unless `--strict`.
     pub(super) fn draw(
         &mut self,
@@ -277,9 +279,9 @@ impl Session {
     /// Draws those views that are not there, one after the other, and gives each picture to `take`. While
     /// one is drawn the next is prepared and its photos are decoded.
     ///
-    /// All are drawn of the same photos. One that turns out corrupt is reported and left out, unless
-    /// `--strict`, and all views are drawn without it, also those that were there: from the one that asked for
-    /// it on, and then those before. What they have cost so far is forgotten, `again` is told of
+    /// All are drawn of the same photos. Those that turn out corrupt are reported and left out, unless
+    /// `--strict`, and all views are drawn without them, also those that were there: from the one that asked for
+    /// them on, and then those before. What they have cost so far is forgotten, `again` is told of
     /// all photos that were left out, and `is_there` is false of every view from then on.
     pub(super) fn draw_all(
         &mut self,
@@ -383,29 +385,39 @@ impl Session {
         &mut self,
         damaged: &BTreeMap<String, String>,
     ) -> anyhow::Result<bool> {
-        let before = self.lumigraph.sources.len();
-        for (name, reason) in damaged {
-            let mut sources = self.lumigraph.sources.iter();
-            if let Some(source_idx) = sources.position(|source| source.name == *name) {
-                let message = reason.clone();
-                self.leave_out(&PhotoError {
-                    source_idx,
-                    message,
-                })?;
-            }
+        let sources = self.lumigraph.sources.iter().enumerate();
+        let known = sources.filter_map(|(i, source)| Some((i, damaged.get(&source.name)?.clone())));
+        let known: BTreeMap<usize, String> = known.collect();
+        if known.is_empty() {
+            return Ok(false);
         }
-        Ok(self.lumigraph.sources.len() < before)
+        self.leave_out_all(&known)?;
+        Ok(true)
     }
 
-    /// Leaves out a photo, as long as enough others remain. What has been drawn is to be drawn again without
-    /// it, so what that has cost is forgotten.
+    /// Leaves out a photo that was asked for in vain, and all others that were for the same picture: that drawn
+    /// without one of them asks for the rest again, and each time all that is drawn from is made anew.
     fn leave_out(&mut self, error: &PhotoError) -> anyhow::Result<()> {
-        let name = self.lumigraph.sources[error.source_idx].name.clone();
-        if self.strict {
-            bail!("photo {name}: {error}; without --strict it would be left out");
+        let mut damaged = BTreeMap::from([(error.source_idx, error.message.clone())]);
+        if !self.strict {
+            for missed in self.lumigraph.photos.take_missed() {
+                damaged.entry(missed.source_idx).or_insert(missed.message);
+            }
         }
-        self.say_left_out(&name, &error.message);
-        self.without.insert(name);
+        self.leave_out_all(&damaged)
+    }
+
+    /// Leaves out photos, by source view with what is wrong with each, as long as enough others remain. What has
+    /// been drawn is to be drawn again without them, so what that has cost is forgotten.
+    fn leave_out_all(&mut self, damaged: &BTreeMap<usize, String>) -> anyhow::Result<()> {
+        for (source_idx, message) in damaged {
+            let name = self.lumigraph.sources[*source_idx].name.clone();
+            if self.strict {
+                bail!("photo {name}: {message}; without --strict it would be left out");
+            }
+            self.say_left_out(&name, message);
+            self.without.insert(name);
+        }
         self.scene.check_enough(&self.without, &self.left_out)?;
         let count = self.lumigraph.sources.len();
         let uploaded = (0..count).filter(|i| self.was_uploaded(*i));
@@ -416,7 +428,7 @@ impl Session {
         let before = std::mem::replace(&mut self.lumigraph, fewer);
         // The report is on the whole run.
         let photos = &mut self.lumigraph.photos;
-        photos.go_on_from(before.photos, error.source_idx);
+        photos.go_on_from(before.photos, &damaged.keys().copied().collect());
         self.forget();
         Ok(())
     }

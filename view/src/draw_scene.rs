@@ -127,6 +127,12 @@ impl<'a> SceneDrawer<'a> {
             match self.try_draw(engine, request, reduction) {
                 Err(RenderError::Photo(error)) if self.may_leave_out(error.source_idx) => {
                     self.gone.push(error.source_idx);
+                    // All that the picture asked for in vain go at once.
+                    for missed in self.lumigraph.photos.take_missed() {
+                        if self.may_leave_out(missed.source_idx) {
+                            self.gone.push(missed.source_idx);
+                        }
+                    }
                     self.ready = None;
                 }
                 drawn => return drawn,

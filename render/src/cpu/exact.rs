@@ -31,7 +31,8 @@ pub(super) fn draw_exact(frame: &Frame<'_>, rays: &RayMap) -> Result<RgbaImage, 
 
 impl Engine<'_> {
     /// The exact field of a band of rows: for each tile in which there is something, where in the band it
-    /// begins, the source views that see it, and what they weigh.
+    /// begins, the source views that see it, and what they weigh. All tiles have their turn, also after one that
+    /// fails.
     pub(super) fn weigh_band(
         &self,
         band: usize,
@@ -40,12 +41,13 @@ impl Engine<'_> {
     ) -> Result<(), PhotoError> {
         asked.forget(self.frame);
         let places: Vec<_> = tiles_of_band(self.frame.desired.width as usize).collect();
+        let mut done = Ok(());
         for block in places.chunks(TILES_OF_BLOCK) {
             let tile = |&[x, y]: &[usize; 2]| self.tile([x, band * BAND + y], |_| true);
             let tiles: Vec<Tile> = block.iter().map(tile).collect();
-            self.weigh_block(&tiles, asked, seen, |i, seen| then(block[i], seen))?;
+            done = done.and(self.weigh_block(&tiles, asked, seen, |i, seen| then(block[i], seen)));
         }
-        Ok(())
+        done
     }
 
     /// The exact field of tiles that are near one another: for each in which there is something, its number, the source
@@ -62,13 +64,14 @@ impl Engine<'_> {
         let balls: Vec<Option<Ball>> = balls.map(|(tile, all)| all.ball_of(tile)).collect();
         let around = extents.iter().copied().fold(Extent::EMPTY, Extent::and);
         asked.enter(around.ball_of_all(&balls));
+        let mut done = Ok(());
         for (i, ((tile, extent), ball)) in tiles.iter().zip(&extents).zip(&balls).enumerate() {
             if !extent.is_empty() {
                 self.weigh(tile, ball.as_ref(), asked, seen);
-                then(i, seen)?;
+                done = done.and(then(i, seen));
             }
         }
-        Ok(())
+        done
     }
 
     /// The exact field of proxy points that are near one another, in tiles of as many as there are lanes: for each in which

@@ -332,7 +332,8 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Blends the photos of a tile: its pixels, straight RGBA.
+    /// Blends the photos of a tile: its pixels, straight RGBA. All of them are asked for, also after one that cannot
+    /// be had.
     fn shade(
         &self,
         photos: &Held<'_>,
@@ -341,18 +342,26 @@ impl<'a> Engine<'a> {
     ) -> Result<[[u8; 4]; LANES], PhotoError> {
         let mut color = [Vec4::ZERO; LANES];
         let mut sum = [0.0_f32; LANES];
+        let mut had = Ok(());
         for (i, sight, term) in seen.iter() {
             let weight = weight(sight, term);
             if weight.iter().all(|w| *w == 0.0) {
                 continue;
             }
-            let photo = photos.get(i)?;
+            let photo = match photos.get(i) {
+                Ok(photo) => photo,
+                Err(error) => {
+                    had = had.and(Err(error));
+                    continue;
+                }
+            };
             let exposure = self.source(i).exposure;
             vectorised(
                 #[inline(always)]
                 || shade::add(photo, exposure, sight, weight, &mut color, &mut sum),
             );
         }
+        had?;
         let mut pixels = [[0; 4]; LANES];
         vectorised(
             #[inline(always)]
@@ -383,7 +392,8 @@ fn put(tile: &[[u8; 4]; LANES], band: &mut [u8], pitch: usize, [x, y]: [usize; 2
     }
 }
 
-/// Runs `band(band, scratch, pixels)` for every band of rows of the picture, in parallel.
+/// Runs `band(band, scratch, pixels)` for every band of rows of the picture, in parallel. Where one fails the others
+/// still ask for their photos: see [`crate::PhotoStore::take_missed`].
 fn draw<S: Default + Send>(
     frame: &Frame<'_>,
     band: impl Fn(usize, &mut S, &mut [u8]) -> Result<(), PhotoError> + Sync,
@@ -391,13 +401,13 @@ fn draw<S: Default + Send>(
     let (width, height) = (frame.desired.width, frame.desired.height);
     let pitch = width as usize * 4;
     let mut pixels = vec![0; pitch * height as usize];
-    pixels
+    let drawn: Vec<Result<(), PhotoError>> = pixels
         .par_chunks_mut(pitch * BAND)
         .enumerate()
         .map_init(S::default, |scratch, (i, pixels)| band(i, scratch, pixels))
-        // The first error from the top, whichever thread is the first to meet one.
-        .find_map_first(Result::err)
-        .map_or(Ok(()), Err)?;
+        .collect();
+    // The first error from the top, whichever thread is the first to meet one.
+    drawn.into_iter().collect::<Result<(), _>>()?;
     frame.check_masks()?;
     Ok(RgbaImage::from_raw(width, height, pixels).expect("the size was computed above"))
 }

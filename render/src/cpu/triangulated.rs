@@ -37,6 +37,7 @@ pub(super) fn draw_field(
         for (y, covering) in covering.chunks_mut(width).enumerate() {
             raster.cover(band * BAND + y, spans, covering);
         }
+        let mut done = Ok(());
         for [x, y] in tiles_of_band(width) {
             Part::of_tile(covering, width, [x, y], parts);
             if parts.is_empty() {
@@ -95,10 +96,10 @@ pub(super) fn draw_field(
                 seen.weigh(&frame.options);
                 seen.add_weights();
             }
-            let colors = engine.shade(&photos, seen, |sight, _| &sight.a)?;
-            put(&colors, pixels, width * 4, [x, y]);
+            let colors = engine.shade(&photos, seen, |sight, _| &sight.a);
+            done = done.and(colors.map(|colors| put(&colors, pixels, width * 4, [x, y])));
         }
-        Ok(())
+        done
     })
 }
 

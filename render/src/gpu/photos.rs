@@ -334,6 +334,9 @@ impl Layers {
                 Content::Photos => some.par_iter().map(|&i| photos.get(i).map(Some)).collect(),
                 Content::Masks | Content::Distances => vec![Ok(None); some.len()],
             };
+            if decoded.iter().any(Result::is_err) {
+                photos.find_missed(&missing);
+            }
             for (&source_idx, photo) in some.iter().zip(decoded) {
                 let layer = self.free_layer(&mut old, residency);
                 match (self.content, photo?) {

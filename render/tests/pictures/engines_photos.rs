@@ -146,3 +146,36 @@ fn a_photo_that_cannot_be_decoded_is_named_and_does_no_further_harm() {
         assert!(by_all(&good_frame, method) == before, "{method:?}");
     }
 }
+
+#[test]
+fn all_photos_that_a_picture_asks_for_in_vain_are_told_at_once() {
+    let shot = Shot::of("shelf", 12, None);
+    let desired = shot.views[0].between(&shot.views[1], 0.3);
+    // What is decoded, and what is told, of photos some of which cannot be decoded.
+    let drawn = |method, by_gpu: bool, broken: &[usize]| {
+        let mut lumigraph = shot.lumigraph();
+        let (store, decoded) = watched(&shot.photos, broken);
+        lumigraph.photos = store;
+        let frame = Frame::new(&lumigraph, desired.clone(), FieldOptions::default());
+        let drawn = match by_gpu {
+            true => gpu().unwrap().render(&frame, method),
+            false => cpu::render(&frame, method),
+        };
+        let missed = lumigraph.photos.take_missed();
+        let missed: BTreeSet<usize> = missed.iter().map(|error| error.source_idx).collect();
+        assert_eq!(drawn.is_ok(), missed.is_empty());
+        let decoded = decoded.lock().unwrap().clone();
+        (decoded, missed)
+    };
+    let all: Vec<usize> = (0..12).collect();
+    for by_gpu in [false, true] {
+        if by_gpu && gpu().is_none() {
+            continue;
+        }
+        for method in METHODS {
+            let (asked, missed) = drawn(method, by_gpu, &[]);
+            assert!(asked.len() > 2 && missed.is_empty(), "{asked:?}");
+            assert_eq!(drawn(method, by_gpu, &all).1, asked, "{method:?}");
+        }
+    }
+}
