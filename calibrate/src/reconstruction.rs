@@ -1,5 +1,6 @@
 use crate::{Camera, CameraError, CameraId, Lens, Pixel, Rigid3};
 use glam::{DVec2, DVec3};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// So many observations, spread over all images, tell how well a model fits its photos.
@@ -77,30 +78,40 @@ pub struct Point3D {
 }
 
 impl Reconstruction {
-    /// What is left when the images of these names were never taken: a sparse point stays
+    /// What is left when the images of these names were never taken: all as it is where it has none of them, and
+    /// else a copy, as [`Self::remove_images`] leaves it.
+    #[must_use]
+    pub fn without_images(&self, names: &BTreeSet<String>) -> Cow<'_, Self> {
+        if !self.images.values().any(|i| names.contains(&i.name)) {
+            return Cow::Borrowed(self);
+        }
+        let mut rest = self.clone();
+        rest.remove_images(names);
+        Cow::Owned(rest)
+    }
+
+    /// Takes the images of these names out, as if they were never taken: a sparse point that they saw stays
     /// only where two or more of the remaining images see it, and a keypoint of one that
     /// went loses its link. Cameras stay. Unknown names are no matter.
-    #[must_use]
-    pub fn without_images(&self, names: &BTreeSet<String>) -> Self {
-        let mut images = self.images.clone();
-        images.retain(|_, image| !names.contains(&image.name));
-        let mut points = self.points.clone();
-        points.retain(|_, point| {
+    pub fn remove_images(&mut self, names: &BTreeSet<String>) {
+        let images = self.images.iter();
+        let gone: BTreeSet<ImageId> = images
+            .filter(|(_, image)| names.contains(&image.name))
+            .map(|(id, _)| *id)
+            .collect();
+        if gone.is_empty() {
+            return;
+        }
+        self.images.retain(|id, _| !gone.contains(id));
+        let mut lost = BTreeSet::new();
+        for (id, point) in &mut self.points {
             let seen_before = point.track.len();
-            point
-                .track
-                .retain(|(image_id, _)| images.contains_key(image_id));
-            let seen_by: BTreeSet<ImageId> = point.track.iter().map(|(id, _)| *id).collect();
-            point.track.len() == seen_before || seen_by.len() >= 2
-        });
-        for keypoint in images.values_mut().flat_map(|image| &mut image.keypoints) {
-            keypoint.point = keypoint.point.filter(|id| points.contains_key(id));
+            point.track.retain(|(image_id, _)| !gone.contains(image_id));
+            if point.track.len() < seen_before && !is_seen_by_two(&point.track) {
+                lost.insert(*id);
+            }
         }
-        Self {
-            cameras: self.cameras.clone(),
-            images,
-            points,
-        }
+        self.remove_points(&lost);
     }
 
     /// The sparse points that every image observing them has farther than so many pixels from where it observes them, or
@@ -251,6 +262,11 @@ impl Reconstruction {
     }
 }
 
+/// Whether a track is of two images or more.
+fn is_seen_by_two(track: &[(ImageId, u32)]) -> bool {
+    track.iter().any(|(id, _)| *id != track[0].0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -321,7 +337,8 @@ mod tests {
 
     #[test]
     fn points_stay_where_two_remaining_images_see_them() {
-        let rest = three_images().without_images(&named(&["b", "unknown"]));
+        let whole = three_images();
+        let rest = whole.without_images(&named(&["b", "unknown"]));
         let ids: Vec<u64> = rest.points.keys().map(|id| id.0).collect();
         assert_eq!(ids, [1, 3], "point 2 is left to a alone");
         assert_eq!(rest.images.len(), 2);
@@ -335,6 +352,13 @@ mod tests {
             .map(|k| k.point.map(|id| id.0))
             .collect();
         assert_eq!(links, [Some(1), None, Some(3)]);
+        // One image that sees a point twice is one.
+        let mut twice = whole.clone();
+        let track = &mut twice.points.get_mut(&Point3DId(1)).unwrap().track;
+        track.retain(|(id, _)| *id != ImageId(12));
+        track.push((ImageId(10), 1));
+        twice.remove_images(&named(&["b"]));
+        assert!(twice.points.keys().eq(&[Point3DId(3)]));
     }
 
     #[test]
@@ -345,7 +369,14 @@ mod tests {
         for image in whole.images.values_mut() {
             image.keypoints.retain(|k| k.point != Some(Point3DId(2)));
         }
-        assert_eq!(whole.without_images(&named(&[])), whole);
+        // Nothing is copied for it.
+        for names in [named(&[]), named(&["unknown"])] {
+            let rest = whole.without_images(&names);
+            assert!(matches!(rest, Cow::Borrowed(same) if std::ptr::eq(same, &whole)));
+            let mut rest = whole.clone();
+            rest.remove_images(&names);
+            assert_eq!(rest, whole);
+        }
     }
 
     #[test]

@@ -219,7 +219,7 @@ fn reduced(whole: &Reconstruction) -> Reconstruction {
         .skip(3)
         .map(|image| image.name.clone())
         .collect();
-    let mut small = whole.without_images(&others);
+    let mut small = whole.without_images(&others).into_owned();
     let kept: BTreeSet<_> = small.points.keys().take(30).copied().collect();
     small.points.retain(|id, _| kept.contains(id));
     for point in small.points.values_mut() {

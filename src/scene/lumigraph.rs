@@ -6,7 +6,7 @@ use calibrate::{Image, ImageId, View};
 use proxy::{DensePoints, Proxy, SparsePoint};
 use render::interior::DepthMaps;
 use render::{Lumigraph, PhotoStore, SourceView, Visibility};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -205,14 +205,19 @@ impl Scene {
         names: &[String],
     ) -> Vec<SparsePoint> {
         let rest = self.reconstruction.without_images(without);
-        let index_of: BTreeMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
+        let by_name: BTreeMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
+        // There are millions of observations, and names are long.
+        let index = |(id, image): (&ImageId, &Image)| {
+            let index = by_name.get(image.name.as_str())?;
+            Some((*id, *index))
+        };
+        let index_of: HashMap<ImageId, u32> = rest.images.iter().filter_map(index).collect();
         let seen_by = |track: &[(ImageId, u32)]| {
-            let source = |(id, _): &(ImageId, u32)| {
-                let image = rest.images.get(id)?;
-                index_of.get(image.name.as_str()).copied()
-            };
-            let seen: BTreeSet<u32> = track.iter().filter_map(source).collect();
-            seen.into_iter().collect()
+            let mut seen = Vec::with_capacity(track.len());
+            seen.extend(track.iter().filter_map(|(id, _)| index_of.get(id).copied()));
+            seen.sort_unstable();
+            seen.dedup();
+            seen
         };
         let points = rest.points.values().filter(|p| p.position.is_finite());
         points
@@ -241,4 +246,47 @@ fn renamed(dense: &DensePoints, names: &[String]) -> Vec<SparsePoint> {
         })
     };
     dense.points.iter().filter_map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::wall;
+    use super::*;
+
+    #[test]
+    fn sparse_points_name_the_photos_that_observe_them_by_their_places() {
+        let (_folder, capture) = wall(5, 1);
+        let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        // Some programs have several observations of a point by one photo.
+        for point in scene.reconstruction.points.values_mut() {
+            let first = point.track.first().copied();
+            point.track.extend(first);
+        }
+        let names = scene.names();
+        let cases: [(&[String], &[String]); 4] = [
+            (&[], &names),
+            (&[], &names[1..3]),
+            (&names[..2], &names[2..]),
+            (&names[3..4], &[]),
+        ];
+        for (without, asked) in cases {
+            let without: BTreeSet<String> = without.iter().cloned().collect();
+            // Name by name, as it is meant.
+            let rest = scene.reconstruction.without_images(&without);
+            let place = |(id, _): &(ImageId, u32)| {
+                let name = &rest.images[id].name;
+                Some(asked.iter().position(|asked| asked == name)? as u32)
+            };
+            let of_point = |point: &calibrate::Point3D| SparsePoint {
+                position: point.position,
+                seen_by: {
+                    let places: BTreeSet<u32> = point.track.iter().filter_map(place).collect();
+                    places.into_iter().collect()
+                },
+            };
+            let expected: Vec<SparsePoint> = rest.points.values().map(of_point).collect();
+            assert!(!expected.is_empty());
+            assert_eq!(scene.sparse_points(&without, asked), expected);
+        }
+    }
 }

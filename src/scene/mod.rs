@@ -149,9 +149,7 @@ impl Scene {
     /// Leaves out the photos that are [misplaced](Self::misplaced), and returns their names.
     pub fn drop_misplaced(&mut self) -> Vec<String> {
         let names = self.misplaced();
-        if !names.is_empty() {
-            self.take_out(&names.iter().cloned().collect::<BTreeSet<String>>());
-        }
+        self.take_out(&names.iter().cloned().collect());
         names
     }
 
@@ -171,11 +169,14 @@ impl Scene {
 
     /// Takes photos out of the scene, and notes that they were left out.
     fn take_out(&mut self, names: &BTreeSet<String>) {
+        if names.is_empty() {
+            return;
+        }
         let (gone, rest): (Vec<Photo>, Vec<Photo>) = std::mem::take(&mut self.photos)
             .into_iter()
             .partition(|photo| names.contains(&photo.name));
         self.photos = rest;
-        self.reconstruction = self.reconstruction.without_images(names);
+        self.reconstruction.remove_images(names);
         // Splits, which may name them, speak of the capture's photos.
         let called = |photo: Photo| photo.original.unwrap_or(photo.name);
         self.left_out.extend(gone.into_iter().map(called));

@@ -43,7 +43,7 @@ impl Scene {
             path: path.to_owned(),
             problem,
         };
-        let reconstruction = colmap::read_model(&folder.join(&file.model))?;
+        let mut reconstruction = colmap::read_model(&folder.join(&file.model))?;
         let posed: BTreeSet<&str> = reconstruction
             .images
             .values()
@@ -113,11 +113,7 @@ impl Scene {
             .difference(&listed)
             .map(|&name| name.to_owned())
             .collect();
-        let reconstruction = if unlisted.is_empty() {
-            reconstruction
-        } else {
-            reconstruction.without_images(&unlisted)
-        };
+        reconstruction.remove_images(&unlisted);
         Ok(Self {
             photos,
             reconstruction,

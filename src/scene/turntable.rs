@@ -89,8 +89,8 @@ impl Scene {
         )));
         let pose = |i: usize| circle.views[i].camera_from_world;
         let left_out = scene.left_out.iter().cloned().collect();
-        scene.reconstruction =
-            reconstruction(&names, pose, size, circle.focal_px).without_images(&left_out);
+        scene.reconstruction = reconstruction(&names, pose, size, circle.focal_px);
+        scene.reconstruction.remove_images(&left_out);
         Ok((scene, warnings))
     }
 
