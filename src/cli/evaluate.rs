@@ -91,12 +91,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let held_out = held_out(args, &scene)?;
     // What cannot be compared is said at once: fitting a proxy may take long.
-    for name in &held_out {
-        compared(name, scene.view(name)?, args.draw.size)?;
+    for (name, view) in held_out.iter().zip(scene.views(&held_out)?) {
+        compared(name, view, args.draw.size)?;
     }
-    let times = held_out
-        .iter()
-        .map(|name| (named(name), scene.time_s(name)));
+    let photos = scene.photos.iter().filter(|p| held_out.contains(&p.name));
+    let times = photos.map(|photo| (named(&photo.name), photo.time_s));
     let remedy = "`import --times FILE.csv` gives it one; or hold out photos that have one";
     args.time.check(None, &scene, times, remedy)?;
     let kept = files_behind_scene(&args.scene.scene, &scene);
@@ -202,8 +201,8 @@ fn score_each(
     session.forget();
     let bar = progress(names.len(), "evaluating");
     let mut lines = Vec::new();
-    for (i, name) in names.iter().enumerate() {
-        let view = session.scene.view(name)?;
+    let views = session.scene.views(names)?;
+    for (i, (name, view)) in names.iter().zip(views).enumerate() {
         let Some(truth) = session.truth(name)? else {
             continue;
         };

@@ -21,7 +21,7 @@ use lumigraph::scene::{
     relative, remedy_of_model,
 };
 use proxy::hull::TURNTABLE_STEPS;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Make a scene of photos and their calibration, or of photos alone
@@ -230,9 +230,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if args.strict {
         check_photos(&scene)?;
     }
+    let times = frames.iter().map(|f| (f.name.as_str(), f.time_s));
+    let time_of: BTreeMap<&str, f64> = times.collect();
     for photo in &mut scene.photos {
-        if let Some(frame) = frames.iter().find(|frame| frame.name == photo.name) {
-            photo.time_s = Some(frame.time_s);
+        if let Some(time_s) = time_of.get(photo.name.as_str()) {
+            photo.time_s = Some(*time_s);
         }
     }
     let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());

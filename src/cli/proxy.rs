@@ -14,7 +14,7 @@ use calibrate::{Pixel, View};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use glam::{DMat4, DVec3};
-use lumigraph::scene::{Kind as Fit, Scene};
+use lumigraph::scene::{Kind as Fit, Scene, SceneError};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -172,7 +172,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let points = scene.reconstruction.points.values();
             let shown: Vec<DVec3> = points.map(|p| p.position).collect();
             make_parent(file)?;
-            ::proxy::write(file, &proxy, &shown, &cameras(&scene)?)?;
+            // Other files hold none.
+            let cameras = match is_to_be_looked_at(file) {
+                true => cameras(&scene)?,
+                false => Vec::new(),
+            };
+            ::proxy::write(file, &proxy, &shown, &cameras)?;
             file.clone()
         }
         None => scene.set_proxy(proxy.clone(), fitted_without)?,
@@ -282,7 +287,7 @@ fn by_hand(
         if let Some(transform) = &args.transform {
             mesh.transform(transform);
         }
-        let views: Vec<View> = cameras(scene)?.into_iter().map(|(_, view)| view).collect();
+        let views = scene.views(&scene.names())?;
         let solid = Solid::new(MeshKind::Mesh, mesh);
         let share = mesh::lies_where_cameras_look(&solid, &views);
         if share < LEAST_SEEN {
@@ -305,12 +310,17 @@ fn by_hand(
 /// A mesh that fewer rays than this share meet probably lies elsewhere.
 const LEAST_SEEN: f64 = 0.2;
 
+/// Whether a proxy's file is one that shows the cameras, too.
+fn is_to_be_looked_at(file: &Path) -> bool {
+    let extension = file.extension();
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("glb"))
+}
+
 /// The photos' cameras, by name.
-fn cameras(scene: &Scene) -> anyhow::Result<Vec<(String, View)>> {
-    let photos = scene.photos.iter();
-    photos
-        .map(|photo| Ok((photo.name.clone(), scene.view(&photo.name)?)))
-        .collect()
+fn cameras(scene: &Scene) -> Result<Vec<(String, View)>, SceneError> {
+    let names = scene.names();
+    let views = scene.views(&names)?;
+    Ok(names.into_iter().zip(views).collect())
 }
 
 /// A photo's name and a pixel of it.

@@ -11,17 +11,37 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl Scene {
-    /// A photo's camera and pose.
+    /// A photo's camera and pose; [`Self::views`] are those of many.
     ///
     /// # Errors
     /// No such photo, or its camera has no lens.
     pub fn view(&self, name: &str) -> Result<View, SceneError> {
         let image = self.reconstruction.images.values().find(|i| i.name == name);
-        let image = image.ok_or_else(|| SceneError::UnknownPhoto {
+        self.view_of(image.ok_or_else(|| self.unknown_photo(name))?)
+    }
+
+    /// Photos' cameras and poses, in the order of the names.
+    ///
+    /// # Errors
+    /// As [`Self::view`].
+    pub fn views<'n>(
+        &self,
+        names: impl IntoIterator<Item = &'n String>,
+    ) -> Result<Vec<View>, SceneError> {
+        let images = self.images_by_name();
+        let view = |name: &'n String| {
+            let image = images.get(name.as_str());
+            self.view_of(image.ok_or_else(|| self.unknown_photo(name))?)
+        };
+        names.into_iter().map(view).collect()
+    }
+
+    /// The error of a name that no photo has.
+    pub(super) fn unknown_photo(&self, name: &str) -> SceneError {
+        SceneError::UnknownPhoto {
             name: name.to_owned(),
             known: self.names(),
-        })?;
-        self.view_of(image)
+        }
     }
 
     /// When a photo was taken, in seconds, where known.
@@ -141,8 +161,8 @@ impl Scene {
         let Proxy::Dense(dense) = proxy else {
             return Ok(());
         };
-        let is_known = |name: &String| self.photos.iter().any(|photo| photo.name == *name);
-        match dense.names.iter().any(is_known) {
+        let known: BTreeSet<&String> = self.photos.iter().map(|photo| &photo.name).collect();
+        match dense.names.iter().any(|name| known.contains(name)) {
             true => Ok(()),
             false => Err(SceneError::OtherPhotos {
                 path: file.to_owned(),
@@ -288,5 +308,24 @@ mod tests {
             assert!(!expected.is_empty());
             assert_eq!(scene.sparse_points(&without, asked), expected);
         }
+    }
+
+    #[test]
+    fn views_are_those_of_the_names_one_by_one() {
+        let (_folder, capture) = wall(5, 1);
+        let (scene, _) = Scene::open(&capture, false).unwrap();
+        let mut names = scene.names();
+        names.swap(1, 3);
+        names.push(names[0].clone());
+        let one_by_one: Vec<View> = names.iter().map(|n| scene.view(n).unwrap()).collect();
+        assert_eq!(scene.views(&names).unwrap(), one_by_one);
+        names.push("other.png".to_owned());
+        let errors = [
+            scene.views(&names).map(|_| ()),
+            scene.view("other.png").map(|_| ()),
+        ];
+        let [of_all, of_one] = errors.map(|error| error.unwrap_err().to_string());
+        assert!(of_one.contains("other.png"), "{of_one}");
+        assert_eq!(of_all, of_one);
     }
 }

@@ -158,10 +158,7 @@ impl Scene {
     ) -> Result<Result<Truth, CaptureError>, SceneError> {
         let view = self.view(name)?;
         let photo = self.photos.iter().find(|photo| photo.name == name);
-        let photo = photo.ok_or_else(|| SceneError::UnknownPhoto {
-            name: name.to_owned(),
-            known: self.names(),
-        })?;
+        let photo = photo.ok_or_else(|| self.unknown_photo(name))?;
         let decode = |photo: &Photo, size| {
             let pixels = photo.decode(size)?;
             let used = photo.decode_ignore_mask(size)?;
