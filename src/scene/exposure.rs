@@ -2,6 +2,7 @@
 
 use super::file::{ExposureEntry, Extra};
 use super::{Photo, Scene};
+use calibrate::Image;
 use calibrate::exposure::{self, Verdict};
 use capture::{CaptureError, apply_matte};
 use image::RgbaImage;
@@ -29,8 +30,11 @@ impl Scene {
         let names: Vec<&str> = used().map(|p| p.name.as_str()).collect();
         let photos: Vec<&Photo> = used().collect();
         let patches = exposure::patches(&rest, &names);
-        let (observations, failed) =
-            exposure::sample_all(&patches, |idx| self.what_counts(photos[idx]));
+        let images = self.images_by_name();
+        let (observations, failed) = exposure::sample_all(&patches, |idx| {
+            // Only photos with a pose see points.
+            self.what_counts(photos[idx], images[names[idx]])
+        });
         let matched = exposure::estimate(names.len(), &patches.points_in_world, &observations);
 
         let failed = failed.into_iter();
@@ -55,10 +59,7 @@ impl Scene {
     }
 
     /// A photo's pixels, transparent where its matte or its ignore mask says so.
-    fn what_counts(&self, photo: &Photo) -> Result<RgbaImage, CaptureError> {
-        let mut images = self.reconstruction.images.values();
-        let image = images.find(|image| image.name == photo.name);
-        let image = image.expect("only photos with a pose see points");
+    fn what_counts(&self, photo: &Photo, image: &Image) -> Result<RgbaImage, CaptureError> {
         let camera = &self.reconstruction.cameras[&image.camera_id];
         let size = (camera.width, camera.height);
         let mut pixels = photo.decode(size)?;

@@ -120,13 +120,13 @@ struct Agreement {
 impl Agreement {
     fn new(photo_count: usize, by_point: &[&Observation], c: usize, half: &[bool]) -> Option<Self> {
         let channel = |side: bool| Channel::new(photo_count, by_point, c, |p| half[p] == side);
-        let (first, second) = (channel(false), channel(true));
+        let (first, second) = rayon::join(|| channel(false), || channel(true));
         let shares = shares(&first.counts(), &second.counts());
         if shares.iter().filter(|share| **share > 0.0).count() < 2 {
             return None;
         }
         let fit = |half: &Channel| half.fit(HALF_PRECISION, &shares);
-        let (a, b) = (fit(&first), fit(&second));
+        let (a, b) = rayon::join(|| fit(&first), || fit(&second));
         let total: f64 = shares.iter().sum();
         let mean = |value: &dyn Fn(usize) -> f64| {
             (0..photo_count).map(|i| shares[i] * value(i)).sum::<f64>() / total

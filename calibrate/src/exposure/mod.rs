@@ -14,6 +14,7 @@ mod estimate;
 mod halves;
 mod sample;
 mod solve;
+mod ties;
 
 pub use estimate::{Evidence, Exposure, MIN_SPREAD, Verdict, estimate};
 pub use sample::{Patch, Patches, patches, sample, sample_all};

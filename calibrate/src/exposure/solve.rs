@@ -1,6 +1,7 @@
 //! One channel's gains: robust least squares in the logarithms.
 
 use super::Observation;
+use super::ties::Ties;
 use std::ops::Range;
 
 /// One channel of the observations, ordered by point.
@@ -75,8 +76,10 @@ impl Channel {
     /// For each photo the lowest photo that shared points link it to; itself if none.
     fn groups(&self) -> Vec<usize> {
         let mut group: Vec<usize> = (0..self.photo_count).collect();
-        fn root(group: &[usize], mut i: usize) -> usize {
+        // Whoever asks brings what it passes nearer to the root: long strips would be long ways.
+        fn root(group: &mut [usize], mut i: usize) -> usize {
             while group[i] != i {
+                group[i] = group[group[i]];
                 i = group[i];
             }
             i
@@ -84,12 +87,14 @@ impl Channel {
         for range in self.start.windows(2) {
             let first = self.photo[range[0]];
             for &photo in &self.photo[range[0]..range[1]] {
-                let (a, b) = (root(&group, first), root(&group, photo));
+                let a = root(&mut group, first);
+                let b = root(&mut group, photo);
                 group[a.max(b)] = a.min(b);
             }
         }
         for i in 0..group.len() {
-            group[i] = root(&group, i);
+            let lowest = root(&mut group, i);
+            group[i] = lowest;
         }
         group
     }
@@ -101,12 +106,18 @@ impl Channel {
     /// Beside the observations, whose noise is estimated, stands the prior that a log gain
     /// has the mean zero and the variance 1 / `precision`.
     pub(super) fn fit(&self, precision: f64, shares: &[f64]) -> Vec<f64> {
+        let ties = Ties::new(self.photo_count, &self.photo, &self.start);
+        self.fit_by(ties, precision, shares)
+    }
+
+    /// Some points by `ties`, the others one by one.
+    fn fit_by(&self, mut ties: Ties, precision: f64, shares: &[f64]) -> Vec<f64> {
         let groups = self.groups();
         let mut log_gains = vec![0.0; self.photo_count];
         let mut weights = self.evidence.clone();
         let mut prior = 0.0;
         for step in 0..HUBER_STEPS + TUKEY_STEPS {
-            self.solve(&weights, prior, &mut log_gains);
+            self.solve(&mut ties, &weights, prior, &mut log_gains);
             center(&groups, shares, &mut log_gains);
             let residuals = self.residuals(&weights, &log_gains);
             let noise = self.noise(&residuals);
@@ -171,33 +182,42 @@ impl Channel {
         (1.4826 * *median).max(MIN_NOISE)
     }
 
-    /// Sums by photo of each observation's value less its point's [`mean`], times its weight. `totals` are the
-    /// points' weights.
-    fn summed(
+    /// Adds to the photos' sums each value less its point's [`mean`], times its weight, of the given points'
+    /// observations. `totals` are the points' weights.
+    fn add_points(
         &self,
+        points: impl Iterator<Item = usize>,
         weights: &[f64],
         totals: &[f64],
         value: impl Fn(usize) -> f64,
-        out: &mut [f64],
+        sums: &mut [f64],
     ) {
-        out.fill(0.0);
-        for (range, &total) in self.start.windows(2).zip(totals) {
-            let range = range[0]..range[1];
-            let mean = mean(weights, total, range.clone(), &value);
+        for point in points {
+            let range = self.start[point]..self.start[point + 1];
+            let mean = mean(weights, totals[point], range.clone(), &value);
             for i in range {
-                out[self.photo[i]] += weights[i] * (value(i) - mean);
+                sums[self.photo[i]] += weights[i] * (value(i) - mean);
             }
         }
     }
 
     /// The weighted least-squares gains, points eliminated (Schur's complement), by
     /// conjugate gradients with Jacobi's preconditioner from the gains given.
-    fn solve(&self, weights: &[f64], prior: f64, x: &mut [f64]) {
+    fn solve(&self, ties: &mut Ties, weights: &[f64], prior: f64, x: &mut [f64]) {
         let count = self.photo_count;
-        // S·x: each observation's x less its point's mean, weighted, summed by photo.
         let totals = self.totals(weights);
         let mut b = vec![0.0; count];
-        self.summed(weights, &totals, |i| self.log[i], &mut b);
+        let all = 0..totals.len();
+        self.add_points(all, weights, &totals, |i| self.log[i], &mut b);
+        // S·x: each observation's x less its point's mean, weighted, summed by photo.
+        ties.weigh(&self.photo, &self.start, weights, &totals);
+        let rest = ties.rest().iter().copied();
+        let multiply = |x: &[f64], product: &mut [f64]| {
+            product.fill(0.0);
+            ties.add_differences(x, product);
+            let value = |i: usize| x[self.photo[i]];
+            self.add_points(rest.clone(), weights, &totals, value, product);
+        };
         let mut diagonal = vec![prior; count];
         for (&photo, weight) in self.photo.iter().zip(weights) {
             diagonal[photo] += weight;
@@ -209,7 +229,7 @@ impl Channel {
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
 
         let mut product = vec![0.0; count];
-        self.summed(weights, &totals, |i| x[self.photo[i]], &mut product);
+        multiply(x, &mut product);
         let mut r: Vec<f64> = (0..count)
             .map(|i| b[i] - product[i] - prior * x[i])
             .collect();
@@ -224,7 +244,7 @@ impl Channel {
             if !(rz > enough) {
                 break;
             }
-            self.summed(weights, &totals, |i| p[self.photo[i]], &mut product);
+            multiply(&p, &mut product);
             for i in 0..count {
                 product[i] += prior * p[i];
             }
@@ -277,3 +297,6 @@ fn center(groups: &[usize], shares: &[f64], log_gains: &mut [f64]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
