@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
 use std::num::NonZero;
 
 /// How many neighbours decide whether a point stands alone.
@@ -22,37 +23,46 @@ pub struct CloudStatistics {
 
 /// Measures a cloud; `None` with fewer than two finite points.
 pub fn statistics(points_in_world: &[DVec3]) -> Option<CloudStatistics> {
-    let nearest = neighbour_distances(points_in_world, 1)?;
-    let isolated = isolated_points(points_in_world)
-        .iter()
-        .filter(|&&b| b)
-        .count();
+    let neighbours = neighbours(points_in_world)?;
+    let isolated = isolated(points_in_world, &neighbours);
     Some(CloudStatistics {
-        spacing: median(nearest),
-        isolated,
+        spacing: median(neighbours.iter().map(|n| n.nearest).collect()),
+        isolated: isolated.iter().filter(|&&b| b).count(),
     })
 }
 
 /// Which points stand alone: far from their neighbours by the cloud's own measure.
 /// Points that are not finite always do. With fewer than three points none does.
 pub fn isolated_points(points_in_world: &[DVec3]) -> Vec<bool> {
+    let neighbours = neighbours(points_in_world).unwrap_or_default();
+    isolated(points_in_world, &neighbours)
+}
+
+/// [`isolated_points`] by the finite points' neighbours.
+fn isolated(points_in_world: &[DVec3], neighbours: &[Neighbours]) -> Vec<bool> {
     let mut isolated: Vec<bool> = points_in_world.iter().map(|p| !p.is_finite()).collect();
-    let Some(distances) = neighbour_distances(points_in_world, NEIGHBOURS) else {
-        return isolated;
-    };
-    if distances.len() < 3 {
+    if neighbours.len() < 3 {
         return isolated;
     }
-    let limit = ISOLATION * median(distances.clone());
-    let finite = (0..points_in_world.len()).filter(|&i| points_in_world[i].is_finite());
-    for (point_idx, distance) in finite.collect::<Vec<_>>().into_iter().zip(distances) {
-        isolated[point_idx] = distance > limit;
+    let limit = ISOLATION * median(neighbours.iter().map(|n| n.mean).collect());
+    let finite = isolated.iter_mut().filter(|is_isolated| !**is_isolated);
+    for (is_isolated, neighbours) in finite.zip(neighbours) {
+        *is_isolated = neighbours.mean > limit;
     }
     isolated
 }
 
-/// For each finite point, the mean distance to its `count` nearest others.
-fn neighbour_distances(points_in_world: &[DVec3], count: usize) -> Option<Vec<f64>> {
+/// How far a point is from the others, in world units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Neighbours {
+    /// From the nearest.
+    nearest: f64,
+    /// From the [`NEIGHBOURS`] nearest, on average.
+    mean: f64,
+}
+
+/// Those of each finite point, in order; `None` with fewer than two.
+fn neighbours(points_in_world: &[DVec3]) -> Option<Vec<Neighbours>> {
     let finite: Vec<[f64; 3]> = points_in_world
         .iter()
         .filter(|p| p.is_finite())
@@ -63,16 +73,30 @@ fn neighbour_distances(points_in_world: &[DVec3], count: usize) -> Option<Vec<f6
     }
     let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&finite).ok()?;
     // One more than asked for: the nearest is the point itself.
-    let wanted = NonZero::new(count.min(finite.len() - 1) + 1)?;
-    let mean_distance = |point: &[f64; 3]| {
+    let wanted = NonZero::new(NEIGHBOURS.min(finite.len() - 1) + 1)?;
+    let of_point = |&point_idx: &u32| {
         let found = tree
-            .query(point)
+            .query(&finite[point_idx as usize])
             .nearest_n::<SquaredEuclidean<f64>>(wanted)
             .execute();
-        let sum: f64 = found.iter().map(|item| item.distance.sqrt()).sum();
-        sum / (found.len().max(2) - 1) as f64
+        let mean_of = |count: usize| {
+            let found = &found[..found.len().min(count + 1)];
+            let sum: f64 = found.iter().map(|item| item.distance.sqrt()).sum();
+            sum / (found.len().max(2) - 1) as f64
+        };
+        Neighbours {
+            nearest: mean_of(1),
+            mean: mean_of(NEIGHBOURS),
+        }
     };
-    Some(finite.iter().map(mean_distance).collect())
+    // Asked leaf by leaf, points find in the caches what those before them have looked at.
+    let order: Vec<u32> = tree.iter().map(|(point_idx, _)| point_idx).collect();
+    let found: Vec<Neighbours> = order.par_iter().map(of_point).collect();
+    let mut neighbours = vec![Neighbours::default(); finite.len()];
+    for (point_idx, found) in order.into_iter().zip(found) {
+        neighbours[point_idx as usize] = found;
+    }
+    Some(neighbours)
 }
 
 /// The point of least summed distance, by Weiszfeld's iteration; a few of the points may be anywhere. Not finite
@@ -139,6 +163,59 @@ mod tests {
         assert!(geometric_median(&turned).distance(expected) < 1e-9);
         assert_eq!(geometric_median(&[DVec3::X; 9]), DVec3::X);
         assert!(!geometric_median(&[]).is_finite());
+    }
+
+    /// The mean distance from each point to its `count` nearest others.
+    fn mean_distances(points: &[DVec3], count: usize) -> Vec<f64> {
+        let of_point = |i: usize| {
+            let others = (0..points.len()).filter(|&k| k != i);
+            let mut distances: Vec<f64> = others.map(|k| points[k].distance(points[i])).collect();
+            distances.sort_unstable_by(f64::total_cmp);
+            distances.truncate(count);
+            distances.iter().sum::<f64>() / distances.len() as f64
+        };
+        (0..points.len()).map(of_point).collect()
+    }
+
+    #[test]
+    fn every_point_has_its_own_neighbours_in_the_order_of_the_points() {
+        let fraction = |i: u32, factor: f64| (f64::from(i) * factor).fract();
+        let point = |i: u32| {
+            // Some where another is.
+            let i = if i % 50 == 49 { i / 2 } else { i };
+            DVec3::new(
+                fraction(i, 0.754_877_666),
+                3.0 * fraction(i, 0.569_840_291),
+                1e3 * fraction(i * i, 0.618_033_989),
+            )
+        };
+        for count in [2, 3, 8, 9, 10, 1500] {
+            let finite: Vec<DVec3> = (0..count).map(point).collect();
+            let mut points = finite.clone();
+            points.insert(1, DVec3::NAN);
+            points.push(DVec3::new(0.0, f64::INFINITY, 0.0));
+            let found = neighbours(&points).unwrap();
+            assert_eq!(found.len(), finite.len());
+            let nearest = mean_distances(&finite, 1);
+            let mean = mean_distances(&finite, NEIGHBOURS);
+            for (i, found) in found.iter().enumerate() {
+                let errors = [found.nearest - nearest[i], found.mean - mean[i]];
+                assert!(
+                    errors.iter().all(|error| error.abs() < 1e-9),
+                    "{count} points, {i}: {found:?}, off by {errors:?}"
+                );
+            }
+            let statistics = statistics(&points).unwrap();
+            assert!((statistics.spacing - median(nearest)).abs() < 1e-9);
+            let isolated = isolated_points(&points);
+            assert_eq!(
+                statistics.isolated,
+                isolated.iter().filter(|b| **b).count(),
+                "{count}"
+            );
+            assert!(isolated[1] && isolated[points.len() - 1]);
+        }
+        assert_eq!(neighbours(&[DVec3::ONE, DVec3::NAN]), None);
     }
 
     #[test]
