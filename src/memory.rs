@@ -4,6 +4,7 @@
 #![expect(unsafe_code, reason = "an allocator cannot be written without")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::fmt;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -43,6 +44,42 @@ fn had(pointer: *mut u8, size: usize) -> *mut u8 {
     pointer
 }
 
+static HAS_SIZE: AtomicBool = AtomicBool::new(false);
+static HAS_CPU_MEMORY: AtomicBool = AtomicBool::new(false);
+
+/// Which of the options that take less memory the command has: those are named where there is no more.
+pub(crate) fn set_remedies(size: bool, cpu_memory: bool) {
+    HAS_SIZE.store(size, Ordering::Relaxed);
+    HAS_CPU_MEMORY.store(cpu_memory, Ordering::Relaxed);
+}
+
+/// What is said where so many bytes more were asked for.
+struct Told {
+    bytes: usize,
+    has_size: bool,
+    has_cpu_memory: bool,
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("out of memory: the system has no ")?;
+        match self.bytes {
+            bytes @ ..1000 => write!(f, "{bytes} bytes")?,
+            bytes @ 1000..100_000 => write!(f, "{:.1} kB", bytes as f64 / 1e3)?,
+            bytes => write!(f, "{:.1} MB", bytes as f64 / 1e6)?,
+        }
+        f.write_str(" more; try ")?;
+        if self.has_size {
+            f.write_str("a smaller --size, ")?;
+        }
+        f.write_str("fewer --threads, ")?;
+        if self.has_cpu_memory {
+            f.write_str("--cpu-memory SIZE for photos, ")?;
+        }
+        f.write_str("or a higher limit (ulimit -v)")
+    }
+}
+
 /// Says so and ends the program, without allocating.
 #[cold]
 fn give_up(size: usize) -> ! {
@@ -53,12 +90,12 @@ fn give_up(size: usize) -> ! {
         std::thread::sleep(Duration::from_secs(1));
     } else {
         // Standard error is not buffered, so nothing is allocated; where it is closed nobody reads.
-        let _ = writeln!(
-            std::io::stderr(),
-            "error: out of memory: the system has no {:.1} MB more; try a smaller --size, fewer \
-             --threads, --cpu-memory SIZE for photos, or a higher limit (ulimit -v)",
-            size as f64 / 1e6
-        );
+        let told = Told {
+            bytes: size,
+            has_size: HAS_SIZE.load(Ordering::Relaxed),
+            has_cpu_memory: HAS_CPU_MEMORY.load(Ordering::Relaxed),
+        };
+        let _ = writeln!(std::io::stderr(), "error: {told}");
     }
     exit()
 }
@@ -75,4 +112,35 @@ fn exit() -> ! {
 #[cfg(not(unix))]
 fn exit() -> ! {
     std::process::exit(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_options_of_the_command_are_named() {
+        let told = |bytes, has_size, has_cpu_memory| {
+            let told = Told {
+                bytes,
+                has_size,
+                has_cpu_memory,
+            };
+            told.to_string()
+        };
+        assert_eq!(
+            told(12_340_000, true, true),
+            "out of memory: the system has no 12.3 MB more; try a smaller --size, fewer --threads, \
+             --cpu-memory SIZE for photos, or a higher limit (ulimit -v)"
+        );
+        assert_eq!(
+            told(32_768, true, false),
+            "out of memory: the system has no 32.8 kB more; try a smaller --size, fewer --threads, \
+             or a higher limit (ulimit -v)"
+        );
+        assert_eq!(
+            told(64, false, false),
+            "out of memory: the system has no 64 bytes more; try fewer --threads, or a higher limit (ulimit -v)"
+        );
+    }
 }

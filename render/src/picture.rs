@@ -1,8 +1,7 @@
 //! The blending field as colours: which photo paints which pixel.
 
 use crate::blend::Contributor;
-use crate::frame::Frame;
-use calibrate::Pixel;
+use crate::rows::{Contributions, FieldRows};
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
@@ -62,19 +61,33 @@ fn srgb_byte(linear: f64) -> u8 {
 /// view) in the shares of their weights, opaque; transparent where nothing contributes.
 ///
 /// # Panics
-/// If `contributors` does not hold one list per pixel of the desired image, or a
-/// contributor has no colour.
-pub fn field_picture(
-    frame: &Frame<'_>,
-    contributors: &[Vec<Contributor>],
+/// If a contributor has no colour.
+pub fn field_picture(field: &FieldRows<'_>, colors: &[[u8; 3]]) -> RgbaImage {
+    field_picture_and(field, colors, |_| ()).0
+}
+
+/// The same, and what is made of each row of the field, from the top. No more rows are held at once than there are
+/// threads.
+///
+/// # Panics
+/// As for [`field_picture`].
+pub fn field_picture_and<T: Send>(
+    field: &FieldRows<'_>,
     colors: &[[u8; 3]],
-) -> RgbaImage {
-    let (width, height) = (frame.desired.width, frame.desired.height);
-    assert_eq!(contributors.len(), width as usize * height as usize);
-    let mut pixels = contributors.iter().map(|list| mix(list, colors));
-    RgbaImage::from_fn(width, height, |_, _| {
-        pixels.next().expect("one list per pixel")
-    })
+    of_row: impl Fn(&Contributions) -> T + Sync,
+) -> (RgbaImage, Vec<T>) {
+    let [width, height] = field.size();
+    let mut picture = RgbaImage::new(width, height);
+    let rows = picture.par_chunks_exact_mut(4 * width as usize);
+    let paint = |(y, pixels): (usize, &mut [u8])| {
+        let lists = field.row(y as u32);
+        for (pixel, list) in pixels.chunks_exact_mut(4).zip(lists.iter()) {
+            pixel.copy_from_slice(&mix(list, colors).0);
+        }
+        of_row(&lists)
+    };
+    let made: Vec<T> = rows.enumerate().map(paint).collect();
+    (picture, made)
 }
 
 fn mix(contributors: &[Contributor], colors: &[[u8; 3]]) -> Rgba<u8> {
@@ -90,26 +103,10 @@ fn mix(contributors: &[Contributor], colors: &[[u8; 3]]) -> Rgba<u8> {
     Rgba([channel(0), channel(1), channel(2), 255])
 }
 
-/// The exact field at every pixel, row by row: for each, who paints it. Empty where the
-/// desired view does not see the proxy.
-///
-/// [`crate::TriangulatedField::contributors`] is its interpolated counterpart.
-pub fn contributors_exact(frame: &Frame<'_>) -> Vec<Vec<Contributor>> {
-    let (width, height) = (frame.desired.width as usize, frame.desired.height as usize);
-    let at_pixel = |i: usize| {
-        let center = Pixel::center_of((i % width) as u32, (i / width) as u32);
-        frame
-            .proxy_point(center)
-            .map_or_else(Vec::new, |point| frame.blend_at(&point))
-    };
-    frame.view_tree();
-    (0..width * height).into_par_iter().map(at_pixel).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FieldOptions, Lumigraph, PhotoStore, SourceView, TriangulatedField};
+    use crate::{FieldOptions, Frame, Lumigraph, PhotoStore, SourceView, TriangulatedField};
     use calibrate::{Lens, Rigid3, View};
     use glam::{DVec2, DVec3};
     use proxy::{Plane, Proxy};
@@ -145,19 +142,11 @@ mod tests {
 
     #[test]
     fn pixels_mix_the_colors_of_who_paints_them() {
-        let lumigraph = lumigraph();
-        let desired = view(DVec3::ZERO, 3, 1);
-        let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
         let share = |source_idx, weight| Contributor { source_idx, weight };
-        let field = [
-            vec![share(1, 1.0)],
-            vec![share(0, 0.25), share(1, 0.75)],
-            vec![],
-        ];
-        let picture = field_picture(&frame, &field, &[[200, 0, 40], [100, 80, 0]]);
-        assert_eq!(picture.get_pixel(0, 0).0, [100, 80, 0, 255]);
-        assert_eq!(picture.get_pixel(1, 0).0, [125, 60, 10, 255]);
-        assert_eq!(picture.get_pixel(2, 0).0, [0, 0, 0, 0]);
+        let mixed = |list: &[Contributor]| mix(list, &[[200, 0, 40], [100, 80, 0]]).0;
+        assert_eq!(mixed(&[share(1, 1.0)]), [100, 80, 0, 255]);
+        assert_eq!(mixed(&[share(0, 0.25), share(1, 0.75)]), [125, 60, 10, 255]);
+        assert_eq!(mixed(&[]), [0, 0, 0, 0]);
     }
 
     #[test]
@@ -166,7 +155,7 @@ mod tests {
         let colors = palette(2);
         let desired = lumigraph.sources[1].view.clone();
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
-        let picture = field_picture(&frame, &contributors_exact(&frame), &colors);
+        let picture = field_picture(&FieldRows::new(&frame, None), &colors);
         let [r, g, b] = colors[1];
         assert!(picture.pixels().all(|p| p.0 == [r, g, b, 255]));
     }
@@ -177,17 +166,16 @@ mod tests {
         let colors = palette(2);
         let desired = view(DVec3::new(0.3, 0.1, -3.0), 64, 48);
         let frame = Frame::new(&lumigraph, desired, FieldOptions::default());
-        let exact = contributors_exact(&frame);
-        assert_eq!(exact.len(), 64 * 48);
-        for list in exact.iter().filter(|l| !l.is_empty()) {
+        let exact = FieldRows::new(&frame, None);
+        let lists = exact.all();
+        assert_eq!(lists.iter().count(), 64 * 48);
+        for list in lists.iter().filter(|l| !l.is_empty()) {
             let sum: f64 = list.iter().map(|c| c.weight).sum();
             assert!((sum - 1.0).abs() < 1e-12);
         }
-        let interpolated = TriangulatedField::new(&frame, 16)
-            .unwrap()
-            .contributors(&frame);
-        let a = field_picture(&frame, &exact, &colors);
-        let b = field_picture(&frame, &interpolated, &colors);
+        let field = TriangulatedField::new(&frame, 16).unwrap();
+        let a = field_picture(&exact, &colors);
+        let b = field_picture(&FieldRows::new(&frame, Some(&field)), &colors);
         assert!(
             a.pixels().any(|p| p.0[3] == 0),
             "the wall outside both photos"

@@ -172,13 +172,3 @@ fn edge(a: [i64; 2], b: [i64; 2]) -> Edge {
         c: dx * (half - a[1]) - dy * (half - a[0]) - i64::from(!owns_zero),
     }
 }
-
-/// The triangle under each pixel of an image, row by row; [`NO_TRIANGLE`] where there is none.
-pub(crate) fn triangle_map(raster: &Raster, width: usize, height: usize) -> Vec<u32> {
-    let mut map = vec![NO_TRIANGLE; width * height];
-    let mut spans = Vec::new();
-    for (row, pixels) in map.chunks_exact_mut(width).enumerate() {
-        raster.cover(row, &mut spans, pixels);
-    }
-    map
-}

@@ -6,9 +6,9 @@ use super::exposure::ExposureArgs;
 use super::film::{frame_count, write_picture};
 use super::frames::{Asked, FRAMES, NamedView};
 use super::inputs::files_behind_scene;
-use super::npz::{Weights, npz};
+use super::npz::{Row, Weights, write_npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
-use super::output::{make_parent, print, write_file};
+use super::output::{fill_file, make_parent, print, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
 use super::targets::{check_file, check_file_in_no_part, check_inputs};
@@ -17,12 +17,12 @@ use anyhow::anyhow;
 use calibrate::{Pixel, View};
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
-use render::blend::Contributor;
 use render::field::FieldTriangle;
 use render::path::{NerfstudioFrame, default_name};
-use render::picture::{contributors_exact, field_picture, palette};
+use render::picture::{field_picture_and, palette};
 use render::triangulation::{Triangulation, to_svg};
-use render::{Frame, Method, Part, TriangulatedField};
+use render::{Contributions, FieldRows, Frame, Method, Part, TriangulatedField};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Picture the blending field: which photo paints which pixel
@@ -159,27 +159,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let frame = Frame::with(&lumigraph, view, args.field.options(), &part);
 
-    // 1. The field, as the renderer asked for has it.
+    // 1. The field, as the renderer asked for has it, and its picture. Who paints each pixel is kept for a file
+    //    alone: it takes many times what the picture does.
     let triangulated = || TriangulatedField::new(&frame, args.field.grid);
     let bar = spinner("weighting photos");
-    let (contributors, field) = match args.field.method() {
-        Method::Exact => (contributors_exact(&frame), None),
-        Method::Triangulated { .. } => {
-            let field = triangulated()?;
-            (field.contributors(&frame), Some(field))
-        }
+    let field = match args.field.method() {
+        Method::Exact => None,
+        Method::Triangulated { .. } => Some(triangulated()?),
     };
+    let colors = palette(frame.sources.len());
+    let is_kept = args.weights.is_some();
+    let keep = |row: &Contributions| is_kept.then(|| Row::of(row));
+    let (picture, kept) = field_picture_and(&FieldRows::new(&frame, field.as_ref()), &colors, keep);
     frame.check_masks()?;
     bar.finish_and_clear();
 
-    // 2. Its pictures.
-    let colors = palette(frame.sources.len());
-    let picture = field_picture(&frame, &contributors, &colors);
+    // 2. Files.
     let mut written = vec![&args.output];
     make_parent(&args.output)?;
     write_picture(&args.output, &picture)?;
     if let Some(file) = &args.weights {
-        write_weights(file, &frame, &contributors)?;
+        let rows: Vec<Row> = kept.into_iter().flatten().collect();
+        write_weights(file, &frame, &rows)?;
         written.push(file);
     }
     if let Some(file) = &args.triangulation {
@@ -240,30 +241,23 @@ fn frame_called(name: &str, names: &[String]) -> anyhow::Result<usize> {
     })
 }
 
-fn write_weights(
-    file: &Path,
-    frame: &Frame<'_>,
-    contributors: &[Vec<Contributor>],
-) -> anyhow::Result<()> {
-    let (width, height) = (frame.desired.width, frame.desired.height);
+fn write_weights(file: &Path, frame: &Frame<'_>, rows: &[Row]) -> anyhow::Result<()> {
     let world_from_camera = frame.desired.camera_from_world.inverse();
-    let point = |i: usize| {
-        let (x, y) = (i as u32 % width, i as u32 / width);
+    let point = |x: u32, y: u32| {
         let point = frame.proxy_point(Pixel::center_of(x, y));
         let in_world = point.map(|p| world_from_camera * (p.ray / p.inverse_distance));
         // At the plane's horizon there is no point that numbers could name.
         in_world.filter(|p| p.is_finite()).unwrap_or(DVec3::NAN)
     };
-    let points: Vec<DVec3> = (0..contributors.len()).map(point).collect();
     let sources = &frame.lumigraph.sources;
-    let bytes = npz(&Weights {
-        width,
-        height,
+    let weights = Weights {
+        width: frame.desired.width,
         camera_names: sources.iter().map(|s| s.name.as_str()).collect(),
-        contributors,
-        points: &points,
-    })?;
-    write_file(file, &bytes)
+        rows,
+    };
+    fill_file(file, |temporary| {
+        write_npz(&File::create(temporary)?, &weights, point)
+    })
 }
 
 /// The triangles, each in the colour of the field at its centre, and the epipoles.

@@ -95,10 +95,15 @@ struct Usage(String);
 /// Parses the command line, runs the command, and says what went wrong: exit code 2 for
 /// usage, 1 for bad data.
 pub(super) fn main() -> ExitCode {
-    let matches = command().get_matches();
+    let all = command();
+    let matches = all.clone().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if let Some((command, given)) = matches.subcommand() {
         unused::say_unused(command, given);
+        let options = all.find_subcommand(command).into_iter();
+        let options = options.flat_map(|command| command.get_arguments());
+        let names: Vec<&str> = options.filter_map(|option| option.get_long()).collect();
+        crate::memory::set_remedies(names.contains(&"size"), names.contains(&"cpu-memory"));
     }
     let done = start_threads(cli.threads).and_then(|()| run(cli));
     let Err(error) = done else {

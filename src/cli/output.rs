@@ -36,8 +36,16 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 /// Writes a file, complete or not at all; makes its folder where it is missing.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    fill_file(path, |temporary| std::fs::write(temporary, bytes))
+}
+
+/// The same with what `fill` writes to a file of another name.
+pub(super) fn fill_file(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> std::io::Result<()>,
+) -> anyhow::Result<()> {
     make_parent(path)?;
-    let written = capture::write_whole(path, |temporary| std::fs::write(temporary, bytes));
+    let written = capture::write_whole(path, fill);
     written.with_context(|| format!("{}: cannot write", path.display()))
 }
 

@@ -271,18 +271,23 @@ fn within_memory(folder: &Path, kilobytes: u64, line: &str) -> std::process::Out
     command.output().unwrap()
 }
 
-#[test]
-fn too_little_memory_is_told_and_leaves_nothing_half_written() {
-    let folder = with_wall();
-    // What the program itself needs, to one part in eight.
+/// How many kilobytes the program itself needs, to one part in eight.
+fn own_memory(folder: &Path) -> u64 {
     let mut own = 32 << 10;
-    while !within_memory(folder.path(), own, "--threads 2 info wall")
+    while !within_memory(folder, own, "--threads 2 info wall")
         .status
         .success()
     {
         own += own / 8;
         assert!(own < 64 << 20, "{own} kB are not enough");
     }
+    own
+}
+
+#[test]
+fn too_little_memory_is_told_and_leaves_nothing_half_written() {
+    let folder = with_wall();
+    let own = own_memory(folder.path());
     let large = "--threads 2 render wall --proxy plane --path sweep --frames 1 --size 6000x4500 \
                  --device cpu -o frames";
     let usual =
@@ -320,6 +325,49 @@ fn too_little_memory_is_told_and_leaves_nothing_half_written() {
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}");
     assert_eq!(all_whole(&folder.path().join("frames")), 1);
+}
+
+/// Who paints each pixel takes some 170 bytes of it, and a picture 4.
+#[test]
+fn a_field_is_pictured_in_little_more_memory_than_its_picture_takes() {
+    let folder = with_wall();
+    let here = folder.path();
+    let own = own_memory(here);
+    let field =
+        "--threads 2 field wall --proxy plane --view 0004.png --without-view -o f.png --size";
+    let output = within_memory(here, own + (192 << 10), &format!("{field} 1600x1200"));
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}");
+    assert_eq!(
+        image::image_dimensions(here.join("f.png")).unwrap(),
+        (1600, 1200)
+    );
+    fs::remove_file(here.join("f.png")).unwrap();
+    // Of what takes less only options that it has are named.
+    let output = within_memory(here, own + (16 << 10), &format!("{field} 6000x4500"));
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let is_told =
+        text.contains("try a smaller --size, fewer --threads, or a higher limit (ulimit -v)");
+    assert!(is_told && !text.contains("--cpu-memory"), "{text}");
+    assert!(!here.join("f.png").exists());
+}
+
+#[test]
+fn weights_that_find_no_room_leave_nothing_half_written() {
+    let folder = with_wall();
+    let here = folder.path();
+    let line = "field wall --proxy plane --view 0004.png --size 48x36 -o f.png";
+    lumigraph(here, line).ok();
+    let before = files(here);
+    let ran = with_room_for(5, here, &format!("{line} --weights w.npz"));
+    let error = ran.error(1);
+    assert!(
+        error.starts_with("w.npz: cannot write: File too large"),
+        "{error}"
+    );
+    assert!(!ran.stderr.contains("ZipWriter"), "{}", ran.stderr);
+    assert!(files(here) == before);
 }
 
 #[test]

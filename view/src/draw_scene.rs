@@ -12,8 +12,8 @@ use image::RgbaImage;
 use proxy::Proxy;
 use rayon::prelude::*;
 use render::{
-    EDGE_SAMPLES, Engine, FieldOptions, Frame, Lumigraph, Method, Moment, Part, Prepared,
-    RenderError, Skips, TriangulatedField, picture,
+    EDGE_SAMPLES, Engine, FieldOptions, FieldRows, Frame, Lumigraph, Method, Moment, Part,
+    Prepared, RenderError, Skips, TriangulatedField, picture,
 };
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -233,11 +233,8 @@ impl<'a> SceneDrawer<'a> {
                 if self.palette.is_empty() {
                     self.palette = picture::palette(self.lumigraph.sources.len());
                 }
-                let contributors = match prepared.field() {
-                    Some(field) => field.contributors(frame),
-                    None => picture::contributors_exact(frame),
-                };
-                picture::field_picture(frame, &contributors, &self.palette)
+                let field = FieldRows::new(frame, prepared.field());
+                picture::field_picture(&field, &self.palette)
             }),
             Layer::Depth => timed(&mut stages, "depth", || {
                 let inverse =

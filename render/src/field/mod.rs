@@ -24,11 +24,10 @@ use crate::blend::{Candidate, Contributor, blend};
 use crate::frame::{Frame, ProxyPoint};
 use crate::held::Held;
 use crate::photos::PhotoError;
-use crate::raster::{NO_TRIANGLE, Raster, triangle_map};
 use crate::reference::{self, candidate};
+use crate::rows::{Contributions, FieldRows};
 use crate::surface::Surface;
 use crate::triangulation::{self, Constraints, Grid, TriangulationError};
-use calibrate::Pixel;
 use constraints::{epipole_vertices, horizon};
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
@@ -197,20 +196,8 @@ impl TriangulatedField {
     }
 
     /// The interpolated field at every pixel, row by row: for each, who paints it.
-    pub fn contributors(&self, frame: &Frame<'_>) -> Vec<Vec<Contributor>> {
-        let (width, height) = (frame.desired.width as usize, frame.desired.height as usize);
-        let raster = Raster::new(self);
-        let map = triangle_map(&raster, width, height);
-        let at_pixel = |i: usize| {
-            let (x, y) = (i % width, i / width);
-            let point = frame.proxy_point(Pixel::center_of(x as u32, y as u32));
-            let Some(point) = point.filter(|_| map[i] != NO_TRIANGLE) else {
-                return Vec::new();
-            };
-            let shares = raster.barycentric(map[i] as usize, x, y).map(f64::from);
-            self.interpolate(frame, map[i] as usize, shares, &point)
-        };
-        (0..width * height).into_par_iter().map(at_pixel).collect()
+    pub fn contributors(&self, frame: &Frame<'_>) -> Contributions {
+        FieldRows::new(frame, Some(self)).all()
     }
 
     /// The field at a proxy point seen through a triangle, with the corners' shares of it.
@@ -277,6 +264,6 @@ pub fn render_reference(
     let contributors = field.contributors(frame);
     let photos = Held::new(frame, &field.listed());
     reference::render(frame, &photos, |(x, y), _| {
-        contributors[y as usize * width + x as usize].clone()
+        contributors.list(y as usize * width + x as usize).to_vec()
     })
 }

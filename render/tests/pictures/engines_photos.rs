@@ -6,10 +6,9 @@ use crate::engines::{moved, turned};
 use glam::DVec3;
 use image::RgbaImage;
 use render::field::FieldEntry;
-use render::picture::contributors_exact;
 use render::{
-    FieldOptions, Frame, Lumigraph, Method, PhotoError, PhotoStore, RenderError, TriangulatedField,
-    cpu,
+    FieldOptions, FieldRows, Frame, Lumigraph, Method, PhotoError, PhotoStore, RenderError,
+    TriangulatedField, cpu,
 };
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
@@ -47,7 +46,7 @@ fn only_photos_in_use_are_decoded_and_when_changes_nothing() {
         // is what a device must have before it draws.
         let frame = Frame::new(&lumigraph, desired.clone(), options);
         let (everywhere, listed) = match method {
-            Method::Exact => (contributors_exact(&frame), None),
+            Method::Exact => (FieldRows::new(&frame, None).all(), None),
             Method::Triangulated { cells_across } => {
                 let field = TriangulatedField::new(&frame, cells_across).unwrap();
                 let of_entry = |e: &FieldEntry| e.source_idx as usize;
