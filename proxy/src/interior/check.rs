@@ -1,5 +1,6 @@
 //! What must hold of an interior, and what is odd about one.
 
+use super::by_cell::PortalsByCell;
 use super::{CellId, Content, Interior, InteriorError, InteriorWarning, Polygon, RoomBox};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeSet;
@@ -156,9 +157,9 @@ impl Interior {
                 }
             }
         }
+        let portals = PortalsByCell::new(self);
         for (id, cell) in (0..).map(CellId).zip(&self.cells) {
-            let has_portal = self.portals_of(Some(id)).next().is_some();
-            if !has_portal && self.cells.len() > 1 {
+            if portals.of(id).is_empty() && self.cells.len() > 1 {
                 found.push(InteriorWarning::NoPortal(cell.name.clone()));
             }
             if cell.other.contains_key("held_out") {

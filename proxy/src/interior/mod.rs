@@ -6,6 +6,7 @@
 //! the cell's content ends it.
 
 mod arrays;
+mod by_cell;
 mod check;
 mod compare;
 mod contents;

@@ -9,6 +9,7 @@
 mod tests;
 mod within;
 
+use super::by_cell::PortalsByCell;
 use super::locate::tolerance;
 use super::seen::Seen;
 use super::visibility::all_around;
@@ -306,11 +307,12 @@ fn look(interior: &Interior, contents: &Contents, seen: &Seen, most: usize) -> S
         from.map(move |from| (portal, from))
     });
     let sides: Vec<(&Portal, CellId)> = sides.collect();
-    let before =
-        |(portal, from): (&Portal, CellId)| before(interior, contents, seen, (portal, from), most);
+    let portals = PortalsByCell::new(interior);
+    let before = |side: (&Portal, CellId)| before(interior, &portals, contents, seen, side, most);
     let mut found: Vec<Strays> = sides.into_par_iter().map(before).collect();
     let ids = (0..interior.cells.len() as u32).into_par_iter().map(CellId);
-    let within = ids.map(|id| within(interior, contents, seen, id, most).unwrap_or_default());
+    let within = |id| within(interior, &portals, contents, seen, id, most).unwrap_or_default();
+    let within = ids.map(within);
     found.extend(within.collect::<Vec<Strays>>());
     found.into_iter().fold(Strays::default(), |mut all, some| {
         all.append(some);
@@ -323,9 +325,10 @@ fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> (Vec<Stray>
     let of_eyes: Vec<&[Stray]> = strays
         .chunk_by(|a, b| a.eye == b.eye && a.from == b.from)
         .collect();
+    let portals = PortalsByCell::new(interior);
     let left = of_eyes.into_par_iter().filter_map(|of_eye| {
         let (from, eye) = (of_eye[0].from, of_eye[0].eye);
-        let (visibility, looked_at) = all_around(interior, from, eye, usize::MAX)?;
+        let (visibility, looked_at) = all_around(interior, &portals, from, eye, usize::MAX)?;
         let again = |old: &Stray| {
             let ray = old.seen - eye;
             let hit = seen.first(eye, ray)?;
@@ -345,6 +348,7 @@ fn look_again(interior: &Interior, seen: &Seen, strays: &[Stray]) -> (Vec<Stray>
 /// What is seen from the places on one side of a portal from which one sees through it.
 fn before(
     interior: &Interior,
+    portals: &PortalsByCell,
     contents: &Contents,
     seen: &Seen,
     (portal, from): (&Portal, CellId),
@@ -375,7 +379,7 @@ fn before(
         }
         // 2. Past it.
         let left = most.saturating_sub(strays.looked_at);
-        let Some((visibility, looked_at)) = all_around(interior, from, eye, left) else {
+        let Some((visibility, looked_at)) = all_around(interior, portals, from, eye, left) else {
             strays.is_cut = true;
             break;
         };

@@ -5,6 +5,7 @@
 //! bounds on the screen; here the part of a portal that is visible is the exact intersection of
 //! cones with their apex at the eye, so that nothing depends on a near plane or on the image.
 
+use super::by_cell::PortalsByCell;
 use super::locate::tolerance;
 use super::{CellId, Interior, Portal, PortalId};
 use calibrate::{Pixel, View};
@@ -220,7 +221,8 @@ pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibi
     else {
         return everything(interior, cell, &region);
     };
-    let mut search = Search::new(interior, eye);
+    let portals = PortalsByCell::new(interior);
+    let mut search = Search::new(interior, &portals, eye);
     match search.visit(cell, &region, None, 0) {
         Ok(()) => search.found,
         Err(TooMany) => everything(interior, Some(cell), &region),
@@ -231,11 +233,12 @@ pub fn visible(interior: &Interior, cell: Option<CellId>, view: &View) -> Visibi
 /// was; `None` where it takes more than `most`.
 pub(super) fn all_around(
     interior: &Interior,
+    portals: &PortalsByCell,
     cell: CellId,
     eye: DVec3,
     most: usize,
 ) -> Option<(Visibility, usize)> {
-    let mut search = Search::new(interior, eye);
+    let mut search = Search::new(interior, portals, eye);
     search.most = most;
     let end = search.visit(cell, &Region::ALL, None, 0);
     let looked_at = search.looked_at;
@@ -262,7 +265,8 @@ pub fn visible_through(
     if !is_known {
         return everything(interior, None, region);
     }
-    let mut search = Search::new(interior, eye);
+    let portals = PortalsByCell::new(interior);
+    let mut search = Search::new(interior, &portals, eye);
     search.is_passed[portal.0 as usize] = true;
     let entrance = interior.portal(portal);
     let inwards = entrance.normal_into(Some(into));
@@ -288,6 +292,7 @@ struct TooMany;
 
 struct Search<'a> {
     interior: &'a Interior,
+    portals: &'a PortalsByCell,
     eye: DVec3,
     /// Whether a portal is part of the way that is being followed.
     is_passed: Vec<bool>,
@@ -298,9 +303,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(interior: &'a Interior, eye: DVec3) -> Self {
+    fn new(interior: &'a Interior, portals: &'a PortalsByCell, eye: DVec3) -> Self {
         Self {
             interior,
+            portals,
             eye,
             is_passed: vec![false; interior.portals.len()],
             looked_at: 0,
@@ -319,8 +325,9 @@ impl<'a> Search<'a> {
         depth: u32,
     ) -> Result<(), TooMany> {
         self.found.add(cell, region);
-        let interior = self.interior;
-        for (id, portal) in interior.portals_of(Some(cell)) {
+        let (interior, portals) = (self.interior, self.portals);
+        for &id in portals.of(cell) {
+            let portal = interior.portal(id);
             if self.is_passed[id.0 as usize] {
                 continue;
             }

@@ -2,6 +2,7 @@
 
 use super::distance::squared_distances;
 use super::grid::Grid;
+use super::outline::{Bounds, squares};
 use super::stubs;
 use super::{Evidence, FindError, FindOptions, Level};
 use glam::{DVec2, DVec3};
@@ -441,13 +442,13 @@ impl Columns {
         back.iter().map(|d| *d > reach).collect()
     }
 
-    /// How high a room's box must be, in metres over the floor.
-    pub(super) fn top_of(&self, labels: &[u32], label: u32) -> f64 {
+    /// How high the box of a room within bounds must be, in metres over the floor.
+    pub(super) fn top_of(&self, labels: &[u32], label: u32, bounds: &Bounds) -> f64 {
         if let Some(ceiling) = self.ceiling {
             return ceiling;
         }
-        let of = labels.iter().zip(&self.taken).filter(|(l, _)| **l == label);
-        let mut tops: Vec<u32> = of.map(|(_, t)| 128 - t.leading_zeros()).collect();
+        let of = squares(self.size[0], labels, label, bounds);
+        let mut tops: Vec<u32> = of.map(|i| 128 - self.taken[i].leading_zeros()).collect();
         tops.sort_unstable();
         let top = tops.get(tops.len() * 19 / 20).copied().unwrap_or(0);
         height_of(top as usize).clamp(2.2, 4.0)

@@ -288,14 +288,17 @@ fn interior(
     options: &FindOptions,
 ) -> Result<(Interior, Vec<Option<CellId>>), FindError> {
     let level = columns.level;
-    let mut outlines: Vec<Vec<DVec2>> = (1..=grown.count)
-        .map(|label| outline::outline(columns, &grown.labels, label))
+    let bounds = outline::bounds(columns.size[0], &grown.labels, grown.count);
+    let mut outlines: Vec<Vec<DVec2>> = (1..)
+        .zip(&bounds)
+        .map(|(label, bounds)| outline::outline(columns, &grown.labels, label, bounds))
         .collect();
     outline::snap(&mut outlines, &mut openings, 2.5 * columns.step);
     let mut cells = Vec::new();
     let mut ids = Vec::new();
     for (i, outline) in outlines.iter().enumerate() {
-        let top = columns.top_of(&grown.labels, i as u32 + 1) * options.meter;
+        let label = i as u32 + 1;
+        let top = columns.top_of(&grown.labels, label, &bounds[i]) * options.meter;
         let heights = [-HEADROOM * options.meter, top + HEADROOM * options.meter];
         let corners = outline
             .iter()

@@ -4,6 +4,7 @@ use super::columns::Columns;
 use super::openings::Opening;
 use crate::interior::polygon::thin;
 use glam::DVec2;
+use std::ops::Range;
 
 /// A room that fills this much of a rectangle is one.
 const RECTANGLE: f64 = 0.9;
@@ -11,41 +12,56 @@ const RECTANGLE: f64 = 0.9;
 const SIMPLER: f64 = 0.15;
 const MOST_CORNERS: usize = 120;
 
-/// A room's outline, counter-clockwise, in the level's frame: a rectangle if it is about one.
-pub(super) fn outline(columns: &Columns, labels: &[u32], label: u32) -> Vec<DVec2> {
-    let at = |p: [f64; 2]| columns.origin + columns.step * DVec2::from_array(p);
-    // 1. The rectangle whose sides are where most of the outline's are.
-    let [width, height] = columns.size;
-    let ends = |count: usize, length: usize, index: &dyn Fn(usize, usize) -> usize| {
-        let (mut first, mut last) = (Vec::new(), Vec::new());
-        for line in 0..count {
-            let mut of = (0..length).filter(|k| labels[index(line, *k)] == label);
-            if let Some(from) = of.next() {
-                first.push(from);
-                last.push(of.next_back().unwrap_or(from) + 1);
+/// Where a room's squares are on the plan: in these columns, and in these rows.
+pub(super) type Bounds = [Range<usize>; 2];
+
+/// The bounds of labels from 1 on to the last: whoever asks for each room's squares would otherwise go through the
+/// whole plan for every room. Empty where a label has no squares.
+pub(super) fn bounds(width: usize, labels: &[u32], last: u32) -> Vec<Bounds> {
+    let mut found = vec![[0..0, 0..0]; last as usize];
+    for (y, row) in labels.chunks_exact(width).enumerate() {
+        for (x, label) in row.iter().enumerate().filter(|(_, label)| **label > 0) {
+            let Some(bounds) = found.get_mut(*label as usize - 1) else {
+                continue;
+            };
+            for (range, k) in bounds.iter_mut().zip([x, y]) {
+                *range = match range.start == range.end {
+                    true => k..k + 1,
+                    false => range.start.min(k)..range.end.max(k + 1),
+                };
             }
         }
-        first.sort_unstable();
-        last.sort_unstable();
-        let median = |list: &[usize]| list.get(list.len() / 2).copied().unwrap_or(0);
-        [median(&first), median(&last)]
-    };
-    let [x0, x1] = ends(height, width, &|y, x| y * width + x);
-    let [y0, y1] = ends(width, height, &|x, y| y * width + x);
-    let is_in = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        x >= x0 && x < x1 && y >= y0 && y < y1
-    };
-    let mine = || (0..labels.len()).filter(|i| labels[*i] == label);
-    let (all, inside) = (mine().count(), mine().filter(|i| is_in(*i)).count());
-    let rectangle = x1.saturating_sub(x0) * y1.saturating_sub(y0);
-    let shared = inside as f64 / (all + rectangle - inside).max(1) as f64;
-    if shared >= RECTANGLE {
-        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    }
+    found
+}
+
+/// The squares with a label that lies within bounds, row by row.
+pub(super) fn squares<'a>(
+    width: usize,
+    labels: &'a [u32],
+    label: u32,
+    [columns, rows]: &Bounds,
+) -> impl Iterator<Item = usize> + use<'a> {
+    let columns = columns.clone();
+    let all = rows
+        .clone()
+        .flat_map(move |y| columns.clone().map(move |x| y * width + x));
+    all.filter(move |i| labels[*i] == label)
+}
+
+/// A room's outline, counter-clockwise, in the level's frame: a rectangle if it is about one.
+pub(super) fn outline(
+    columns: &Columns,
+    labels: &[u32],
+    label: u32,
+    bounds: &Bounds,
+) -> Vec<DVec2> {
+    let at = |p: [f64; 2]| columns.origin + columns.step * DVec2::from_array(p);
+    if let Some(corners) = rectangle(columns.size, labels, label, bounds) {
         return corners.map(|p| at(p.map(|x| x as f64))).to_vec();
     }
-    // 2. The longest way around it.
-    let around = longest_loop(columns, labels, label);
+    // The longest way around it.
+    let around = longest_loop(columns.size, labels, label, bounds);
     let mut within = columns.squares(SIMPLER);
     loop {
         let simple = simplified(&around, within);
@@ -56,10 +72,50 @@ pub(super) fn outline(columns: &Columns, labels: &[u32], label: u32) -> Vec<DVec
     }
 }
 
+/// The rectangle whose sides are where most of a room's are, if it is about that.
+fn rectangle(
+    [width, _]: [usize; 2],
+    labels: &[u32],
+    label: u32,
+    bounds: &Bounds,
+) -> Option<[[usize; 2]; 4]> {
+    let ends =
+        |lines: &Range<usize>, along: &Range<usize>, index: &dyn Fn(usize, usize) -> usize| {
+            let (mut first, mut last) = (Vec::new(), Vec::new());
+            for line in lines.clone() {
+                let mut of = along.clone().filter(|k| labels[index(line, *k)] == label);
+                if let Some(from) = of.next() {
+                    first.push(from);
+                    last.push(of.next_back().unwrap_or(from) + 1);
+                }
+            }
+            first.sort_unstable();
+            last.sort_unstable();
+            let median = |list: &[usize]| list.get(list.len() / 2).copied().unwrap_or(0);
+            [median(&first), median(&last)]
+        };
+    let [columns, rows] = bounds;
+    let [x0, x1] = ends(rows, columns, &|y, x| y * width + x);
+    let [y0, y1] = ends(columns, rows, &|x, y| y * width + x);
+    let is_in = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        x >= x0 && x < x1 && y >= y0 && y < y1
+    };
+    let mine = || squares(width, labels, label, bounds);
+    let (all, inside) = (mine().count(), mine().filter(|i| is_in(*i)).count());
+    let rectangle = x1.saturating_sub(x0) * y1.saturating_sub(y0);
+    let shared = inside as f64 / (all + rectangle - inside).max(1) as f64;
+    (shared >= RECTANGLE).then_some([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+}
+
 /// Follows squares' sides with the room on the left; turns left where two squares touch at a
 /// corner only.
-fn longest_loop(columns: &Columns, labels: &[u32], label: u32) -> Vec<[f64; 2]> {
-    let [width, height] = columns.size;
+fn longest_loop(
+    [width, height]: [usize; 2],
+    labels: &[u32],
+    label: u32,
+    bounds: &Bounds,
+) -> Vec<[f64; 2]> {
     let is_in = |x: isize, y: isize| {
         let is_there = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
         is_there && labels[y as usize * width + x as usize] == label
@@ -76,13 +132,18 @@ fn longest_loop(columns: &Columns, labels: &[u32], label: u32) -> Vec<[f64; 2]> 
         let (left, right) = sides(x, y, way);
         left && !right
     };
-    let mut is_done = vec![false; width * height];
+    // Steps along the first axis are below squares of the room.
+    let [columns, rows] = bounds;
+    let place = |x: isize, y: isize| {
+        (y as usize - rows.start) * columns.len() + (x as usize - columns.start)
+    };
+    let mut is_done = vec![false; columns.len() * rows.len()];
     let mut best: Vec<[f64; 2]> = Vec::new();
     let mut best_area = 0.0;
-    for i in 0..width * height {
-        // Each loop has a step along the first axis, with a square of the room over it.
+    for i in squares(width, labels, label, bounds) {
+        // Each loop has such a step.
         let (x, y) = ((i % width) as isize, (i / width) as isize);
-        if is_done[i] || !goes(x, y, 0) {
+        if is_done[place(x, y)] || !goes(x, y, 0) {
             continue;
         }
         let mut corners: Vec<[f64; 2]> = Vec::new();
@@ -90,7 +151,7 @@ fn longest_loop(columns: &Columns, labels: &[u32], label: u32) -> Vec<[f64; 2]> 
         let mut area = 0.0;
         loop {
             if way == 0 {
-                is_done[py as usize * width + px as usize] = true;
+                is_done[place(px, py)] = true;
             }
             corners.push([px as f64, py as f64]);
             let (nx, ny) = (px + WAYS[way].0, py + WAYS[way].1);
@@ -225,7 +286,45 @@ fn tidy(outline: &mut Vec<DVec2>) {
 mod tests {
     use super::*;
 
-    fn rectangle([x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) -> Vec<DVec2> {
+    /// Squares by their labels: a hall, a room with a corner, one in two parts around a shaft, and one that is none.
+    const PLAN: [&str; 9] = [
+        "...............",
+        ".111111.2222...",
+        ".111111.2222...",
+        ".111111.22.....",
+        ".111111.22.....",
+        "..........33333",
+        ".3........3...3",
+        "33........3..33",
+        ".3........33333",
+    ];
+
+    #[test]
+    fn what_a_room_is_within_its_bounds_it_is_on_the_whole_plan() {
+        let size = [PLAN[0].len(), PLAN.len()];
+        let letters = PLAN.iter().flat_map(|row| row.chars());
+        let labels: Vec<u32> = letters.map(|c| c.to_digit(10).unwrap_or(0)).collect();
+        let all = bounds(size[0], &labels, 4);
+        assert_eq!(
+            all,
+            [[1..7, 1..5], [8..12, 1..5], [0..15, 5..9], [0..0, 0..0]]
+        );
+        let whole = [0..size[0], 0..size[1]];
+        for (label, within) in (1..).zip(&all) {
+            let squares = |bounds| squares(size[0], &labels, label, bounds).collect::<Vec<_>>();
+            assert_eq!(squares(within), squares(&whole));
+            let around = |bounds| longest_loop(size, &labels, label, bounds);
+            assert_eq!(around(within), around(&whole), "{label}");
+            let rectangle = |bounds| rectangle(size, &labels, label, bounds);
+            assert_eq!(rectangle(within), rectangle(&whole), "{label}");
+            assert_eq!(rectangle(within).is_some(), label == 1);
+        }
+        // Around the larger part, and not around the shaft in it.
+        let around = longest_loop(size, &labels, 3, &all[2]);
+        assert!(around.contains(&[15.0, 9.0]) && !around.contains(&[0.0, 7.0]));
+    }
+
+    fn corners([x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) -> Vec<DVec2> {
         let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
         corners.map(DVec2::from_array).to_vec()
     }
@@ -245,9 +344,9 @@ mod tests {
         // Squares are one wide: a hall, a closet, and another hall behind its door.
         for width in [1.0, 2.0, 2.5] {
             let mut outlines = [
-                rectangle([-20.0, -9.0], [-1.0, 9.0]),
-                rectangle([0.0, 0.0], [width, 6.0]),
-                rectangle([width, -9.0], [30.0, 9.5]),
+                corners([-20.0, -9.0], [-1.0, 9.0]),
+                corners([0.0, 0.0], [width, 6.0]),
+                corners([width, -9.0], [30.0, 9.5]),
             ];
             let mut openings = [doorway(width - 0.25)];
             snap(&mut outlines, &mut openings, 2.5);
@@ -261,8 +360,8 @@ mod tests {
         }
         // As before where it is wide enough.
         let mut outlines = [
-            rectangle([-20.0, -9.0], [-1.0, 9.0]),
-            rectangle([0.0, 0.0], [4.0, 6.0]),
+            corners([-20.0, -9.0], [-1.0, 9.0]),
+            corners([0.0, 0.0], [4.0, 6.0]),
         ];
         snap(&mut outlines, &mut [], 2.5);
         let spans = outlines.each_ref().map(|outline| span(outline, 0));

@@ -65,8 +65,9 @@ fn around_both() -> Model {
 fn where_too_many_ways_lead_on_fewer_places_are_looked_from() {
     let (interior, model) = (rooms(), around_both());
     let eye = DVec3::new(2.0, 1.0, 1.5);
-    assert_eq!(all_around(&interior, WEST, eye, 0), None);
-    let (visibility, looked_at) = all_around(&interior, WEST, eye, 1).unwrap();
+    let portals = PortalsByCell::new(&interior);
+    assert_eq!(all_around(&interior, &portals, WEST, eye, 0), None);
+    let (visibility, looked_at) = all_around(&interior, &portals, WEST, eye, 1).unwrap();
     assert_eq!((visibility.cells.len(), looked_at), (2, 1));
     let (contents, _) = Contents::new(&interior, &model).unwrap();
     let seen = Seen::new(&model, &contents.triangles, &contents.elsewhere);

@@ -1,6 +1,7 @@
 //! Lines of sight all around from places in a cell, wherever its portals are.
 
 use super::{LINES, NEXT_2, NEXT_3, Strays, TRIES, at_heights, height_over, hidden};
+use crate::interior::by_cell::PortalsByCell;
 use crate::interior::seen::Seen;
 use crate::interior::visibility::all_around;
 use crate::interior::{CellId, Contents, Interior, RoomBox};
@@ -21,6 +22,7 @@ const MOST_HIDDEN: f64 = 0.25;
 /// of a cell whose place is unknown.
 pub(super) fn within(
     interior: &Interior,
+    portals: &PortalsByCell,
     contents: &Contents,
     seen: &Seen,
     from: CellId,
@@ -58,7 +60,7 @@ pub(super) fn within(
         }
         // 3. All around.
         let left = most.saturating_sub(strays.looked_at);
-        let Some((visibility, looked_at)) = all_around(interior, from, eye, left) else {
+        let Some((visibility, looked_at)) = all_around(interior, portals, from, eye, left) else {
             strays.is_cut = true;
             break;
         };
