@@ -43,8 +43,16 @@ pub struct OpenCvCalibration {
 /// The file cannot be read or is damaged; no camera has a name known here or in `keys`; a
 /// value that makes no camera or no pose; the model of another program.
 pub fn read_calibration(path: &Path, keys: &Keys) -> Result<OpenCvCalibration, OpenCvError> {
-    let storage = FileStorage::read(path)?;
-    let mut calibration = calibration(path, &storage, keys)?;
+    calibration_and_beside(path, &FileStorage::read(path)?, keys)
+}
+
+/// The same of a file that was read already.
+pub(super) fn calibration_and_beside(
+    path: &Path,
+    storage: &FileStorage,
+    keys: &Keys,
+) -> Result<OpenCvCalibration, OpenCvError> {
+    let mut calibration = calibration(path, storage, keys)?;
     let notes = &mut calibration.notes;
     if calibration.cameras.len() == 2 && calibration.right_from_left.is_none() {
         calibration.right_from_left = rig_beside(path, notes)?;

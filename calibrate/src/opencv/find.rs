@@ -1,6 +1,6 @@
 //! Which files of a folder are OpenCV's calibrations, and which look like one.
 
-use super::calibration::{files, is_storage_name, read_calibration};
+use super::calibration::{calibration_and_beside, files, is_storage_name};
 use super::storage::FileStorage;
 use super::values::Values;
 use super::{Keys, OpenCvError, matrix, poses};
@@ -32,12 +32,21 @@ pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
         if !(is_storage_name(&file) && is_small(&file)) {
             continue;
         }
-        match read_calibration(&file, keys) {
+        // Read once: it may be another program's, with many thousands of poses.
+        let (calibration, has_poses) = match FileStorage::read(&file) {
+            Ok(storage) => {
+                let calibration = calibration_and_beside(&file, &storage, keys);
+                let has_poses = calibration.is_err() && holds_poses(&file, &storage);
+                (calibration, has_poses)
+            }
+            Err(error) => (Err(error), false),
+        };
+        match calibration {
             Ok(calibration) if calibration.photo_poses().is_empty() => {
                 found.unusable.push(OpenCvError::NoPoses { path: file });
             }
             Ok(_) => found.usable.push(file),
-            Err(error) if holds_matrices(&file) || holds_poses(&file) => found.unusable.push(error),
+            Err(error) if has_poses || holds_matrices(&file) => found.unusable.push(error),
             Err(_) => {}
         }
     }
@@ -56,8 +65,11 @@ pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
 pub fn may_be_calibration(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default();
     let looks_like_one = || {
-        let is_one = || read_calibration(file, &Keys::default()).is_ok();
-        is_small(file) && (holds_matrices(file) || holds_poses(file) || is_one())
+        let is_one = |storage: FileStorage| {
+            holds_poses(file, &storage)
+                || calibration_and_beside(file, &storage, &Keys::default()).is_ok()
+        };
+        is_small(file) && (holds_matrices(file) || FileStorage::read(file).is_ok_and(is_one))
     };
     is_storage_name(file) && (!extension.eq_ignore_ascii_case("json") || looks_like_one())
 }
@@ -87,9 +99,7 @@ fn holds_matrices(file: &Path) -> bool {
 }
 
 /// Whether a file has the poses of views under a name known here.
-fn holds_poses(file: &Path) -> bool {
-    FileStorage::read(file).is_ok_and(|storage| {
-        let poses = poses::of_views(&Values::of(file, &storage));
-        poses.is_ok_and(|poses| !poses.is_empty())
-    })
+fn holds_poses(file: &Path, storage: &FileStorage) -> bool {
+    let poses = poses::of_views(&Values::of(file, storage));
+    poses.is_ok_and(|poses| !poses.is_empty())
 }
