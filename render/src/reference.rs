@@ -3,7 +3,7 @@
 //! Nothing here is fast. The `cpu` and `gpu` paths are compared with it.
 
 use crate::blend::{Candidate, Contributor, blend};
-use crate::contradictions::{Contradictions, frame_of_cells};
+use crate::contradictions::{Contradictions, Shown, frame_of_cells};
 use crate::edges::Edges;
 use crate::field::TriangulatedField;
 use crate::frame::{Frame, ProxyPoint, exposed, trust};
@@ -13,6 +13,7 @@ use crate::mask::IGNORED;
 use crate::photos::PhotoError;
 use crate::pyramid::Pyramid;
 use calibrate::Pixel;
+use glam::Vec3;
 use image::{ImageBuffer, RgbaImage};
 use rayon::prelude::*;
 
@@ -78,35 +79,34 @@ pub(crate) fn contradictions(
     let among = field.map_or_else(|| frame.taking_part().collect(), TriangulatedField::listed);
     let photos = Held::again(frame, &among);
     let frame_of_cells = frame_of_cells(frame);
-    let variance = |point: &ProxyPoint| {
+    let shown_at = |point: &ProxyPoint| {
         let contributors = blend_among(&frame_of_cells, point, among.iter().copied());
-        variance_at(&frame_of_cells, &photos, point, &contributors)
+        shown_by(&frame_of_cells, &photos, point, &contributors)
     };
-    let variances = |(): &mut (), points: &[ProxyPoint]| points.iter().map(variance).collect();
-    let found = Contradictions::of(frame, || (), variances)?;
+    let shown = |(): &mut (), points: &[ProxyPoint]| points.iter().map(shown_at).collect();
+    let found = Contradictions::of(frame, || (), shown)?;
     frame.check_masks()?;
     Ok(Some(found))
 }
 
-/// The variance of the contributors' colours at a proxy point, 0…1, by what they weigh, in the mean over channels; `None`
-/// where there is none.
-fn variance_at(
+/// What the contributors' photos show of a proxy point.
+fn shown_by(
     frame: &Frame<'_>,
     photos: &Held<'_>,
     point: &ProxyPoint,
     contributors: &[Contributor],
-) -> Result<Option<f32>, PhotoError> {
-    let mean = color_at(frame, photos, point, contributors)?;
-    let (mut squares, mut sum) = (0.0, 0.0);
+) -> Result<Vec<Shown>, PhotoError> {
+    let mut shown = Vec::new();
     for &contributor in contributors {
-        let Some((weight, color)) = painted(frame, photos, point, contributor)? else {
-            continue;
-        };
-        let squared = |c: usize| (color[c] - mean[c]).powi(2);
-        squares += weight * (0..3).map(squared).sum::<f64>();
-        sum += weight;
+        if let Some((weight, [r, g, b, _])) = painted(frame, photos, point, contributor)? {
+            shown.push(Shown {
+                source_idx: contributor.source_idx,
+                weight: weight as f32,
+                color: Vec3::from_array([r, g, b].map(|c| c as f32)),
+            });
+        }
     }
-    Ok((sum > 0.0).then(|| (squares / (3.0 * sum)) as f32))
+    Ok(shown)
 }
 
 /// A source view as a candidate for a proxy point that falls on a pixel of its image; `None`

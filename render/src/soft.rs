@@ -7,11 +7,11 @@
 //! (`contradictions.rs`) at most one of them shows what is there: the less they agree, the wider the mean. Both by one
 //! pyramid, whose levels are mixed from coarse to fine (Burt and Adelson 1983).
 
-use crate::contradictions::Contradictions;
+use crate::contradictions::{Contradictions, goes_all_round};
 use crate::frame::Frame;
 use crate::surface::{FacetMap, Surface};
 use glam::Vec4;
-use image::RgbaImage;
+use image::{GenericImage, GenericImageView, RgbaImage};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -52,21 +52,41 @@ pub fn soften(
     contradictions: Option<&Contradictions>,
     picture: &mut RgbaImage,
 ) -> Softened {
-    match &frame.surface {
-        Surface::Facets(map) => soften_where(map, contradictions, picture),
-        _ => Softened::default(),
+    let Surface::Facets(map) = &frame.surface else {
+        return Softened::default();
+    };
+    if !goes_all_round(&frame.desired) {
+        return soften_where(map, contradictions, 0, picture);
     }
+    // The left border of a picture that goes all round is beside the right one.
+    let (width, height) = picture.dimensions();
+    let beside = width / 2;
+    let mut wide = RgbaImage::from_fn(width + 2 * beside, height, |x, y| {
+        *picture.get_pixel((x + width - beside) % width, y)
+    });
+    let count = soften_where(map, contradictions, beside as usize, &mut wide);
+    picture
+        .copy_from(&*wide.view(beside, 0, width, height), 0, 0)
+        .expect("it is as large");
+    count
 }
 
+/// The same of a picture beside which so many columns of it are repeated on either side.
 fn soften_where(
     map: &FacetMap,
     contradictions: Option<&Contradictions>,
+    beside: usize,
     picture: &mut RgbaImage,
 ) -> Softened {
     let size = [picture.width() as usize, picture.height() as usize];
-    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * size[0] + x]);
+    let width = size[0] - 2 * beside;
+    let own = |x: usize| match beside {
+        0 => x,
+        _ => (x + width - beside) % width,
+    };
+    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * width + own(x)]);
     // 1. How coarse each is to be: where photos contradict each other, and of guesses.
-    let longer = size[0].max(size[1]) as f32;
+    let longer = width.max(size[1]) as f32;
     let pixels = picture.as_raw().as_chunks::<4>().0;
     let of_row = |y: usize| {
         let offs = contradictions.map(|all| all.row(y)).into_iter().flatten();
@@ -74,10 +94,11 @@ fn soften_where(
             0 => 0.0,
             _ => level(LEVEL_BY_CONTRADICTION * longer * (off - AGREE).max(0.0)),
         };
-        offs.zip(&pixels[y * size[0]..][..size[0]]).map(level)
+        offs.zip(&pixels[y * size[0] + beside..][..width])
+            .map(level)
     };
     let contradicted: Vec<f32> = (0..size[1]).into_par_iter().flat_map_iter(of_row).collect();
-    let contradicted_at = |x: usize, y: usize| contradicted.get(y * size[0] + x).copied();
+    let contradicted_at = |x: usize, y: usize| contradicted.get(y * width + own(x)).copied();
     let is_soft = |x: usize, y: usize| {
         contradicted_at(x, y).is_some_and(|level| level > 0.0) || is_guess(x, y)
     };
@@ -124,8 +145,9 @@ fn soften_where(
     }
     // 4. Into the picture.
     let mut count = Softened::default();
+    let columns = soft.columns.start.max(beside)..soft.columns.end.min(beside + width);
     for y in soft.rows.clone() {
-        for x in soft.columns.clone().filter(|x| level_at(*x, y) > 0.0) {
+        for x in columns.clone().filter(|x| level_at(*x, y) > 0.0) {
             let Some(at) = around.index(x, y) else {
                 continue;
             };

@@ -119,10 +119,10 @@ impl Cpu {
             return Ok(None);
         }
         self.ask(frame, field, &frame_of_cells(frame), |engine, photos| {
-            let variances = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
-                engine.variances(photos, scratch, points)
+            let shown = |scratch: &mut (Asked, Seen), points: &[ProxyPoint]| {
+                engine.shown(photos, scratch, points)
             };
-            Contradictions::of(frame, Default::default, variances)
+            Contradictions::of(frame, Default::default, shown)
         })
         .map(Some)
     }

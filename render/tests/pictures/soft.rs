@@ -2,9 +2,9 @@
 
 use crate::{common, mesh, points};
 
-use calibrate::{Rigid3, View};
+use calibrate::{Distortion, Lens, Rigid3, View};
 use common::{Shot, assert_close, by_reference, psnr, unmoved};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use image::RgbaImage;
 use mesh::meshed;
 use points::lumigraph;
@@ -12,6 +12,7 @@ use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, Softened, Surface, cpu,
     soften,
 };
+use std::f64::consts::{PI, TAU};
 
 /// From farther back than all photos, and aside.
 fn desired_views(shot: &Shot, lumigraph: &Lumigraph) -> Vec<View> {
@@ -158,6 +159,66 @@ fn what_photos_contradict_each_other_of_is_drawn_softly() {
     let sharp = by_reference(&wrong, Method::TRIANGULATED).unwrap();
     let (by_reference, _) = softened(DeviceChoice::Reference, &wrong, sharp);
     assert_close(&soft, &by_reference, "reference");
+}
+
+#[test]
+fn photos_in_another_light_are_no_contradiction() {
+    let mut shot = Shot::of("wall", 6, None);
+    // Every other one is darker.
+    for photo in shot.photos.iter_mut().step_by(2) {
+        for pixel in photo.pixels_mut() {
+            let [r, g, b, alpha] = pixel.0;
+            let [r, g, b] = [r, g, b].map(|color| (0.6 * f32::from(color)).round() as u8);
+            pixel.0 = [r, g, b, alpha];
+        }
+    }
+    let desired = shot.views[0].between(&shot.views[3], 0.4);
+    for (nearer, least, most) in [(0.0, 0, 0), (0.4, 1000, 160 * 120)] {
+        let lumigraph = wall(&shot, nearer, 20.0);
+        let frame = frame(&lumigraph, &desired);
+        for by in [DeviceChoice::Cpu, DeviceChoice::Reference] {
+            let picture = cpu::render(&frame, Method::TRIANGULATED).unwrap();
+            let (_, count) = softened(by, &frame, picture);
+            let count = count.contradicted;
+            assert!((least..=most).contains(&count), "{nearer}: {count}");
+        }
+    }
+}
+
+/// Where the picture begins decides nothing.
+#[test]
+fn a_panorama_that_is_turned_is_softened_alike() {
+    let shot = Shot::of("wall", 6, None);
+    let wrong = wall(&shot, 0.4, 1.0);
+    let (width, height) = (256, 128);
+    let middle = 0.5 * DVec2::new(f64::from(width), f64::from(height));
+    let focal = middle * DVec2::new(1.0, 2.0) / PI;
+    let lens = Lens::new(focal, middle, Distortion::Equirectangular);
+    let place = shot.views[0].between(&shot.views[3], 0.4);
+    let pictures = [0.0, 0.5].map(|turn: f64| {
+        let turned = Rigid3 {
+            rotation: DQuat::from_rotation_y(TAU * turn),
+            translation: DVec3::ZERO,
+        };
+        let desired = View {
+            lens,
+            width,
+            height,
+            camera_from_world: turned * place.camera_from_world,
+        };
+        let frame = frame(&wrong, &desired);
+        let sharp = cpu::render(&frame, Method::Exact).unwrap();
+        let (soft, count) = softened(DeviceChoice::Cpu, &frame, sharp.clone());
+        assert!(count.guessed + count.contradicted > 500, "{count:?}");
+        [sharp, soft]
+    });
+    let [ahead, behind] = &pictures;
+    for (ahead, behind) in ahead.iter().zip(behind) {
+        let turned = RgbaImage::from_fn(width, height, |x, y| {
+            *behind.get_pixel((x + width / 2) % width, y)
+        });
+        assert_close(ahead, &turned, "turned");
+    }
 }
 
 /// There the photo is all that counts, whatever the others show.
