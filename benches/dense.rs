@@ -1,13 +1,13 @@
 //! What frames over captures' own meshes take, stage by stage:
 //! `cargo bench --bench dense -- CAPTURE=PROXY.ply …`; see README.md.
 
-use calibrate::{Lens, View};
+#[expect(dead_code, reason = "others make scenes, too")]
+mod common;
+
+use common::on_the_way;
 use cpu_time::ProcessTime;
-use glam::DVec2;
 use lumigraph::scene::Scene;
-use render::{
-    DeviceChoice, EDGE_SAMPLES, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared,
-};
+use render::{DeviceChoice, EDGE_SAMPLES, Engine, FieldOptions, Frame, Method, Prepared};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::Path;
@@ -38,20 +38,6 @@ fn main() {
     }
 }
 
-/// A pinhole midway between a photo and the next.
-fn midway(lumigraph: &Lumigraph, first: usize) -> View {
-    let [a, b] = [first, first + 1].map(|i| &lumigraph.sources[i].view);
-    let scale = f64::from(LONG_SIDE) / f64::from(a.width.max(a.height));
-    let [width, height] = [a.width, a.height].map(|s| (f64::from(s) * scale).round() as u32);
-    let half = 0.5 * DVec2::new(f64::from(width), f64::from(height));
-    View {
-        lens: Lens::pinhole(DVec2::splat(a.lens.mean_focal() * scale), half),
-        width,
-        height,
-        ..a.between(b, 0.5)
-    }
-}
-
 fn measure(capture: &Path, proxy: &Path) -> Result<(), Box<dyn Error>> {
     let (scene, _) = Scene::open(capture, false)?;
     let lumigraph = scene.lumigraph(&BTreeSet::new(), proxy::read(proxy)?)?;
@@ -60,7 +46,7 @@ fn measure(capture: &Path, proxy: &Path) -> Result<(), Box<dyn Error>> {
     let mut hash = 0_u64;
     for i in 0..VIEWS {
         let first = (i + 1) * (lumigraph.sources.len() - 1) / (VIEWS + 1);
-        let desired = midway(&lumigraph, first);
+        let desired = on_the_way(&lumigraph, first, 0.5, LONG_SIDE);
         let mut least = [Duration::MAX; STAGES.len()];
         // The first one decodes photos and makes distance maps.
         for repeat in 0..=REPEATS {

@@ -4,7 +4,8 @@
 //! where the ray enters. That holds on edges, too, where a ray meets both neighbours, which counting
 //! sides does not. A point outside goes to the nearest side; what sees no side sees nothing.
 
-use super::{BAND, Prepared, Threads, by_bands};
+use super::draw::by_bands;
+use super::{BAND, Prepared, Threads};
 use crate::{Rays, Solid};
 use calibrate::View;
 use glam::DVec3;

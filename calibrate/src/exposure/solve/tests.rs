@@ -1,14 +1,13 @@
 use super::*;
+use crate::period::scramble;
 
-/// Pseudo-random numbers in 0…1, the same everywhere: SplitMix64 (Steele et al. 2014).
+/// Pseudo-random numbers in 0…1, by the index of the next.
 struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        self.0 += 1;
+        (scramble(self.0) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     fn below(&mut self, count: usize) -> usize {
