@@ -277,7 +277,7 @@ impl Session {
     }
 
     /// Draws those views that are not there, one after the other, and gives each picture to `take`. While
-    /// one is drawn the next is prepared and its photos are decoded.
+    /// one is drawn the next is prepared and its photos are decoded, and the one before is taken.
     ///
     /// All are drawn of the same photos. Those that turn out corrupt are reported and left out, unless
     /// `--strict`, and all views are drawn without them, also those that were there: from the one that asked for
@@ -287,7 +287,7 @@ impl Session {
         &mut self,
         views: &[(View, Option<Moment>)],
         is_there: &mut [bool],
-        mut take: impl FnMut(usize, RgbaImage) -> anyhow::Result<()>,
+        mut take: impl FnMut(usize, RgbaImage) -> anyhow::Result<()> + Send,
         mut again: impl FnMut(&BTreeMap<String, String>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         self.prepare()?;

@@ -2,7 +2,7 @@
 
 use super::*;
 use clap::Parser;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a session is told beside its scene.
 #[derive(Parser)]
@@ -38,6 +38,19 @@ fn session(capture: &Path, without: &BTreeSet<String>) -> Session {
     .unwrap()
 }
 
+/// A capture of nine photos.
+fn wall(folder: &Path) -> PathBuf {
+    let capture = folder.join("wall");
+    let options = datasets::Options {
+        size: Some((96, 72)),
+        samples_per_side: Some(1),
+        ..datasets::Options::default()
+    };
+    let wall = datasets::by_name("wall", &options).unwrap();
+    datasets::write(&wall, &capture).unwrap();
+    capture
+}
+
 /// Two views that all nine photos have a part in, and how often they were begun anew: each time all that is drawn
 /// from is made again.
 fn drawn(session: &mut Session) -> (Vec<RgbaImage>, usize) {
@@ -66,14 +79,7 @@ fn drawn(session: &mut Session) -> (Vec<RgbaImage>, usize) {
 #[test]
 fn all_damaged_photos_that_a_picture_asks_for_are_left_out_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let capture = folder.path().join("wall");
-    let options = datasets::Options {
-        size: Some((96, 72)),
-        samples_per_side: Some(1),
-        ..datasets::Options::default()
-    };
-    let wall = datasets::by_name("wall", &options).unwrap();
-    datasets::write(&wall, &capture).unwrap();
+    let capture = wall(folder.path());
     let damaged: BTreeSet<String> = [2, 4, 5, 7].map(|i| format!("{i:04}.png")).into();
     let (expected, anew) = drawn(&mut session(&capture, &damaged));
     assert_eq!((expected.len(), anew), (2, 0));
@@ -100,4 +106,27 @@ fn all_damaged_photos_that_a_picture_asks_for_are_left_out_at_once() {
     let (pictures, anew) = drawn(&mut knowing);
     assert!(pictures == expected);
     assert_eq!(anew, 0);
+}
+
+#[test]
+fn pictures_are_taken_in_order_and_none_after_one_that_was_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = session(&wall(folder.path()), &BTreeSet::new());
+    let view = |name: &str| (session.scene.view(name).unwrap(), None);
+    let views = ["0000.png", "0004.png", "0008.png", "0002.png"].map(view);
+    for full_at in [0, 2, 3, 4] {
+        let mut taken = Vec::new();
+        let take = |i: usize, _: RgbaImage| {
+            taken.push(i);
+            anyhow::ensure!(i < full_at, "no room for picture {i}");
+            Ok(())
+        };
+        let drawn = session.draw_all(&views, &mut [false; 4], take, |_| Ok(()));
+        let expected: Vec<usize> = (0..=full_at).take(views.len()).collect();
+        assert_eq!(taken, expected);
+        match drawn {
+            Ok(()) => assert_eq!(full_at, 4),
+            Err(error) => assert_eq!(error.to_string(), format!("no room for picture {full_at}")),
+        }
+    }
 }
