@@ -44,6 +44,8 @@ pub struct Runs<'a> {
 
 /// Triangles in a run, at most.
 pub(super) const RUN: usize = 96;
+/// Runs that are worth a thread to be looked at.
+pub(super) const FEW_RUNS: usize = 256;
 /// More triangles than this are halved on two threads.
 const ALONE: usize = 4096;
 /// Rounding, in shares of the distance.
@@ -103,18 +105,18 @@ impl CellGeometry {
 
 impl<'a> Runs<'a> {
     fn add(&mut self, runs: &'a [Run], eye: DVec3, regions: &[Region]) {
-        for run in runs {
-            self.asked += run.triangles.len();
+        let is_seen = |run: &&Run| {
             let offset = run.center - eye;
             let reach = run.radius + SLACK * (offset.length() + run.radius);
             let touches = |cone: &Region| {
                 let mut sides = cone.sides().iter();
                 sides.all(|side| side.dot(offset) >= -reach)
             };
-            if regions.iter().any(touches) {
-                self.runs.push(run);
-            }
-        }
+            regions.iter().any(touches)
+        };
+        let all = runs.par_iter().with_min_len(FEW_RUNS);
+        self.asked += all.clone().map(|run| run.triangles.len()).sum::<usize>();
+        self.runs.par_extend(all.filter(is_seen));
     }
 
     /// Each run's triangles, and the centre and radius of the ball around them.

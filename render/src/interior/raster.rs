@@ -9,9 +9,10 @@
 //! already, or what an image fills for good: of them nothing would be seen, so pictures are the
 //! same.
 
-use super::geometry::{RUN, Run};
+use super::geometry::{FEW_RUNS, RUN, Run};
 use super::projected::Projected;
 use super::squares::Squares;
+use super::target::{ALONE, fill_all};
 use super::triangle::{Around, Band, Ready, spans};
 use super::{Pinhole, Runs, Window};
 use crate::cpu::lanes::vectorised;
@@ -134,10 +135,15 @@ impl Raster {
     pub(super) fn clear_to(&mut self, camera: &Pinhole, floor: &[f32]) {
         let count = camera.width as usize * camera.height as usize;
         self.width = camera.width;
-        self.keys.clear();
-        let key = |s: &f32| u64::from(s.to_bits()) << 32;
-        self.keys.extend(floor.iter().map(key));
+        if floor.is_empty() {
+            return fill_all(&mut self.keys, count, 0);
+        }
         self.keys.resize(count, 0);
+        let key = |s: &f32| u64::from(s.to_bits()) << 32;
+        let keys = self.keys.par_chunks_mut(ALONE);
+        keys.zip(floor.par_chunks(ALONE)).for_each(|(keys, floor)| {
+            keys.iter_mut().zip(floor).for_each(|(k, s)| *k = key(s));
+        });
     }
 
     /// Draws runs of triangles where windows let them; both sides of triangles are seen.
@@ -153,12 +159,16 @@ impl Raster {
         assert_eq!(self.width, camera.width, "cleared for the camera");
         let mut queue: Vec<Queued<'_>> = Vec::new();
         for (runs, window) in parts {
-            queue.extend(runs.runs.iter().filter_map(|run| {
+            let runs = runs.runs.par_iter().with_min_len(FEW_RUNS);
+            queue.par_extend(runs.filter_map(|run| {
                 let queued = Queued::new(run, window, camera);
                 queued.or_else(|| options.all.then(|| Queued::aside(run, window)))
             }));
         }
-        queue.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        // Nearest first. None is negative, so they are in the order of their bits.
+        let places = queue.iter().zip(0..);
+        let mut order: Vec<(u64, u32)> = places.map(|(q, i)| (q.distance.to_bits(), i)).collect();
+        order.sort_unstable();
         let width = camera.width as usize;
         let bands = self.keys.par_chunks_mut(BAND * width).enumerate();
         bands.for_each_init(Scratch::default, |scratch, (i, keys)| {
@@ -167,7 +177,7 @@ impl Raster {
             // Loops, not chains of calls: those would be compiled without vector instructions.
             vectorised(
                 #[inline(always)]
-                || draw_band(&mut band, &queue, camera, options, scratch),
+                || draw_band(&mut band, (&queue, &order), camera, options, scratch),
             );
         });
         let (mut tried, mut touching) = (0, 0);
@@ -193,11 +203,11 @@ impl Raster {
     }
 }
 
-/// Draws what of waiting runs is in a band.
+/// Draws what of waiting runs is in a band, in an order of their places.
 #[inline(always)]
 fn draw_band(
     band: &mut Band<'_>,
-    queue: &[Queued<'_>],
+    (queue, order): (&[Queued<'_>], &[(u64, u32)]),
     camera: &Pinhole,
     options: &DrawOptions<'_>,
     scratch: &mut Scratch,
@@ -206,7 +216,7 @@ fn draw_band(
     let width = camera.width as usize;
     let mut candidates = [0; RUN + 1];
     squares.begin(width, (band.rows[1] - band.rows[0]) as usize);
-    for queued in queue {
+    for queued in order.iter().map(|(_, i)| &queue[*i as usize]) {
         let Some(block) = band.block(queued.columns, queued.rows) else {
             continue;
         };

@@ -1,6 +1,7 @@
 //! What is drawn into.
 
 use image::RgbaImage;
+use rayon::prelude::*;
 
 /// A picture with depth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,10 +29,8 @@ impl Target {
     pub fn clear(&mut self, width: u32, height: u32) {
         let count = width as usize * height as usize;
         (self.width, self.height) = (width, height);
-        self.color.clear();
-        self.color.resize(count, [0; 4]);
-        self.inverse_depth.clear();
-        self.inverse_depth.resize(count, 0.0);
+        fill_all(&mut self.color, count, [0; 4]);
+        fill_all(&mut self.inverse_depth, count, 0.0);
     }
 
     /// The picture.
@@ -39,4 +38,15 @@ impl Target {
         let bytes = self.color.as_flattened().to_vec();
         RgbaImage::from_raw(self.width, self.height, bytes).expect("four bytes a pixel")
     }
+}
+
+/// Pixels that are worth a thread to be emptied.
+pub(super) const ALONE: usize = 1 << 15;
+
+/// So many of a value in a list, whatever was there. Whole pictures are emptied several times a frame.
+pub(super) fn fill_all<T: Copy + Send + Sync>(list: &mut Vec<T>, count: usize, value: T) {
+    list.truncate(count);
+    let parts = list.par_chunks_mut(ALONE);
+    parts.for_each(|part| part.fill(value));
+    list.resize(count, value);
 }

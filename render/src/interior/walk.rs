@@ -170,8 +170,10 @@ pub struct Walk<'a> {
     mixed_in: Target,
     /// One portal's, where one is seen before another.
     apart: Target,
-    /// By pixel: one more than the place in the frame's list of fills; 0 for none.
+    /// By pixel: one more than the place in the frame's list of fills; 0 for none. Of a frame without any nothing.
     owners: Vec<u16>,
+    /// See [`Self::find_floor`].
+    floor: Vec<f32>,
     picture: Target,
     /// By place of the library, of images, then of LDIs: whether the walk needed it.
     is_used: Vec<bool>,
@@ -218,6 +220,7 @@ impl<'a> Walk<'a> {
             mixed_in: Target::default(),
             apart: Target::default(),
             owners: Vec::new(),
+            floor: Vec::new(),
             picture: Target::default(),
         }
     }
@@ -321,7 +324,8 @@ impl<'a> Walk<'a> {
             false => asked.runs(visibility.clone()),
         };
         cost.triangles_in_cells = windows.iter().map(|(runs, _)| runs.asked).sum();
-        let floor = self.floor(&fills, &camera);
+        let mut floor = std::mem::take(&mut self.floor);
+        self.find_floor(&fills, &camera, &mut floor);
         let met = self.painter.meet(
             self.model,
             &windows,
@@ -334,39 +338,41 @@ impl<'a> Walk<'a> {
         // 4. Colours.
         let start = Instant::now();
         cost.holes = self.compose(view, &camera, &fills, &floor)?;
+        self.floor = floor;
         cost.shade = start.elapsed();
         Ok(cost)
     }
 
     /// By pixel, the inverse depth of the plane that hides what is beyond it: where images fill a
-    /// portal and nothing is mixed in. Empty where no pixel has one.
-    fn floor(&self, fills: &[Filled<'_>], camera: &Pinhole) -> Vec<f32> {
+    /// portal and nothing is mixed in; else 0. Empty where no pixel has one.
+    fn find_floor(&self, fills: &[Filled<'_>], camera: &Pinhole, floor: &mut Vec<f32>) {
         let Some(last) = fills.iter().rposition(|f| f.share >= 1.0) else {
-            return Vec::new();
+            return floor.clear();
         };
         let width = camera.width as usize;
         let (owners, filled) = (&self.owners, &self.filled);
-        let mut floor = vec![0.0_f32; owners.len()];
-        let row = |(y, floor): (usize, &mut [f32])| {
-            let start = y * width;
-            for (x, floor) in floor.iter_mut().enumerate() {
-                let pixel = start + x;
-                let owner = usize::from(owners[pixel]);
-                if owner == 0 || owner > last + 1 {
-                    continue;
-                }
-                let f = &fills[owner - 1];
-                if f.leaves_open(filled.color[pixel][3]) {
-                    continue;
-                }
-                let plane = f.plane.inverse_depth(camera.ray(x as u32, y as u32));
-                if f.share >= 1.0 && f.plane.is_ahead() && plane > 0.0 && plane.is_finite() {
-                    *floor = plane as f32;
-                }
+        let of_pixel = |x: usize, y: usize| {
+            let pixel = y * width + x;
+            let owner = usize::from(owners[pixel]);
+            if owner == 0 || owner > last + 1 {
+                return 0.0;
+            }
+            let f = &fills[owner - 1];
+            if f.leaves_open(filled.color[pixel][3]) {
+                return 0.0;
+            }
+            let plane = f.plane.inverse_depth(camera.ray(x as u32, y as u32));
+            match f.share >= 1.0 && f.plane.is_ahead() && plane > 0.0 && plane.is_finite() {
+                true => plane as f32,
+                false => 0.0,
             }
         };
-        floor.par_chunks_mut(width).enumerate().for_each(row);
-        floor
+        floor.resize(owners.len(), 0.0);
+        let rows = floor.par_chunks_mut(width).enumerate();
+        rows.for_each(|(y, floor)| {
+            let pixels = floor.iter_mut().enumerate();
+            pixels.for_each(|(x, floor)| *floor = of_pixel(x, y));
+        });
     }
 }
 

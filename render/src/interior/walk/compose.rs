@@ -13,7 +13,7 @@ const PIXEL: u64 = 1 << 16;
 
 impl Walk<'_> {
     /// The picture; how many pixels of portals nothing was drawn in ([`FrameCost::holes`](super::FrameCost::holes)).
-    /// `floor` is [`Walk::floor`].
+    /// `floor` is what [`Walk::find_floor`] found.
     pub(super) fn compose(
         &mut self,
         view: &View,

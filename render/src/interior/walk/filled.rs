@@ -122,7 +122,9 @@ impl Walk<'_> {
         apart: bool,
         cost: &mut FrameCost,
     ) {
-        self.filled.clear(camera.width, camera.height);
+        if !fills.is_empty() {
+            self.filled.clear(camera.width, camera.height);
+        }
         for (k, (f, images)) in fills.iter().zip(images).enumerate() {
             if !apart {
                 let (painter, options) = (&mut self.painter, &self.options);

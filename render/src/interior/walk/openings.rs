@@ -3,6 +3,7 @@
 use super::Walk;
 use super::filled::Filled;
 use crate::interior::reference::plane_of;
+use crate::interior::target::fill_all;
 use crate::interior::{Beyond, Captured, LdiSource, Pinhole, PortalFill, Window};
 use glam::DVec3;
 use proxy::interior::{CellId, Pass, Portal, PortalId, Region};
@@ -210,12 +211,12 @@ impl Walk<'_> {
         fills: &[Filled<'_>],
         camera: &Pinhole,
     ) -> bool {
-        let width = camera.width as usize;
-        self.owners.clear();
-        self.owners.resize(width * camera.height as usize, 0);
         if fills.is_empty() {
+            self.owners.clear();
             return false;
         }
+        let width = camera.width as usize;
+        fill_all(&mut self.owners, width * camera.height as usize, 0);
         // 1. By opening, one more than its place.
         let mut planes: Vec<Beyond> = Vec::with_capacity(openings.len());
         for (place, opening) in openings.iter().enumerate() {
