@@ -94,11 +94,11 @@ fn soften_where(
             0 => 0.0,
             _ => level(LEVEL_BY_CONTRADICTION * longer * (off - AGREE).max(0.0)),
         };
-        offs.zip(&pixels[y * size[0] + beside..][..width])
-            .map(level)
+        let own = &pixels[y * size[0] + beside..][..width];
+        offs.zip(own).map(level).collect()
     };
-    let contradicted: Vec<f32> = (0..size[1]).into_par_iter().flat_map_iter(of_row).collect();
-    let contradicted_at = |x: usize, y: usize| contradicted.get(y * width + own(x)).copied();
+    let contradicted: Vec<Vec<f32>> = (0..size[1]).into_par_iter().map(of_row).collect();
+    let contradicted_at = |x: usize, y: usize| contradicted[y].get(own(x)).copied();
     let is_soft = |x: usize, y: usize| {
         contradicted_at(x, y).is_some_and(|level| level > 0.0) || is_guess(x, y)
     };
@@ -106,24 +106,23 @@ fn soften_where(
         return Softened::default();
     };
     let far = soft.and(1, 1, size);
-    let distances = distances(&far, is_guess);
-    let of_row = |y: usize| {
-        let row = far
-            .columns
-            .clone()
-            .zip(&distances[(y - far.rows.start) * far.columns.len()..]);
-        row.map(move |(x, distance)| {
-            level(LEVEL_BY_DISTANCE * distance).max(contradicted_at(x, y).unwrap_or(0.0))
-        })
+    let distances = match map.any_is_moved() {
+        true => distances(&far, is_guess),
+        false => vec![Vec::new(); far.rows.len()],
     };
-    let levels: Vec<f32> = far
-        .rows
-        .clone()
-        .into_par_iter()
-        .flat_map_iter(of_row)
-        .collect();
-    let level_at = |x: usize, y: usize| far.index(x, y).map_or(0.0, |i| levels[i]);
-    let coarsest = levels.iter().copied().fold(0.0, f32::max).ceil() as usize;
+    let of_row = |(y, distances): (usize, Vec<f32>)| -> Vec<f32> {
+        let distances = distances.into_iter().chain(std::iter::repeat(0.0));
+        let row = far.columns.clone().zip(distances);
+        let level = |(x, distance): (usize, f32)| {
+            level(LEVEL_BY_DISTANCE * distance).max(contradicted_at(x, y).unwrap_or(0.0))
+        };
+        row.map(level).collect()
+    };
+    let rows = far.rows.clone().into_par_iter();
+    let levels: Vec<Vec<f32>> = rows.zip(distances).map(of_row).collect();
+    let level_at = |x: usize, y: usize| far.place(x, y).map_or(0.0, |[x, y]| levels[y][x]);
+    let coarsest = levels.par_iter().flat_map_iter(|row| row.iter().copied());
+    let coarsest = coarsest.reduce(|| 0.0, f32::max).ceil() as usize;
     // 2. Ever coarser pictures of what is around, whose pixels lie on the same ones of the picture wherever that is.
     let around = soft.and(REACH << coarsest, 1 << coarsest, size);
     let mut pyramid = vec![Level::of(picture, &around)];
@@ -144,15 +143,15 @@ fn soften_where(
         mixed = own;
     }
     // 4. Into the picture.
-    let mut count = Softened::default();
     let columns = soft.columns.start.max(beside)..soft.columns.end.min(beside + width);
-    for y in soft.rows.clone() {
+    let of_row = |(y, row): (usize, &mut [[u8; 4]])| {
+        let mut count = Softened::default();
         for x in columns.clone().filter(|x| level_at(*x, y) > 0.0) {
-            let Some(at) = around.index(x, y) else {
+            let Some([column, row_of_part]) = around.place(x, y) else {
                 continue;
             };
-            let sum = mixed.sums[at];
-            let pixel = &mut picture.get_pixel_mut(x as u32, y as u32).0;
+            let sum = mixed.rows[row_of_part][column];
+            let pixel = &mut row[x];
             let is_guess = is_guess(x, y);
             count.guessed += usize::from(is_guess);
             if pixel[3] > 0 && sum.w > 0.0 {
@@ -162,8 +161,20 @@ fn soften_where(
                 *pixel = [r, g, b, pixel[3]];
             }
         }
+        count
+    };
+    let rows = picture.as_chunks_mut::<4>().0.par_chunks_exact_mut(size[0]);
+    let rows = rows.enumerate().skip(soft.rows.start).take(soft.rows.len());
+    rows.map(of_row).reduce(Softened::default, Softened::and)
+}
+
+impl Softened {
+    fn and(self, more: Self) -> Self {
+        Self {
+            guessed: self.guessed + more.guessed,
+            contradicted: self.contradicted + more.contradicted,
+        }
     }
-    count
 }
 
 /// The level of the pyramid of what is so much wider than a pixel.
@@ -208,16 +219,16 @@ impl Part {
         }
     }
 
-    /// Where a pixel of the picture is in it, row by row, if it is.
-    fn index(&self, x: usize, y: usize) -> Option<usize> {
+    /// Its column and row in which a pixel of the picture is, if it is in it.
+    fn place(&self, x: usize, y: usize) -> Option<[usize; 2]> {
         let is_in = self.columns.contains(&x) && self.rows.contains(&y);
-        is_in.then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
+        is_in.then(|| [x - self.columns.start, y - self.rows.start])
     }
 }
 
-/// How far each pixel of a part is from those that are no guesses, in pixels; as far as the part is wide and high where there
-/// are none. Exact (Meijster et al. 2000: down columns, then the lowest of parabolas along rows).
-fn distances(part: &Part, is_guess: impl Fn(usize, usize) -> bool + Sync) -> Vec<f32> {
+/// How far each pixel of a part, row by row, is from those that are no guesses, in pixels; as far as the part is wide and high
+/// where there are none. Exact (Meijster et al. 2000: down columns, then the lowest of parabolas along rows).
+fn distances(part: &Part, is_guess: impl Fn(usize, usize) -> bool + Sync) -> Vec<Vec<f32>> {
     let (width, height) = (part.columns.len(), part.rows.len());
     let none = width + height;
     // 1. To the nearest above or below.
@@ -236,7 +247,7 @@ fn distances(part: &Part, is_guess: impl Fn(usize, usize) -> bool + Sync) -> Vec
         }
     }
     // 2. Of all columns: of each run of guesses those and the seen ones at its ends, as what is beyond is farther.
-    let rows = down.par_chunks_exact(width).flat_map_iter(|row| {
+    let rows = down.par_chunks_exact(width).map(|row| {
         let mut distances = vec![0.0; width];
         let mut lowest = Vec::new();
         let mut start = 0;
@@ -287,10 +298,10 @@ fn lowest_parabolas(columns: &[usize], lowest: &mut Vec<(usize, f64)>) {
     }
 }
 
-/// A level of the pyramid: premultiplied colours of 0…255 and alpha, row by row.
+/// A level of the pyramid: premultiplied colours of 0…255 and alpha, row by row. (Each row has memory of its own: in one
+/// piece, all that a frame needs is asked of the system anew, on one thread.)
 struct Level {
-    width: usize,
-    sums: Vec<Vec4>,
+    rows: Vec<Vec<Vec4>>,
 }
 
 impl Level {
@@ -303,68 +314,60 @@ impl Level {
         };
         let of_row = |y: usize| {
             let row = &pixels[y * picture.width() as usize..][part.columns.clone()];
-            row.iter().map(premultiplied)
+            row.iter().map(premultiplied).collect()
         };
         Self {
-            width: part.columns.len(),
-            sums: part
-                .rows
-                .clone()
-                .into_par_iter()
-                .flat_map_iter(of_row)
-                .collect(),
+            rows: part.rows.clone().into_par_iter().map(of_row).collect(),
         }
     }
 
     /// Half as wide and high: a pixel lies on every other one. What is beyond the border repeats it.
     fn reduced(&self) -> Self {
-        let (width, height) = (self.width, self.sums.len() / self.width);
+        let (width, height) = self.size();
         let near = |at: usize, k: usize, side: usize| (2 * at + k).saturating_sub(2).min(side - 1);
         let half = width.div_ceil(2);
         let of_row = |y: usize| {
             let mut column = vec![Vec4::ZERO; width];
             for (k, tap) in TAPS.into_iter().enumerate() {
-                let row = &self.sums[near(y, k, height) * width..][..width];
-                column
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(sum, own)| *sum += *own * tap);
+                let row = column.iter_mut().zip(&self.rows[near(y, k, height)]);
+                row.for_each(|(sum, own)| *sum += *own * tap);
             }
-            let mean = move |x: usize| {
+            let mean = |x: usize| {
                 let taps = TAPS.into_iter().enumerate();
                 taps.map(|(k, tap)| column[near(x, k, width)] * tap)
                     .sum::<Vec4>()
             };
-            (0..half).map(mean)
+            (0..half).map(mean).collect()
         };
         let rows = (0..height.div_ceil(2)).into_par_iter();
         Self {
-            width: half,
-            sums: rows.flat_map_iter(of_row).collect(),
+            rows: rows.map(of_row).collect(),
         }
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.rows.first().map_or(0, Vec::len), self.rows.len())
     }
 
     /// Takes of the coarser level as large a share as is wanted of it at each pixel, 0…1.
     fn mix_with(&mut self, coarser: &Self, share: impl Fn(usize, usize) -> f32 + Sync) {
-        let rows_of_coarser = coarser.sums.len() / coarser.width;
-        let mix = |(y, row): (usize, &mut [Vec4])| {
+        let (width, height) = coarser.size();
+        let mix = |(y, row): (usize, &mut Vec<Vec4>)| {
             for (x, sum) in row.iter_mut().enumerate() {
                 let share = share(x, y);
                 if share > 0.0 {
                     let mut wide = Vec4::ZERO;
-                    for (row, down) in finer_taps(y, rows_of_coarser) {
-                        for (column, along) in finer_taps(x, coarser.width) {
-                            wide += coarser.sums[row * coarser.width + column] * (down * along);
+                    for (row, down) in finer_taps(y, height) {
+                        let row = &coarser.rows[row];
+                        for (column, along) in finer_taps(x, width) {
+                            wide += row[column] * (down * along);
                         }
                     }
                     *sum += (wide - *sum) * share;
                 }
             }
         };
-        self.sums
-            .par_chunks_exact_mut(self.width)
-            .enumerate()
-            .for_each(mix);
+        self.rows.par_iter_mut().enumerate().for_each(mix);
     }
 }
 
@@ -403,7 +406,7 @@ mod tests {
                     .clone()
                     .flat_map(|y| (2..width).map(move |x| (x, y)))
             };
-            let found = distances(&part, is_guess);
+            let found = distances(&part, is_guess).into_iter().flatten();
             for ((x, y), found) in places().zip(found) {
                 let seen = places().filter(|(x, y)| !is_guess(*x, *y));
                 let to = seen.map(|(a, b)| a.abs_diff(x).pow(2) + b.abs_diff(y).pow(2));
@@ -419,7 +422,7 @@ mod tests {
             columns: 0..5,
             rows: 0..4,
         };
-        for distance in distances(&part, |_, _| true) {
+        for distance in distances(&part, |_, _| true).into_iter().flatten() {
             assert!((9.0..=14.0).contains(&distance), "{distance}");
         }
     }
@@ -438,7 +441,7 @@ mod tests {
             let mut middle = fine.reduced();
             middle.mix_with(&coarse, |_, _| 1.0);
             fine.mix_with(&middle, |_, _| 0.5);
-            for sum in fine.sums.iter().chain(&coarse.sums) {
+            for sum in fine.rows.iter().chain(&coarse.rows).flatten() {
                 let off = *sum - glam::Vec4::new(200.0, 100.0, 50.0, 255.0);
                 assert!(off.abs().max_element() < 1e-3, "{sum}");
             }
