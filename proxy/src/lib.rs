@@ -46,7 +46,7 @@ pub use points::SparsePoint;
 pub use scan::{Kept, Rays, Scan};
 pub use shell::shell;
 pub use shown::{shown_name, shown_number};
-pub use solid::{Hit, MeshKind, Solid};
+pub use solid::{Hit, MeshKind, RAYS_TOGETHER, Solid};
 pub use tunnel::{Tunnel, TunnelError};
 
 /// The approximate surface.

@@ -14,7 +14,7 @@ use crate::visibility::TOLERANCE;
 use calibrate::Pixel;
 use glam::DVec3;
 use image::RgbaImage;
-use proxy::{Proxy, Solid};
+use proxy::{Hit, Proxy, RAYS_TOGETHER, Solid};
 use rayon::prelude::*;
 
 /// How many samples of a pixel, across and down, do for most: with 3 and 4 held-out photos of temple-ring gain 0.07 and
@@ -133,10 +133,16 @@ impl<'f> Edges<'f> {
         let moved = self.moved_around(x, y);
         let step = 1.0 / self.across as f64;
         let at = |first: usize, k: usize| first as f64 + step * (k as f64 + 0.5);
-        let sample = |k: usize| {
+        let ray_of_sample = |k: usize| {
             let place = Pixel::new(at(x, k % self.across), at(y, k / self.across));
-            let ray = ray_of(&self.frame.desired.lens, place)?;
-            let own = self.plane_along(ray)?;
+            ray_of(&self.frame.desired.lens, place)
+        };
+        let rays: Vec<Option<DVec3>> = (0..self.across * self.across).map(ray_of_sample).collect();
+        let planes = rays
+            .chunks(RAYS_TOGETHER)
+            .flat_map(|rays| self.planes_along(rays));
+        let sample = |(ray, own): (&Option<DVec3>, Option<DVec3>)| {
+            let (ray, own) = ((*ray)?, own?);
             let s = own.dot(ray);
             let seen = match &self.between {
                 Some(between) if s > 0.0 => between.who_sees((x, y), ray, s),
@@ -156,7 +162,7 @@ impl<'f> Edges<'f> {
                 plane,
             })
         };
-        (0..self.across * self.across).map(sample).collect()
+        rays.iter().zip(planes).map(sample).collect()
     }
 
     /// The plane of the triangle that a ray meets first.
@@ -164,11 +170,23 @@ impl<'f> Edges<'f> {
         let desired = &self.frame.desired;
         let in_world = desired.camera_from_world.rotation.conjugate() * ray;
         let hit = self.solid.first_hit(desired.center(), in_world)?;
-        Some(FacetMap::plane_of_triangle(
-            self.solid,
-            hit.triangle_idx,
-            desired,
-        ))
+        Some(self.plane_of(&hit))
+    }
+
+    /// Those of some rays that are near one another, up to [`RAYS_TOGETHER`]; none where there is no ray.
+    fn planes_along(&self, rays: &[Option<DVec3>]) -> [Option<DVec3>; RAYS_TOGETHER] {
+        let desired = &self.frame.desired;
+        let world_from_camera = desired.camera_from_world.rotation.conjugate();
+        let in_world = std::array::from_fn(|k| match rays.get(k) {
+            Some(Some(ray)) => world_from_camera * *ray,
+            _ => DVec3::NAN,
+        });
+        let hits = self.solid.first_hits(desired.center(), in_world);
+        hits.map(|hit| hit.map(|hit| self.plane_of(&hit)))
+    }
+
+    fn plane_of(&self, hit: &Hit) -> DVec3 {
+        FacetMap::plane_of_triangle(self.solid, hit.triangle_idx, &self.frame.desired)
     }
 
     /// Of a pixel and those around it what they meet, by its inverse distance, and where to that was moved, if it was; none
@@ -252,19 +270,23 @@ fn find(frame: &Frame<'_>, map: &FacetMap, picture: &RgbaImage) -> Vec<usize> {
     // Of each pixel whether it jumps to the one at its right, and to the one below.
     let of_row = |y: usize| {
         let row = y * width..(y + 1) * width;
-        row.map(move |i| {
+        let of_pixel = |i| {
             let right = i + 1 < (y + 1) * width && is_jump(i, i + 1);
             [right, y + 1 < height && is_jump(i, i + width)]
-        })
+        };
+        row.map(of_pixel).collect()
     };
-    let rows = (0..height).into_par_iter().with_min_len(8);
-    let all: Vec<[bool; 2]> = rows.flat_map_iter(of_row).collect();
-    let from_before = |i: usize| {
-        let from_left = !i.is_multiple_of(width) && all[i - 1][0];
-        from_left || (i >= width && all[i - width][1])
+    let rows = || (0..height).into_par_iter().with_min_len(8);
+    let all: Vec<Vec<[bool; 2]>> = rows().map(of_row).collect();
+    let is_edge = |x: usize, y: usize| {
+        let from_before = (x > 0 && all[y][x - 1][0]) || (y > 0 && all[y - 1][x][1]);
+        all[y][x][0] || all[y][x][1] || from_before
     };
-    let is_edge = |i: &usize| all[*i][0] || all[*i][1] || from_before(*i);
-    (0..all.len()).filter(is_edge).collect()
+    let edges_of_row = |y: usize| {
+        let edges = (0..width).filter(move |x| is_edge(*x, y));
+        edges.map(move |x| y * width + x)
+    };
+    rows().flat_map_iter(edges_of_row).collect()
 }
 
 /// Whether two pixels of straight alpha differ by little.

@@ -1,6 +1,7 @@
 //! A mesh as a proxy: its kind, and rays that meet it.
 
 mod runs;
+mod together;
 
 use crate::{Kept, Mesh};
 use glam::{DVec3, Vec3A};
@@ -17,6 +18,8 @@ use std::fmt;
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 use std::time::Duration;
+pub use together::RAYS_TOGETHER;
+use together::is_nearer;
 
 /// Where a mesh came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -314,11 +317,7 @@ impl Solid {
                 let Some(along) = meet(corners.map(|p| p - from_in_world), unit, front_only) else {
                     continue;
                 };
-                let first = nearest.is_none_or(|n| {
-                    let order = along.total_cmp(&n.along);
-                    order.then(triangle_idx.cmp(&n.triangle_idx)).is_lt()
-                });
-                if first {
+                if nearest.is_none_or(|known| is_nearer((along, triangle_idx), &known)) {
                     nearest = Some(Hit {
                         triangle_idx,
                         along,

@@ -48,6 +48,10 @@ proptest! {
             let off = (at - center).length() / radius;
             prop_assert!((0.98..1.001).contains(&off), "{off}");
         }
+        let beside = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::NEG_ONE];
+        let together = beside.map(|beside| ray + 0.01 * beside);
+        let alone = together.map(|direction| solid.first_hit(from, direction));
+        prop_assert_eq!(solid.first_hits(from, together), alone);
     }
 }
 
@@ -184,6 +188,14 @@ proptest! {
         let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let found = solid.first_hit(from, direction).map(|hit| hit.triangle_idx);
         prop_assert_eq!(found, nearest.map(|(_, i)| i));
+        // Several at once meet what they do alone.
+        let others = [DVec3::X, -DVec3::ONE, DVec3::NAN, DVec3::new(0.3, 0.0, -0.1)];
+        for (i, other) in others.into_iter().enumerate() {
+            let mut together = [direction, direction + other, other, DVec3::ZERO];
+            together.rotate_right(i);
+            let alone = together.map(|direction| solid.first_hit(from, direction));
+            prop_assert_eq!(solid.first_hits(from, together), alone);
+        }
         // And all that are as near, but for those with the same corners.
         let along = nearest.map_or(0.0, |(along, _)| along);
         let until = along * (1.0 + 1e-9) / direction.length();
