@@ -84,13 +84,20 @@ impl Rigid3 {
     /// The motion of a rotation matrix and a translation; `None` where the matrix is not
     /// a rotation to within `tolerance` in any entry of RᵀR − I, or mirrors.
     pub fn from_matrix(rotation: DMat3, translation: DVec3, tolerance: f64) -> Option<Self> {
-        let should_be_identity = rotation.transpose() * rotation - DMat3::IDENTITY;
-        let worst = should_be_identity
+        let ok = Self::deviation(rotation) <= tolerance
+            && rotation.determinant() > 0.0
+            && translation.is_finite();
+        ok.then(|| Self::new(DQuat::from_mat3(&rotation), translation))
+    }
+
+    /// How far a matrix of finite numbers is from a rotation, or from a mirrored one: the largest entry of
+    /// RᵀR − I, without its sign.
+    pub fn deviation(rotation: DMat3) -> f64 {
+        let should_be_zero = rotation.transpose() * rotation - DMat3::IDENTITY;
+        should_be_zero
             .to_cols_array()
             .iter()
-            .fold(0.0_f64, |m, v| m.max(v.abs()));
-        let ok = worst <= tolerance && rotation.determinant() > 0.0 && translation.is_finite();
-        ok.then(|| Self::new(DQuat::from_mat3(&rotation), translation))
+            .fold(0.0_f64, |worst, entry| worst.max(entry.abs()))
     }
 
     /// Whether every number is finite.

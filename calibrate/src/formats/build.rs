@@ -202,12 +202,9 @@ fn nearest_rotation(matrix: DMat3) -> Result<DMat3, Problem> {
             "the rotation has entries that are no finite numbers",
         ));
     }
-    let gram = matrix.transpose() * matrix;
-    let worst = (gram - DMat3::IDENTITY)
-        .to_cols_array()
-        .into_iter()
-        .fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
+    let worst = Rigid3::deviation(matrix);
     if !(worst <= ROTATION_TOLERANCE) {
+        let gram = matrix.transpose() * matrix;
         let [x, y, z] = [gram.x_axis.x, gram.y_axis.y, gram.z_axis.z].map(f64::sqrt);
         return Err(Problem::new(
             format!(

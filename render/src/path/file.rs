@@ -107,8 +107,9 @@ struct StoredFrame {
     extra: Map<String, Value>,
 }
 
-/// How far RᵀR of a pose may be from the identity: what six printed digits leave.
-const ROTATION_TOLERANCE: f64 = 1e-6;
+/// How far RᵀR of a pose may be from the identity in any entry: six printed digits leave up to 2e-6, single
+/// precision less; a matrix that scales is far beyond.
+pub(super) const ROTATION_TOLERANCE: f64 = 1e-4;
 
 /// Reads a path; keyframes are sampled at its frame rate. Of nerfstudio's, which are told by their
 /// content, the frames are read, as if its world were ours. A screenshot, told by its content, too, is a
@@ -504,24 +505,31 @@ impl StoredFrame {
         let row = |r: usize| DVec3::new(m[4 * r], m[4 * r + 1], m[4 * r + 2]);
         let rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
         let translation = DVec3::new(m[3], m[7], m[11]);
-        pose_of_matrix(rotation, translation, ROTATION_TOLERANCE).ok_or_else(|| {
-            malformed(
-                "camera_from_world does not begin with a rotation: its rows must be of length \
-                 1, at right angles and right-handed"
-                    .to_owned(),
-            )
-        })
+        pose_of_matrix(rotation, translation).ok_or_else(|| malformed(not_a_rotation(rotation)))
     }
 }
 
+/// What is wrong with a matrix that is no rotation, and what to do about it.
+fn not_a_rotation(matrix: DMat3) -> String {
+    let deviation = Rigid3::deviation(matrix);
+    let found = if deviation > ROTATION_TOLERANCE {
+        format!(
+            "RᵀR differs from the identity by up to {deviation:.3e}; take the scale or shear out of it, or write \
+             more digits"
+        )
+    } else {
+        "it mirrors (its determinant is −1); check that no axis was negated on the way".to_owned()
+    };
+    format!(
+        "camera_from_world does not begin with a rotation: its rows must be of length 1, at right angles and \
+         right-handed, but {found}"
+    )
+}
+
 /// A pose of a rotation matrix, as [`Rigid3::from_matrix`] makes it; a matrix that we wrote gives back
-/// the very quaternion.
-pub(super) fn pose_of_matrix(
-    rotation: DMat3,
-    translation: DVec3,
-    tolerance: f64,
-) -> Option<Rigid3> {
-    let pose = Rigid3::from_matrix(rotation, translation, tolerance)?;
+/// the very quaternion. `None` of what is farther from a rotation than [`ROTATION_TOLERANCE`].
+pub(super) fn pose_of_matrix(rotation: DMat3, translation: DVec3) -> Option<Rigid3> {
+    let pose = Rigid3::from_matrix(rotation, translation, ROTATION_TOLERANCE)?;
     let written = Rigid3 {
         rotation: settled(pose.rotation),
         translation,

@@ -1,5 +1,5 @@
 use super::*;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use proptest::prelude::*;
 
 fn pinhole(f: f64) -> Camera {
@@ -124,6 +124,42 @@ fn poses_are_read_row_by_row() {
     assert!((moved - DVec3::new(1.0, 3.0, 3.0)).length() < 1e-13);
 }
 
+/// Programs print six digits. The first of these matrices is 1.6e-6 from a rotation by that.
+#[test]
+fn rotations_of_six_digits_are_read_as_exact_ones() {
+    let mut rows = vec![
+        DMat3::from_cols_array(&[
+            0.743556, -0.163107, -0.648475, //
+            0.488352, -0.529997, 0.693264, //
+            -0.456766, -0.832165, -0.314429,
+        ])
+        .transpose(),
+    ];
+    rows.extend((1..300).map(|i| {
+        let turn = f64::from(i) * DVec3::new(0.37, 0.61, 0.83);
+        DMat3::from_quat(DQuat::from_scaled_axis(turn))
+    }));
+    let written = |r: &DMat3| {
+        let [x, y, z] = r.transpose().to_cols_array_2d();
+        let row = |v: [f64; 3]| format!("{:.6},{:.6},{:.6}", v[0], v[1], v[2]);
+        let matrix = format!("{},0, {},0, {},3, 0,0,0,1", row(x), row(y), row(z));
+        frame(&matrix, "PINHOLE", "50, 50, 32, 24", "")
+    };
+    let texts: Vec<String> = rows.iter().map(written).collect();
+    let path = read_text(&frames(&texts.join(",\n")));
+    assert_eq!(path.frames.len(), rows.len());
+    for (frame, expected) in path.frames.iter().zip(&rows) {
+        let read = frame.view.camera_from_world.matrix();
+        assert!(Rigid3::deviation(read) < 1e-14);
+        assert!(
+            (read - *expected)
+                .to_cols_array()
+                .iter()
+                .all(|d| d.abs() < 5e-6)
+        );
+    }
+}
+
 #[test]
 fn keyframes_in_files_are_sampled() {
     let at = |t: f64| good_frame(&format!(r#", "t_s": {t}"#));
@@ -204,15 +240,31 @@ fn bad_files_are_named() {
         "DIR/p.json: frame 1: the last row of camera_from_world is [5.0, 6.0, 7.0, 1.0], not \
          [0, 0, 0, 1]; is the matrix written column by column?"
     );
-    for not_a_rotation in [
-        "1.00001,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1",
-        "-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1",
-        "0,0,0,0, 0,0,0,0, 0,0,0,0, 0,0,0,1",
+    let more_digits = |deviation: &str| {
+        format!(
+            "RᵀR differs from the identity by up to {deviation}; take the scale or shear out of it, or write more \
+             digits"
+        )
+    };
+    let mirrors = "it mirrors (its determinant is −1); check that no axis was negated on the way";
+    for (not_a_rotation, found) in [
+        (
+            "1.001,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1",
+            more_digits("2.001e-3"),
+        ),
+        (
+            "1,0.001,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1",
+            more_digits("1.000e-3"),
+        ),
+        ("0,0,0,0, 0,0,0,0, 0,0,0,0, 0,0,0,1", more_digits("1.000e0")),
+        ("-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1", mirrors.to_owned()),
     ] {
         assert_eq!(
             bad(frame(not_a_rotation, "PINHOLE", "50, 50, 32, 24", "")),
-            "DIR/p.json: frame 1: camera_from_world does not begin with a rotation: its rows \
-             must be of length 1, at right angles and right-handed"
+            format!(
+                "DIR/p.json: frame 1: camera_from_world does not begin with a rotation: its rows \
+                 must be of length 1, at right angles and right-handed, but {found}"
+            )
         );
     }
     assert_eq!(

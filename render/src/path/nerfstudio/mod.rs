@@ -15,7 +15,7 @@ mod write;
 pub(super) use read::{frames, is_nerfstudio, keyframes};
 pub use write::write_nerfstudio;
 
-use super::file::{PathFileError, pose_of_matrix};
+use super::file::{PathFileError, ROTATION_TOLERANCE, pose_of_matrix};
 use calibrate::Rigid3;
 use capture::without_byte_order_mark;
 use glam::{DMat3, DVec3};
@@ -47,9 +47,6 @@ struct StoredTransform {
     transform: Vec<Vec<f64>>,
     scale: f64,
 }
-
-/// How far from rotations matrices may be: those of the viewers have been through 32 bits.
-const ROTATION_TOLERANCE: f64 = 1e-4;
 
 impl NerfstudioFrame {
     /// Reads `dataparser_transforms.json`.
@@ -103,7 +100,7 @@ impl NerfstudioFrame {
             ),
         };
         let rotation = world_from_camera.transpose();
-        pose_of_matrix(rotation, -(rotation * center), ROTATION_TOLERANCE)
+        pose_of_matrix(rotation, -(rotation * center))
     }
 
     /// The 4 × 4 matrix `camera_to_world`, row by row.
