@@ -1,4 +1,4 @@
-use crate::{Camera, CameraError, CameraId, Lens, Pixel, Rigid3};
+use crate::{Camera, CameraError, CameraId, Lens, Pixel, Reprojection, Rigid3};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -115,7 +115,7 @@ impl Reconstruction {
     }
 
     /// The sparse points that every image observing them has farther than so many pixels from where it observes them, or
-    /// behind it. Points that no image observes are none of them, nor those of which one observation cannot be
+    /// behind it or beyond its lens. Points that no image observes are none of them, nor those of which one observation cannot be
     /// judged: its keypoint is not there, or its camera has no lens.
     pub fn contradicted_points(&self, limit_px: f64) -> BTreeSet<Point3DId> {
         let cameras = self.cameras.iter();
@@ -175,27 +175,37 @@ impl Reconstruction {
         count
     }
 
-    /// The distances in pixels between a camera's keypoints and the projections of the
-    /// sparse points that they observe; infinite where a point lies behind the camera.
+    /// Where the sparse points that a camera's keypoints observe fall beside these.
     ///
     /// # Errors
     /// The camera has no lens.
-    pub fn reprojection_errors_px(&self, camera_id: CameraId) -> Result<Vec<f64>, CameraError> {
+    pub fn reprojections(&self, camera_id: CameraId) -> Result<Vec<Reprojection>, CameraError> {
         let Some(camera) = self.cameras.get(&camera_id) else {
             return Ok(Vec::new());
         };
         let lens = camera.lens()?;
-        let mut errors = Vec::new();
+        let mut reprojections = Vec::new();
         for image in self.images.values().filter(|i| i.camera_id == camera_id) {
-            let error = |keypoint| self.error_px(image, &lens, keypoint, DVec2::ZERO);
-            errors.extend(image.keypoints.iter().filter_map(error));
+            let of = |keypoint| self.reprojection(image, &lens, keypoint, DVec2::ZERO);
+            reprojections.extend(image.keypoints.iter().filter_map(of));
         }
-        Ok(errors)
+        Ok(reprojections)
+    }
+
+    /// The distances in pixels between a camera's keypoints and the projections of the
+    /// sparse points that they observe; infinite where a point projects nowhere: behind the camera, or beyond
+    /// what its lens maps one to one.
+    ///
+    /// # Errors
+    /// The camera has no lens.
+    pub fn reprojection_errors_px(&self, camera_id: CameraId) -> Result<Vec<f64>, CameraError> {
+        let reprojections = self.reprojections(camera_id)?;
+        Ok(reprojections.into_iter().map(Reprojection::px).collect())
     }
 
     /// The median of the distances in pixels between the keypoints of all images and the projections of
     /// the sparse points that they observe, judged by some hundreds of them spread evenly; infinite where
-    /// most points lie behind the cameras, `None` where no keypoint observes any. Images of cameras
+    /// most points project nowhere, `None` where no keypoint observes any. Images of cameras
     /// without a lens have no say.
     pub fn median_error_px(&self) -> Option<f64> {
         self.median_error_px_from(|_| DVec2::ZERO)
@@ -247,7 +257,7 @@ impl Reconstruction {
     }
 
     /// How far a keypoint, counted from `origin`, is from the projection of the sparse point that it
-    /// observes, in pixels; infinite where that lies behind the camera, `None` where there is none.
+    /// observes, in pixels; infinite where that projects nowhere, `None` where there is none.
     fn error_px(
         &self,
         image: &Image,
@@ -255,10 +265,23 @@ impl Reconstruction {
         keypoint: &Keypoint,
         origin: DVec2,
     ) -> Option<f64> {
+        let reprojection = self.reprojection(image, lens, keypoint, origin);
+        reprojection.map(Reprojection::px)
+    }
+
+    /// Where the sparse point that a keypoint, counted from `origin`, observes falls beside it; `None` where there
+    /// is none.
+    fn reprojection(
+        &self,
+        image: &Image,
+        lens: &Lens,
+        keypoint: &Keypoint,
+        origin: DVec2,
+    ) -> Option<Reprojection> {
         let point = self.points.get(&keypoint.point?)?;
-        let projected = lens.project(image.camera_from_world * point.position);
+        let point_in_camera = image.camera_from_world * point.position;
         let observed = Pixel::new(keypoint.x + origin.x, keypoint.y + origin.y);
-        Some(projected.map_or(f64::INFINITY, |pixel| pixel.distance(observed)))
+        Some(Reprojection::of(lens, point_in_camera, observed))
     }
 }
 
@@ -388,6 +411,27 @@ mod tests {
         assert!((errors[6] - 0.5).abs() < 1e-12);
         let none = three_images().reprojection_errors_px(CameraId(8)).unwrap();
         assert!(none.is_empty());
+    }
+
+    #[test]
+    fn points_behind_cameras_and_beyond_their_lenses_are_told_apart() {
+        let mut whole = three_images();
+        let nowhere = |whole: &Reconstruction| {
+            let all = whole.reprojections(CameraId(7)).unwrap();
+            [Reprojection::Behind, Reprojection::BeyondLens]
+                .map(|what| all.iter().filter(|r| **r == what).count())
+        };
+        assert_eq!(nowhere(&whole), [0, 0]);
+        // 1. A lens that folds at 0.13 of the distance; a sees points 2 and 3 beyond.
+        let camera = whole.cameras.get_mut(&CameraId(7)).unwrap();
+        camera.model = ModelKind::SimpleRadial;
+        camera.params.push(-20.0);
+        assert_eq!(nowhere(&whole), [0, 2]);
+        // 2. Point 1, which all observe, behind.
+        whole.points.get_mut(&Point3DId(1)).unwrap().position.z = -10.0;
+        assert_eq!(nowhere(&whole), [3, 2]);
+        let errors = whole.reprojection_errors_px(CameraId(7)).unwrap();
+        assert_eq!(errors.iter().filter(|px| px.is_infinite()).count(), 5);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::options::{
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use super::surface::{proxy_json, proxy_text};
-use calibrate::{TRUSTED_TIE, WeakGroup, colmap};
+use calibrate::{Reprojection, TRUSTED_TIE, WeakGroup, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
 use lumigraph::bench::median;
@@ -132,8 +132,8 @@ fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Re
         ] {
             photo_bytes = photo_bytes.saturating_add(bytes.saturating_mul(count as u64));
         }
-        let errors = reconstruction.reprojection_errors_px(*id);
-        let errors = errors.map_err(|source| SceneError::Camera {
+        let reprojections = reconstruction.reprojections(*id);
+        let reprojections = reprojections.map_err(|source| SceneError::Camera {
             name: format!("id {}", id.0),
             source,
         })?;
@@ -144,7 +144,7 @@ fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Re
             "height": camera.height,
             "params": camera.params,
             "photos": photos,
-            "reprojection_px": reprojection(errors),
+            "reprojection_px": reprojection(&reprojections),
         }));
     }
     let positions: Vec<DVec3> = reconstruction.points.values().map(|p| p.position).collect();
@@ -193,10 +193,11 @@ fn times(scene: &Scene) -> Option<(usize, f64, f64)> {
 }
 
 /// Mean, median and 95th percentile of the finite errors; how many there are, and how many points lie
-/// behind the camera that is said to see them.
-fn reprojection(errors_px: Vec<f64>) -> Value {
-    let behind = errors_px.iter().filter(|e| !e.is_finite()).count();
-    let mut finite: Vec<f64> = errors_px.into_iter().filter(|e| e.is_finite()).collect();
+/// behind the camera that is said to see them, or beyond what its lens maps one to one.
+fn reprojection(all: &[Reprojection]) -> Value {
+    let count = |what: Reprojection| all.iter().filter(|r| **r == what).count();
+    let mut finite: Vec<f64> = all.iter().map(|r| r.px()).collect();
+    finite.retain(|px| px.is_finite());
     finite.sort_by(f64::total_cmp);
     let mean = finite.iter().sum::<f64>() / finite.len() as f64;
     json!({
@@ -204,7 +205,8 @@ fn reprojection(errors_px: Vec<f64>) -> Value {
         "median": median(&finite),
         "p95": finite.get(finite.len() * 95 / 100),
         "observations": finite.len(),
-        "behind": behind,
+        "behind": count(Reprojection::Behind),
+        "beyond_lens": count(Reprojection::BeyondLens),
     })
 }
 
@@ -267,12 +269,19 @@ mod tests {
 
     #[test]
     fn the_median_of_two_errors_is_between_them() {
-        let told = reprojection(vec![3.0, f64::INFINITY, 1.0]);
+        let [three, one] = [3.0, 1.0].map(Reprojection::Off);
+        let told = reprojection(&[three, Reprojection::Behind, one]);
         assert_eq!(told["median"], 2.0);
         assert_eq!(
             (&told["observations"], &told["behind"]),
             (&json!(2), &json!(1))
         );
-        assert!(reprojection(Vec::new())["median"].is_null());
+        assert_eq!(told["beyond_lens"], 0);
+        let told = reprojection(&[one, Reprojection::BeyondLens, Reprojection::BeyondLens]);
+        assert_eq!(
+            (&told["behind"], &told["beyond_lens"]),
+            (&json!(0), &json!(2))
+        );
+        assert!(reprojection(&[])["median"].is_null());
     }
 }

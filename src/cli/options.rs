@@ -96,8 +96,8 @@ fn drop_weak_saying(scene: &mut Scene, remedy: &str) {
 pub(super) fn contradicted_text(count: usize, points: usize) -> Option<String> {
     (count > 0).then(|| {
         format!(
-            "{count} of {points} sparse points, which all photos that observe them see behind them or more than \
-             {DOUBTFUL_PX} pixels from where the calibration has them"
+            "{count} of {points} sparse points, which all photos that observe them see behind them, beyond their \
+             lenses, or more than {DOUBTFUL_PX} pixels from where the calibration has them"
         )
     })
 }
@@ -107,12 +107,12 @@ pub(super) fn misplaced_text(names: &[String]) -> Option<String> {
     match names {
         [] => None,
         [name] => Some(format!(
-            "photo {name} sees most of its sparse points behind it or more than {DOUBTFUL_PX} pixels from where \
-             the calibration has them"
+            "photo {name} sees most of its sparse points behind it, beyond its lens, or more than {DOUBTFUL_PX} pixels \
+             from where the calibration has them"
         )),
         _ => Some(format!(
-            "{} photos see most of their sparse points behind them or more than {DOUBTFUL_PX} pixels from where \
-             the calibration has them: {}",
+            "{} photos see most of their sparse points behind them, beyond their lenses, or more than {DOUBTFUL_PX} \
+             pixels from where the calibration has them: {}",
             names.len(),
             names.join(", ")
         )),

@@ -1,7 +1,7 @@
 //! Whether a calibration fits its photos at all, and each of them.
 
 use super::Warning;
-use calibrate::{Image, Point3DId, Reconstruction, TRUSTED_TIE};
+use calibrate::{Image, Point3DId, Reconstruction, Reprojection, TRUSTED_TIE};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
@@ -16,22 +16,45 @@ pub(super) fn of(whole: &Reconstruction) -> Option<Warning> {
     if median_px <= DOUBTFUL_PX {
         return None;
     }
-    let problem = if median_px.is_finite() {
-        format!(
+    let (problem, doubtful) = if median_px.is_finite() {
+        let problem = format!(
             "photos see the sparse points {median_px:.0} pixels (the median) from where the calibration has them"
-        )
+        );
+        (problem, "that the calibration belongs to these photos")
     } else {
-        "most sparse points lie behind the cameras that see them".to_owned()
+        let (problem, doubtful) = nowhere(whole);
+        (problem.to_owned(), doubtful)
     };
     Some(Warning::Note(format!(
-        "{problem}: pictures will be wrong; check that the calibration belongs to these photos, or export it \
-         again in another format"
+        "{problem}: pictures will be wrong; check {doubtful}, or export it again in another format"
     )))
 }
 
-/// The names of photos that see most of their own sparse points behind them, or so far from where the calibration
-/// has them, while most photos do not; sorted. They are misplaced: an unaligned photo of a model far from the
-/// world's origin has no pose, for one, and lies there. They are fewer than the others.
+/// Where sparse points lie of which most project nowhere, and what to check then.
+fn nowhere(whole: &Reconstruction) -> (&'static str, &'static str) {
+    let has = |what: Reprojection| {
+        let mut all = whole.cameras.keys().map(|id| whole.reprojections(*id));
+        all.any(|camera| camera.is_ok_and(|camera| camera.contains(&what)))
+    };
+    match [Reprojection::Behind, Reprojection::BeyondLens].map(has) {
+        [_, false] => (
+            "most sparse points lie behind the cameras that see them",
+            "that the calibration belongs to these photos",
+        ),
+        [false, true] => (
+            "most sparse points lie beyond what the lenses of the cameras that see them map one to one",
+            "the distortion coefficients",
+        ),
+        [true, true] => (
+            "most sparse points lie behind the cameras that see them, or beyond what their lenses map one to one",
+            "that the calibration belongs to these photos, and its distortion coefficients",
+        ),
+    }
+}
+
+/// The names of photos that see most of their own sparse points behind them, beyond what their lens sees, or so far
+/// from where the calibration has them, while most photos do not; sorted. They are misplaced: an unaligned photo of a
+/// model far from the world's origin has no pose, for one, and lies there. They are fewer than the others.
 pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
     // 1. What photos usually miss, by the upper of two: nothing says which of two photos is the wrong one.
     let errors_px = whole.median_errors_px(TRUSTED_TIE);
@@ -48,8 +71,8 @@ pub(super) fn misplaced(whole: &Reconstruction) -> Vec<String> {
     names
 }
 
-/// The sparse points that all photos observing them see behind them, or so far from where the calibration has them,
-/// while photos usually do not: they are wrong, whatever observes them.
+/// The sparse points that all photos observing them see behind them, beyond what their lens sees, or so far from where
+/// the calibration has them, while photos usually do not: they are wrong, whatever observes them.
 pub(super) fn contradicted(whole: &Reconstruction) -> BTreeSet<Point3DId> {
     match whole.median_error_px() {
         // Where all are a little off, some are by more.
@@ -159,8 +182,38 @@ mod tests {
         );
         let behind = of(&seen(-2.0, 0.0)).unwrap().to_string();
         assert!(
-            behind.starts_with("most sparse points lie behind"),
+            behind.starts_with("most sparse points lie behind the cameras that see them: "),
             "{behind}"
+        );
+    }
+
+    #[test]
+    fn a_lens_that_folds_before_what_it_sees_is_told() {
+        let mut folded = seen(2.0, 0.0);
+        let camera = folded.cameras.get_mut(&CameraId(1)).unwrap();
+        camera.model = ModelKind::SimpleRadial;
+        camera.params.push(-30.0);
+        let mut point = folded.points[&Point3DId(1)].clone();
+        point.position.x = 1.0;
+        folded.points.insert(Point3DId(1), point.clone());
+        assert_eq!(
+            of(&folded).unwrap().to_string(),
+            "most sparse points lie beyond what the lenses of the cameras that see them map one to one: pictures \
+             will be wrong; check the distortion coefficients, or export it again in another format"
+        );
+        // One of several is behind.
+        point.position.z = -2.0;
+        folded.points.insert(Point3DId(2), point);
+        let image = folded.images.get_mut(&ImageId(1)).unwrap();
+        let mut other = image.keypoints[0];
+        other.point = Some(Point3DId(2));
+        image.keypoints.push(other);
+        let both = of(&folded).unwrap().to_string();
+        assert!(
+            both.starts_with(
+                "most sparse points lie behind the cameras that see them, or beyond what"
+            ),
+            "{both}"
         );
     }
 

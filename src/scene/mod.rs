@@ -140,8 +140,8 @@ impl Scene {
         weak
     }
 
-    /// The names of photos that are misplaced, as they see most of their own sparse points behind them or more than
-    /// [`DOUBTFUL_PX`] from where the calibration has them, while most photos do not; sorted.
+    /// The names of photos that are misplaced, as they see most of their own sparse points behind them, beyond what
+    /// their lens sees, or more than [`DOUBTFUL_PX`] from where the calibration has them, while most photos do not; sorted.
     pub fn misplaced(&self) -> Vec<String> {
         misfit::misplaced(&self.reconstruction)
     }
@@ -153,8 +153,8 @@ impl Scene {
         names
     }
 
-    /// The sparse points that all photos observing them see behind them, or more than [`DOUBTFUL_PX`] from where the
-    /// calibration has them, while photos usually do not.
+    /// The sparse points that all photos observing them see behind them, beyond what their lens sees, or more than
+    /// [`DOUBTFUL_PX`] from where the calibration has them, while photos usually do not.
     pub fn contradicted_points(&self) -> BTreeSet<Point3DId> {
         misfit::contradicted(&self.reconstruction)
     }

@@ -261,7 +261,7 @@ fn a_photo_that_is_misplaced_is_named_and_harms_no_others() {
         (ran.json()["mean"]["psnr"].as_f64().unwrap(), ran.stderr)
     };
     let (usual, said) = scored("");
-    let named = "photo 0003.png sees most of its sparse points behind it or more than 10 pixels";
+    let named = "photo 0003.png sees most of its sparse points behind it, beyond its lens, or more than 10 pixels";
     assert!(!said.contains(named), "{said}");
     let mut model = colmap::read_model(&model_folder).unwrap();
     let mut images = model.images.values_mut();
