@@ -219,14 +219,7 @@ fn text(scene: &Scene, info: &Value) -> String {
             .flatten()
             .map(ToString::to_string)
             .collect();
-        let error = &camera["reprojection_px"];
-        let error = match (error["mean"].as_f64(), error["median"].as_f64()) {
-            (Some(mean), Some(median)) => format!(
-                "reprojection error {mean:.3} px mean, {median:.3} px median over {} observations",
-                error["observations"]
-            ),
-            _ => "no observations of points".to_owned(),
-        };
+        let error = error_text(&camera["reprojection_px"]);
         text += &format!(
             "camera   {}: {} {}×{} [{}], {} photos, {error}\n",
             camera["id"],
@@ -263,6 +256,32 @@ fn text(scene: &Scene, info: &Value) -> String {
     text
 }
 
+/// What [`reprojection`] found, with the observations that no error is known of.
+fn error_text(error: &Value) -> String {
+    let counts = [
+        ("behind", "of points behind the camera"),
+        (
+            "beyond_lens",
+            "of points beyond what its lens maps one to one",
+        ),
+    ];
+    let counted = counts.map(|(key, what)| (error[key].as_u64().unwrap_or_default(), what));
+    let nowhere = counted.iter().filter(|(count, _)| *count > 0);
+    let nowhere: Vec<String> = nowhere.map(|(n, what)| format!("{n} {what}")).collect();
+    let nowhere = nowhere.join(", ");
+    match (error["mean"].as_f64(), error["median"].as_f64()) {
+        (Some(mean), Some(median)) => {
+            let more = if nowhere.is_empty() { "" } else { "; besides " };
+            format!(
+                "reprojection error {mean:.3} px mean, {median:.3} px median over {} observations{more}{nowhere}",
+                error["observations"]
+            )
+        }
+        _ if nowhere.is_empty() => "no observations of points".to_owned(),
+        _ => format!("no observations of points that its lens sees; {nowhere}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,5 +302,26 @@ mod tests {
             (&json!(0), &json!(2))
         );
         assert!(reprojection(&[])["median"].is_null());
+    }
+
+    #[test]
+    fn observations_of_points_that_project_nowhere_are_told() {
+        let text = |all: &[Reprojection]| error_text(&reprojection(all));
+        let (off, behind) = (Reprojection::Off(0.5), Reprojection::Behind);
+        let beyond = Reprojection::BeyondLens;
+        assert_eq!(text(&[]), "no observations of points");
+        assert_eq!(
+            text(&[off, off]),
+            "reprojection error 0.500 px mean, 0.500 px median over 2 observations"
+        );
+        assert_eq!(
+            text(&[off, beyond, behind, beyond]),
+            "reprojection error 0.500 px mean, 0.500 px median over 1 observations; besides 1 of points behind the \
+             camera, 2 of points beyond what its lens maps one to one"
+        );
+        assert_eq!(
+            text(&[behind, behind]),
+            "no observations of points that its lens sees; 2 of points behind the camera"
+        );
     }
 }
