@@ -20,19 +20,19 @@ pub enum ExportError {
     },
     /// Lenses that cannot stand in one file.
     #[error(
-        "camera {fisheye} ({fisheye_model}) is a fisheye and camera {other} ({other_model}) is \
-         not, and transforms.json has one camera_model for all; import the photos with \
-         --undistort and export that scene, or export as colmap"
+        "camera {camera_id} ({}) is a {} and camera {other} ({}) is \
+         not, and transforms.json has one camera_model for all; {}",
+        model.name(), kind_of(*model), other_model.name(), remedy_beside(*model)
     )]
     Mixed {
-        /// A fisheye.
-        fisheye: u32,
+        /// A fisheye or panorama.
+        camera_id: u32,
         /// Its model.
-        fisheye_model: &'static str,
+        model: ModelKind,
         /// One that is none.
         other: u32,
         /// Its model.
-        other_model: &'static str,
+        other_model: ModelKind,
     },
     /// Several cameras where the format has one.
     #[error(
@@ -60,6 +60,22 @@ pub enum ExportError {
     /// There is nothing to export.
     #[error("the reconstruction has no images; there is nothing to export")]
     NoImages,
+}
+
+/// What a camera is that cannot stand beside others.
+fn kind_of(model: ModelKind) -> &'static str {
+    match model {
+        ModelKind::Equirectangular => "panorama",
+        _ => "fisheye",
+    }
+}
+
+/// What to do about such a one: nothing undistorts panoramas.
+fn remedy_beside(model: ModelKind) -> &'static str {
+    match model {
+        ModelKind::Equirectangular => "export as colmap",
+        _ => "import the photos with --undistort and export that scene, or export as colmap",
+    }
 }
 
 /// What to do about a model that some format lacks.

@@ -16,6 +16,17 @@ pub(super) enum Terms {
     Fisheye { k: [f64; 4], alpha: f64 },
 }
 
+/// A camera's lens.
+///
+/// # Errors
+/// The camera has none.
+pub(super) fn lens(id: CameraId, camera: &Camera) -> Result<Lens, ExportError> {
+    camera.lens().map_err(|source| ExportError::Camera {
+        camera_id: id.0,
+        source,
+    })
+}
+
 /// A camera's lens and its terms in OpenCV's model.
 ///
 /// # Errors
@@ -25,10 +36,7 @@ pub(super) fn terms(
     camera: &Camera,
     format: &'static str,
 ) -> Result<(Lens, Terms), ExportError> {
-    let lens = camera.lens().map_err(|source| ExportError::Camera {
-        camera_id: id.0,
-        source,
-    })?;
+    let lens = lens(id, camera)?;
     let flat = |k, p| Terms::Standard {
         k,
         p,

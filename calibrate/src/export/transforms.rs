@@ -5,11 +5,13 @@
 //! at the top where all frames share a camera, else in each frame; `camera_model` always at
 //! the top, where alone it is read. nerfstudio's k1, k2, p1, p2 and k3 are OpenCV's, so
 //! every model without a denominator is an `OPENCV` camera, the fisheyes without further
-//! terms are `OPENCV_FISHEYE`, exactly.
+//! terms are `OPENCV_FISHEYE`, exactly. Panoramas that go all round are `EQUIRECTANGULAR`; what nerfstudio has for
+//! focal lengths is then half the width, and the height.
 
 use super::ExportError;
-use super::lens::{Terms, refused, terms};
-use crate::{Camera, CameraId, Image, Reconstruction};
+use super::lens::{Terms, lens, refused, terms};
+use crate::{Camera, CameraId, Image, ModelKind, Reconstruction};
+use glam::DVec2;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -34,8 +36,8 @@ pub struct FrameFiles {
 /// so depth maps.
 ///
 /// # Errors
-/// No image; a camera without a lens, or one whose lens is none of OpenCV's or has a
-/// denominator; fisheyes beside others.
+/// No image; a camera without a lens, or one whose lens is no panorama's and none of OpenCV's or has a
+/// denominator; a panorama of another size than its photos; fisheyes, or panoramas, beside others.
 pub fn transforms_json(
     reconstruction: &Reconstruction,
     files_of: &dyn Fn(&Image) -> FrameFiles,
@@ -53,14 +55,14 @@ pub fn transforms_json(
         intrinsics.insert(id, keys);
     }
     let (&kind, &some) = kinds.last_key_value().ok_or(ExportError::NoImages)?;
-    if let (Kind::Fisheye, Some((_, &other))) = (kind, kinds.first_key_value())
+    if let (Kind::Fisheye | Kind::Panorama, Some((_, &other))) = (kind, kinds.first_key_value())
         && kinds.len() > 1
     {
         return Err(ExportError::Mixed {
-            fisheye: some.0,
-            fisheye_model: used[&some].model.name(),
+            camera_id: some.0,
+            model: used[&some].model,
             other: other.0,
-            other_model: used[&other].model.name(),
+            other_model: used[&other].model,
         });
     }
 
@@ -116,6 +118,7 @@ enum Kind {
     Pinhole,
     OpenCv,
     Fisheye,
+    Panorama,
 }
 
 impl Kind {
@@ -124,21 +127,18 @@ impl Kind {
             Self::Pinhole => "PINHOLE",
             Self::OpenCv => "OPENCV",
             Self::Fisheye => "OPENCV_FISHEYE",
+            Self::Panorama => "EQUIRECTANGULAR",
         }
     }
 }
 
 /// A camera's model and its intrinsics by their keys.
 fn keys(id: CameraId, camera: &Camera) -> Result<(Kind, Map<String, Value>), ExportError> {
+    if camera.model == ModelKind::Equirectangular {
+        return Ok((Kind::Panorama, panorama(id, camera)?));
+    }
     let (lens, terms) = terms(id, camera, FORMAT)?;
-    let mut keys = vec![
-        ("w", json!(camera.width)),
-        ("h", json!(camera.height)),
-        ("fl_x", json!(lens.focal.x)),
-        ("fl_y", json!(lens.focal.y)),
-        ("cx", json!(lens.principal.x)),
-        ("cy", json!(lens.principal.y)),
-    ];
+    let mut keys = shared_keys(camera, lens.focal, lens.principal).to_vec();
     let mut add = |names: &[&'static str], values: &[f64]| {
         let values = values.iter().map(|value| json!(value));
         keys.extend(names.iter().copied().zip(values));
@@ -170,6 +170,35 @@ fn keys(id: CameraId, camera: &Camera) -> Result<(Kind, Map<String, Value>), Exp
     };
     let keys = keys.into_iter().map(|(key, value)| (key.to_owned(), value));
     Ok((kind, keys.collect()))
+}
+
+/// The intrinsics of a panorama, which goes all round.
+fn panorama(id: CameraId, camera: &Camera) -> Result<Map<String, Value>, ExportError> {
+    lens(id, camera)?;
+    let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+    if camera.params != size.to_array() {
+        return Err(refused(
+            id,
+            camera,
+            " of another size than its photos",
+            FORMAT,
+        ));
+    }
+    let keys = shared_keys(camera, DVec2::new(0.5 * size.x, size.y), 0.5 * size);
+    let keys = keys.into_iter().map(|(key, value)| (key.to_owned(), value));
+    Ok(keys.collect())
+}
+
+/// The intrinsics that cameras of all kinds have, in pixels.
+fn shared_keys(camera: &Camera, focal: DVec2, principal: DVec2) -> [(&'static str, Value); 6] {
+    [
+        ("w", json!(camera.width)),
+        ("h", json!(camera.height)),
+        ("fl_x", json!(focal.x)),
+        ("fl_y", json!(focal.y)),
+        ("cx", json!(principal.x)),
+        ("cy", json!(principal.y)),
+    ]
 }
 
 /// The rows of world from camera, OpenGL's y and z being ours turned round.

@@ -53,6 +53,16 @@ fn fisheyes() -> Vec<Camera> {
     ]
 }
 
+/// Photos that go all round, of a size.
+fn panorama(width: u32, height: u32) -> Camera {
+    Camera {
+        model: ModelKind::Equirectangular,
+        width,
+        height,
+        params: vec![width.into(), height.into()],
+    }
+}
+
 /// What OpenCV alone has: 12 coefficients, 14, a skewed fisheye.
 fn opencvs_own() -> Vec<Camera> {
     use ModelKind::*;
@@ -268,10 +278,43 @@ fn a_transforms_file_holds_many_cameras() {
     let poses: Vec<Rigid3> = (0..7)
         .map(|i| Rigid3::new(DQuat::from_rotation_y(0.1 * f64::from(i)), DVec3::X))
         .collect();
-    for cameras in [expressible(), fisheyes()] {
+    let panoramas = vec![panorama(4096, 2048), panorama(101, 50)];
+    for cameras in [expressible(), fisheyes(), panoramas] {
         let whole = reconstruction(&cameras, &poses);
         assert_same(&through_transforms(&whole), &whole);
     }
+}
+
+#[test]
+fn panoramas_are_written_as_nerfstudio_has_them() {
+    let files = |image: &Image| FrameFiles {
+        photo: image.name.clone(),
+        mask: None,
+        depth: None,
+        time_s: None,
+    };
+    let text = |cameras: &[Camera]| {
+        transforms_json(&reconstruction(cameras, &[Rigid3::IDENTITY; 2]), &files)
+    };
+    let one: serde_json::Value =
+        serde_json::from_str(&text(&[panorama(400, 200)]).unwrap()).unwrap();
+    assert_eq!(one["camera_model"], "EQUIRECTANGULAR");
+    let intrinsics = ["w", "h", "fl_x", "fl_y", "cx", "cy"].map(|key| one[key].as_f64().unwrap());
+    assert_eq!(intrinsics, [400.0, 200.0, 200.0, 200.0, 200.0, 100.0]);
+    // It has one model for all, and no panorama that is cropped.
+    let message = |cameras: &[Camera]| text(cameras).unwrap_err().to_string();
+    assert_eq!(
+        message(&[expressible()[1].clone(), panorama(400, 200)]),
+        "camera 4 (EQUIRECTANGULAR) is a panorama and camera 3 (PINHOLE) is not, and transforms.json has one \
+         camera_model for all; export as colmap"
+    );
+    let mut cropped = panorama(400, 200);
+    cropped.height = 150;
+    assert_eq!(
+        message(&[cropped]),
+        "camera 3 is EQUIRECTANGULAR of another size than its photos, which transforms.json cannot express; export \
+         as colmap, or cut the panoramas into views first"
+    );
 }
 
 #[test]
