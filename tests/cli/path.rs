@@ -116,16 +116,22 @@ fn a_calibration_is_no_path_and_its_error_says_what_draws_its_poses() {
     let here = folder.path();
     lumigraph(here, "export wall --format transforms -o t.json").ok();
     std::fs::write(here.join("model.nvm"), "NVM_V3\n").unwrap();
+    lumigraph(here, "export wall --format opencv -o cv.yml").ok();
     let render = "render wall --proxy plane --size 48x36";
     let error = lumigraph(here, &format!("{render} --path t.json -o x")).error(1);
     let said = "t.json: a calibration, not a path file; `lumigraph render SCENE --views t.json -o FRAMES` draws";
     assert!(error.contains(said), "{error}");
-    for option in ["--views", "--path"] {
-        let error = lumigraph(here, &format!("{render} {option} model.nvm -o x")).error(1);
-        let said = "model.nvm: a calibration, not a path file; with its photos, `lumigraph import PHOTOS \
-                    --calibration model.nvm -o SCENE` and `lumigraph export SCENE --format colmap -o MODEL` make a \
-                    model";
-        assert!(error.contains(said), "{error}");
+    for (option, file) in [
+        ("--views", "model.nvm"),
+        ("--path", "model.nvm"),
+        ("--views", "cv.yml"),
+    ] {
+        let error = lumigraph(here, &format!("{render} {option} {file} -o x")).error(1);
+        let said = format!(
+            "{file}: a calibration, not a path file; with its photos, `lumigraph import PHOTOS --calibration {file} \
+             -o SCENE` and `lumigraph export SCENE --format colmap -o MODEL` make a model"
+        );
+        assert!(error.contains(&said), "{error}");
     }
     lumigraph(here, "import wall/images --calibration t.json -o scene").ok();
     lumigraph(here, "export scene --format colmap -o model").ok();

@@ -1,6 +1,6 @@
 //! Which files of a folder are OpenCV's calibrations, and which look like one.
 
-use super::calibration::{calibration_and_beside, files, is_storage_name};
+use super::calibration::{calibration, calibration_and_beside, files, is_storage_name};
 use super::storage::FileStorage;
 use super::values::Values;
 use super::{Keys, OpenCvError, matrix, poses};
@@ -46,7 +46,9 @@ pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
                 found.unusable.push(OpenCvError::NoPoses { path: file });
             }
             Ok(_) => found.usable.push(file),
-            Err(error) if has_poses || holds_matrices(&file) => found.unusable.push(error),
+            Err(error) if has_poses || is_read_so(&file, holds_matrices) => {
+                found.unusable.push(error)
+            }
             Err(_) => {}
         }
     }
@@ -64,35 +66,44 @@ pub fn find_calibrations(folder: &Path, keys: &Keys) -> FoundCalibrations {
 /// things, one of that also by what it holds.
 pub fn may_be_calibration(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default();
-    let looks_like_one = || {
-        let is_one = |storage: FileStorage| {
-            holds_poses(file, &storage)
-                || calibration_and_beside(file, &storage, &Keys::default()).is_ok()
-        };
-        is_small(file) && (holds_matrices(file) || FileStorage::read(file).is_ok_and(is_one))
+    let is_json = extension.eq_ignore_ascii_case("json");
+    is_storage_name(file) && (!is_json || is_small(file) && is_read_so(file, is_calibration))
+}
+
+/// Whether a file's content looks like a calibration of OpenCV's, whatever its name: it holds cameras or poses under
+/// names known here, or matrices the way OpenCV writes them, whole or damaged.
+pub fn is_calibration(content: &[u8]) -> bool {
+    // Named in errors alone.
+    let file = Path::new("");
+    let is_one = |storage: FileStorage| {
+        holds_poses(file, &storage) || calibration(file, &storage, &Keys::default()).is_ok()
     };
-    is_storage_name(file) && (!extension.eq_ignore_ascii_case("json") || looks_like_one())
+    content.len() as u64 <= LARGEST
+        && (holds_matrices(content) || FileStorage::parse(file, content).is_ok_and(is_one))
+}
+
+/// Whether a file can be read, and what is in it is so.
+fn is_read_so(file: &Path, is_so: fn(&[u8]) -> bool) -> bool {
+    fs::read(file).is_ok_and(|content| is_so(&content))
 }
 
 fn is_small(file: &Path) -> bool {
     fs::metadata(file).is_ok_and(|m| m.len() <= LARGEST)
 }
 
-/// Whether a file has the mark of OpenCV's matrices, as far as it can be unpacked.
-fn holds_matrices(file: &Path) -> bool {
-    let Ok(packed) = fs::read(file) else {
-        return false;
-    };
+/// Whether a file's content has the mark of OpenCV's matrices, as far as it can be unpacked.
+fn holds_matrices(content: &[u8]) -> bool {
     let mut unpacked = Vec::new();
-    if packed.starts_with(&[0x1f, 0x8b]) {
+    let text = if content.starts_with(&[0x1f, 0x8b]) {
         // What is read before an error stays, and a whole file was refused for what it holds.
-        let reader = flate2::read::MultiGzDecoder::new(packed.as_slice());
+        let reader = flate2::read::MultiGzDecoder::new(content);
         let _ = reader.take(LARGEST).read_to_end(&mut unpacked);
+        unpacked.as_slice()
     } else {
-        unpacked = packed;
-    }
+        content
+    };
     let holds = |mark: &&str| {
-        let mut places = unpacked.windows(mark.len());
+        let mut places = text.windows(mark.len());
         places.any(|bytes| bytes == mark.as_bytes())
     };
     matrix::TYPES.iter().any(holds)

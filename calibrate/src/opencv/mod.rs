@@ -31,5 +31,5 @@ pub use board::Board;
 pub use calibration::{OpenCvCalibration, calibration, is_storage_name, read_calibration};
 pub use cameras::{Keys, OpenCvCamera};
 pub use error::OpenCvError;
-pub use find::{FoundCalibrations, find_calibrations, may_be_calibration};
+pub use find::{FoundCalibrations, find_calibrations, is_calibration, may_be_calibration};
 pub use storage::{DataType, Entries, FileStorage, Matrix, Node, Value};

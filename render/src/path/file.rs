@@ -5,7 +5,7 @@ use super::nerfstudio::{self, NerfstudioFrame};
 use super::shot;
 use super::{CameraPath, Interpolation, Keyframe, PathError, PathFrame, default_name, settled};
 use calibrate::formats::{Format, WITHOUT_NUMBER, detect_content, no_number};
-use calibrate::{Camera, ModelKind, Rigid3};
+use calibrate::{Camera, ModelKind, Rigid3, opencv};
 use capture::{as_argument, without_byte_order_mark};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -218,6 +218,7 @@ pub(super) fn parse_own(
             Some(_) => PathFileError::Calibration(path),
             None => match str::from_utf8(bytes).ok().and_then(no_number) {
                 Some(found) => PathFileError::NoNumber(path, found),
+                None if opencv::is_calibration(bytes) => PathFileError::Calibration(path),
                 None => json(error),
             },
         }

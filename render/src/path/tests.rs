@@ -339,12 +339,19 @@ fn bad_files_are_named() {
         "DIR/p.json: a calibration, not a path file; `lumigraph render SCENE --views DIR/p.json -o FRAMES` draws the \
          views of its frames"
     );
-    let calibration = message("NVM_V3\n");
-    assert!(
-        calibration.starts_with("DIR/p.json: a calibration, not a path file; with its photos, ")
-            && calibration.contains("--calibration DIR/p.json -o SCENE` and `lumigraph export"),
-        "{calibration}"
-    );
+    // OpenCV's are YAML, XML or JSON; damaged ones, and such without poses, are some, too.
+    let yaml = "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
+                data: [ 500, 0, 320, 0, 500, 240, 0, 0, 1 ]\n";
+    let json = r#"{"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "D": [0.1, 0, 0, 0, 0]}"#;
+    for calibration in ["NVM_V3\n", yaml, &yaml[..70], json] {
+        let calibration = message(calibration);
+        assert!(
+            calibration
+                .starts_with("DIR/p.json: a calibration, not a path file; with its photos, ")
+                && calibration.contains("--calibration DIR/p.json -o SCENE` and `lumigraph export"),
+            "{calibration}"
+        );
+    }
     assert!(message("[").starts_with("DIR/p.json: not a path file: "));
     // What Python writes where a number is none, nerfstudio's paths included.
     let again = "; remove what has it, as a frame without a pose, or export it again from the program it is from";
