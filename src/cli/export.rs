@@ -2,7 +2,7 @@
 
 use super::Usage;
 use super::inputs::{calibration_of, files_behind_scene, model_files};
-use super::options::{SceneArgs, beside_counts};
+use super::options::{Doubtful, SceneArgs, beside_counts};
 use super::output::{print, say, write_file};
 use super::targets::{check_apart, check_file, check_folder};
 use anyhow::bail;
@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// masks, depth maps and times, too. Photos are not copied.
 /// What a format cannot express is an error: `import --undistort` gives pinhole cameras, which
 /// all of them can. Tilted sensors and skewed fisheyes are OpenCV's alone.
+/// Photos and points that what draws leaves out as unsure or wrong are written, too, which a note says.
 ///
 ///     lumigraph export my-scene --format colmap -o model
 ///     lumigraph export my-scene --format transforms -o my-scene/transforms.json
@@ -109,18 +110,38 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
     }
     say_beside(&scene, args.format);
+    say_doubtful(&scene, args.format);
     print(&format!(
         "{}: {} photos, {}\n",
         output.display(),
         whole.images.len(),
         match args.format {
             Format::Transforms => "no points: the format has none".to_owned(),
-            Format::OpenCv if !has_board(whole) => {
+            Format::OpenCv if !has_points(whole, args.format) => {
                 "no points: the format has those of a calibration board alone".to_owned()
             }
             _ => format!("{} points", whole.points.len()),
         }
     ))
+}
+
+/// Whether sparse points are written.
+fn has_points(whole: &Reconstruction, format: Format) -> bool {
+    match format {
+        Format::Colmap | Format::ColmapText => true,
+        Format::Transforms => false,
+        Format::OpenCv => has_board(whole),
+    }
+}
+
+/// Says which of the photos and points that are written what draws leaves out.
+fn say_doubtful(scene: &Scene, format: Format) {
+    let whole = &scene.reconstruction;
+    let mut doubtful = Doubtful::of(scene);
+    if !has_points(whole, format) {
+        doubtful.contradicted = 0;
+    }
+    doubtful.say(whole.points.len(), "exported all the same, though ");
 }
 
 /// What the names of pictures end in.

@@ -3,14 +3,11 @@
 use super::import::check_photos;
 use super::info_of_file;
 use super::interior::check_no_interior;
-use super::options::{
-    KeyArgs, SceneArgs, beside_counts, beside_text, contradicted_text, misplaced_text,
-    print_warnings, tie_text,
-};
+use super::options::{Doubtful, KeyArgs, SceneArgs, beside_counts, beside_text, print_warnings};
 use super::output::{print, print_json, say};
 use super::report::megabytes;
 use super::surface::{proxy_json, proxy_text};
-use calibrate::{Reprojection, TRUSTED_TIE, WeakGroup, colmap};
+use calibrate::{Reprojection, colmap};
 use capture::find_photos_folder;
 use glam::DVec3;
 use lumigraph::bench::median;
@@ -59,28 +56,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if let Err(error) = scene.check_own_proxy() {
         say!("note: {error}");
     }
-    let weak = scene.reconstruction.weakly_tied(TRUSTED_TIE);
-    let misplaced = scene.misplaced();
-    let contradicted = scene.contradicted_points().len();
-    let mut info = gather(&scene, &weak, &misplaced)?;
-    info["contradicted_points"] = json!(contradicted);
+    let doubtful = Doubtful::of(&scene);
+    let info = gather(&scene, &doubtful)?;
     if args.json {
         return print_json(&info);
     }
     print(&text(&scene, &info))?;
-    for group in &weak {
-        say!(
-            "note: {}; what draws leaves them out, unless --keep-weak",
-            tie_text(group)
-        );
-    }
-    if let Some(misplaced) = misplaced_text(&misplaced) {
-        say!("note: {misplaced}; what draws leaves them out, unless --keep-weak");
-    }
-    let points = scene.reconstruction.points.len();
-    if let Some(contradicted) = contradicted_text(contradicted, points) {
-        say!("note: {contradicted}; what draws leaves them out, unless --keep-weak");
-    }
+    doubtful.say(scene.reconstruction.points.len(), "");
     Ok(())
 }
 
@@ -108,7 +90,7 @@ fn open(args: &Args) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Result<Value> {
+fn gather(scene: &Scene, doubtful: &Doubtful) -> anyhow::Result<Value> {
     let reconstruction = &scene.reconstruction;
     let mut cameras = Vec::new();
     let mut photo_bytes = 0_u64;
@@ -171,17 +153,18 @@ fn gather(scene: &Scene, weak: &[WeakGroup], misplaced: &[String]) -> anyhow::Re
             "range_s": [first, last],
         })),
         "left_out": scene.left_out,
-        "weakly_tied": weak.iter().map(|group| json!({
+        "weakly_tied": doubtful.weak.iter().map(|group| json!({
             "photos": group.names,
             "shared_points": group.shared_points,
         })).collect::<Vec<_>>(),
-        "misplaced": misplaced,
+        "misplaced": doubtful.misplaced,
         "cameras": cameras,
         "points": positions.len(),
         "spacing": cloud.map(|c| c.spacing),
         "isolated": cloud.map(|c| c.isolated),
         "proxy": own,
         "memory_bytes": photo_bytes,
+        "contradicted_points": doubtful.contradicted,
     }))
 }
 

@@ -3,9 +3,8 @@
 use super::interior::check_no_interior;
 use super::output::say;
 pub(super) use super::shape::{compared, cut};
-use calibrate::View;
-use calibrate::WeakGroup;
 use calibrate::opencv::Keys;
+use calibrate::{TRUSTED_TIE, View, WeakGroup};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{DOUBTFUL_PX, Photo, Scene, Warning};
@@ -92,8 +91,39 @@ fn drop_weak_saying(scene: &mut Scene, remedy: &str) {
     }
 }
 
+/// What a scene has that what draws leaves out.
+pub(super) struct Doubtful {
+    /// Photos that too few points tie to the rest.
+    pub(super) weak: Vec<WeakGroup>,
+    /// The names of photos that are misplaced.
+    pub(super) misplaced: Vec<String>,
+    /// How many sparse points are contradicted.
+    pub(super) contradicted: usize,
+}
+
+impl Doubtful {
+    /// Of a scene that was opened whole.
+    pub(super) fn of(scene: &Scene) -> Self {
+        Self {
+            weak: scene.reconstruction.weakly_tied(TRUSTED_TIE),
+            misplaced: scene.misplaced(),
+            contradicted: scene.contradicted_points().len(),
+        }
+    }
+
+    /// Says so, and of what becomes of them here; `points` is how many sparse points there are.
+    pub(super) fn say(&self, points: usize, here: &str) {
+        let ties = self.weak.iter().map(tie_text);
+        let misplaced = misplaced_text(&self.misplaced);
+        let contradicted = contradicted_text(self.contradicted, points);
+        for what in ties.chain(misplaced).chain(contradicted) {
+            say!("note: {what}; {here}what draws leaves them out, unless --keep-weak");
+        }
+    }
+}
+
 /// What tells that so many of all sparse points are wrong; `None` of none.
-pub(super) fn contradicted_text(count: usize, points: usize) -> Option<String> {
+fn contradicted_text(count: usize, points: usize) -> Option<String> {
     (count > 0).then(|| {
         format!(
             "{count} of {points} sparse points, which all photos that observe them see behind them, beyond their \
@@ -103,7 +133,7 @@ pub(super) fn contradicted_text(count: usize, points: usize) -> Option<String> {
 }
 
 /// What tells that these photos are misplaced; `None` of none.
-pub(super) fn misplaced_text(names: &[String]) -> Option<String> {
+fn misplaced_text(names: &[String]) -> Option<String> {
     match names {
         [] => None,
         [name] => Some(format!(
@@ -120,7 +150,7 @@ pub(super) fn misplaced_text(names: &[String]) -> Option<String> {
 }
 
 /// How little ties a group of photos to the rest.
-pub(super) fn tie_text(group: &WeakGroup) -> String {
+fn tie_text(group: &WeakGroup) -> String {
     let (names, points) = (group.names.join(", "), group.shared_points);
     match group.names.len() {
         1 => format!("photo {names} shares only {points} points with the others"),

@@ -26,6 +26,15 @@ pub(super) fn say_unused(command: &str, given: &ArgMatches) {
         let why = "--stress writes no report, and draws by all that there is";
         say_idle(&["device", "output"], is_given, why);
     }
+    // These leave no photo out.
+    let of_all = match command {
+        "export" => Some("all photos and points are exported"),
+        "info" => Some("all photos and points are counted"),
+        _ => None,
+    };
+    if let Some(why) = of_all {
+        say_idle(&["keep_weak"], is_given, why);
+    }
     if command == "proxy" && ["point", "through", "mesh"].into_iter().any(is_given) {
         let why = "a surface that is given by hand rests on no photos";
         say_idle(&["hold_out"], is_given, why);

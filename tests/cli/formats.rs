@@ -271,6 +271,15 @@ fn a_photo_that_is_misplaced_is_named_and_harms_no_others() {
     colmap::write_text(&model, &model_folder).unwrap();
     let info = lumigraph(here, "info wall").ok();
     assert!(info.stderr.contains(named), "{}", info.stderr);
+    // Exported, with it and with the option that changes nothing there.
+    let idle = "note: --keep-weak changes nothing: all photos and points are exported\n";
+    for (more, is_idle) in [("", false), (" --keep-weak", true)] {
+        let line = format!("export wall --format transforms -o t.json{more}");
+        let said = lumigraph(here, &line).ok().stderr;
+        assert!(said.contains(named), "{said}");
+        assert!(said.contains("; exported all the same, though"), "{said}");
+        assert_eq!(said.contains(idle), is_idle, "{said}");
+    }
     // Left out, and used: where it is says nothing of how large the scene is.
     let (without, said) = scored("");
     assert!(
@@ -313,6 +322,11 @@ fn points_that_all_their_photos_contradict_are_left_out() {
     );
     let info = lumigraph(here, "info wall").ok();
     assert!(info.stderr.contains(&named), "{}", info.stderr);
+    for (format, has_points) in [("colmap", true), ("transforms", false)] {
+        let line = format!("export wall --format {format} -o {format}");
+        let said = lumigraph(here, &line).ok().stderr;
+        assert_eq!(said.contains(&named), has_points, "{said}");
+    }
     let (left_out, said) = scored("");
     let note = format!("note: left out, as wrong: {named}");
     assert!(said.contains(&note), "{said}");
