@@ -59,7 +59,7 @@ pub use frame::{Frame, FrameSource, LEVEL_BIAS, Part, ProxyPoint};
 pub use held::{Held, decode_ahead};
 pub use lumigraph::{Lumigraph, SourceView};
 pub use mask::Mask;
-pub use options::{Blend, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips};
+pub use options::{Blend, FieldOptions, MAX_BETA, MAX_CONTRIBUTORS, Method, Resolution, Skips};
 pub use path::{CameraPath, PathFrame};
 pub use photos::{PhotoError, PhotoStore};
 pub use pyramid::{MAX_LEVELS, Pyramid};

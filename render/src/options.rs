@@ -3,7 +3,7 @@
 pub struct FieldOptions {
     /// How many source views share a ray, roughly: Buehler's k. At least 1.
     pub k: usize,
-    /// β/α: radians of angular difference that a doubling of the pixel footprint is worth.
+    /// β/α: radians of angular difference that a doubling of the pixel footprint is worth. At most [`MAX_BETA`].
     pub beta: f64,
     /// The formula for the weights.
     pub blend: Blend,
@@ -17,6 +17,11 @@ pub struct FieldOptions {
 /// At most this many source views contribute to a ray. Large k meet this limit, and weights
 /// jump there: by up to 9 % at k = 16, not at all at k = 5.
 pub const MAX_CONTRIBUTORS: usize = 16;
+
+/// β/α is no more than this, which is far beyond what makes any difference: engines multiply it in 32 bits with
+/// differences of resolution, which are lengths in world units with [`Resolution::Length`], and of what is not finite no
+/// weights follow.
+pub const MAX_BETA: f64 = 1e6;
 
 impl Default for FieldOptions {
     fn default() -> Self {
@@ -53,8 +58,11 @@ impl FieldOptions {
                 self.k
             ));
         }
-        if !(self.beta >= 0.0 && self.beta.is_finite()) {
-            return Err(format!("beta is {}; it must be zero or more", self.beta));
+        if !(self.beta >= 0.0 && self.beta <= MAX_BETA) {
+            return Err(format!(
+                "beta is {}; it must be zero or more, up to {MAX_BETA:e}",
+                self.beta
+            ));
         }
         if !(self.feather >= 0.0 && self.feather <= 0.5) {
             return Err(format!(
@@ -154,4 +162,30 @@ pub enum Method {
 impl Method {
     /// The triangulated field at the default grid.
     pub const TRIANGULATED: Self = Self::Triangulated { cells_across: 32 };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beta_is_what_32_bits_hold() {
+        let check = |beta: f64| {
+            let options = FieldOptions {
+                beta,
+                ..FieldOptions::default()
+            };
+            options.check()
+        };
+        for beta in [0.0, 0.1, MAX_BETA] {
+            assert_eq!(check(beta), Ok(()));
+        }
+        for beta in [-0.1, 1.1e6, 1e39, f64::INFINITY, f64::NAN] {
+            let problem = check(beta).unwrap_err();
+            assert!(
+                problem.ends_with("; it must be zero or more, up to 1e6"),
+                "{problem}"
+            );
+        }
+    }
 }

@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use lumigraph::scene::{DOUBTFUL_PX, Photo, Scene, Warning};
 use render::{
-    Blend, DeviceChoice, EDGE_SAMPLES, FieldOptions, MAX_CONTRIBUTORS, Method, Resolution, Skips,
+    Blend, DeviceChoice, EDGE_SAMPLES, FieldOptions, MAX_BETA, MAX_CONTRIBUTORS, Method,
+    Resolution, Skips,
 };
 
 use std::collections::BTreeSet;
@@ -233,8 +234,8 @@ pub(super) struct FieldArgs {
     /// How many photos share a ray, roughly: Buehler's k
     #[arg(long, default_value_t = 5, value_parser = contributors)]
     k: usize,
-    /// Radians of angular difference that half the resolution is worth: Buehler's β/α
-    #[arg(long, default_value_t = 0.1, value_parser = zero_or_more)]
+    /// Radians of angular difference that half the resolution is worth: Buehler's β/α, up to 1e6
+    #[arg(long, default_value_t = 0.1, value_parser = beta)]
     beta: f64,
 }
 
@@ -479,6 +480,12 @@ fn contributors(text: &str) -> Result<usize, String> {
     count.ok_or_else(|| format!("expected a whole number in 1..={MAX_CONTRIBUTORS}"))
 }
 
+/// Buehler's β/α.
+fn beta(text: &str) -> Result<f64, String> {
+    let beta = zero_or_more(text).ok().filter(|&beta| beta <= MAX_BETA);
+    beta.ok_or_else(|| format!("expected a number, zero or more, up to {MAX_BETA:e}"))
+}
+
 /// A number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     zero_or_more(text)
@@ -542,6 +549,12 @@ mod tests {
                 .all(|bad| max_error(bad).is_err())
         );
         assert!(zero_or_more("-0.1").is_err() && zero_or_more("inf").is_err());
+        assert_eq!((beta("0"), beta("1e6")), (Ok(0.0), Ok(1e6)));
+        assert!(
+            ["-0.1", "1e39", "inf", "nan"]
+                .iter()
+                .all(|bad| beta(bad).is_err())
+        );
         assert_eq!((cells_across("1"), contributors("16")), (Ok(1), Ok(16)));
         assert!(
             ["0", "-1", "x", ""]

@@ -26,6 +26,7 @@ fn usage_errors_exit_with_2() {
         ("evaluate wall --threads 100000", "a whole number in 1..="),
         ("import wall --frames 1 -o out", "a whole number above one"),
         ("evaluate wall --beta -1", "zero or more"),
+        ("evaluate wall --beta 1e39", "zero or more, up to 1e6"),
         ("evaluate wall --proxy sphere", "plane, dominant-plane"),
         ("evaluate wall --every 1", "--every"),
         (

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use hands::Drag;
 use proxy::interior::CellId;
 use render::path::CameraPath;
-use render::{Method, PathFrame};
+use render::{MAX_BETA, Method, PathFrame};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -482,7 +482,7 @@ impl State {
     /// The picture to ask for, if it is another than the one asked for last.
     pub fn wanted(&mut self) -> Option<Request> {
         let view = self.view()?;
-        self.look.options.beta = self.beta / self.alpha.max(1e-6);
+        self.look.options.beta = (self.beta / self.alpha.max(1e-6)).min(MAX_BETA);
         self.look.photo = self.wipe.is_some();
         let is_moving = self.still_s < (STILL_SHARE * self.full_s).clamp(STILL_S, STILL_MOST_S);
         let pointer = self.pointer.filter(|_| self.tells_weights && !is_moving);

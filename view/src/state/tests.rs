@@ -348,6 +348,10 @@ fn weights_and_sliders_reach_the_request() {
     let asked = state.wanted().unwrap();
     assert!((asked.look.options.beta - 0.25).abs() < 1e-12 && asked.look.photo);
     assert_eq!(asked.look.options.check(), Ok(()));
+    // By the command line's greatest and the slider's least, too.
+    (state.alpha, state.beta) = (0.1, render::MAX_BETA);
+    let asked = state.wanted().unwrap();
+    assert_eq!(asked.look.options.check(), Ok(()));
 }
 
 #[test]
