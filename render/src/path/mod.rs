@@ -137,6 +137,17 @@ pub enum PathError {
         /// The time of the one before.
         before: f64,
     },
+    /// Keyframes so soon after one another that the speed between them is none to compute with.
+    #[error(
+        "keyframe {index}: t_s is {apart_s:?} s after that of the one before; keyframes are a nanosecond \
+         apart at least: are the times in seconds?"
+    )]
+    TooSoon {
+        /// Which.
+        index: usize,
+        /// From the one before to it.
+        apart_s: f64,
+    },
     /// Nothing lies between two different cameras.
     #[error(
         "keyframe {index}: its camera is {} {} × {}, that of keyframe 0 is {} {} × {}; \
@@ -176,6 +187,9 @@ pub enum PathError {
         frames: f64,
     },
 }
+
+/// Keyframes are so far apart at least, in seconds: how far poses are apart is divided by it.
+const LEAST_APART_S: f64 = 1e-9;
 
 /// More frames than this are taken for a slip of units.
 pub const MAX_FRAMES: usize = 1_000_000;
@@ -299,8 +313,8 @@ impl CameraPath {
     /// the path otherwise. A frame at a keyframe's time has its pose (see [`PathFrame::new`]).
     ///
     /// # Errors
-    /// No keyframes; times not increasing; cameras unusable or of different model or size; some
-    /// with a time of the scene's and some without; more than [`MAX_FRAMES`].
+    /// No keyframes; times not increasing, or by less than a nanosecond; cameras unusable or of different model or
+    /// size; some with a time of the scene's and some without; more than [`MAX_FRAMES`].
     pub fn from_keyframes(
         keyframes: &[Keyframe],
         interpolation: Interpolation,
@@ -379,6 +393,10 @@ fn check_keyframes(keyframes: &[Keyframe]) -> Result<(), PathError> {
                 t_s: keyframe.t_s,
                 before,
             });
+        }
+        let apart_s = keyframe.t_s - before;
+        if apart_s < LEAST_APART_S {
+            return Err(PathError::TooSoon { index, apart_s });
         }
         let (found, first) = (
             model_and_size(&keyframe.camera),

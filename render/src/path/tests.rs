@@ -387,6 +387,12 @@ fn bad_keyframes_are_named() {
         error(&[still(1.0), still(1.0)], 30.0),
         "keyframe 1: t_s is 1, not after the 1 of the one before"
     );
+    // Speeds are not finite there.
+    assert_eq!(
+        error(&[still(0.0), key(1e-310, DVec3::X, 0.1), still(1.0)], 30.0),
+        "keyframe 1: t_s is 1e-310 s after that of the one before; keyframes are a nanosecond apart at least: \
+         are the times in seconds?"
+    );
     let mut wide = still(2.0);
     wide.camera.width = 65;
     assert_eq!(
