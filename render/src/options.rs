@@ -115,12 +115,12 @@ pub enum Blend {
 /// What a source view's lack of resolution is measured by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
-    /// The ratio of pixel footprints on the proxy, less one. With equal focal lengths it
-    /// is [`Self::Distance`].
+    /// The ratio of pixel footprints on the proxy, less one, or 0 where that is less. With equal focal lengths it
+    /// is [`Self::Distance`]. The desired view's focal length counts up to the longest of the source views'.
     Footprint,
-    /// |p − c|/|p − d| − 1.
+    /// max(0, |p − c|/|p − d| − 1).
     Distance,
-    /// |p − c| − |p − d| in world units: Buehler 2001, §4.1, literally.
+    /// max(0, |p − c| − |p − d|) in world units: Buehler 2001, §4.1, literally.
     Length,
 }
 

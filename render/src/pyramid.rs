@@ -6,8 +6,8 @@ use std::fmt;
 
 /// A decoded photo and its mip levels.
 ///
-/// Texel (i, j) of level l covers pixels i·2ˡ…(i+1)·2ˡ of the photo exactly, whatever its
-/// size; what would lie outside repeats the border. Colour is premultiplied by alpha.
+/// Texel (i, j) of level l covers pixels i·2ˡ…(i+1)·2ˡ of the photo exactly, as far as they are within it, whatever
+/// its size. An odd last row or column of each level pairs with itself. Colour is premultiplied by alpha.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Pyramid {
     /// Level 0 is the photo. Those finer than [`Self::finest`] are empty.

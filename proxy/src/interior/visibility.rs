@@ -35,7 +35,8 @@ impl Region {
     };
 
     /// The directions that a view's image shows, in the world: a pinhole's exactly, of other
-    /// lenses a pyramid around them, or all where they reach 90° from the axis.
+    /// lenses a pyramid around them. All where any reaches 87° from the axis, as a pyramid around such has hardly
+    /// fewer in front, and none behind.
     pub fn of(view: &View) -> Self {
         /// Pixels of each side of the image that are asked about.
         const STEPS: u32 = 32;
