@@ -194,7 +194,11 @@ fn with_moved(mut map: FacetMap, moved: Vec<Vec<Moved>>) -> FacetMap {
         for moved in row {
             map.seers.note((moved.x, y), moved.source_idx);
             map.tiles.mix(moved.x, y);
-            map.facet_of[y * width + moved.x] = map.planes.len() as u32;
+            let at = y * width + moved.x;
+            // It may move twice.
+            let before = map.shift_px(map.facet_of[at]);
+            map.shifts_px.push(before.max(moved.shift_px));
+            map.facet_of[at] = map.planes.len() as u32;
             map.planes.push(moved.plane);
         }
     }
@@ -207,6 +211,15 @@ struct Moved {
     plane: DVec3,
     /// The first source view that has it.
     source_idx: u32,
+    /// How far apart that has it from where it was, in pixels of the desired view: by so much it is a guess.
+    shift_px: f32,
+}
+
+/// The angle by which a source view has the point at ray / s apart from that at ray / `to`, in pixels of a desired view.
+fn shift_px(source: &FrameSource, desired: &View, ray: DVec3, s: f64, to: f64) -> f32 {
+    let [a, b] = [s, to].map(|s| from_source(source, ray, s));
+    let angle = a.cross(b).length().atan2(a.dot(b));
+    (desired.lens.mean_focal() * angle) as f32
 }
 
 /// Whether the source view of a guess has all points between some well inside its image.
@@ -349,12 +362,13 @@ fn moved(
                     }
                     let seer = |s: f64| views.first_well(&along, ray, s);
                     let nearest = nearest_seen(s, &mut |s: f64| seer(s).is_some());
-                    if let Some((s, found)) = nearest.and_then(|s| Some((s, seer(s)?))) {
+                    if let Some((to, found)) = nearest.and_then(|to| Some((to, seer(to)?))) {
                         last = found;
                         moved.push(Moved {
                             x,
-                            plane: ray * (s / ray.length_squared()),
+                            plane: ray * (to / ray.length_squared()),
                             source_idx: found as u32,
+                            shift_px: shift_px(&views.sources[found], desired, ray, s, to),
                         });
                     }
                 }

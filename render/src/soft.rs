@@ -84,7 +84,8 @@ fn soften_where(
         0 => x,
         _ => (x + width - beside) % width,
     };
-    let is_guess = |x: usize, y: usize| map.is_moved(map.facet_of[y * width + own(x)]);
+    let shift_px = |x: usize, y: usize| map.shift_px(map.facet_of[y * width + own(x)]);
+    let is_guess = |x: usize, y: usize| shift_px(x, y) > 0.0;
     // 1. How coarse each is to be: where photos contradict each other, and of guesses.
     let longer = width.max(size[1]) as f32;
     let pixels = picture.as_raw().as_chunks::<4>().0;
@@ -114,7 +115,8 @@ fn soften_where(
         let distances = distances.into_iter().chain(std::iter::repeat(0.0));
         let row = far.columns.clone().zip(distances);
         let level = |(x, distance): (usize, f32)| {
-            level(LEVEL_BY_DISTANCE * distance).max(contradicted_at(x, y).unwrap_or(0.0))
+            let of_guess = level(LEVEL_BY_DISTANCE * distance.min(shift_px(x, y)));
+            of_guess.max(contradicted_at(x, y).unwrap_or(0.0))
         };
         row.map(level).collect()
     };

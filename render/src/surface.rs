@@ -39,6 +39,8 @@ pub struct FacetMap {
     pub(crate) tiles: FacetTiles,
     /// From this facet on they are pixels' own, moved to where a photo has or shows them.
     pub(crate) moved_from: u32,
+    /// By how much each of those is a guess, in pixels: how far apart the photo that it was moved to has it from where it was.
+    pub(crate) shifts_px: Vec<f32>,
     /// Which photos have what was moved.
     pub(crate) seers: Seers,
 }
@@ -173,6 +175,12 @@ impl FacetMap {
         facet != NO_FACET && facet >= self.moved_from
     }
 
+    /// By how many pixels a facet is a guess; by none where it was not moved.
+    pub(crate) fn shift_px(&self, facet: u32) -> f32 {
+        let moved = facet.wrapping_sub(self.moved_from) as usize;
+        self.shifts_px.get(moved).copied().unwrap_or(0.0)
+    }
+
     /// Whether any pixel of a rectangle sees a facet.
     pub(crate) fn any_within(&self, least: DVec2, most: DVec2) -> bool {
         let size = self.size.map(|side| side as usize);
@@ -279,6 +287,7 @@ impl FacetMap {
             tiles: FacetTiles::of(&facet_of, desired.width as usize),
             planes,
             facet_of,
+            shifts_px: Vec::new(),
             seers: Seers::default(),
             size: [desired.width, desired.height],
         }

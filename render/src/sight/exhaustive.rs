@@ -37,13 +37,13 @@ fn exhaustive(
                 continue;
             }
             let nearest = nearest_seen(s, &mut |s: f64| first(s, &sees_well).is_some());
-            if let Some(s) = nearest {
-                let source_idx = first(s, &sees_well).unwrap() as u32;
-                let plane = ray * (s / ray.length_squared());
+            if let Some(to) = nearest {
+                let source_idx = first(to, &sees_well).unwrap();
                 moved.push(Moved {
                     x,
-                    plane,
-                    source_idx,
+                    plane: ray * (to / ray.length_squared()),
+                    source_idx: source_idx as u32,
+                    shift_px: shift_px(&sources[source_idx], desired, ray, s, to),
                 });
             }
         }

@@ -3,6 +3,7 @@
 use super::views::Views;
 use super::{
     HALVINGS, Moved, STEPS, beam_of_tile, factor, from_source, look, nearest_tried, sees_well,
+    shift_px,
 };
 use crate::options::MAX_CONTRIBUTORS;
 use crate::photos::PhotoStore;
@@ -83,6 +84,27 @@ impl<'a> Asked<'a> {
         let around = [-within_px, within_px].map(|by| [pixel.x + by, pixel.y + by]);
         let is_beside = left >= SHOWN && map.largest_within(around[0], around[1]) > nearer * s;
         Some((pixel, if is_beside { 0.0 } else { left }))
+    }
+
+    /// By how many pixels of a desired view the point at ray / s is a guess that is shown elsewhere: so far apart who shows
+    /// it has both. Or who is nearest to the viewer, from whom it may be hidden: by as much more as that counts less,
+    /// since it counts the more the nearer it is, and at its own place alone.
+    fn shift_px(&self, desired: &View, ray: DVec3, s: f64, shown: &Shown) -> f32 {
+        let sources = self.views.sources;
+        let shift = |view: usize| shift_px(&sources[view], desired, ray, s, s * shown.times);
+        let mut nearest = self
+            .nearest
+            .iter()
+            .map(|view| *view as usize)
+            .filter(|view| {
+                let source = &sources[*view];
+                source.takes_part() && source.time_penalty == 0.0
+            });
+        let by_nearest = nearest.find_map(|view| {
+            let (_, left) = self.visible(view, ray, s, (0.0, f64::INFINITY))?;
+            Some(shift(view) / left as f32)
+        });
+        by_nearest.unwrap_or(f32::INFINITY).min(shift(shown.view))
     }
 
     /// What one says of the point at ray / s.
@@ -373,6 +395,7 @@ impl Looks<'_> {
             x,
             plane: shown.plane(ray, s),
             source_idx: shown.view as u32,
+            shift_px: asked.shift_px(self.desired, ray, s, &shown),
         })
     }
 }

@@ -8,6 +8,7 @@ use glam::{DQuat, DVec2, DVec3};
 use image::RgbaImage;
 use mesh::meshed;
 use points::lumigraph;
+use proxy::MeshKind;
 use render::{
     DeviceChoice, Engine, FieldOptions, Frame, Lumigraph, Method, Prepared, Softened, Surface, cpu,
     soften,
@@ -113,6 +114,26 @@ fn a_view_at_a_photos_own_pose_has_no_guesses() {
         let (sharp, soft, count) = drawn(&frame(&lumigraph, view));
         assert_eq!((count, soft), (0, sharp));
     }
+}
+
+/// Around what hides something the photo's own distance map may hide its rim from it, too.
+#[test]
+fn nor_has_one_of_what_hides_a_part_of_itself() {
+    let lumigraph = mesh::lumigraph(mesh::pillar(), MeshKind::Mesh);
+    let mut moved_anywhere = 0;
+    for source in &lumigraph.sources {
+        let frame = frame(&lumigraph, &source.view);
+        moved_anywhere += moved(&frame).iter().filter(|is_moved| **is_moved).count();
+        let (sharp, soft, count) = drawn(&frame);
+        assert_eq!((count, soft), (0, sharp), "{}", source.name);
+        // A little aside, what is moved little is a guess by little.
+        let mut beside = source.view.clone();
+        beside.camera_from_world.translation.x += 1e-6;
+        let beside = self::frame(&lumigraph, &beside);
+        let (sharp, soft, _) = drawn(&beside);
+        assert_close(&soft, &sharp, &source.name);
+    }
+    assert!(moved_anywhere > 0);
 }
 
 /// What an engine makes of a picture.
