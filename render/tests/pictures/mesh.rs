@@ -101,6 +101,13 @@ pub(crate) fn lumigraph(mesh: Mesh, kind: MeshKind) -> Lumigraph {
     lumigraph_of(&solid, |view| photo(&solid, view))
 }
 
+/// The same from the first so many of its cameras.
+pub(crate) fn lumigraph_of_few(mesh: Mesh, kind: MeshKind, count: usize) -> Lumigraph {
+    let solid = Arc::new(Solid::new(kind, mesh));
+    let few = views().into_iter().take(count).collect();
+    lumigraph_from(&solid, few, |view| photo(&solid, view))
+}
+
 fn lumigraph_of(solid: &Arc<Solid>, photo: impl Fn(&View) -> RgbaImage) -> Lumigraph {
     lumigraph_from(solid, views(), photo)
 }
