@@ -3,6 +3,7 @@
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use std::num::NonZero;
 
 /// How many neighbours decide whether a point stands alone.
@@ -122,6 +123,22 @@ pub fn geometric_median(points: &[DVec3]) -> DVec3 {
         at = next;
     }
     at
+}
+
+/// The [`geometric_median`], the same in whatever order points come; `None` without any.
+pub(crate) fn middle(mut points: Vec<DVec3>) -> Option<DVec3> {
+    points.sort_by(by_coordinates);
+    // From one of them, so that far from the world's origin no digits are lost.
+    let origin = *points.get(points.len() / 2)?;
+    points.iter_mut().for_each(|p| *p -= origin);
+    let place = origin + geometric_median(&points);
+    Some(if place.is_finite() { place } else { origin })
+}
+
+/// By x, then by y, then by z.
+pub(crate) fn by_coordinates(a: &DVec3, b: &DVec3) -> Ordering {
+    let plan = a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+    plan.then(a.z.total_cmp(&b.z))
 }
 
 /// The middle value (the upper of two). The slice must not be empty.

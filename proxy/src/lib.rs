@@ -18,6 +18,7 @@ mod glb;
 pub mod hull;
 pub mod interior;
 pub mod mesh;
+mod order;
 mod plane;
 mod planes;
 pub mod points;

@@ -4,6 +4,7 @@
 use crate::Plane;
 use crate::cloud::median;
 use crate::condition::thinnest;
+use crate::order::spread_over;
 use calibrate::View;
 use glam::DVec3;
 
@@ -27,10 +28,11 @@ const WIDTH: f64 = 0.1;
 /// these has three such points with a chance of 98 %, and triples of near points are tried
 /// more often than chance would.
 const TRIALS: usize = 4000;
-/// Points that judge each plane, at most.
+/// Points that judge each plane tried, at most; all judge the one that is found.
 const JUDGES: usize = 2000;
 
-/// The ground, its normal upwards; `None` where there is no such plane.
+/// The ground, its normal upwards; `None` where there is no such plane. The points stand in their
+/// [own order](crate::order::in_own_order).
 pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<Plane> {
     let up = views.iter().map(View::up).sum::<DVec3>() / views.len().max(1) as f64;
     if up.length() < COMMON_UP || points.len() < FEWEST {
@@ -38,8 +40,7 @@ pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<
     }
     let up = up.normalize();
     let thickness = THICKNESS * median(points.iter().map(|p| p.distance(center)).collect());
-    let every = points.len().div_ceil(JUDGES);
-    let judges: Vec<DVec3> = points.iter().step_by(every).copied().collect();
+    let judges = spread_over(points, JUDGES);
 
     // 1. The plane through three points that most others lie on.
     let mut random = Random(0x1234_5678);
@@ -71,7 +72,7 @@ pub(super) fn ground(views: &[View], points: &[DVec3], center: DVec3) -> Option<
             return None;
         }
     }
-    judge(&plane, up, views, &judges, thickness).map(|_| plane)
+    judge(&plane, up, views, points, thickness).map(|_| plane)
 }
 
 fn upwards(normal: DVec3, up: DVec3) -> DVec3 {

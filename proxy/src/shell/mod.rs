@@ -2,7 +2,8 @@
 
 mod ground;
 
-use crate::cloud::{geometric_median, isolated_points, median};
+use crate::cloud::{isolated_points, median, middle};
+use crate::order::in_own_order;
 use crate::{Mesh, Plane, SparsePoint};
 use calibrate::{View, outer, principal_axes};
 use glam::{DMat3, DVec3};
@@ -54,7 +55,7 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Of what is finite among cameras and points.
+    /// Of what is finite among cameras and points, in whatever order these come.
     pub(crate) fn of(views: &[View], points: impl Iterator<Item = DVec3>) -> Self {
         // 1. The cameras' middle.
         let finite = |v: &&View| v.center().is_finite();
@@ -62,7 +63,8 @@ impl Surroundings {
         let points: Vec<DVec3> = points.filter(|p| p.is_finite()).collect();
         let isolated = isolated_points(&points);
         let kept = points.iter().zip(&isolated).filter(|(_, alone)| !**alone);
-        let points: Vec<DVec3> = kept.map(|(p, _)| *p).collect();
+        let kept: Vec<DVec3> = kept.map(|(p, _)| *p).collect();
+        let points = in_own_order(&kept);
         let centers: Vec<DVec3> = views.iter().map(View::center).collect();
         let of = if centers.is_empty() {
             &points
@@ -149,19 +151,6 @@ impl Surroundings {
     }
 }
 
-/// The geometric median, the same in whatever order points come; `None` without any.
-fn middle(mut points: Vec<DVec3>) -> Option<DVec3> {
-    points.sort_by(|a, b| {
-        let plan = a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
-        plan.then(a.z.total_cmp(&b.z))
-    });
-    // From one of them, so that far from the world's origin no digits are lost.
-    let origin = *points.get(points.len() / 2)?;
-    points.iter_mut().for_each(|p| *p -= origin);
-    let place = origin + geometric_median(&points);
-    Some(if place.is_finite() { place } else { origin })
-}
-
 /// Principal axes of the directions from a place to points, as columns, the longest first and right-handed;
 /// the first two have the directions' mean on their side. Of directions, as a few far points would have it all
 /// their way.
@@ -229,4 +218,49 @@ fn icosphere(splits: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         triangles = split;
     }
     (directions, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::order::tests::in_other_orders;
+    use calibrate::{Lens, Rigid3};
+    use glam::DVec2;
+
+    /// Every other point is on the ground: one in two of them, by their places in the list, would be all or none.
+    #[test]
+    fn the_order_of_points_decides_neither_the_ground_nor_the_rest() {
+        let view = |i: u32| {
+            let (sin, cos) = (0.7 * f64::from(i)).sin_cos();
+            let center = DVec3::new(4.0 * cos, 4.0 * sin, 1.6);
+            View {
+                lens: Lens::pinhole(DVec2::splat(100.0), DVec2::splat(50.0)),
+                width: 100,
+                height: 100,
+                camera_from_world: Rigid3::looking_at(center, DVec3::Z, DVec3::Z),
+            }
+        };
+        let views: Vec<View> = (0..9).map(view).collect();
+        let part = |i: u32, factor: f64| (f64::from(i) * factor).fract();
+        let point = |i: u32| {
+            let across = [part(i, 0.754_877_666), part(i, 0.569_840_291)];
+            let [x, y] = across.map(|share| 6.0 * share - 3.0);
+            let above = 0.2 + 2.0 * part(i * i, 0.618_033_989);
+            DVec3::new(x, y, if i % 2 == 0 { 0.0 } else { above })
+        };
+        let points: Vec<DVec3> = (0..3000).map(point).collect();
+        let expected = Surroundings::of(&views, points.iter().copied());
+        let ground = expected.ground.unwrap();
+        assert!(ground.normal().distance(DVec3::Z) < 1e-6, "{ground:?}");
+        assert!(ground.signed_distance(DVec3::ZERO).abs() < 1e-6);
+        for other in in_other_orders(&points) {
+            let found = Surroundings::of(&views, other.into_iter());
+            assert_eq!(found.ground, expected.ground);
+            assert_eq!(found.axes, expected.axes);
+            assert_eq!(
+                (found.center, found.radius),
+                (expected.center, expected.radius)
+            );
+        }
+    }
 }
