@@ -4,6 +4,7 @@ use super::direction::{guesses, principal_direction};
 use super::fitting::{Fitting, TOLERANCES};
 use super::{ON_WALL, Tunnel, TunnelError};
 use crate::cloud::median;
+use crate::order::{in_own_order, spread_over};
 use calibrate::View;
 use glam::{DMat3, DVec3};
 
@@ -12,7 +13,7 @@ const LEAST_POINTS: usize = 12;
 /// Points farther from the cameras' middle than this many times the median are left out; cameras where
 /// they are that much farther than both points and cameras are.
 const FAR: f64 = 100.0;
-/// So many points, spread over the list, decide about guesses.
+/// So many points, spread over all, try guesses.
 const SAMPLE: usize = 1200;
 /// A path tells the direction when it is this long (standard deviation, shares of the size).
 const WALK: f64 = 0.5;
@@ -23,7 +24,7 @@ const FLAT: f64 = 1e-6;
 ///
 /// Points and cameras that are not finite, and points far from everything, do not count.
 /// Only `share_on_walls`, or [`Tunnel::is_hallway`], tells whether the scene is one: points
-/// in any arrangement get the box that fits them best.
+/// in any arrangement get the box that fits them best, whatever their order.
 ///
 /// # Errors
 /// No camera; too few points, or all of them on a line.
@@ -54,6 +55,7 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
             expected: LEAST_POINTS,
         });
     }
+    let points = in_own_order(&points);
 
     // 2. Its size: points lie half of it from the path.
     let guesses = guesses(&posed, &centers, &points);
@@ -63,9 +65,8 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
         return Err(TunnelError::NoWalls);
     }
 
-    // 3. The best box for each guess, roughly; then the best three in all detail.
-    let stride = points.len().div_ceil(SAMPLE);
-    let few: Vec<DVec3> = points.iter().step_by(stride).copied().collect();
+    // 3. The best box for each guess, roughly; then the best three in all detail, of which all points tell the best.
+    let few = spread_over(&points, SAMPLE);
     let path = principal_direction(&centers)
         .filter(|(_, spread)| *spread > WALK * size)
         .map(|(path, _)| path);
@@ -81,11 +82,14 @@ pub fn fit(views: &[View], points_in_world: &[DVec3]) -> Result<Tunnel, TunnelEr
     let mut fits: Vec<(f64, Fitting)> = fits
         .into_iter()
         .take(3)
-        .map(|(_, f)| f.in_detail())
+        .map(|(_, fitting)| {
+            let mut fitting = fitting.in_detail();
+            fitting.points = &points;
+            (fitting.cost(), fitting)
+        })
         .collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best = fits.swap_remove(0).1;
-    best.points = &points;
     best.size = 0.5 * ((best.max.x - best.min.x) + (best.max.y - best.min.y));
     for tolerance in &TOLERANCES[2..] {
         best.tolerance = *tolerance;

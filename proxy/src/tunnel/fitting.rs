@@ -147,14 +147,14 @@ impl<'a> Fitting<'a> {
         points.iter().map(of_point).sum()
     }
 
-    /// From coarse to fine; with what it costs in the end.
-    pub(super) fn in_detail(mut self) -> (f64, Self) {
+    /// From coarse to fine.
+    pub(super) fn in_detail(mut self) -> Self {
         for tolerance in TOLERANCES {
             self.tolerance = tolerance;
             self.search();
             self.refine();
         }
-        (self.cost(), self)
+        self
     }
 
     /// What a point outside costs more, by how far `inside` of the nearest walls it is, in

@@ -1,4 +1,5 @@
 use super::*;
+use crate::order::tests::in_other_orders;
 use calibrate::colmap::read_model;
 use calibrate::{Reconstruction, View};
 use proptest::prelude::*;
@@ -128,6 +129,24 @@ fn noise_and_mismatches_hardly_move_it() {
     println!("{errors:.5?}");
     assert!(errors.iter().all(|e| *e < 0.02), "{errors:?}");
     assert!(tunnel.is_hallway(), "{tunnel:?}");
+}
+
+/// Every other point is on a wall: one in two of them, by their places in the list, would be all or none.
+#[test]
+fn the_order_of_points_changes_nothing() {
+    let (views, walls) = hallway();
+    let noise = |i: usize, k: usize| ((i * 37 + k * 101) as f64 * 0.754_877_666).fract() - 0.5;
+    let furnished = |(i, wall): (usize, &DVec3)| {
+        let aside = DVec3::new(noise(i, 0), noise(i, 1), noise(i, 2));
+        [*wall, 0.6 * *wall + aside]
+    };
+    let some = walls.iter().step_by(3).enumerate();
+    let points: Vec<DVec3> = some.flat_map(furnished).collect();
+    assert!((1201..2400).contains(&points.len()), "{}", points.len());
+    let expected = fit(&views, &points).unwrap();
+    for other in in_other_orders(&points) {
+        assert_eq!(fit(&views, &other), Ok(expected));
+    }
 }
 
 /// Most photos are a panorama of a tripod's, where the walk begins.
