@@ -3,7 +3,7 @@
 use super::session::spinner;
 use calibrate::exposure::{Evidence, Verdict};
 use clap::Args;
-use lumigraph::scene::Scene;
+use lumigraph::scene::{Matched, Scene};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -52,6 +52,20 @@ impl ExposureArgs {
     /// Gives the scene's photos the gains to draw with: its own if it has been written
     /// with some that rest on none of the photos in `without`, else new ones.
     pub(super) fn choose(&self, scene: &mut Scene, without: &BTreeSet<String>) -> ExposureUsed {
+        self.choose_by(scene, without, |scene| scene.match_exposure(without))
+    }
+
+    /// The same for a scene that is to be written: what draws leaves out, unless asked to keep it, has no say.
+    pub(super) fn choose_to_write(&self, scene: &mut Scene) -> ExposureUsed {
+        self.choose_by(scene, &BTreeSet::new(), Scene::match_exposure_by_trusted)
+    }
+
+    fn choose_by(
+        &self,
+        scene: &mut Scene,
+        without: &BTreeSet<String>,
+        matching: impl FnOnce(&mut Scene) -> Matched,
+    ) -> ExposureUsed {
         let start = Instant::now();
         let mut left_out = BTreeMap::new();
         let how = if self.no_exposure {
@@ -61,7 +75,7 @@ impl ExposureArgs {
             How::Stored
         } else {
             let bar = spinner("matching exposures");
-            let matched = scene.match_exposure(without);
+            let matched = matching(scene);
             bar.finish_and_clear();
             left_out = matched.left_out;
             How::Matched(matched.verdict)

@@ -237,7 +237,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             photo.time_s = Some(*time_s);
         }
     }
-    let exposure = args.exposure.choose(&mut scene, &BTreeSet::new());
+    let exposure = args.exposure.choose_to_write(&mut scene);
     // The scene keeps them: what is made of it may do without, or of their depth maps alone.
     for damaged in &exposure.left_out {
         say!("note: for matching exposures, {}", left_out_text(damaged));

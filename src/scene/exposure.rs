@@ -58,6 +58,41 @@ impl Scene {
         }
     }
 
+    /// The same for a scene that is to be written, by what draws alone: photos whose places are unsure, those that are
+    /// [misplaced](Self::misplaced), and points that all theirs contradict have no say. Such photos have gains, too, for whoever
+    /// uses them: relative to the others, as matching all of them has it.
+    pub fn match_exposure_by_trusted(&mut self) -> Matched {
+        let without = BTreeSet::new();
+        let mut trusted = self.clone();
+        trusted.drop_weak();
+        trusted.drop_misplaced();
+        trusted.drop_contradicted();
+        let mut matched = trusted.match_exposure(&without);
+        let known = trusted.photos.iter();
+        let known = known.filter_map(|photo| Some((photo.name.clone(), photo.gain?)));
+        let known: BTreeMap<String, [f64; 3]> = known.collect();
+        let better = |photo: &Photo| known.get(&photo.name).copied();
+
+        let has_others = trusted.photos.len() < self.photos.len();
+        if has_others && matches!(matched.verdict, Verdict::Matched(_)) {
+            let whole = self.match_exposure(&without);
+            matched.left_out.extend(whole.left_out);
+            let better: Vec<Option<[f64; 3]>> = self.photos.iter().map(better).collect();
+            let all = self.photos.iter().map(|p| p.gain.unwrap_or([1.0; 3]));
+            let all: Vec<[f64; 3]> = all.collect();
+            let gains = exposure::completed(&better, &all);
+            for (photo, gain) in self.photos.iter_mut().zip(gains) {
+                photo.gain = Some(gain);
+            }
+        } else {
+            for photo in &mut self.photos {
+                photo.gain = better(photo);
+            }
+        }
+        self.exposure = trusted.exposure;
+        matched
+    }
+
     /// A photo's pixels, transparent where its matte or its ignore mask says so.
     fn what_counts(&self, photo: &Photo, image: &Image) -> Result<RgbaImage, CaptureError> {
         let camera = &self.reconstruction.cameras[&image.camera_id];

@@ -1,6 +1,7 @@
 //! Photos of different exposures.
 
 use crate::run::{files, lumigraph, with_wall};
+use calibrate::colmap;
 use serde_json::Value;
 use std::path::Path;
 
@@ -93,6 +94,45 @@ fn known_gains_are_found_and_seams_go() {
     drawn("-o all");
     drawn("--no-exposure -o all-unmatched");
     assert!(files(&folder.path().join("all")) == files(&folder.path().join("all-unmatched")));
+}
+
+/// What draws leaves it out, so it has no say in the others' gains; but it has one.
+#[test]
+fn a_misplaced_photo_has_no_say_in_the_gains_of_a_scene_either() {
+    let folder = with_wall();
+    let here = folder.path();
+    expose(here, |_| [DIM; 3]);
+    expose(here, gain);
+    let model_folder = here.join("wall/sparse/0");
+    let mut model = colmap::read_model(&model_folder).unwrap();
+    let mut images = model.images.values_mut();
+    let stray = images.find(|image| image.name == "0003.png").unwrap();
+    stray.camera_from_world.translation.x += 3.0;
+    std::fs::remove_dir_all(&model_folder).unwrap();
+    colmap::write_text(&model, &model_folder).unwrap();
+    lumigraph(here, "import wall -o scene").ok();
+    let drawn = |scene: &str| {
+        let line = format!(
+            "render {scene} --proxy plane --path orbit --frames 2 --size 48x36 --json -o {scene}-drawn"
+        );
+        let ran = lumigraph(here, &line).ok();
+        let left_out = "left out, as misplaced: photo 0003.png";
+        assert!(ran.stderr.contains(left_out), "{}", ran.stderr);
+        let range = ran.json()["exposure"]["range"].clone();
+        serde_json::from_value::<[f64; 2]>(range).unwrap()
+    };
+    let (capture, scene) = (drawn("wall"), drawn("scene"));
+    let off = [0, 1].map(|k| (capture[k] - scene[k]).abs());
+    assert!(off[0].max(off[1]) < 1e-9, "{capture:?} {scene:?}");
+    assert!(files(&here.join("wall-drawn")) == files(&here.join("scene-drawn")));
+    // Its own follows from the others'.
+    let found = gains(here);
+    let log = |i: usize, c: usize| (found[i].unwrap()[c] / gain(i)[c]).ln();
+    for c in 0..3 {
+        let others = (0..9).filter(|&i| i != 3).map(|i| log(i, c));
+        let mean = others.sum::<f64>() / 8.0;
+        assert!((log(3, c) - mean).abs() < 0.05, "{c}: {found:?}");
+    }
 }
 
 #[test]

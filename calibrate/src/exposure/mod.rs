@@ -10,12 +10,14 @@
 //! 2. [`estimate`] solves for the gains, robustly, and says whether they can be told from
 //!    none at all.
 
+mod completed;
 mod estimate;
 mod halves;
 mod sample;
 mod solve;
 mod ties;
 
+pub use completed::completed;
 pub use estimate::{Evidence, Exposure, MIN_SPREAD, Verdict, estimate};
 pub use sample::{Patch, Patches, patches, sample, sample_all};
 
