@@ -91,6 +91,11 @@ const MAX_CANDIDATES: usize = 20_000;
 /// Times nearer than this part of the mean time from photo to photo are nearly the same: those of a rig's
 /// cameras, or of a burst.
 const NEARLY_AT_ONCE: f64 = 0.1;
+/// Lags that differ by less than this part of the whole time are the same. Those of photos at even steps lie on borders
+/// of bins, or half a period from others: rounding, which goes by when times are counted from, would deal them.
+const SAME: f64 = 1.0 / (1 << 20) as f64;
+/// Lags are rounded to this part of that, so that the same ones are in one order.
+const ROUNDED: f64 = 1.0 / 16.0;
 /// How often times are dealt at random: one chance in 20 of finding a period in nothing.
 const DEALS: u64 = 19;
 /// A period explains at least this much.
@@ -111,8 +116,8 @@ struct Pair {
 /// The period that best explains how the photos differ.
 ///
 /// It lies between twice the typical time from photo to photo and half the whole time; the
-/// order of the photos does not matter. Photos taken nearly at once count as one for what is
-/// typical. No more than 20,000 periods are tried, from the longest on at even steps of frequency:
+/// order of the photos does not matter, nor when times are counted from. Photos taken nearly at
+/// once count as one for what is typical. No more than 20,000 periods are tried, from the longest on at even steps of frequency:
 /// of photos that follow each other very much more quickly than the whole time is long, the
 /// shortest periods are left out.
 ///
@@ -131,13 +136,14 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
         frequencies_hz: candidates,
         step_hz,
     } = candidates(&times_s)?;
+    let same_s = SAME * (times_s[times_s.len() - 1] - times_s[0]);
 
     // 2. How photos from nearby differ.
     let pairs = near_pairs(&sorted);
 
     // 3. The best of all candidates, and of as many for times that mean nothing.
     let scores = |times_s: &[f64]| -> Vec<f64> {
-        let lags = lags(&pairs, times_s);
+        let lags = lags(&pairs, times_s, same_s);
         let explained = |&hz: &f64| explained(&lags, hz, MIN_IN_BIN);
         candidates.iter().map(explained).collect()
     };
@@ -165,7 +171,7 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
     }
 
     // 4. Between the candidates around it.
-    let lags = lags(&pairs, &times_s);
+    let lags = lags(&pairs, &times_s, same_s);
     let found = refined(&lags, candidates[at], step_hz, MIN_IN_BIN);
 
     // 5. A multiple of it may not have filled all bins, and so have had no score.
@@ -237,7 +243,8 @@ fn candidates(times_s: &[f64]) -> Result<Candidates, PeriodError> {
 
     // 3. At even steps of frequency, the longest periods first.
     let step_hz = 1.0 / (OVERSAMPLING * span_s);
-    let count = ((1.0 / shortest_s - 1.0 / longest_s) / step_hz) as usize + 1;
+    // Of even steps a whole number, whatever rounding makes of it.
+    let count = ((1.0 / shortest_s - 1.0 / longest_s) / step_hz * (1.0 + SAME)) as usize + 1;
     let frequency_hz = |i: usize| 1.0 / longest_s + step_hz * i as f64;
     Ok(Candidates {
         frequencies_hz: (0..count.min(MAX_CANDIDATES)).map(frequency_hz).collect(),
@@ -316,12 +323,16 @@ struct Lags {
     pairs: Vec<(f64, f64)>,
     /// The sum of the differences before each pair, and of all.
     sums: Vec<f64>,
+    /// By how many seconds lags may differ and be the same.
+    same_s: f64,
 }
 
-fn lags(pairs: &[Pair], times_s: &[f64]) -> Lags {
+fn lags(pairs: &[Pair], times_s: &[f64], same_s: f64) -> Lags {
+    let step_s = ROUNDED * same_s;
     let lag = |pair: &Pair| {
         let [i, j] = pair.photos;
-        ((times_s[i] - times_s[j]).abs(), pair.difference)
+        let steps = ((times_s[i] - times_s[j]).abs() / step_s).round();
+        (steps * step_s, pair.difference)
     };
     let mut pairs: Vec<(f64, f64)> = pairs.iter().map(lag).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -330,7 +341,11 @@ fn lags(pairs: &[Pair], times_s: &[f64]) -> Lags {
         *sum += difference;
         Some(*sum)
     }));
-    Lags { pairs, sums }
+    Lags {
+        pairs,
+        sums,
+        same_s,
+    }
 }
 
 /// Some differences: their sum and how many they are.
@@ -351,25 +366,26 @@ fn mean((sum, count): Bin) -> f64 {
 /// Nothing where a bin has fewer than `least_in_bin` pairs, or all bins together too few.
 fn explained(lags: &Lags, hz: f64, least_in_bin: usize) -> f64 {
     let half_s = 0.5 / hz;
+    let same_s = lags.same_s;
     let longest_s = lags.pairs.last().map_or(0.0, |pair| pair.0);
     let mut bins = [(0.0, 0_usize); BINS];
     let mut squares = 0.0;
     let mut sum = 0.0;
     let (mut from, mut to) = (0, 0);
     for &(lag_s, difference) in &lags.pairs {
-        if lag_s < half_s || lag_s + half_s > longest_s {
+        if lag_s < half_s - same_s || lag_s + half_s > longest_s + same_s {
             continue;
         }
-        while lags.pairs[from].0 < lag_s - half_s {
+        while lags.pairs[from].0 < lag_s - half_s - same_s {
             from += 1;
         }
-        while to < lags.pairs.len() && lags.pairs[to].0 <= lag_s + half_s {
+        while to < lags.pairs.len() && lags.pairs[to].0 <= lag_s + half_s + same_s {
             to += 1;
         }
         let off = difference - mean((lags.sums[to] - lags.sums[from], to - from));
         let turns = lag_s * hz;
         let apart = (turns - turns.round()).abs();
-        let bin = ((2.0 * BINS as f64 * apart) as usize).min(BINS - 1);
+        let bin = ((2.0 * BINS as f64 * (apart + same_s * hz)) as usize).min(BINS - 1);
         bins[bin].0 += off;
         bins[bin].1 += 1;
         sum += difference;

@@ -82,6 +82,28 @@ fn the_order_of_photos_and_the_origin_of_time_do_not_matter() {
     assert!((later.period_s / found.period_s - 1.0).abs() < 1e-3);
 }
 
+/// Of photos at even steps lags lie on the borders of bins, where rounding dealt them.
+#[test]
+fn lags_on_borders_are_not_dealt_by_rounding() {
+    for (count, period_s) in [(33, 1.37), (65, 0.61), (100, 2.0)] {
+        let shots = photos(&every(0.2, count), running_light(period_s));
+        let found = find_period(&shots).unwrap();
+        for (zero_s, nearly) in [
+            (64.0, 1e-9),
+            (512.0, 1e-9),
+            (-4096.0, 1e-9),
+            (2f64.powi(30), 1e-6),
+        ] {
+            let mut later = shots.clone();
+            later.iter_mut().for_each(|s| s.time_s += zero_s);
+            let later = find_period(&later).unwrap();
+            let off = (later.period_s / found.period_s - 1.0).abs();
+            assert!(off < nearly, "{count} from {zero_s} s: {found:?} {later:?}");
+            assert!((later.explained - found.explained).abs() < 1e-9, "{count}");
+        }
+    }
+}
+
 /// A third of it explains something, and the photos hardly reach over three turns.
 #[test]
 fn a_part_of_a_period_is_not_taken_for_it() {
