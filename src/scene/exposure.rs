@@ -2,8 +2,8 @@
 
 use super::file::{ExposureEntry, Extra};
 use super::{Photo, Scene};
-use calibrate::Image;
 use calibrate::exposure::{self, Verdict};
+use calibrate::{Image, TRUSTED_TIE};
 use capture::{CaptureError, apply_matte};
 use image::RgbaImage;
 use std::collections::{BTreeMap, BTreeSet};
@@ -63,6 +63,11 @@ impl Scene {
     /// uses them: relative to the others, as matching all of them has it.
     pub fn match_exposure_by_trusted(&mut self) -> Matched {
         let without = BTreeSet::new();
+        let tied = self.reconstruction.weakly_tied(TRUSTED_TIE);
+        if tied.is_empty() && self.misplaced().is_empty() && self.contradicted_points().is_empty() {
+            // A model may be large.
+            return self.match_exposure(&without);
+        }
         let mut trusted = self.clone();
         trusted.drop_weak();
         trusted.drop_misplaced();

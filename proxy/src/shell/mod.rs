@@ -246,7 +246,7 @@ mod tests {
             let across = [part(i, 0.754_877_666), part(i, 0.569_840_291)];
             let [x, y] = across.map(|share| 6.0 * share - 3.0);
             let above = 0.2 + 2.0 * part(i * i, 0.618_033_989);
-            DVec3::new(x, y, if i % 2 == 0 { 0.0 } else { above })
+            DVec3::new(x, y, if i.is_multiple_of(2) { 0.0 } else { above })
         };
         let points: Vec<DVec3> = (0..3000).map(point).collect();
         let expected = Surroundings::of(&views, points.iter().copied());
