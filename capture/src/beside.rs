@@ -260,6 +260,21 @@ pub fn apply_matte(photo: &mut RgbaImage, matte: &GrayImage) {
     }
 }
 
+/// Gives a picture that was resampled the colours of `usable`, the same resampled with what is to be ignored transparent:
+/// nothing of that bleeds into what is used. Where nothing usable is, and in alpha, the picture stays.
+///
+/// # Panics
+/// If the sizes differ.
+pub fn take_usable_colors(picture: &mut RgbaImage, usable: &RgbaImage) {
+    assert_eq!(picture.dimensions(), usable.dimensions());
+    for (pixel, usable) in picture.pixels_mut().zip(usable.pixels()) {
+        let [r, g, b, alpha] = usable.0;
+        if alpha > 0 {
+            pixel.0 = [r, g, b, pixel.0[3]];
+        }
+    }
+}
+
 /// Depth at each pixel's centre: along the camera's z axis, or along the pixel's ray where the photo reaches
 /// behind the camera (`calibrate::DepthAlong`).
 #[derive(Clone, Debug, PartialEq)]

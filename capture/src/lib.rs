@@ -30,7 +30,7 @@ pub use argument::as_argument;
 pub use beside::{
     Beside, DepthMap, Matched, apply_matte, check_beside, decode_depth, decode_depth_steps,
     decode_mask, is_black_and_white, is_in_alpha, match_by_name, match_jpegs_by_name,
-    match_others_by_name,
+    match_others_by_name, take_usable_colors,
 };
 pub use decode::{content_size, decode, decode_content, decode_reduced, photo_size};
 pub use error::CaptureError;

@@ -6,8 +6,8 @@ use super::{Photo, Scene, SceneError, Warning, picture_files};
 use calibrate::undistort::{Undistortion, undistort};
 use calibrate::{Camera, DepthAlong, Lens, Pixel};
 use capture::{
-    Beside, CaptureError, Footprint, Kernel, copy_photo, decode_depth_steps, warp,
-    warp_depth_steps, write_depth_steps, write_mask, write_png,
+    Beside, CaptureError, Footprint, Kernel, apply_matte, copy_photo, decode_depth_steps,
+    take_usable_colors, warp, warp_depth_steps, write_depth_steps, write_mask, write_png,
 };
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
 use rayon::prelude::*;
@@ -34,8 +34,8 @@ impl Scene {
     /// `masks/NAME.png`, `mattes/NAME.png` and `silhouettes/NAME.png`, and depth maps by their nearest pixels, as
     /// `depth/NAME.png` in the same steps: the optical axis stays, and with it depth along z; that
     /// along rays becomes it.
-    /// Where a photo does not fill its picture, that is ignored. `progress` is called after
-    /// each photo.
+    /// Where a photo does not fill its picture, that is ignored. What masks ignore and mattes cut out
+    /// lends the rest no colour. `progress` is called after each photo.
     ///
     /// # Errors
     /// As [`Scene::save`]; a camera that has no undistorted picture; two photos that would
@@ -146,11 +146,27 @@ fn write_photo(
     // 1. The photo. One that stays is decoded, too, so that a damaged one is found now.
     let picture = capture::decode(&photo.path, undistortion.is_identity().then_some(size))?;
     let photo_size = picture.dimensions();
+    let decoded = |path: &Option<PathBuf>| {
+        let decode = |path: &PathBuf| {
+            let kind = Beside::ObjectMatte;
+            capture::decode_mask(kind, path, &photo.name, photo_size)
+        };
+        path.as_ref().map(decode).transpose()
+    };
+    let ignore_mask = photo.decode_ignore_mask(photo_size)?;
+    let matte = decoded(&photo.object_matte)?;
     if undistortion.is_identity() {
         copy_photo(&photo.path, &folder.join(&file))?;
     } else {
-        let picture = warp(&picture, size, KERNEL, footprint_of);
-        write_png(&folder.join(&file), &picture)?;
+        let mut flat = warp(&picture, size, KERNEL, footprint_of);
+        let mut usable = picture;
+        for hidden in [&ignore_mask, &matte].into_iter().flatten() {
+            apply_matte(&mut usable, hidden);
+        }
+        if ignore_mask.is_some() || matte.is_some() {
+            take_usable_colors(&mut flat, &warp(&usable, size, KERNEL, footprint_of));
+        }
+        write_png(&folder.join(&file), &flat)?;
     }
 
     // 2. What lies beside it, named after it.
@@ -165,7 +181,7 @@ fn write_photo(
         Ok(Some(file))
     };
     // To ignore: what was, and what the photo does not fill.
-    let ignored = match photo.decode_ignore_mask(photo_size)? {
+    let ignored = match ignore_mask {
         None if undistortion.is_filled() => None,
         Some(mask) => Some(warped(mask)),
         None => Some(warped(GrayImage::from_pixel(
@@ -174,14 +190,8 @@ fn write_photo(
             Luma([255]),
         ))),
     };
-    let warped_file = |path: &Option<PathBuf>| {
-        let Some(path) = path else { return Ok(None) };
-        let kind = Beside::ObjectMatte;
-        let matte = capture::decode_mask(kind, path, &photo.name, photo_size)?;
-        Ok::<_, CaptureError>(Some(warped(matte)))
-    };
-    let matte = warped_file(&photo.object_matte)?;
-    let silhouette = warped_file(&photo.silhouette)?;
+    let matte = matte.map(warped);
+    let silhouette = decoded(&photo.silhouette)?.map(warped);
     let depth_map = match &photo.depth_map {
         Some(path) => {
             let steps = decode_depth_steps(path, &photo.name, photo_size)?;
@@ -266,4 +276,79 @@ fn footprint(undistortion: &Undistortion, column: u32, row: u32) -> Option<Footp
 fn slashed(path: &Path) -> String {
     let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
     parts.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibrate::{CameraId, ModelKind};
+    use image::{Rgba, RgbaImage};
+
+    /// What is hidden of the photos.
+    fn is_hidden(x: u32, y: u32) -> bool {
+        (30..50).contains(&x) && (20..45).contains(&y)
+    }
+
+    #[test]
+    fn what_is_hidden_lends_the_rest_no_colour() {
+        let camera = Camera {
+            model: ModelKind::OpenCv,
+            width: 96,
+            height: 72,
+            params: vec![92.0, 92.0, 47.2, 36.4, -0.2, 0.03, 1e-3, -1e-3],
+        };
+        let undistortion = Undistortion::new(CameraId(1), &camera).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let mask = GrayImage::from_fn(96, 72, |x, y| Luma([if is_hidden(x, y) { 0 } else { 255 }]));
+        let mask_file = folder.path().join("mask.png");
+        write_mask(&mask_file, &mask).unwrap();
+
+        for ignored in [true, false] {
+            let written = [false, true].map(|painted| {
+                let picture = RgbaImage::from_fn(96, 72, |x, y| match painted && is_hidden(x, y) {
+                    true => Rgba([255, 0, 255, 255]),
+                    false => Rgba([(2 * x) as u8, (3 * y) as u8, (x * y % 200) as u8, 255]),
+                });
+                let path = folder.path().join("0.png");
+                write_png(&path, &picture).unwrap();
+                let photo = Photo {
+                    name: "0.png".to_owned(),
+                    path,
+                    original: None,
+                    ignore_mask: ignored.then(|| mask_file.clone()),
+                    object_matte: (!ignored).then(|| mask_file.clone()),
+                    silhouette: None,
+                    depth_map: None,
+                    depth_scale: None,
+                    time_s: None,
+                    gain: None,
+                    depth_bounds: None,
+                    orientation: None,
+                    other: serde_json::Map::new(),
+                };
+                let name = Path::new("0.png");
+                let flat = write_photo(&photo, &undistortion, name, folder.path()).unwrap();
+                let open = |path: &Path| image::open(folder.path().join(path)).unwrap();
+                let mask = match ignored {
+                    true => flat.ignore_mask.unwrap(),
+                    false => flat.object_matte.unwrap(),
+                };
+                (open(&flat.path).into_rgba8(), open(&mask).into_luma8())
+            });
+            let [(own, mask), (painted, same_mask)] = written;
+            assert_eq!(mask, same_mask);
+            let (mut soft, mut differ) = (0, 0);
+            for ((own, painted), mask) in own.pixels().zip(painted.pixels()).zip(mask.iter()) {
+                assert_eq!(own.0[3], 255);
+                if *mask > 0 {
+                    assert_eq!(own, painted, "where the mask is {mask}");
+                    soft += u32::from(*mask < 255);
+                } else {
+                    differ += u32::from(own != painted);
+                }
+            }
+            // There is a border between the two, and what is hidden stays in the file.
+            assert!(soft > 40 && differ > 300, "{soft} and {differ}");
+        }
+    }
 }
