@@ -38,7 +38,7 @@ pub use exif::{Exif, quarters_of, read_exif};
 pub use photo_set::{
     PhotoFile, PhotoSet, find_photos_folder, find_photos_within, has_photo_extension,
 };
-pub use resize::{reduced_size, resize, resize_mask};
+pub use resize::{reduced_size, resize, resize_mask, resize_used};
 pub use sequence::is_sequence;
 pub use text::{Lines, byte_lines, lines, without_byte_order_mark};
 pub use times::{

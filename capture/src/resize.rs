@@ -1,3 +1,4 @@
+use crate::{apply_matte, take_usable_colors};
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 use image::{DynamicImage, GrayImage, RgbaImage};
 
@@ -35,6 +36,19 @@ pub fn resize(image: &RgbaImage, width: u32, height: u32) -> RgbaImage {
     Resizer::new()
         .resize(image, &mut resized, &options)
         .expect("two RGBA pictures of non-zero size");
+    resized
+}
+
+/// As [`resize`], with a mask of what to use (255) and what to ignore (0): what is ignored does not bleed in, either.
+/// Alpha, and where nothing is used colours, are as without.
+///
+/// # Panics
+/// As [`resize`], and if the mask has another size than `image`.
+pub fn resize_used(image: &RgbaImage, used: &GrayImage, width: u32, height: u32) -> RgbaImage {
+    let mut resized = resize(image, width, height);
+    let mut usable = image.clone();
+    apply_matte(&mut usable, used);
+    take_usable_colors(&mut resized, &resize(&usable, width, height));
     resized
 }
 

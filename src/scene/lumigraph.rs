@@ -82,7 +82,8 @@ impl Scene {
         self.reduced_lumigraph(without, proxy, u32::MAX)
     }
 
-    /// The same, its photos reduced to `long_side` pixels along the longer side.
+    /// The same, its photos reduced to `long_side` pixels along the longer side; what masks ignore does not bleed
+    /// into what is used.
     ///
     /// # Errors
     /// As [`Self::lumigraph`].
@@ -118,9 +119,14 @@ impl Scene {
         let photos = PhotoStore::new(files.len(), move |source_idx| {
             let (photo, own, reduced) = &files[source_idx];
             let pixels = photo.decode(*own).map_err(|error| error.to_string())?;
-            Ok(match own == reduced {
-                true => pixels,
-                false => capture::resize(&pixels, reduced.0, reduced.1),
+            let (width, height) = *reduced;
+            if own == reduced {
+                return Ok(pixels);
+            }
+            // A mask that cannot be decoded is told where it is asked for itself.
+            Ok(match photo.decode_ignore_mask(*own).ok().flatten() {
+                Some(used) => capture::resize_used(&pixels, &used, width, height),
+                None => capture::resize(&pixels, width, height),
             })
         });
         let photos = photos.with_masks(&masked, move |source_idx| {

@@ -72,7 +72,7 @@ impl Truth {
         &self.pixels
     }
 
-    /// The same in another size, reduced by area.
+    /// The same in another size, reduced by area; what is ignored does not bleed into what is used.
     #[must_use]
     pub fn resized(self, width: u32, height: u32) -> Self {
         let (old_width, old_height) = self.pixels.dimensions();
@@ -86,7 +86,10 @@ impl Truth {
         );
         let points = self.points.into_iter();
         Self {
-            pixels: capture::resize(&self.pixels, width, height),
+            pixels: match &self.used {
+                Some(used) => capture::resize_used(&self.pixels, used, width, height),
+                None => capture::resize(&self.pixels, width, height),
+            },
             inside: self.inside.map(mask),
             matte: self.matte.map(mask),
             used: self.used.map(mask),
@@ -225,6 +228,30 @@ mod tests {
         let mean = TruthScore::mean(&[scores, nothing]).unwrap();
         assert_eq!(mean.coverage_points, Some(0.5));
         assert_eq!(mean.matte.unwrap().coverage_matte, Some(0.5));
+    }
+
+    #[test]
+    fn what_is_ignored_has_no_say_in_a_reduced_truth() {
+        let used = GrayImage::from_fn(72, 48, |x, y| {
+            let hidden = (11..38).contains(&x) && (7..30).contains(&y);
+            Luma([if hidden { 0 } else { 255 }])
+        });
+        let truth = |hidden: Option<[u8; 3]>| {
+            let pixels = RgbaImage::from_fn(72, 48, |x, y| match hidden {
+                Some([r, g, b]) if used.get_pixel(x, y).0[0] == 0 => Rgba([r, g, b, 255]),
+                _ => Rgba([(3 * x) as u8, (5 * y) as u8, (x * y % 250) as u8, 255]),
+            });
+            Truth::new(pixels, Some(used.clone()), Vec::new())
+        };
+        for (width, height) in [(36, 24), (24, 16), (50, 33)] {
+            let rendered = RgbaImage::from_pixel(width, height, Rgba([90, 110, 130, 255]));
+            let psnr = |hidden| {
+                let truth = truth(hidden).resized(width, height);
+                truth.score(&rendered).unwrap().masked.unwrap().psnr_masked
+            };
+            assert_eq!(psnr(None), psnr(Some([255, 0, 255])), "{width}");
+            assert_eq!(psnr(None), psnr(Some([0; 3])), "{width}");
+        }
     }
 
     #[test]
