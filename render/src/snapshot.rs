@@ -11,6 +11,8 @@ use rayon::prelude::*;
 /// Places across the image; few, so that each is the mean of many pixels and parallax
 /// matters little.
 const ACROSS: u32 = 32;
+/// What has no less alpha is shown whole: mattes and masks of many programs are a few steps less than 255 there.
+const WHOLE: f64 = 0.9;
 
 /// What each photo that has a time shows of the proxy, at places evenly spread over the view
 /// of the photo in the middle. Photos are decoded one by one and not kept; those that cannot
@@ -43,8 +45,9 @@ pub fn snapshots(lumigraph: &Lumigraph) -> Vec<Snapshot> {
             let pixel = frame.project(source_idx, point)?;
             let level = frame.level_of_detail(source_idx, point);
             let seen = source.view.contains(pixel);
-            let [r, g, b, alpha] = sample(&photo, pixel, level).map(|v| v as f32);
-            (seen && alpha > 0.99).then_some([r, g, b])
+            let [r, g, b, alpha] = sample(&photo, pixel, level);
+            // The colour alone, which is not premultiplied.
+            (seen && alpha >= WHOLE).then(|| [r, g, b].map(|v| (v / alpha) as f32))
         };
         Some(Snapshot {
             time_s,

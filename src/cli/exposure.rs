@@ -127,7 +127,9 @@ impl ExposureUsed {
                 self.seconds
             ),
             (How::Matched(Verdict::NoLinks), _) => {
-                "as it is (photos share no sparse points to match them by)".to_owned()
+                "as it is (photos share too few sparse points to match them by that they show whole, neither too dark \
+                 nor too bright)"
+                    .to_owned()
             }
         }
     }

@@ -32,7 +32,7 @@ pub(super) fn is_beside(name: &str) -> bool {
 /// World units a step of depth maps, if nobody says: millimetres where units are metres.
 pub const DEPTH_UNITS_PER_STEP: f64 = 0.001;
 
-/// An ignore mask's value below which depth is not used: masks have soft borders, and some are JPEG.
+/// An ignore mask's value below which neither depth nor colour is compared with other photos': masks have soft borders, and some are JPEG.
 pub(super) const USED: u8 = 128;
 /// So many masks, spread over the photos, decide whether all are silhouettes.
 pub(super) const MASKS_JUDGED: usize = 5;

@@ -1,10 +1,11 @@
 //! The photos' gains.
 
+use super::beside::USED;
 use super::file::{ExposureEntry, Extra};
 use super::{Photo, Scene};
 use calibrate::exposure::{self, Verdict};
 use calibrate::{Image, TRUSTED_TIE};
-use capture::{CaptureError, apply_matte};
+use capture::CaptureError;
 use image::RgbaImage;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -98,13 +99,17 @@ impl Scene {
         matched
     }
 
-    /// A photo's pixels, transparent where its matte or its ignore mask says so.
+    /// A photo's pixels, transparent where its matte says so or its ignore mask ignores them.
     fn what_counts(&self, photo: &Photo, image: &Image) -> Result<RgbaImage, CaptureError> {
         let camera = &self.reconstruction.cameras[&image.camera_id];
         let size = (camera.width, camera.height);
         let mut pixels = photo.decode(size)?;
         if let Some(mask) = photo.decode_ignore_mask(size)? {
-            apply_matte(&mut pixels, &mask);
+            for (pixel, used) in pixels.pixels_mut().zip(mask.pixels()) {
+                if used.0[0] < USED {
+                    pixel.0[3] = 0;
+                }
+            }
         }
         Ok(pixels)
     }

@@ -2,6 +2,7 @@
 
 use crate::run::{files, lumigraph, with_wall};
 use calibrate::colmap;
+use image::{GrayImage, Luma};
 use serde_json::Value;
 use std::path::Path;
 
@@ -94,6 +95,46 @@ fn known_gains_are_found_and_seams_go() {
     drawn("-o all");
     drawn("--no-exposure -o all-unmatched");
     assert!(files(&folder.path().join("all")) == files(&folder.path().join("all-unmatched")));
+}
+
+#[test]
+fn mattes_and_masks_that_are_nearly_whole_change_no_gain() {
+    let folder = with_wall();
+    let here = folder.path();
+    expose(here, |_| [DIM; 3]);
+    expose(here, gain);
+    let found = |options: &str| {
+        let line = format!("import wall{options} -o scene --force");
+        lumigraph(here, &line).ok();
+        gains(here)
+    };
+    let opaque = found("");
+    assert!(opaque.iter().all(Option::is_some), "{opaque:?}");
+    std::fs::create_dir(here.join("254")).unwrap();
+    for i in 0..9 {
+        let mask = GrayImage::from_pixel(96, 72, Luma([254]));
+        mask.save(here.join(format!("254/{i:04}.png"))).unwrap();
+    }
+    let masks = here.join("254");
+    assert_eq!(found(&format!(" --masks {}", masks.display())), opaque);
+    for i in 0..9 {
+        let path = here.join(format!("wall/images/{i:04}.png"));
+        let mut photo = image::open(&path).unwrap().into_rgba8();
+        photo.pixels_mut().for_each(|pixel| pixel.0[3] = 250);
+        photo.save(&path).unwrap();
+    }
+    assert_eq!(found(""), opaque);
+    // Where nothing is whole, that is why.
+    for i in 0..9 {
+        let mask = GrayImage::from_pixel(96, 72, Luma([100]));
+        mask.save(here.join(format!("254/{i:04}.png"))).unwrap();
+    }
+    let line = format!("import wall --masks {} -o faint", masks.display());
+    let said = lumigraph(here, &line).ok().stderr;
+    assert!(
+        said.contains("too few sparse points to match them by that they show whole"),
+        "{said}"
+    );
 }
 
 /// What draws leaves it out, so it has no say in the others' gains; but it has one.

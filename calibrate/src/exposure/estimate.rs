@@ -24,8 +24,8 @@ pub enum Verdict {
     Matched(Evidence),
     /// What differs may be chance, or is too little to be seen.
     NotMeasurable(Evidence),
-    /// No two photos show a point in common that is neither too dark nor too bright, or
-    /// all such points lie in one place.
+    /// No two photos show a point in common that is whole (no matte or mask cuts into it) and neither too dark nor too
+    /// bright, or all such points lie in one place.
     NoLinks,
 }
 

@@ -40,6 +40,9 @@ const MAX_MAGNIFICATION: f64 = 4.0;
 const PROPORTIONAL: std::ops::RangeInclusive<f64> = 12.0..=245.0;
 /// A pixel at this value may have been brighter.
 const CLIPPED: u8 = 253;
+/// A pixel of no less alpha is whole: mattes of many programs are a few steps less than 255 within the object, and colours
+/// are straight.
+const WHOLE: u8 = 230;
 /// Within how many standard deviations pixels count.
 const REACH: f64 = 2.5;
 
@@ -96,7 +99,7 @@ pub fn patches(reconstruction: &Reconstruction, photo_names: &[&str]) -> Patches
     patches
 }
 
-/// What a photo shows at its patches. A patch with a transparent pixel, or whose middle is
+/// What a photo, of straight alpha, shows at its patches. A patch with a pixel of less than 0.9 alpha, or whose middle is
 /// outside the photo, shows nothing; a channel that is clipped anywhere in it, or too dark
 /// or bright on the whole, is `None`.
 pub fn sample(photo: &RgbaImage, photo_idx: usize, patches: &[Patch]) -> Vec<Observation> {
@@ -131,7 +134,7 @@ fn mean_color(photo: &RgbaImage, patch: &Patch) -> Option<[Option<f64>; 3]> {
         let down = bell(f64::from(y) + 0.5 - patch.y);
         for x in range(patch.x, photo.width()) {
             let [r, g, b, alpha] = photo.get_pixel(x, y).0;
-            if alpha < 255 {
+            if alpha < WHOLE {
                 return None;
             }
             let weight = down * bell(f64::from(x) + 0.5 - patch.x);

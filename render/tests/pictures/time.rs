@@ -399,6 +399,36 @@ fn the_frozen_phase_beats_ignoring_time_with_the_period_given_or_found() {
     assert!(wrong < given - 2.0, "{wrong}, {given} dB");
 }
 
+/// Mattes of many programs are a few steps less than 255 within the object.
+#[test]
+fn photos_of_nearly_whole_alpha_tell_the_same_period() {
+    let shot = helicopter();
+    let matted = shot.photos.iter().map(|photo| {
+        let mut photo = photo.clone();
+        for (x, y, pixel) in photo.enumerate_pixels_mut() {
+            pixel.0[3] = pixel.0[3].min(240 + ((x + 3 * y) % 16) as u8);
+        }
+        photo
+    });
+    let matted = Lumigraph {
+        photos: PhotoStore::from_images(matted.collect()),
+        ..shot.lumigraph()
+    };
+    let (opaque, matted) = (snapshots(&shot.lumigraph()), snapshots(&matted));
+    assert_eq!(opaque.len(), matted.len());
+    for (opaque, matted) in opaque.iter().zip(&matted) {
+        for (opaque, matted) in opaque.colors.iter().zip(&matted.colors) {
+            assert_eq!(opaque.is_some(), matted.is_some());
+            let both = opaque.iter().flatten().zip(matted.iter().flatten());
+            for (opaque, matted) in both {
+                assert!((opaque - matted).abs() < 0.01, "{opaque} {matted}");
+            }
+        }
+    }
+    let found = find_period(&matted).unwrap();
+    assert!((found.period_s / PERIOD_S - 1.0).abs() < 0.01, "{found:?}");
+}
+
 /// Its blades are of one shape: half a turn, or a third, explains something of a few turns' photos.
 #[test]
 fn no_part_of_a_turn_is_taken_for_the_period() {
