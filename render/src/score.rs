@@ -111,19 +111,9 @@ pub fn score(rendered: &RgbaImage, photo: &RgbaImage) -> Result<Score, ScoreErro
     let covered_count = covered().count();
     let covered_total: u64 = covered().map(|(i, _)| squared_error(i)).sum();
     let alpha_sum: u64 = alphas().map(u64::from).sum();
-    let gain: [f64; 3] = std::array::from_fn(|c| {
-        let pairs = covered().map(|(i, _)| (ours[i][c], theirs[i][c]));
-        best_gain(pairs)
-    });
-    // Not rounded: where gains are near one that would cost more than they bring.
-    let exposed = |i: usize, c: usize| (f64::from(ours[i][c]) * gain[c]).min(255.0);
-    let exposed_error = |i: usize| -> f64 {
-        let difference = |c: usize| exposed(i, c) - f64::from(theirs[i][c]);
-        (0..3).map(|c| difference(c).powi(2)).sum()
-    };
     Ok(Score {
         psnr: psnr(total as f64, count),
-        psnr_exposed: psnr((0..count).map(exposed_error).sum(), count),
+        psnr_exposed: exposed(rendered, &ours, &theirs, |_| true),
         ssim: ssim(&ours, &theirs, width as usize, |_| true).unwrap_or(f64::NAN),
         psnr_covered: (covered_count > 0).then(|| psnr(covered_total as f64, covered_count)),
         coverage: alpha_sum as f64 / (255.0 * count as f64),
@@ -141,12 +131,7 @@ pub fn score_masked(
     mask: &GrayImage,
 ) -> Result<Option<MaskedScore>, ScoreError> {
     check_sizes(rendered, photo)?;
-    if mask.dimensions() != photo.dimensions() {
-        return Err(ScoreError::MaskSize {
-            mask: mask.dimensions(),
-            photo: photo.dimensions(),
-        });
-    }
+    check_mask(mask, photo)?;
     let (ours, theirs) = (on_black(rendered), on_black(photo));
     let inside = |i: usize| mask.as_raw()[i] >= HALF;
     let indices = || (0..ours.len()).filter(|&i| inside(i));
@@ -162,6 +147,48 @@ pub fn score_masked(
         ssim_masked: ssim(&ours, &theirs, rendered.width() as usize, inside),
         coverage_masked: indices().map(alpha).sum::<u64>() as f64 / (255.0 * count as f64),
     }))
+}
+
+/// [`Score::psnr_exposed`] alone, inside a mask where there is one: the factors are those that fit the covered pixels
+/// there. `None` where the mask is nowhere half or more.
+///
+/// # Errors
+/// As for [`score_masked`].
+pub fn psnr_exposed(
+    rendered: &RgbaImage,
+    photo: &RgbaImage,
+    mask: Option<&GrayImage>,
+) -> Result<Option<f64>, ScoreError> {
+    check_sizes(rendered, photo)?;
+    let inside = |i: usize| mask.is_none_or(|mask| mask.as_raw()[i] >= HALF);
+    if let Some(mask) = mask {
+        check_mask(mask, photo)?;
+    }
+    let (ours, theirs) = (on_black(rendered), on_black(photo));
+    let is_somewhere = (0..ours.len()).any(inside);
+    Ok(is_somewhere.then(|| exposed(rendered, &ours, &theirs, inside)))
+}
+
+/// The same of pixels on black, over those that count, by their index.
+fn exposed(
+    rendered: &RgbaImage,
+    ours: &[[u8; 3]],
+    theirs: &[[u8; 3]],
+    counts: impl Fn(usize) -> bool,
+) -> f64 {
+    let indices = || (0..ours.len()).filter(|&i| counts(i));
+    let is_covered = |i: &usize| rendered.as_raw()[4 * i + 3] >= HALF;
+    let gain: [f64; 3] = std::array::from_fn(|c| {
+        let pairs = indices().filter(is_covered);
+        best_gain(pairs.map(|i| (ours[i][c], theirs[i][c])))
+    });
+    // Not rounded: where gains are near one that would cost more than they bring.
+    let value = |i: usize, c: usize| (f64::from(ours[i][c]) * gain[c]).min(255.0);
+    let squared_error = |i: usize| -> f64 {
+        let difference = |c: usize| value(i, c) - f64::from(theirs[i][c]);
+        (0..3).map(|c| difference(c).powi(2)).sum()
+    };
+    psnr(indices().map(squared_error).sum(), indices().count())
 }
 
 /// The mean of scores inside masks, as [`mean`]; `None` of nothing.
@@ -190,6 +217,16 @@ fn check_sizes(rendered: &RgbaImage, photo: &RgbaImage) -> Result<(), ScoreError
         });
     }
     check_size(width, height)
+}
+
+fn check_mask(mask: &GrayImage, photo: &RgbaImage) -> Result<(), ScoreError> {
+    if mask.dimensions() != photo.dimensions() {
+        return Err(ScoreError::MaskSize {
+            mask: mask.dimensions(),
+            photo: photo.dimensions(),
+        });
+    }
+    Ok(())
 }
 
 /// Fails where pictures of so many pixels are too small for [`score`].

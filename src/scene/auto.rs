@@ -22,7 +22,7 @@ pub struct Trial {
     pub kind: Kind,
     /// Whether what lies behind a part of it counted as hidden.
     pub occludes: bool,
-    /// The mean PSNR of the pictures that decide, in dB, or why there is none.
+    /// The mean PSNR of the pictures that decide, each at its photo's own exposure, in dB, or why there is none.
     pub score: Result<f64, String>,
 }
 

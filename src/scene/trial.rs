@@ -57,7 +57,7 @@ pub(super) struct Trials<'a> {
     bounds: BTreeMap<usize, Option<Arc<Solid>>>,
 }
 
-/// How a proxy did: PSNR in dB for each judge; `None` for those that were not asked.
+/// How a proxy did: PSNR in dB for each judge, at its own exposure; `None` for those that were not asked.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scores(Vec<Option<f64>>);
 
@@ -375,7 +375,8 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// PSNR of a judge's picture, in dB: of what is to be used of the photo.
+    /// PSNR of a judge's picture, in dB: of what is to be used of the photo, at the photo's own exposure, which no surface
+    /// tells.
     fn score(&self, judge: usize) -> Result<f64, SceneError> {
         let judge = &self.judges[judge];
         let part = Part {
@@ -385,14 +386,13 @@ impl<'a> Trials<'a> {
         let (desired, options) = (judge.desired.clone(), FieldOptions::default());
         let frame = Frame::with(&self.lumigraph, desired, options, &part);
         let picture = cpu::render(&frame, Method::Exact).map_err(|e| self.undrawn(e))?;
-        let (picture, truth) = (&picture, &judge.truth);
-        let used = match &judge.used {
-            Some(used) => score::score_masked(picture, truth, used).map_err(unfit)?,
-            None => None,
+        let psnr = |used: Option<&GrayImage>| {
+            score::psnr_exposed(&picture, &judge.truth, used).map_err(unfit)
         };
-        let psnr = match used {
-            Some(used) => used.psnr_masked,
-            None => score::score(picture, truth).map_err(unfit)?.psnr,
+        // A mask that is nowhere half or more does not judge.
+        let psnr = match psnr(judge.used.as_ref())? {
+            Some(psnr) => psnr,
+            None => psnr(None)?.unwrap_or(PSNR_CAP_DB),
         };
         // What none differs in says nothing of the others.
         Ok(psnr.min(PSNR_CAP_DB))
@@ -438,6 +438,29 @@ mod tests {
                 assert!(members.iter().all(|m| m % coarse == fold), "{photos}");
             }
         }
+    }
+
+    #[test]
+    fn how_a_judge_is_exposed_does_not_judge() {
+        let (_folder, capture) = wall(6, 1);
+        let none = BTreeSet::new();
+        let (scene, _) = Scene::open(&capture, false).unwrap();
+        let scores = || {
+            let mut trials = Trials::new(&scene, &none, 2).unwrap();
+            let first = trials.judges[0].name.clone();
+            let (scores, _) = trials.scores(Kind::Plane, None).unwrap();
+            (first, scores.0[0].unwrap())
+        };
+        let (first, clean) = scores();
+        let mut photos = scene.photos.iter();
+        let path = &photos.find(|photo| photo.name == first).unwrap().path;
+        let mut picture = image::open(path).unwrap().into_rgb8();
+        picture.iter_mut().for_each(|value| *value /= 2);
+        picture.save(path).unwrap();
+        let (_, halved) = scores();
+        // As a picture of half the light, all differences are half as large.
+        let expected = clean + 2.0_f64.log10() * 20.0;
+        assert!((halved - expected).abs() < 1.0, "{halved} dB, {clean} dB");
     }
 
     #[test]

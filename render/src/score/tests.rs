@@ -106,6 +106,29 @@ fn a_picture_can_be_given_the_photos_exposure() {
 }
 
 #[test]
+fn exposures_are_fitted_inside_masks() {
+    let photo = picture(40, 23);
+    let all = psnr_exposed(&picture(40, 23), &photo, None).unwrap();
+    assert_eq!(all, Some(f64::INFINITY));
+    // Even, so that halves are exact; magenta where the mask is less than half.
+    let mask = GrayImage::from_fn(40, 23, |x, _| Luma([if x < 20 { 127 } else { 128 }]));
+    let (mut even, mut halved) = (photo.clone(), photo);
+    for (x, y, pixel) in even.enumerate_pixels_mut() {
+        let [r, g, b, _] = pixel.0.map(|v| v / 2);
+        pixel.0 = [2 * r, 2 * g, 2 * b, 255];
+        let hidden = [255, 0, 255, 255];
+        halved.get_pixel_mut(x, y).0 = if x < 20 { hidden } else { [r, g, b, 255] };
+    }
+    let of = |mask: Option<&GrayImage>| psnr_exposed(&even, &halved, mask).unwrap();
+    assert_eq!(of(Some(&mask)), Some(f64::INFINITY));
+    let whole = score(&even, &halved).unwrap().psnr_exposed;
+    assert_eq!(of(None), Some(whole));
+    assert!(whole < 20.0, "{whole}");
+    assert_eq!(of(Some(&GrayImage::new(40, 23))), None);
+    assert!(psnr_exposed(&even, &halved, Some(&GrayImage::new(23, 40))).is_err());
+}
+
+#[test]
 fn a_fitted_exposure_is_not_rounded() {
     // 39 of 49 columns of one grey, and the rest of another.
     let greys = |dark: u8, bright: u8| {
