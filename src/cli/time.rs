@@ -157,6 +157,14 @@ impl Clock {
         let Some(photos) = Span::of(&times_s) else {
             return Err(no_times());
         };
+        if times_s.len() > 1 && photos.first_s == photos.last_s {
+            say!(
+                "note: all {} photos that have a time have the same, {:.3} s: no moment differs from another; import \
+                 the photos with --times FILE.csv (name,seconds) or --frame-rate F",
+                times_s.len(),
+                photos.first_s
+            );
+        }
         let period_s = match args.period {
             None => None,
             Some(PeriodChoice::Seconds(seconds)) => Some(seconds),

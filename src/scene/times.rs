@@ -89,18 +89,25 @@ fn from_calibration(
     Some(times)
 }
 
-/// Those that cameras wrote into the photos, or their names if these tell more.
+/// Those that cameras wrote into the photos, or their names if these tell more: more times that differ, or else of more
+/// photos.
 fn from_photos(photos: &[Photo], taken: &[Exif], warnings: &mut Vec<Warning>) -> Times {
     let names: Vec<&str> = photos.iter().map(|p| p.name.as_str()).collect();
     let by_name = capture::times_of_names(&names);
     let by_camera = from_earliest(taken.iter().map(|exif| exif.taken_s).collect());
-    let count = |times: &Times| times.iter().flatten().count();
-    let (times, told_by) = if count(&by_name) > count(&by_camera) {
+    let told = |times: &Times| {
+        let mut times: Vec<f64> = times.iter().flatten().copied().collect();
+        let count = times.len();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        (times.len(), count)
+    };
+    let (times, told_by) = if told(&by_name) > told(&by_camera) {
         (by_name, "the photos' names")
     } else {
         (by_camera, "what cameras wrote into the photos")
     };
-    if count(&times) > 0 {
+    if times.iter().any(Option::is_some) {
         warnings.extend(note_of_lack(photos, &times, told_by));
     }
     times
@@ -156,4 +163,44 @@ fn from_numbers(photos: &[Photo], per_second: f64) -> Result<Times, SceneError> 
         times.push(Some(number as f64 / per_second));
     }
     Ok(times)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Scene;
+    use super::super::tests::wall;
+    use super::*;
+
+    #[test]
+    fn names_count_where_cameras_tell_fewer_times_that_differ() {
+        let (_folder, capture) = wall(6, 1);
+        let (scene, _) = Scene::open(&capture, false).unwrap();
+        const THEN_S: f64 = 1_706_715_900.0;
+        let found = |name: fn(usize) -> String, taken_s: fn(usize) -> f64| {
+            let mut photos = scene.photos.clone();
+            for (i, photo) in photos.iter_mut().enumerate() {
+                photo.name = name(i);
+            }
+            let exif = |i: usize| Exif {
+                taken_s: Some(THEN_S + taken_s(i)),
+                ..Exif::default()
+            };
+            let taken: Vec<Exif> = (0..photos.len()).map(exif).collect();
+            from_photos(&photos, &taken, &mut Vec::new())
+        };
+        let fifths: Times = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0].map(Some).to_vec();
+        // Of a phone: seconds and milliseconds.
+        let phone = |i: usize| format!("PXL_20240131_1500{:05}.png", 200 * i);
+        let film = |i: usize| format!("shot_t{:.3}s.png", 0.2 * i as f64);
+        let plain = |i: usize| format!("{i:04}.png");
+        // 1. Whole seconds alone, or those of whatever wrote the files.
+        assert_eq!(found(phone, |i| (i / 5) as f64), fifths);
+        assert_eq!(found(film, |_| 0.0), fifths);
+        // 2. As many: the camera's.
+        let steps: Times = (0..6).map(|i| Some(3.0 * i as f64)).collect();
+        assert_eq!(found(film, |i| 3.0 * i as f64), steps);
+        // 3. Fractions are those that were written.
+        assert_eq!(found(plain, |i| 0.2 * i as f64), fifths);
+        assert_eq!(found(plain, |_| 0.0), [Some(0.0); 6]);
+    }
 }

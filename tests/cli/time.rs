@@ -104,6 +104,33 @@ fn frames_show_their_moment() {
 }
 
 #[test]
+fn photos_that_are_all_of_one_time_are_told_where_times_count() {
+    let folder = with_wall();
+    let here = folder.path();
+    let said = |times: [f64; 9], options: &str| {
+        let line = |(i, time_s): (usize, f64)| format!("{i:04}.png,{time_s}\n");
+        let lines: String = times.into_iter().enumerate().map(line).collect();
+        fs::write(here.join("wall/times.csv"), lines).unwrap();
+        let line = format!(
+            "render wall --proxy plane --size 24x18 -o out --views wall --frames 3..4{options}"
+        );
+        lumigraph(here, &line).ok().stderr
+    };
+    let note = "note: all 9 photos that have a time have the same, 7.500 s";
+    for (options, is_told) in [
+        (" --period 1.37 --time 4.2", true),
+        (" --time-window 1", true),
+        ("", false),
+    ] {
+        let said = said([7.5; 9], options);
+        assert_eq!(said.contains(note), is_told, "{options}: {said}");
+    }
+    let mut times = [7.5; 9];
+    times[4] = 8.0;
+    assert!(!said(times, " --period 1.37 --time 4.2").contains("have the same"));
+}
+
+#[test]
 fn times_of_frames_that_change_nothing_are_told() {
     let folder = with_helicopter();
     let here = folder.path();

@@ -30,9 +30,9 @@ pub fn times_of_names(names: &[&str]) -> Times {
     found.iter().map(|t| t.map(NameTime::seconds)).collect()
 }
 
-/// The same times with the earliest at zero.
+/// The same times with the earliest at zero, to a microsecond: what is counted from 1970 is no finer.
 pub fn from_earliest(times_s: Times) -> Times {
     let earliest = times_s.iter().flatten().copied().reduce(f64::min);
-    let since = |t: f64| t - earliest.unwrap_or(0.0);
+    let since = |t: f64| ((t - earliest.unwrap_or(0.0)) * 1e6).round() / 1e6;
     times_s.into_iter().map(|t| t.map(since)).collect()
 }
