@@ -235,7 +235,8 @@ pub fn decode_mask(
     photo_size: (u32, u32),
 ) -> Result<GrayImage, CaptureError> {
     let (picture, format) = decode_beside(kind, path, photo, photo_size)?;
-    let mut mask = picture.into_luma8();
+    let ones = deep_zeros_and_ones(&picture);
+    let mut mask = ones.unwrap_or_else(|| picture.into_luma8());
     if format == ImageFormat::Jpeg {
         mask.iter_mut().for_each(|value| match *value {
             ..=JPEG_NOISE => *value = 0,
@@ -246,6 +247,18 @@ pub fn decode_mask(
         mask.iter_mut().for_each(|value| *value *= 255);
     }
     Ok(mask)
+}
+
+/// A picture of 16 bits that has nothing but zeros and ones, as they are: of 8 bits both would be zero.
+fn deep_zeros_and_ones(picture: &DynamicImage) -> Option<GrayImage> {
+    let color = picture.color();
+    if color.bytes_per_pixel() == color.channel_count() {
+        return None;
+    }
+    let deep = picture.to_luma16();
+    let is_it = deep.iter().all(|value| *value <= 1);
+    let value = |x, y| Luma([u8::from(deep.get_pixel(x, y).0[0] != 0)]);
+    is_it.then(|| GrayImage::from_fn(deep.width(), deep.height(), value))
 }
 
 /// Cuts a photo out by a matte: its alpha becomes the lesser of the two, so that a matte

@@ -120,6 +120,16 @@ fn masks_are_grey_whatever_they_are_stored_as() {
             "wide.png",
             ImageBuffer::from_fn(4, 3, |x, _| Luma([if left(x) { 0_u16 } else { 65535 }])),
         ),
+        save(
+            &folder,
+            "wide-ones.png",
+            ImageBuffer::from_fn(4, 3, |x, _| Luma([u16::from(!left(x))])),
+        ),
+        save(
+            &folder,
+            "wide-rgb-ones.png",
+            ImageBuffer::from_fn(4, 3, |x, _| Rgb([u16::from(!left(x)); 3])),
+        ),
     ];
     for path in paths {
         let mask = decode_mask(Beside::IgnoreMask, &path, "a.jpg", (4, 3)).unwrap();
