@@ -323,7 +323,7 @@ fn check_no_calibration(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Fails of a photo that cannot be decoded.
+/// Fails of a photo that cannot be decoded, or what lies beside it.
 pub(super) fn check_photos(scene: &Scene) -> Result<(), SceneError> {
     let bar = spinner("decoding every photo");
     let checked = scene.check_photos();

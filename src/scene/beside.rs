@@ -65,6 +65,21 @@ impl Photo {
         Ok(pixels)
     }
 
+    /// Decodes it and all that lies beside it, only to find what is damaged.
+    ///
+    /// # Errors
+    /// One of the files cannot be decoded or has another size than `size`; a depth map that is not 16-bit grey.
+    pub(super) fn check(&self, size: (u32, u32)) -> Result<(), CaptureError> {
+        self.decode_usable(size)?;
+        if let Some(path) = &self.silhouette {
+            capture::decode_mask(Beside::ObjectMatte, path, &self.name, size)?;
+        }
+        if let Some(path) = &self.depth_map {
+            capture::decode_depth_steps(path, &self.name, size)?;
+        }
+        Ok(())
+    }
+
     /// Its ignore mask, if it has one: 0 = ignore, 255 = use.
     ///
     /// # Errors

@@ -286,7 +286,8 @@ impl Scene {
         self.leave_out(unwritable, strict)
     }
 
-    /// Fails of the first photo that cannot be decoded, of which headers tell nothing.
+    /// Fails of the first photo that cannot be decoded, or of which a mask, a matte, a silhouette or a depth map cannot:
+    /// headers tell nothing of that.
     ///
     /// # Errors
     /// As said; as where a missing photo is one.
@@ -294,7 +295,7 @@ impl Scene {
         let images = self.images_by_name();
         let wrong = |photo: &Photo| {
             let camera = &self.reconstruction.cameras[&images[photo.name.as_str()].camera_id];
-            let error = photo.decode((camera.width, camera.height)).err()?;
+            let error = photo.check((camera.width, camera.height)).err()?;
             Some(SceneError::Strict {
                 name: photo.name.clone(),
                 reason: error.to_string(),

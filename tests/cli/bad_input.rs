@@ -1,6 +1,7 @@
 //! Bad data: one clear error, exit code 1, no panic, nothing half-written.
 
 use crate::run::{files, lumigraph, with_wall};
+use image::{GrayImage, Luma};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -251,6 +252,51 @@ fn strict_imports_decode_every_photo() {
     assert!(!here.join("strict").exists());
     lumigraph(here, "info wall").ok();
     lumigraph(here, "import wall --no-exposure -o scene").ok();
+}
+
+#[test]
+fn strict_imports_decode_what_lies_beside_the_photos() {
+    let folder = with_wall();
+    let here = folder.path();
+    let check = |file: &str| {
+        let path = here.join("wall").join(file);
+        let whole = fs::read(&path).unwrap();
+        lumigraph(here, "info wall --strict").ok();
+        fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        for line in [
+            "info wall --strict",
+            "import wall --strict -o strict",
+            "import wall --strict --undistort -o strict",
+        ] {
+            let error = lumigraph(here, line).error(1);
+            let is_told = error.starts_with("photo 0003.png: ") && error.contains(file);
+            assert!(is_told, "{line}: {error}");
+        }
+        fs::write(&path, whole).unwrap();
+    };
+    // Ignoring so many tenths of each photo.
+    let masks = |tenths: u32| {
+        fs::create_dir_all(here.join("wall/masks")).unwrap();
+        for i in 0..9 {
+            let value = |x: u32, y: u32| {
+                Luma([if (7 * x + 13 * y) % 10 < tenths {
+                    0
+                } else {
+                    255
+                }])
+            };
+            let mask = GrayImage::from_fn(96, 72, value);
+            mask.save(here.join(format!("wall/masks/{i:04}.png")))
+                .unwrap();
+        }
+    };
+    check("depth/0003.png");
+    masks(2);
+    check("masks/0003.png");
+    masks(8);
+    let said = lumigraph(here, "info wall").ok().stderr;
+    assert!(said.contains("serve the hull only"), "{said}");
+    check("masks/0003.png");
 }
 
 #[test]
