@@ -249,7 +249,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     } else if args.undistort {
         let bar = progress(scene.photos.len(), "undistorting photos");
         let step = || bar.inc(1);
-        let warnings = scene.save_undistorted(&args.output, args.force, args.strict, &step);
+        let asked = args.depth.is_some();
+        let (output, strict) = (&args.output, args.strict);
+        let warnings = scene.save_undistorted(output, args.force, strict, asked, &step);
         bar.finish_and_clear();
         print_warnings(&warnings?);
     } else {

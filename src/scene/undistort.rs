@@ -40,12 +40,14 @@ impl Scene {
     /// # Errors
     /// As [`Scene::save`]; a camera that has no undistorted picture; two photos that would
     /// have one name. A photo that cannot be decoded, or what lies beside it, is left out, or
-    /// with `strict` an error, as at the import.
+    /// with `strict` an error, as at the import; but a depth map that cannot be is left out alone, which a note says,
+    /// unless maps were `asked` for: then it is an error.
     pub fn save_undistorted(
         &mut self,
         folder: &Path,
         replace: bool,
         strict: bool,
+        asked: bool,
         progress: &(dyn Fn() + Sync),
     ) -> Result<Vec<Warning>, SceneError> {
         Self::check_free(folder, replace)?;
@@ -68,7 +70,7 @@ impl Scene {
         undistorted.write_folder(folder, replace, |scene, new| {
             // 1. The photos, each by itself.
             let jobs: Vec<(&Photo, &PathBuf)> = self.photos.iter().zip(&new_names).collect();
-            let written: Vec<Result<Photo, CaptureError>> = jobs
+            let written: Vec<Result<Written, CaptureError>> = jobs
                 .into_par_iter()
                 .map(|(photo, new_name)| {
                     let done = write_photo(photo, cameras[photo.name.as_str()], new_name, new);
@@ -78,20 +80,33 @@ impl Scene {
                 .collect();
 
             // 2. The scene names them, where they will be.
-            let mut unusable = Vec::new();
+            let (mut unusable, mut damaged_maps) = (Vec::new(), Vec::new());
             let photos = scene.photos.iter_mut().zip(&new_names);
             for ((photo, new_name), written) in photos.zip(written) {
                 match written {
-                    Ok(Photo {
-                        name,
-                        path,
-                        ignore_mask,
-                        object_matte,
-                        silhouette,
-                        depth_map,
-                        ..
+                    Ok(Written {
+                        photo:
+                            Photo {
+                                name,
+                                path,
+                                ignore_mask,
+                                object_matte,
+                                silhouette,
+                                depth_map,
+                                ..
+                            },
+                        damaged_map,
                     }) => {
                         let there = |file: PathBuf| folder.join(file);
+                        match damaged_map {
+                            Some(error) if strict => unusable.push((photo.name.clone(), error)),
+                            Some(error) if asked => return Err(error.into()),
+                            Some(error) => {
+                                photo.depth_scale = None;
+                                damaged_maps.push(error);
+                            }
+                            None => {}
+                        }
                         photo.original.get_or_insert_with(|| photo.name.clone());
                         if photo.original.as_ref() == Some(&name) {
                             photo.original = None;
@@ -117,6 +132,13 @@ impl Scene {
                 .map(|(photo, new_name)| (photo.name.as_str(), slashed(new_name)))
                 .collect();
             warnings = scene.leave_out(unusable, strict)?;
+            if let Some(error) = damaged_maps.first() {
+                warnings.push(Warning::Note(format!(
+                    "{} of {} depth maps are not used, for one: {error}; --no-depth leaves all of them out",
+                    damaged_maps.len(),
+                    self.photos.iter().filter(|p| p.depth_map.is_some()).count()
+                )));
+            }
             for image in scene.reconstruction.images.values_mut() {
                 if let Some(name) = renamed.get(image.name.as_str()) {
                     image.name.clone_from(name);
@@ -130,14 +152,21 @@ impl Scene {
     }
 }
 
-/// Writes a photo without distortion, and what lies beside it, into the scene's folder. What
-/// comes back has the new name, and paths from that folder.
+/// A photo that was written, with its new name and paths from the scene's folder.
+struct Written {
+    photo: Photo,
+    /// Why it has no depth map any more.
+    damaged_map: Option<CaptureError>,
+}
+
+/// Writes a photo without distortion, and what lies beside it, into the scene's folder. Nothing needs a depth map that
+/// cannot be decoded.
 fn write_photo(
     photo: &Photo,
     undistortion: &Undistortion,
     new_name: &Path,
     folder: &Path,
-) -> Result<Photo, CaptureError> {
+) -> Result<Written, CaptureError> {
     let file = Path::new(IMAGES_FOLDER).join(new_name);
     let Camera { width, height, .. } = undistortion.camera();
     let size = (width, height);
@@ -192,18 +221,19 @@ fn write_photo(
     };
     let matte = matte.map(warped);
     let silhouette = decoded(&photo.silhouette)?.map(warped);
-    let depth_map = match &photo.depth_map {
-        Some(path) => {
-            let steps = decode_depth_steps(path, &photo.name, photo_size)?;
+    let decode_map = |path: &PathBuf| decode_depth_steps(path, &photo.name, photo_size);
+    let (depth_map, damaged_map) = match photo.depth_map.as_ref().map(decode_map) {
+        Some(Ok(steps)) => {
             let steps = along_axis(steps, undistortion.lens());
             let file = beside(DEPTH_FOLDER, new_name);
             let steps = warp_depth_steps(&steps, size, footprint_of);
             write_depth_steps(&folder.join(&file), &steps)?;
-            Some(file)
+            (Some(file), None)
         }
-        None => None,
+        Some(Err(error)) => (None, Some(error)),
+        None => (None, None),
     };
-    Ok(Photo {
+    let photo = Photo {
         name: slashed(new_name),
         path: file,
         ignore_mask: written(MASKS_FOLDER, ignored)?,
@@ -211,7 +241,8 @@ fn write_photo(
         silhouette: written(SILHOUETTES_FOLDER, silhouette)?,
         depth_map,
         ..photo.clone()
-    })
+    };
+    Ok(Written { photo, damaged_map })
 }
 
 /// The file of what lies beside a photo, by its path from the scene's folder.
@@ -327,7 +358,9 @@ mod tests {
                     other: serde_json::Map::new(),
                 };
                 let name = Path::new("0.png");
-                let flat = write_photo(&photo, &undistortion, name, folder.path()).unwrap();
+                let flat = write_photo(&photo, &undistortion, name, folder.path())
+                    .unwrap()
+                    .photo;
                 let open = |path: &Path| image::open(folder.path().join(path)).unwrap();
                 let mask = match ignored {
                     true => flat.ignore_mask.unwrap(),

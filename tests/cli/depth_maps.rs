@@ -19,6 +19,33 @@ fn scene_json(folder: &Path, scene: &str) -> Value {
 }
 
 #[test]
+fn damaged_maps_that_nobody_named_leave_no_photo_out() {
+    let folder = with_wall();
+    let here = folder.path();
+    let map = here.join("wall/depth/0003.png");
+    let whole = fs::read(&map).unwrap();
+    fs::write(&map, &whole[..whole.len() / 2]).unwrap();
+    let ran = lumigraph(here, "import wall --undistort -o scene").ok();
+    let note = "note: 1 of 9 depth maps are not used, for one: cannot decode ";
+    let is_told = ran.stderr.contains(note) && ran.stderr.contains("wall/depth/0003.png");
+    assert!(is_told, "{}", ran.stderr);
+    assert!(!ran.stderr.contains("left out"), "{}", ran.stderr);
+    assert!(ran.stdout.contains(": 9 photos, "), "{}", ran.stdout);
+    assert!(ran.stdout.ends_with(", 8 depth maps\n"), "{}", ran.stdout);
+    let photo = scene_json(here, "scene")["photos"][3].clone();
+    assert_eq!(photo["name"], "0003.png");
+    assert!(photo.get("depth_map").is_none(), "{photo}");
+    assert!(photo.get("depth_scale").is_none(), "{photo}");
+    assert!(!here.join("scene/depth/0003.png.png").exists());
+    for option in ["--strict", "--depth wall/depth"] {
+        let line = format!("import wall --undistort {option} -o none");
+        let error = lumigraph(here, &line).error(1);
+        assert!(error.contains("wall/depth/0003.png"), "{error}");
+        assert!(!here.join("none").exists());
+    }
+}
+
+#[test]
 fn maps_of_another_size_that_nobody_named_are_passed_over() {
     let folder = with_wall();
     let here = folder.path();
