@@ -3,6 +3,7 @@
 use crate::memory::PHOTO;
 use crate::run::{files, lumigraph, with_wall};
 use calibrate::colmap;
+use image::{GrayImage, Luma};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -207,10 +208,19 @@ fn what_is_somebodys_own_within_a_scenes_parts_stays() {
 fn what_is_left_of_a_photo_that_is_left_out_is_no_part_of_the_scene() {
     let folder = with_wall();
     let here = folder.path();
-    // Found when the photo itself is written already.
-    let depth = here.join("wall/depth/0003.png");
-    let bytes = fs::read(&depth).unwrap();
-    fs::write(&depth, &bytes[..bytes.len() / 2]).unwrap();
+    // Silhouettes, of which a damaged one is found when the photo itself is written already.
+    let masks = here.join("wall/masks");
+    fs::create_dir(&masks).unwrap();
+    let object = GrayImage::from_fn(96, 72, |x, y| {
+        let is_in = (30..60).contains(&x) && (20..50).contains(&y);
+        Luma([if is_in { 255 } else { 0 }])
+    });
+    for i in 0..9 {
+        object.save(masks.join(format!("{i:04}.png"))).unwrap();
+    }
+    let damaged = masks.join("0003.png");
+    let bytes = fs::read(&damaged).unwrap();
+    fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
     lumigraph(here, "import wall --undistort -o flat").ok();
     let left = ["images/0003.png", "images/.DS_Store"].map(|file| here.join("flat").join(file));
     assert!(!left[0].exists());
