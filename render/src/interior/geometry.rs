@@ -105,7 +105,7 @@ impl CellGeometry {
 
 impl<'a> Runs<'a> {
     fn add(&mut self, runs: &'a [Run], eye: DVec3, regions: &[Region]) {
-        let is_seen = |run: &&Run| {
+        let is_seen = |run: &Run| {
             let offset = run.center - eye;
             let reach = run.radius + SLACK * (offset.length() + run.radius);
             let touches = |cone: &Region| {
@@ -114,9 +114,24 @@ impl<'a> Runs<'a> {
             };
             regions.iter().any(touches)
         };
-        let all = runs.par_iter().with_min_len(FEW_RUNS);
-        self.asked += all.clone().map(|run| run.triangles.len()).sum::<usize>();
-        self.runs.par_extend(all.filter(is_seen));
+        let with = |mut found: Self, run: &'a Run| {
+            found.asked += run.triangles.len();
+            if is_seen(run) {
+                found.runs.push(run);
+            }
+            found
+        };
+        let parts = runs.par_iter().with_min_len(FEW_RUNS);
+        let found = parts.fold(Self::default, with);
+        let found = found.reduce(Self::default, Self::and);
+        *self = std::mem::take(self).and(found);
+    }
+
+    /// Both, in order.
+    fn and(mut self, more: Self) -> Self {
+        self.runs.extend(more.runs);
+        self.asked += more.asked;
+        self
     }
 
     /// Each run's triangles, and the centre and radius of the ball around them.
